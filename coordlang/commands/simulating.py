@@ -24,7 +24,7 @@ from coordlang.language.tolerance import Tolerance
 from coordlang.simulation.floor import floor_of
 from coordlang.simulation.record import RunRecord, SimulationRecord, WishRecord, to_bytes
 from coordlang.simulation.recording import KINDS, recorded
-from coordlang.simulation.runs import record_of, runs_of
+from coordlang.simulation.run import record_of, runs_of
 from coordlang.simulation.settings import Settings
 from coordlang.simulation.simulator import require_simulator
 from coordlang.simulation.team import Agreement, Mission, mission

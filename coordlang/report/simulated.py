@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from coordlang.language.provenance import domain_sha256
-from coordlang.simulation.record import EventRecord, RunRecord, SimulationRecord
+from coordlang.simulation.record import RunRecord, SimulationRecord, event_text
 from planners.joint.model import own_text
 from planners.pddl.lifted import Domain
 from planners.system.errors import BadInput, Position
@@ -101,30 +101,7 @@ def _run(found: RunRecord, robots: Sequence[str]) -> dict[str, Any]:
         "human": [[round(x, 2), round(y, 2)] for x, y in found.human],
         "steps": [steps[robot] for robot in robots],
         "events": [
-            [event.time, _told(event), event.kind in ("collision", "deadlock", "missed")]
+            [event.time, event_text(event), event.kind in ("collision", "deadlock", "missed")]
             for event in found.events
         ],
     }
-
-
-def _told(event: EventRecord) -> str:
-    who = " and ".join(event.robots)
-    match event.kind:
-        case "collision":
-            return f"{who} touches {event.touched}" if event.touched else f"{who} collide"
-        case "stopped":
-            return f"{who} stands before something"
-        case "missed":
-            return f"{who} is not there when a step begins"
-        case "word":
-            return f"{who} may have come to word {event.words[who] + 1} of the sentence"
-        case "detour":
-            return _detour(who, event)
-        case "deadlock":
-            return "nobody moves any more"
-    return "all have arrived"
-
-
-def _detour(who: str, event: EventRecord) -> str:
-    what = f"visit {event.visit}" if event.visit else f"keep out of {event.avoid}"
-    return f"{who} wants to {what}: {'its choices allow it' if event.granted else 'impossible'}"

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal
 
 Kind = Literal["step", "word"]
 #: By name, as ``--step`` has them.
@@ -41,106 +41,56 @@ class Message:
 class Progress:
     """How far a robot is, by its own account.
 
-    ``steps`` are done, ``words`` of the sentence are passed at most; the last step was done at time
-    ``done`` (seconds; 0 before the first), and begun at time ``begun`` (negative before the first).
+    ``steps`` are done, ``words`` of the sentence are passed at most; the last step was begun at
+    time ``begun`` (seconds; negative before the first).
     """
 
     steps: int = 0
     words: int = 0
-    done: float = 0.0
     begun: float = -1.0
 
 
-class Pace(Protocol):
-    """One robot's way to keep step with the others."""
+class Pace:
+    """One robot's way to keep step with the others.
 
-    #: Whether all robots turn in the same time before they drive, and idle without time.
-    is_common: bool
+    Parameters
+    ----------
+    way
+        One of `PACES`.
+    robots
+        All robots.
+    period
+        Seconds of a step by the clock.
+    """
+
+    def __init__(self, way: str, robots: Iterable[str], period: float) -> None:
+        self._way, self._period = way, period
+        self._heard = dict.fromkeys(robots, 0)
+
+    @property
+    def is_common(self) -> bool:
+        """Whether all robots turn in the same time before they drive, and idle without time."""
+        return self._way != "word"
 
     def hears(self, messages: Iterable[Message]) -> None:
-        """Take in what was told."""
+        """Take in how far the others are."""
+        for message in messages:
+            if message.sender in self._heard:
+                self._heard[message.sender] = max(self._heard[message.sender], message.number)
 
     def told(self, before: Progress, after: Progress) -> Sequence[tuple[Kind, int]]:
         """Return what to tell all robots after a step."""
+        if self._way == "barrier":
+            return [("step", after.steps)]
+        return [("word", after.words)] if self._way == "word" and after.words > before.words else []
 
     def may_begin(self, progress: Progress, time: float) -> bool:
-        """Say whether the next step may begin."""
-
-
-class Clock:
-    """A common clock: one step at most in a period, begun with it; nothing is told."""
-
-    is_common = True
-
-    def __init__(self, period: float) -> None:
-        self._period = period
-
-    def hears(self, messages: Iterable[Message]) -> None:
-        """Take in nothing."""
-
-    def told(self, before: Progress, after: Progress) -> Sequence[tuple[Kind, int]]:
-        """Return nothing."""
-        return ()
-
-    def may_begin(self, progress: Progress, time: float) -> bool:
-        """Say whether a period begins: who is not there in time misses its beginning."""
-        begins = abs(math.remainder(time, self._period)) < _SAME
-        return begins and progress.begun < time
-
-
-class Barrier:
-    """A barrier before each step: it opens when all have told that the step before is done."""
-
-    is_common = True
-
-    def __init__(self, robots: Iterable[str]) -> None:
-        self._done = dict.fromkeys(robots, 0)
-
-    def hears(self, messages: Iterable[Message]) -> None:
-        """Take in how many steps each robot has done."""
-        _count(self._done, messages, "step")
-
-    def told(self, before: Progress, after: Progress) -> Sequence[tuple[Kind, int]]:
-        """Return that a further step is done."""
-        return [("step", after.steps)]
-
-    def may_begin(self, progress: Progress, time: float) -> bool:
-        """Say whether all have done as many steps as this robot."""
-        return all(done >= progress.steps for done in self._done.values())
-
-
-class WordBarrier:
-    """A barrier before each word of the sentence, and free running within a word."""
-
-    is_common = False
-
-    def __init__(self, robots: Iterable[str]) -> None:
-        self._words = dict.fromkeys(robots, 0)
-
-    def hears(self, messages: Iterable[Message]) -> None:
-        """Take in how many words each robot has passed."""
-        _count(self._words, messages, "word")
-
-    def told(self, before: Progress, after: Progress) -> Sequence[tuple[Kind, int]]:
-        """Return that the robot may have come to a further word, if so."""
-        return [("word", after.words)] if after.words > before.words else ()
-
-    def may_begin(self, progress: Progress, time: float) -> bool:
-        """Say whether all have come as far in the sentence as this robot."""
-        return all(words >= progress.words for words in self._words.values())
-
-
-def pace_of(name: str, robots: Iterable[str], period: float) -> Pace:
-    """Return a way to keep step by its name, of one robot."""
-    if name == "clock":
-        return Clock(period)
-    return Barrier(robots) if name == "barrier" else WordBarrier(robots)
-
-
-def _count(heard: dict[str, int], messages: Iterable[Message], kind: Kind) -> None:
-    for message in messages:
-        if message.kind == kind and message.sender in heard:
-            heard[message.sender] = max(heard[message.sender], message.number)
+        """Say whether the next step may begin; by the clock, who is late misses its beginning."""
+        if self._way == "clock":
+            begins = abs(math.remainder(time, self._period)) < _SAME
+            return begins and progress.begun < time
+        own = progress.steps if self._way == "barrier" else progress.words
+        return all(heard >= own for heard in self._heard.values())
 
 
 @dataclass(frozen=True, slots=True)

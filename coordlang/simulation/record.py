@@ -212,6 +212,27 @@ def read_simulation(path: str | Path) -> SimulationRecord:
     return record
 
 
+def event_text(event: EventRecord) -> str:
+    """Return an event in words."""
+    who = " and ".join(event.robots)
+    match event.kind:
+        case "collision":
+            return f"{who} touches {event.touched}" if event.touched else f"{who} collide"
+        case "stopped":
+            return f"{who} stands before something"
+        case "missed":
+            return f"{who} is not there when a step begins"
+        case "word":
+            return f"{who} may have come to word {event.words[who] + 1} of the sentence"
+        case "detour":
+            what = f"visit {event.visit}" if event.visit else f"keep out of {event.avoid}"
+            allowed = "its choices allow it" if event.granted else "impossible"
+            return f"{who} wants to {what}: {allowed}"
+        case "deadlock":
+            return "nobody moves any more"
+    return "all have arrived"
+
+
 def _wrong(record: SimulationRecord, run: RunRecord) -> str | None:
     """Say why a run cannot be played, None if it can."""
     lengths = {len(run.poses.get(name, ())) for name in record.robots}

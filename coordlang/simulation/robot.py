@@ -276,7 +276,7 @@ class Robot:
             words = max(words, self._words.words[self._word_state])
         known = None if self._words is None else words
         self.steps[-1] = replace(step, end=sensed.time, words=known)
-        self._progress = replace(before, steps=before.steps + 1, words=words, done=sensed.time)
+        self._progress = replace(before, steps=before.steps + 1, words=words)
         told = self._pace.told(before, self._progress)
         return tuple(Message(self.name, kind, number) for kind, number in told)
 

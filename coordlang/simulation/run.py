@@ -1,21 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One run: the robots' own logics, the simulator, and the messages between them, tick by tick."""
+"""Runs: the robots' own logics, the simulator, and the messages between them, tick by tick."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from random import Random
 
-from coordlang.simulation.floor import Floor
+from coordlang.language.candidates import describe
+from coordlang.simulation.floor import Floor, require_room
 from coordlang.simulation.human import Human
-from coordlang.simulation.pace import Message, pace_of
-from coordlang.simulation.record import EventRecord, RunRecord, StepRecord, WishRecord
-from coordlang.simulation.robot import Act, Body, OwnStep, Robot, Sensed
+from coordlang.simulation.pace import Message, Pace
+from coordlang.simulation.record import (
+    FORMAT,
+    VERSION,
+    EventRecord,
+    RunRecord,
+    SimulationRecord,
+    StepRecord,
+    WishRecord,
+)
+from coordlang.simulation.robot import Act, Body, Robot, Sensed
 from coordlang.simulation.settings import POSITION_NOISE, Settings
-from coordlang.simulation.simulator import Simulator
+from coordlang.simulation.simulator import Simulator, require_simulator
 from coordlang.simulation.team import Mission
 from coordlang.simulation.tracking import Pose
 from coordlang.sites.coordinates import Point
@@ -28,9 +36,25 @@ WITH_WALKER = 12
 INTERVAL = 0.2
 
 
-def ticks_of_interval(settings: Settings) -> int:
-    """How many ticks there are from one pose of the record to the next."""
-    return max(1, round(INTERVAL / settings.tick))
+def runs_of(
+    mission: Mission,
+    floor: Floor,
+    settings: Settings,
+    number: int,
+    seed: int = 0,
+    wishes: Sequence[WishRecord] = (),
+) -> Iterator[RunRecord]:
+    """Run a mission so many times, with the seeds ``seed``, ``seed + 1``, ..
+
+    Raises
+    ------
+    UsageError
+        If ir-sim is not installed, or the robots are too large for the floor.
+    """
+    require_room(floor, settings.radius)
+    require_simulator()
+    for further in range(number):
+        yield run(mission, floor, settings, seed + further, wishes)
 
 
 def run(
@@ -57,65 +81,69 @@ def run(
     wishes
         What robots come to want on the way.
     """
-    going = _Going.of(mission, floor, settings, seed)
-    going.wishes = tuple(wishes)
+    going = _Going(mission, floor, settings, seed, wishes)
     while not going.has_ended:
         going.tick()
     return going.record()
 
 
-@dataclass(slots=True)
+def record_of(
+    mission: Mission,
+    floor: Floor,
+    settings: Settings,
+    runs: Sequence[RunRecord],
+    wishes: Sequence[WishRecord] = (),
+) -> SimulationRecord:
+    """Put runs together with what they were made with."""
+    used = mission.task_language
+    return SimulationRecord(
+        format=FORMAT,
+        version=VERSION,
+        domain=dict(used.language.provenance.domain),
+        task=describe(used.space, used.task),
+        robots=list(mission.robots),
+        agreement=mission.agreement,
+        sentence=used.text(mission.sentence) if mission.agreement == "sentence" else None,
+        covered=used.covered,
+        step=settings.step,  # type: ignore[arg-type]
+        makespan=mission.steps,
+        period=settings.period(floor.longest),
+        interval=_ticks_of_interval(settings) * settings.tick,
+        cell=settings.cell,
+        radius=settings.radius,
+        noise=settings.noise,
+        lidar=settings.lidar,
+        human=settings.human,
+        wishes=list(wishes),
+        places={name: (round(x, 6), round(y, 6)) for name, (x, y) in sorted(floor.points.items())},
+        walls=list(floor.walls),
+        goals=dict(mission.goals),
+        runs=list(runs),
+    )
+
+
+def _ticks_of_interval(settings: Settings) -> int:
+    """How many ticks there are from one pose of the record to the next."""
+    return max(1, round(INTERVAL / settings.tick))
+
+
 class _Going:
     """A run that is going on."""
 
-    mission: Mission
-    settings: Settings
-    seed: int
-    period: float
-    robots: Mapping[str, Robot]
-    simulator: Simulator
-    sensing: Mapping[str, Random]
-    human: Human | None
-    wishes: tuple[WishRecord, ...] = ()
-    wished: set[WishRecord] = field(default_factory=set)
-    asked: dict[str, int] = field(default_factory=dict)
-    human_at: list[Point] = field(default_factory=list)
-    ticks: int = 0
-    heard: tuple[Message, ...] = ()
-    messages: int = 0
-    touching: set[tuple[str, str]] = field(default_factory=set)
-    collided: set[str] = field(default_factory=set)
-    collisions: int = 0
-    nearest: float = math.inf
-    stopped: dict[str, int] = field(default_factory=dict)
-    missed: dict[str, int] = field(default_factory=dict)
-    last_change: float = 0.0
-    steps_known: int = 0
-    events: list[EventRecord] = field(default_factory=list)
-    poses: dict[str, list[Pose]] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, mission: Mission, floor: Floor, settings: Settings, seed: int) -> _Going:
-        period = settings.period(floor.longest)
-        robots = {
-            name: Robot(
-                name,
-                given.monitor,
-                Body(
-                    settings.drive,
-                    floor.points,
-                    mission.leads[name],
-                    settings.cell,
-                    settings.clearance,
-                    settings.reaction,
-                ),
-                pace_of(settings.step, mission.robots, period),
-                period,
-                Random(f"{seed} choices {name}"),
-                given.words,
-            )
-            for name, given in mission.team(seed).items()
-        }
+    def __init__(
+        self,
+        mission: Mission,
+        floor: Floor,
+        settings: Settings,
+        seed: int,
+        wishes: Sequence[WishRecord],
+    ) -> None:
+        self.mission, self.settings, self.seed = mission, settings, seed
+        self.period = settings.period(floor.longest)
+        self.robots = _robots(mission, floor, settings, seed)
+        self.sensing = {name: Random(f"{seed} sensors {name}") for name in self.robots}
+        self.wishes = list(wishes)
+        self.human = _human(mission, floor, settings, seed)
         poses = {
             name: (
                 *floor.points[place],
@@ -123,20 +151,19 @@ class _Going:
             )
             for name, place in mission.starts.items()
         }
-        sensing = {name: Random(f"{seed} sensors {name}") for name in robots}
-        human = None
-        if settings.human is not None:
-            human = Human.of(
-                settings.human,
-                floor,
-                list(mission.starts.values()),
-                list(mission.goals.values()),
-                settings.cell,
-                Random(f"{seed} human"),
-            )
-        standing = floor.points[human.place] if human is not None else None
-        simulator = Simulator(floor, poses, settings, seed, standing)
-        return cls(mission, settings, seed, period, robots, simulator, sensing, human)
+        standing = floor.points[self.human.place] if self.human is not None else None
+        self.simulator = Simulator(floor, poses, settings, seed, standing)
+        self.ticks = self.messages = self.collisions = self.changes = 0
+        self.last_change, self.nearest = 0.0, math.inf
+        self.heard: tuple[Message, ...] = ()
+        self.touching: set[tuple[str, str]] = set()
+        self.collided: set[str] = set()
+        #: By robot: detours told, the step in which it was stopped, beginnings missed.
+        self.asked, self.missed = dict.fromkeys(self.robots, 0), dict.fromkeys(self.robots, 0)
+        self.stopped: dict[str, int] = {}
+        self.events: list[EventRecord] = []
+        self.poses: dict[str, list[Pose]] = {name: [] for name in self.robots}
+        self.human_at: list[Point] = []
 
     @property
     def time(self) -> float:
@@ -151,13 +178,9 @@ class _Going:
     @property
     def has_ended(self) -> bool:
         """Whether all are there, or nobody will move any more."""
-        return self.has_arrived or self.time - self.last_change > self.patience
-
-    @property
-    def patience(self) -> float:
-        """Seconds without a step after which nobody will move any more."""
         walks = self.human is not None and self.human.walks
-        return (WITH_WALKER if walks else PATIENCE) * self.period
+        patience = (WITH_WALKER if walks else PATIENCE) * self.period
+        return self.has_arrived or self.time - self.last_change > patience
 
     def tick(self) -> None:
         """Let a tick pass: sense, choose, tell, move."""
@@ -169,77 +192,70 @@ class _Going:
             velocities[name] = act.velocity
             self._take(name, robot, act)
         changes = sum(len(robot.steps) + robot.done for robot in self.robots.values())
-        if changes > self.steps_known:
-            self.steps_known, self.last_change = changes, self.time
+        if changes > self.changes:
+            self.changes, self.last_change = changes, self.time
         self.simulator.tick(velocities, self._walk())
         self.ticks += 1
         self._see_collisions()
-        self._see_distances()
+        middles = [self.simulator.pose(name)[:2] for name in self.robots]
+        apart = (math.dist(one, other) for one, other in combinations(middles, 2))
+        self.nearest = min(self.nearest, *apart, math.inf)
 
     def record(self) -> RunRecord:
         """Return the record of the run that has ended."""
         self._keep_poses()
+        steps = [
+            StepRecord(name, one.number, one.subaction, one.place, one.begin, one.end, one.words)
+            for name, robot in self.robots.items()
+            for one in robot.steps
+        ]
         has_arrived, is_stuck = self.has_arrived, not self.has_arrived and not self.collided
-        seconds = self._seconds()
+        seconds = self.time
+        if has_arrived:
+            seconds = max((step.end for step in steps if step.end is not None), default=0.0)
         if has_arrived or is_stuck:
             self._event("arrived" if has_arrived else "deadlock", list(self.robots))
         subplans = {name: robot.subplan() for name, robot in self.robots.items()}
-        steps = math.ceil(seconds / self.period - 1e-6)
+        late = math.ceil(seconds / self.period - 1e-6) - self.mission.steps
         return RunRecord(
             seed=self.seed,
             collisions=self.collisions,
             deadlock=is_stuck,
-            late=max(0, steps - self.mission.steps) if has_arrived else 0,
+            late=max(0, late) if has_arrived else 0,
             messages=self.messages,
             seconds=seconds,
             arrived=has_arrived,
             mixes=self.mission.mixes(subplans),
             nearest=None if math.isinf(self.nearest) else round(self.nearest, 3),
             subplans=subplans,
-            steps=[_step(name, step) for name, step in self._steps()],
+            steps=sorted(steps, key=lambda step: step.begin),
             events=self.events,
             human=self.human_at,
-            poses={name: [_rounded(pose) for pose in poses] for name, poses in self.poses.items()},
+            poses={
+                name: [(round(x, 3), round(y, 3), round(heading, 3)) for x, y, heading in poses]
+                for name, poses in self.poses.items()
+            },
         )
-
-    def _seconds(self) -> float:
-        """Seconds until the last robot was there, or until nobody moved any more."""
-        if not self.has_arrived:
-            return self.time
-        ends = [step.end for _, step in self._steps() if step.end is not None]
-        return max(ends, default=0.0)
-
-    def _steps(self) -> list[tuple[str, OwnStep]]:
-        every = [(name, step) for name, robot in self.robots.items() for step in robot.steps]
-        return sorted(every, key=lambda pair: pair[1].begin)
 
     def _sensed(self, name: str, robot: Robot, heard: tuple[Message, ...]) -> Sensed:
-        x, y, heading = self.simulator.pose(name)
-        spread = POSITION_NOISE * self.settings.noise
-        random = self.sensing[name]
-        pose = (
-            x + random.gauss(0, spread),
-            y + random.gauss(0, spread),
-            heading + random.gauss(0, spread),
-        )
+        spread, random = POSITION_NOISE * self.settings.noise, self.sensing[name]
+        x, y, heading = (value + random.gauss(0, spread) for value in self.simulator.pose(name))
         ahead: float | None = math.inf
         if self.settings.lidar:
             ahead = self.simulator.ahead(name) if robot.looks_ahead else None
         strangers: tuple[tuple[float, float], ...] = ()
         if self.human is not None and robot.looks_around:
             strangers = self.simulator.strangers(name)
-        return Sensed(self.time, pose, ahead, heard, strangers, self._wanted(name, robot))
+        return Sensed(
+            self.time, (x, y, heading), ahead, heard, strangers, self._wanted(name, robot)
+        )
 
     def _wanted(self, name: str, robot: Robot) -> tuple[str, ...]:
         """What a robot comes to want now."""
         if not robot.looks_around:
             return ()
-        now = [
-            wish
-            for wish in self.wishes
-            if wish.robot == name and wish.step <= robot.done and wish not in self.wished
-        ]
-        self.wished.update(now)
+        now = [wish for wish in self.wishes if wish.robot == name and wish.step <= robot.done]
+        self.wishes = [wish for wish in self.wishes if wish not in now]
         return tuple(wish.visit for wish in now)
 
     def _walk(self) -> tuple[float, float]:
@@ -258,7 +274,7 @@ class _Going:
         for message in act.messages:
             if message.kind == "word":
                 self._event("word", [name])
-        for detour in robot.detours[self.asked.get(name, 0) :]:
+        for detour in robot.detours[self.asked[name] :]:
             self._event(
                 "detour", [name], visit=detour.visit, avoid=detour.avoid, granted=detour.granted
             )
@@ -269,7 +285,7 @@ class _Going:
         if self.settings.step == "clock" and robot.steps:
             step = robot.steps[-1]
             missed = round(step.begin / self.period) - step.number
-            if missed > self.missed.get(name, 0):
+            if missed > self.missed[name]:
                 self._event("missed", [name])
             self.missed[name] = missed
 
@@ -283,29 +299,23 @@ class _Going:
             self._event("collision", robots, touched=others[0] if others else None)
         self.touching = touching
 
-    def _see_distances(self) -> None:
-        middles = [self.simulator.pose(name)[:2] for name in self.robots]
-        for one, other in combinations(middles, 2):
-            self.nearest = min(self.nearest, math.dist(one, other))
-
     def _keep_poses(self) -> None:
-        if self.ticks % ticks_of_interval(self.settings) == 0:
-            for name in self.robots:
-                self.poses.setdefault(name, []).append(self.simulator.pose(name))
+        if self.ticks % _ticks_of_interval(self.settings) == 0:
+            for name, poses in self.poses.items():
+                poses.append(self.simulator.pose(name))
             if self.human is not None:
                 x, y = self.simulator.human()
                 self.human_at.append((round(x, 3), round(y, 3)))
 
     def _event(self, kind: str, robots: list[str], **further: object) -> None:
+        knows_words = self.mission.agreement != "nothing"
         self.events.append(
             EventRecord(
                 time=self.time,
                 kind=kind,  # type: ignore[arg-type]
                 robots=robots,
                 steps={name: robot.done for name, robot in self.robots.items()},
-                words={name: robot.words for name, robot in self.robots.items()}
-                if self.mission.agreement != "nothing"
-                else {},
+                words={n: robot.words for n, robot in self.robots.items()} if knows_words else {},
                 places={name: self._places(name) for name in self.robots},
                 **further,  # type: ignore[arg-type]
             )
@@ -321,12 +331,31 @@ class _Going:
         return [been[-1], *underway]
 
 
-def _step(robot: str, step: OwnStep) -> StepRecord:
-    return StepRecord(
-        robot, step.number, step.subaction, step.place, step.begin, step.end, step.words
-    )
+def _robots(mission: Mission, floor: Floor, settings: Settings, seed: int) -> dict[str, Robot]:
+    period = settings.period(floor.longest)
+    return {
+        name: Robot(
+            name,
+            given.monitor,
+            Body(
+                settings.drive,
+                floor.points,
+                mission.leads[name],
+                settings.cell,
+                settings.clearance,
+                settings.reaction,
+            ),
+            Pace(settings.step, mission.robots, period),
+            period,
+            Random(f"{seed} choices {name}"),
+            given.words,
+        )
+        for name, given in mission.team(seed).items()
+    }
 
 
-def _rounded(pose: Pose) -> Pose:
-    x, y, heading = pose
-    return round(x, 3), round(y, 3), round(heading, 3)
+def _human(mission: Mission, floor: Floor, settings: Settings, seed: int) -> Human | None:
+    if settings.human is None:
+        return None
+    starts, goals = list(mission.starts.values()), list(mission.goals.values())
+    return Human.of(settings.human, floor, starts, goals, settings.cell, Random(f"{seed} human"))

@@ -12,9 +12,8 @@ from typing import Any
 
 import pytest
 
-from coordlang.simulation import runs
+import coordlang.simulation.run as simulation_run
 from coordlang.simulation.record import RunRecord, read_simulation
-from coordlang.simulation.run import run
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
 
@@ -119,12 +118,14 @@ def test_a_limit_while_the_world_is_made_is_no_line_on_stdout(
 def test_an_interrupt_keeps_the_runs_that_are_done(
     language: Path, coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    run = simulation_run.run
+
     def interrupted(*arguments: Any) -> RunRecord:
         if arguments[3] == 2:
             raise KeyboardInterrupt
         return run(*arguments)
 
-    monkeypatch.setattr(runs, "run", interrupted)
+    monkeypatch.setattr(simulation_run, "run", interrupted)
     record = tmp_path / "runs.json"
     outcome = coordlang("simulate", language, *T_MAP, "--runs", "9", "-o", record)
     assert outcome.code == 130

@@ -13,10 +13,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from coordlang.simulation.record import SimulationRecord, read_simulation, to_bytes
-from coordlang.simulation.recording import frames, recorded
-from coordlang.simulation.runs import record_of, runs_of
-from coordlang.simulation.scene import Scene, colour_of, event_text, new_figure
+from coordlang.simulation.record import SimulationRecord, event_text, read_simulation, to_bytes
+from coordlang.simulation.recording import ROBOTS, Scene, frames, new_figure, recorded
+from coordlang.simulation.run import record_of, runs_of
 from coordlang.simulation.settings import Settings
 from planners.system.errors import BadInput, UsageError
 from tests.support.simulation import floor_for, mission_of
@@ -53,7 +52,7 @@ def test_robots_are_drawn_where_they_are() -> None:
             around = image[
                 400 - int(row) - 2 : 400 - int(row) + 3, int(column) - 2 : int(column) + 3
             ]
-            assert pixels(around, colour_of(number)) > 12, (index, name)
+            assert pixels(around, ROBOTS[number]) > 12, (index, name)
 
 
 def test_films_have_the_frames_that_are_drawn() -> None:
