@@ -7,7 +7,7 @@ sentence.  For comparison all robots follow one whole plan, or each an optimal p
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from random import Random
@@ -19,7 +19,6 @@ from coordlang.execution.monitor import FORMAT, IDLE, VERSION, Monitor
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.simulation.pace import OwnWords
 from coordlang.sites.world import World, find_world
-from planners.joint.model import JointModel
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
 from planners.system.errors import BadInput, UsageError, note
@@ -79,22 +78,14 @@ class Mission:
     def team(self, seed: int) -> dict[str, Given]:
         """Return what each robot is given in the run with this seed."""
         if self.agreement == "sentence":
-            return {
-                name: Given(given.monitor.copy(), given.words)
-                for name, given in self._given.items()
-            }
-        model = self.task_language.model
-        if self.agreement == "plan":
-            plan = self.agreed_plan(seed)
-            words = self._words_on(plan)
-            return {
-                name: self._following(name, _own(model, plan, robot), words)
-                for robot, name in enumerate(self.robots)
-            }
-        return {
-            name: self._following(name, _own(model, self._drawn(f"{seed} plan {name}"), robot))
-            for robot, name in enumerate(self.robots)
-        }
+            return {name: Given(g.monitor.copy(), g.words) for name, g in self._given.items()}
+        team = {}
+        for robot, name in enumerate(self.robots):
+            agreed = self.agreement == "plan"
+            plan = self.agreed_plan(seed) if agreed else self._drawn(f"{seed} plan {name}")
+            own = [self.task_language.model.label_text(robot, step[robot]) for step in plan]
+            team[name] = self._following(name, own, self._words_on(plan) if agreed else None)
+        return team
 
     def agreed_plan(self, seed: int) -> Plan:
         """Return the plan that all robots follow in the run with this seed if they agree on one."""
@@ -143,15 +134,8 @@ class Mission:
         place, states = self.starts[robot], list[dict[str, Any]]()
         for step, text in enumerate([*subactions, None]):
             following = {text or IDLE: step + 1} if step < len(subactions) else {}
-            states.append(
-                {
-                    "step": step,
-                    "left": 1,
-                    "next": following,
-                    "true": [number[place]],
-                    "unknown": [],
-                }
-            )
+            known: dict[str, Any] = {"true": [number[place]], "unknown": []}
+            states.append({"step": step, "left": 1, "next": following, **known})
             place = self.leads[robot].get(text or IDLE, place)
         entry = {
             "robot": robot,
@@ -232,8 +216,8 @@ def own_words(fits: PlanSpace, task_language: TaskLanguage, robot: int) -> OwnWo
     word = task_language.partition.word_of(fits.rows)[fits.state]
     passed = {int(fits.starts[0]): 0}
     first = frozenset(passed)
-    numbers, moves, words = {first: 0}, [], []
-    for nodes in _growing(numbers):
+    numbers, order, moves, words = {first: 0}, [first], list[dict[str, int]](), []
+    for nodes in order:  # which grows meanwhile
         targets: dict[str, set[int]] = {}
         for node in sorted(nodes):
             for edge in fits.out_edges(node):
@@ -242,26 +226,11 @@ def own_words(fits: PlanSpace, task_language: TaskLanguage, robot: int) -> OwnWo
                 passed[target] = passed[node] + int(word[target] != word[node])
                 targets.setdefault(text, set()).add(target)
         words.append(max(passed[node] for node in nodes))
-        moves.append(
-            {
-                text: numbers.setdefault(frozenset(found), len(numbers))
-                for text, found in sorted(targets.items())
-            }
-        )
+        moves.append({})
+        for text, found in sorted(targets.items()):
+            moves[-1][text] = numbers.setdefault(frozenset(found), len(numbers))
+            order += [frozenset(found)] if len(numbers) > len(order) else []
     return OwnWords(moves, words)
-
-
-def _growing(numbers: dict[frozenset[int], int]) -> Iterator[frozenset[int]]:
-    """The keys of a dictionary that grows meanwhile, in the order of their numbers."""
-    done = 0
-    while done < len(numbers):
-        waiting = list(numbers)[done:]
-        done = len(numbers)
-        yield from waiting
-
-
-def _own(model: JointModel, plan: Plan, robot: int) -> list[str | None]:
-    return [model.label_text(robot, step[robot]) for step in plan]
 
 
 def _starts(world: World, robots: Sequence[str], state: Sequence[str]) -> dict[str, str]:
