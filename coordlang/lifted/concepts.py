@@ -5,21 +5,45 @@
 ``(not C)``; ``(and C D)``; ``(some R C)``, the x with (R x y) for some y in C.  Roles R: a
 predicate with two arguments, ``(inverse R)``, and ``(closure R)``: one or more steps.  Numbers:
 ``(size C)``, and ``(gap P C D)``, the fewest links of a static relation from C to D.
+
+What a concept is in states is a table (states, objects), what a number is one value for each state.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from coordlang.lifted.attributes import distances, links
-from coordlang.lifted.world import NONE, States
+from coordlang.lifted.world import NONE, Readable, States
 from planners.joint.tables import Bools, Ints
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Role:
+class Expression(Readable):
+    """What is written as an s-expression: its head, and then its parts."""
+
+    __slots__ = ()
+    HEAD: ClassVar[str]
+    __match_args__: ClassVar[tuple[str, ...]]
+
+    @property
+    def parts(self) -> list[object]:
+        """What it is made of."""
+        return [getattr(self, name) for name in self.__match_args__]
+
+    def __str__(self) -> str:
+        return f"({' '.join((self.HEAD, *map(str, self.parts)))})"
+
+    @property
+    def complexity(self) -> int:
+        """How much there is to say: one for each head and each name."""
+        return 1 + sum(part.complexity for part in self.parts if isinstance(part, Expression))
+
+
+@dataclass(frozen=True, slots=True)
+class Role(Expression):
     """A predicate with two arguments, read in either direction, one step or any number of them."""
 
     predicate: str
@@ -32,7 +56,7 @@ class Role:
 
     @property
     def complexity(self) -> int:
-        """How much there is to say."""
+        """One, and one more for any number of steps."""
         return 1 + self.closure
 
     def some(self, states: States, members: Bools) -> Bools:
@@ -60,25 +84,19 @@ class Role:
         return found
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Everything:
+@dataclass(frozen=True, slots=True)
+class Everything(Expression):
     """All objects."""
 
     def __str__(self) -> str:
         return "all"
 
-    @property
-    def complexity(self) -> int:
-        """How much there is to say."""
-        return 1
-
-    def read(self, states: States) -> Bools:
-        """(states, objects)."""
+    def _read(self, states: States) -> Bools:
         return np.ones((len(states), len(states.world.objects)), bool)
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Named:
+@dataclass(frozen=True, slots=True)
+class Named(Expression):
     """The objects of a type, or of which a predicate with one argument is true."""
 
     name: str
@@ -86,13 +104,7 @@ class Named:
     def __str__(self) -> str:
         return self.name
 
-    @property
-    def complexity(self) -> int:
-        """How much there is to say."""
-        return 1
-
-    def read(self, states: States) -> Bools:
-        """(states, objects)."""
+    def _read(self, states: States) -> Bools:
         world = states.world
         found = np.zeros((len(states), len(world.objects)), bool)
         always = [*world.types.get(self.name, ())]
@@ -104,84 +116,57 @@ class Named:
         return found
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class One:
+@dataclass(frozen=True, slots=True)
+class One(Expression):
     """The object of a name; none where the problem does not have it."""
 
+    HEAD = "one"
     name: str
 
-    def __str__(self) -> str:
-        return f"(one {self.name})"
-
-    @property
-    def complexity(self) -> int:
-        """How much there is to say."""
-        return 1
-
-    def read(self, states: States) -> Bools:
-        """(states, objects)."""
+    def _read(self, states: States) -> Bools:
         own = np.array([name == self.name for name in states.world.objects], bool)
         return np.tile(own, (len(states), 1))
 
 
 @dataclass(frozen=True, slots=True)
-class Without:
+class Without(Expression):
     """The objects that are not in a concept."""
 
+    HEAD = "not"
     concept: Concept
 
-    def __str__(self) -> str:
-        return f"(not {self.concept})"
-
-    @property
-    def complexity(self) -> int:
-        """How much there is to say."""
-        return 1 + self.concept.complexity
-
-    def read(self, states: States) -> Bools:
-        """(states, objects)."""
+    def _read(self, states: States) -> Bools:
         others: Bools = ~states.get(self.concept)
         return others
 
 
 @dataclass(frozen=True, slots=True)
-class Both:
+class Both(Expression):
     """The objects in two concepts."""
 
+    HEAD = "and"
     one: Concept
     other: Concept
 
-    def __str__(self) -> str:
-        return f"(and {self.one} {self.other})"
-
-    @property
-    def complexity(self) -> int:
-        """How much there is to say."""
-        return 1 + self.one.complexity + self.other.complexity
-
-    def read(self, states: States) -> Bools:
-        """(states, objects)."""
+    def _read(self, states: States) -> Bools:
         common: Bools = states.get(self.one) & states.get(self.other)
         return common
 
 
 @dataclass(frozen=True, slots=True)
-class Some:
+class Some(Expression):
     """The objects that a role relates with one in a concept."""
 
+    HEAD = "some"
     role: Role
     concept: Concept
 
-    def __str__(self) -> str:
-        return f"(some {self.role} {self.concept})"
-
     @property
     def complexity(self) -> int:
-        """How much there is to say."""
+        """That of its parts."""
         return self.role.complexity + self.concept.complexity
 
-    def read(self, states: States) -> Bools:
-        """(states, objects)."""
+    def _read(self, states: States) -> Bools:
         return self.role.some(states, states.get(self.concept))
 
 
@@ -189,44 +174,27 @@ Concept = Everything | Named | One | Without | Both | Some
 
 
 @dataclass(frozen=True, slots=True)
-class Size:
+class Size(Expression):
     """How many objects are in a concept."""
 
+    HEAD = "size"
     concept: Concept
 
-    def __str__(self) -> str:
-        return f"(size {self.concept})"
-
-    @property
-    def complexity(self) -> int:
-        """How much there is to say."""
-        return 1 + self.concept.complexity
-
-    def read(self, states: States) -> Ints:
-        """Per state the number."""
-        members: Bools = states.get(self.concept)
-        size: Ints = members.sum(axis=1)
+    def _read(self, states: States) -> Ints:
+        size: Ints = states.get(self.concept).sum(axis=1)
         return size
 
 
 @dataclass(frozen=True, slots=True)
-class Gap:
+class Gap(Expression):
     """The fewest links of a static relation from an object of one concept to one of another."""
 
+    HEAD = "gap"
     relation: str
     one: Concept
     other: Concept
 
-    def __str__(self) -> str:
-        return f"(gap {self.relation} {self.one} {self.other})"
-
-    @property
-    def complexity(self) -> int:
-        """How much there is to say."""
-        return 1 + self.one.complexity + self.other.complexity
-
-    def read(self, states: States) -> Ints:
-        """Per state the number, `NONE` without a way."""
+    def _read(self, states: States) -> Ints:
         here: Bools = states.get(self.one)
         there: Bools = states.get(self.other)
         far = distances(states.world, self.relation)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coordlang.lifted.attributes import attribute, distances
-from coordlang.lifted.concepts import Gap, Size
+from coordlang.lifted.concepts import Expression, Gap, Size
 from coordlang.lifted.world import ANY, NONE, States
 from planners.joint.tables import Ints
 
@@ -25,9 +25,9 @@ from planners.joint.tables import Ints
 UNDEFINED = -2
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Term:
-    """The object that a fact of a predicate relates a named object with."""
+@dataclass(frozen=True, slots=True)
+class Term(Expression):
+    """The object that a fact of a predicate relates a named object with; `NONE`: there is none."""
 
     predicate: str
     named: str
@@ -38,17 +38,16 @@ class Term:
 
     @property
     def complexity(self) -> int:
-        """How much there is to say."""
+        """One, and one more for the other direction."""
         return 1 + self.inverse
 
-    def read(self, states: States) -> Ints:
-        """Per state the number of the object, `NONE` where there is none."""
+    def _read(self, states: States) -> Ints:
         return states.image(self.predicate, self.named, self.inverse)
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Attribute:
-    """An attribute of the object that a term names."""
+@dataclass(frozen=True, slots=True)
+class Attribute(Expression):
+    """An attribute of the object that a term names, `NONE` where it is not defined."""
 
     name: str
     relation: str
@@ -57,43 +56,29 @@ class Attribute:
     def __str__(self) -> str:
         return f"({self.name} {self.relation + ' ' if self.relation else ''}{self.term})"
 
-    @property
-    def complexity(self) -> int:
-        """How much there is to say."""
-        return 1 + self.term.complexity
-
-    def read(self, states: States) -> Ints:
-        """Per state the number, `NONE` where it is not defined."""
+    def _read(self, states: States) -> Ints:
         of_object = np.append(attribute(states.world, self.name, self.relation or None), NONE)
         number: Ints = of_object[states.get(self.term)]
         return number
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Distance:
-    """The links of a static relation between the objects of two terms."""
+@dataclass(frozen=True, slots=True)
+class Distance(Expression):
+    """The links of a static relation between the objects of two terms; `NONE` without a way."""
 
+    HEAD = "distance"
     relation: str
     one: Term
     other: Term
 
-    def __str__(self) -> str:
-        return f"(distance {self.relation} {self.one} {self.other})"
-
-    @property
-    def complexity(self) -> int:
-        """How much there is to say."""
-        return 1 + self.one.complexity + self.other.complexity
-
-    def read(self, states: States) -> Ints:
-        """Per state the number, `NONE` where it is not defined."""
+    def _read(self, states: States) -> Ints:
         here, there = states.get(self.one), states.get(self.other)
         far = distances(states.world, self.relation)[here, there]
         return np.where((here == NONE) | (there == NONE), NONE, far)
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Count:
+@dataclass(frozen=True, slots=True)
+class Count(Expression):
     """How many atoms of a predicate are true that have some objects where they are named."""
 
     predicate: str
@@ -104,11 +89,10 @@ class Count:
 
     @property
     def complexity(self) -> int:
-        """How much there is to say."""
+        """One, and one more for each object that is named."""
         return 1 + sum(arg != ANY for arg in self.args)
 
-    def read(self, states: States) -> Ints:
-        """Per state the number."""
+    def _read(self, states: States) -> Ints:
         return states.count(self.predicate, self.args)
 
 
@@ -116,8 +100,8 @@ Number = Attribute | Distance | Count | Size | Gap
 
 
 @dataclass(frozen=True, slots=True)
-class Sign:
-    """Which of two numbers is larger."""
+class Sign(Expression):
+    """Which of two numbers is larger: -1, 0 or 1."""
 
     one: Number
     other: Number
@@ -125,76 +109,56 @@ class Sign:
     def __str__(self) -> str:
         return f"(sign (- {self.one} {self.other}))"
 
-    @property
-    def complexity(self) -> int:
-        """How much there is to say."""
-        return 1 + self.one.complexity + self.other.complexity
-
-    def read(self, states: States) -> Ints:
-        """Per state -1, 0 or 1."""
+    def _read(self, states: States) -> Ints:
         one, other = states.get(self.one), states.get(self.other)
         return np.where((one == NONE) | (other == NONE), UNDEFINED, np.sign(one - other))
 
 
 @dataclass(frozen=True, slots=True)
-class Residue:
+class Residue(Expression):
     """What is left of a number by division."""
 
+    HEAD = "mod"
     number: Number
     modulus: int
 
-    def __str__(self) -> str:
-        return f"(mod {self.number} {self.modulus})"
-
     @property
     def complexity(self) -> int:
-        """How much there is to say."""
+        """That of the number, and the modulus."""
         return self.number.complexity + self.modulus
 
-    def read(self, states: States) -> Ints:
-        """Per state 0 to the modulus, without it."""
+    def _read(self, states: States) -> Ints:
         number = states.get(self.number)
         return np.where(number == NONE, UNDEFINED, number % self.modulus)
 
 
 @dataclass(frozen=True, slots=True)
-class Least:
+class Least(Expression):
     """A number up to a most."""
 
+    HEAD = "min"
     number: Number
     most: int
 
-    def __str__(self) -> str:
-        return f"(min {self.number} {self.most})"
-
     @property
     def complexity(self) -> int:
-        """How much there is to say; what is large in small problems is nothing in large ones."""
+        """That of the number, and twice the most: what is large in small problems is nothing."""
         return self.number.complexity + 2 * self.most
 
-    def read(self, states: States) -> Ints:
-        """Per state 0 to the most."""
+    def _read(self, states: States) -> Ints:
         number = states.get(self.number)
         return np.where(number == NONE, UNDEFINED, np.minimum(number, self.most))
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Same:
-    """Whether two terms name one object."""
+@dataclass(frozen=True, slots=True)
+class Same(Expression):
+    """Whether two terms name one object: 0 or 1."""
 
+    HEAD = "same"
     one: Term
     other: Term
 
-    def __str__(self) -> str:
-        return f"(same {self.one} {self.other})"
-
-    @property
-    def complexity(self) -> int:
-        """How much there is to say."""
-        return 1 + self.one.complexity + self.other.complexity
-
-    def read(self, states: States) -> Ints:
-        """Per state 0 or 1."""
+    def _read(self, states: States) -> Ints:
         one, other = states.get(self.one), states.get(self.other)
         return np.where((one == NONE) | (other == NONE), UNDEFINED, one == other)
 

@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 from coordlang.lifted.concepts import (
     Both,
-    Concept,
     Everything,
+    Expression,
     Gap,
     Named,
     One,
@@ -24,7 +24,6 @@ from coordlang.lifted.features import (
     Distance,
     Feature,
     Least,
-    Number,
     Residue,
     Same,
     Sign,
@@ -33,19 +32,35 @@ from coordlang.lifted.features import (
 from coordlang.lifted.world import ANY
 
 _SIGNS = {-1: "<", 0: "=", 1: ">"}
+#: What is made of its parts, as a formula and in English.
+_FORMS: Mapping[type[Expression], tuple[str, str]] = {
+    Sign: ("sign({} - {})", "which is larger, {} or {}"),
+    Residue: ("{} mod {}", "{}, modulo {}"),
+    Least: ("min({}, {})", "{0}, where {1} stands for {1} or more"),
+    Same: ("[{} = {}]", "whether {} is {}"),
+    Distance: ("{}-distance({}, {})", "the links of {} between {} and {}"),
+    Size: ("|{}|", "the number of objects that are {}"),
+    Gap: (
+        "{}-distance({}, {})",
+        "the fewest links of {} between an object that is {} and one that is {}",
+    ),
+    Everything: ("all", "any"),
+    Named: ("{}", "{}"),
+    One: ("{{{}}}", "{}"),
+    Without: ("not {}", "not {}"),
+    Both: ("({} and {})", "({} and {})"),
+    Some: ("some {}.{}", "{} to something {}"),
+}
 
 
 def formula(feature: Feature) -> str:
     """A feature as a formula, ``column(at(r1)) mod 3``."""
-    match feature:
-        case Sign(one, other):
-            return f"sign({_number(one)} - {_number(other)})"
-        case Residue(number, modulus):
-            return f"{_number(number)} mod {modulus}"
-        case Least(number, most):
-            return f"min({_number(number)}, {most})"
-        case Same(first, second):
-            return f"[{_term(first)} = {_term(second)}]"
+    return _formula(feature)
+
+
+def english(feature: Feature) -> str:
+    """A feature in words."""
+    return _english(feature)
 
 
 def condition(feature: Feature, value: int) -> str:
@@ -54,105 +69,46 @@ def condition(feature: Feature, value: int) -> str:
         return f"{formula(feature)} undefined"
     match feature:
         case Sign(one, other):
-            return f"{_number(one)} {_SIGNS.get(value, '?')} {_number(other)}"
+            return f"{_formula(one)} {_SIGNS.get(value, '?')} {_formula(other)}"
         case Least(number, most):
-            return f"{_number(number)} {'>=' if value == most else '='} {value}"
+            return f"{_formula(number)} {'>=' if value == most else '='} {value}"
         case Same(first, second):
-            return f"{_term(first)} {'=' if value else '!='} {_term(second)}"
+            return f"{_formula(first)} {'=' if value else '!='} {_formula(second)}"
         case Residue():
             return f"{formula(feature)} = {value}"
 
 
-def english(feature: Feature) -> str:
-    """A feature in words."""
-    match feature:
-        case Sign(one, other):
-            return f"which is larger, {_number_said(one)} or {_number_said(other)}"
-        case Residue(number, modulus):
-            return f"{_number_said(number)}, modulo {modulus}"
-        case Least(number, most):
-            return f"{_number_said(number)}, where {most} stands for {most} or more"
-        case Same(first, second):
-            return f"whether {_term_said(first)} is {_term_said(second)}"
-
-
-def _number(number: Number) -> str:
-    match number:
+def _formula(part: object) -> str:
+    match part:
         case Attribute(name, relation, term):
-            return f"{relation + '-' if relation else ''}{name}({_term(term)})"
-        case Distance(relation, one, other):
-            return f"{relation}-distance({_term(one)}, {_term(other)})"
+            return f"{relation + '-' if relation else ''}{name}({_formula(term)})"
         case Count(predicate, args):
             return f"#{predicate}({', '.join(args)})"
-        case Size(concept):
-            return f"|{_concept(concept)}|"
-        case Gap(relation, first, second):
-            return f"{relation}-distance({_concept(first)}, {_concept(second)})"
+        case Term(predicate, named, inverse):
+            return f"{predicate}{'^-1' * inverse}({named})"
+        case Role(predicate, inverse, closure):
+            return f"{predicate}{'^-1' * inverse}{'+' * closure}"
+        case Expression():
+            return _FORMS[type(part)][0].format(*map(_formula, part.parts))
+    return str(part)
 
 
-def _term(term: Term) -> str:
-    return f"{term.predicate}{'^-1' * term.inverse}({term.named})"
-
-
-def _concept(concept: Concept) -> str:
-    match concept:
-        case Everything():
-            return "all"
-        case Named(name):
-            return name
-        case One(name):
-            return f"{{{name}}}"
-        case Without(inner):
-            return f"not {_concept(inner)}"
-        case Both(one, other):
-            return f"({_concept(one)} and {_concept(other)})"
-        case Some(role, inner):
-            return f"some {_role(role)}.{_concept(inner)}"
-
-
-def _role(role: Role) -> str:
-    return f"{role.predicate}{'^-1' * role.inverse}{'+' * role.closure}"
-
-
-def _number_said(number: Number) -> str:
-    match number:
+def _english(part: object) -> str:
+    match part:
         case Attribute("degree", relation, term):
-            return f"the number of objects that {relation} links with {_term_said(term)}"
-        case Attribute("position", relation, term):
-            return f"the position along {relation} of {_term_said(term)}"
-        case Attribute(name, _, term):
-            return f"the {name} of {_term_said(term)}"
-        case Distance(relation, one, other):
-            return f"the links of {relation} between {_term_said(one)} and {_term_said(other)}"
+            return f"the number of objects that {relation} links with {_english(term)}"
+        case Attribute(name, relation, term):
+            along = f" along {relation}" if relation else ""
+            return f"the {name}{along} of {_english(term)}"
         case Count(predicate, args):
-            return f"the number of true atoms ({' '.join((predicate, *map(_any, args)))})"
-        case Size(concept):
-            return f"the number of objects that are {_concept_said(concept)}"
-        case Gap(relation, first, second):
-            between = f"{_concept_said(first)} and one that is {_concept_said(second)}"
-            return f"the fewest links of {relation} between an object that is {between}"
-
-
-def _any(arg: str) -> str:
-    return ".." if arg == ANY else arg
-
-
-def _term_said(term: Term) -> str:
-    ends: Sequence[str] = ("..", term.named) if term.inverse else (term.named, "..")
-    return f"the object in ({' '.join((term.predicate, *ends))})"
-
-
-def _concept_said(concept: Concept) -> str:
-    match concept:
-        case Everything():
-            return "any"
-        case Named(name) | One(name):
-            return name
-        case Without(inner):
-            return f"not {_concept_said(inner)}"
-        case Both(one, other):
-            return f"({_concept_said(one)} and {_concept_said(other)})"
-        case Some(role, inner):
-            inverse = "inversely " * role.inverse
-            steps = " in one or more steps" * role.closure
-            return f"{inverse}{role.predicate}-related{steps} to something {_concept_said(inner)}"
+            shown = (".." if arg == ANY else arg for arg in args)
+            return f"the number of true atoms ({' '.join((predicate, *shown))})"
+        case Term(predicate, named, inverse):
+            ends = ("..", named) if inverse else (named, "..")
+            return f"the object in ({' '.join((predicate, *ends))})"
+        case Role(predicate, inverse, closure):
+            steps = " in one or more steps" * closure
+            return f"{'inversely ' * inverse}{predicate}-related{steps}"
+        case Expression():
+            return _FORMS[type(part)][1].format(*map(_english, part.parts))
+    return str(part)

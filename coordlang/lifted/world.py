@@ -123,11 +123,17 @@ class World:
         return {name: own for name, own in pairs.items() if own}
 
 
-class Readable(Protocol):
+class Readable:
     """What can be read of states: concepts, numbers, features."""
+
+    __slots__ = ()
 
     def read(self, states: States) -> Any:
         """Its values: one for each state, or for each state and object."""
+        return self._read(states)
+
+    def _read(self, states: States) -> Any:
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,7 @@ def test_leads_are_the_same_beyond_the_table(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_pieces_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("coordlang.verification.by_definition._CHUNK", 7)
+    monkeypatch.setattr("coordlang.verification.walk._CHUNK", 7)
     answers = compared(range(915, 925), 2)
     assert min(answers[True], answers[False]) >= 2
 
