@@ -41,8 +41,8 @@ from coordlang.language.tolerance import Tolerance, tolerance_data
 from coordlang.language.words import Language
 from coordlang.required.failure import TooManyToCount
 from coordlang.required.failures import NONE, Failures, failures_under
-from coordlang.required.fewest_actions import requiring
 from coordlang.required.miscoordination import Miscoordination
+from coordlang.required.task_answers import requiring
 from coordlang.verification.candidates import verify_candidates
 from coordlang.verification.certificate_file import Certificate, read_certificate
 from coordlang.verification.check_certificate import Checked

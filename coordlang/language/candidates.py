@@ -11,18 +11,18 @@ from typing import Literal
 import numpy as np
 
 from coordlang.language.listed import ListedTask, goal_text, listed_task, model_of_listed
-from coordlang.language.reached import MOST_STATES, explored_if_small, surely_unreachable, unchecked
-from coordlang.language.shared_search import SharedSearch
+from coordlang.language.reached import MOST_STATES, explored_if_small, surely_unreachable
 from planners.joint.model import NO_FACT, FullState, Goal, JointModel, PlanningTask
-from planners.joint.tables import Ints, Rows, find_rows, unique_rows
+from planners.joint.tables import Rows, find_rows, unique_rows
 from planners.loading import PlanningInstance, build
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
-from planners.search.kept_plans import search, search_each
+from planners.search.kept_plans import search
 from planners.search.optimal_plans import joined, plan_spaces, solvable
 from planners.search.plan_space import PlanSpace
 from planners.search.portions import Explored, PlanSpaces, Searched, Source
-from planners.search.reachable import explore
+from planners.search.reachable import Space, explore
+from planners.search.unreachable import searched
 from planners.system.errors import BadInput, Position, ProvedImpossible, note
 
 Kind = Literal["problems", "all", "file"]
@@ -63,6 +63,36 @@ class Candidates:
         """The table of states that every plan space's state numbers refer to."""
         return self.source.rows
 
+    @classmethod
+    def explored(
+        cls,
+        kind: Kind,
+        loaded: PlanningInstance,
+        space: Space,
+        goals: Sequence[tuple[Goal, Rows | None]],
+        states: int,
+        listed: Sequence[ListedTask] = (),
+        skipped: Sequence[str] = (),
+    ) -> Candidates:
+        """Tasks over one explored space, by goal; None: from all other states."""
+        source = Explored(space, goals)
+        spaces = PlanSpaces(source)
+        return cls(kind, loaded, tuple(listed), spaces, source, states, tuple(skipped))
+
+    @classmethod
+    def searched(
+        cls,
+        kind: Kind,
+        loaded: PlanningInstance,
+        spaces: Sequence[PlanSpace],
+        listed: Sequence[ListedTask],
+        skipped: Sequence[str] = (),
+    ) -> Candidates:
+        """Tasks that were searched one by one."""
+        plans = joined(spaces)
+        source = Searched(plans)
+        return cls(kind, loaded, tuple(listed), (plans,), source, None, tuple(skipped))
+
 
 def from_problems(
     domain: Domain,
@@ -89,10 +119,7 @@ def from_problems(
             skipped.append(problem.source.name)
             continue
         listed.append(listed_task(domain, problem, task))
-    plans = joined(spaces)
-    return Candidates(
-        "problems", loaded, tuple(listed), (plans,), Searched(plans), None, tuple(skipped)
-    )
+    return Candidates.searched("problems", loaded, spaces, listed, skipped)
 
 
 def all_pairs(
@@ -100,42 +127,31 @@ def all_pairs(
 ) -> Candidates:
     """Every ordered pair of different states reachable in the problem, the second from the first.
 
-    Goals are full states.
+    Goals are full states.  With ``--remember-actions`` they are the same pairs: every task starts
+    with no action to remember.
     """
     loaded = build(domain, problems, options)
-    inits = np.stack([task.init for task in loaded.tasks])
-    if loaded.model.remembers:
-        return _all_pairs_remembering(loaded, inits)
-    space = explore(loaded.model, inits)
-    source = Explored(space, _to_each_state(loaded.model, space.rows))
-    return Candidates("all", loaded, (), PlanSpaces(source), source, len(space))
-
-
-def _all_pairs_remembering(loaded: PlanningInstance, inits: Rows) -> Candidates:
-    """The same pairs of states as without ``--remember-actions``.
-
-    Every task starts with no action to remember.
-    """
     model = loaded.model
+    inits = np.stack([task.init for task in loaded.tasks])
+    if not model.remembers:
+        space = explore(model, inits)
+        return Candidates.explored("all", loaded, space, _to_each_state(space), len(space))
     forgetting = replace(model.without_slack, codec=replace(model.codec, memory=None))
     base = explore(forgetting, model.codec.facts_part(inits))
-    zeros = np.zeros((len(base), len(model.robots)), np.uint64)
-    starts = np.hstack((base.rows, zeros))
-    groups = []
-    for space in plan_spaces(base, _to_each_state(forgetting, base.rows)):
-        goal_of_task, state = space.goal[space.starts], space.state[space.starts]
-        for number, goal in enumerate(space.goals):
+    starts = np.hstack((base.rows, np.zeros((len(base), len(model.robots)), np.uint64)))
+    groups: list[tuple[Goal, Rows | None]] = []
+    for plans in plan_spaces(base, _to_each_state(base)):
+        goal_of_task, state = plans.goal[plans.starts], plans.state[plans.starts]
+        for number, goal in enumerate(plans.goals):
             mine = state[goal_of_task == number]
             if len(mine):
                 groups.append((goal, starts[mine]))
-    extended = explore(model, starts)
-    source = Explored(extended, groups)
-    return Candidates("all", loaded, (), PlanSpaces(source), source, len(base))
+    return Candidates.explored("all", loaded, explore(model, starts), groups, len(base))
 
 
-def _to_each_state(model: JointModel, rows: Rows) -> list[tuple[Goal, None]]:
+def _to_each_state(space: Space) -> list[tuple[Goal, Rows | None]]:
     """For each state the tasks to get there, from every state that can."""
-    return [(model.full_state(row), None) for row in rows]
+    return [(space.model.full_state(row), None) for row in space.rows]
 
 
 def from_listed(
@@ -166,115 +182,106 @@ def from_listed(
         )
     loaded, tasks = model_of_listed(domain, problems, listed, options, position)
     model = loaded.model
-    space = explored_if_small(model, np.stack([task.init for task in loaded.tasks]))
+    starts = np.stack([task.init for task in loaded.tasks])
+    inits = np.stack([task.init for task in tasks])
+    space = explored_if_small(model, starts)
     if space is None:
-        return _one_by_one(loaded, problems[0], listed, tasks, position, skip_unsolvable)
-    reached, _ = unique_rows(model.codec.facts_part(space.rows))
-    inits = model.codec.facts_part(np.stack([task.init for task in tasks]))
-    _refuse(model, tasks, np.flatnonzero(find_rows(reached, inits) < 0), problems[0], position)
-    by_goal = _by_goal(tasks)
-    if model.remembers:  # a task starts with no action to remember: those are states of their own
-        space = explore(model, np.concatenate([inits for _, inits in by_goal]))
-    kept = solvable(space, by_goal) if skip_unsolvable else []
-    skipped: tuple[str, ...] = ()
-    if kept:
-        served = _served(tasks, kept)
-        skipped = tuple(
-            f"task {number} ({_init_text(task)} -> {_goal_text(task)})"
-            for number, (task, good) in enumerate(zip(listed, served, strict=True), 1)
-            if not good
-        )
-        listed = list(compress(listed, served))
-    try:
-        spaces = tuple(plan_spaces(space, kept or by_goal))
-    except ProvedImpossible as error:
-        number = _served(tasks, solvable(space, by_goal)).index(False)
-        raise _unsolvable(number + 1, listed[number], position, error) from None
-    source = Explored(space, kept or by_goal)
-    return Candidates("file", loaded, tuple(listed), spaces, source, len(reached), skipped)
-
-
-def _refuse(
-    model: JointModel,
-    tasks: Sequence[PlanningTask],
-    unreachable: Sequence[int] | Ints,
-    problem: Problem,
-    position: Position | None,
-) -> None:
-    """Raise `BadInput` for the first of the tasks whose start cannot be reached, if there is one.
-
-    Such a state is taken for a mistake.
-    """
-    if len(unreachable):
-        number = int(unreachable[0])
+        unreachable = surely_unreachable(model, starts, inits)
+    else:
+        reached, _ = unique_rows(model.codec.facts_part(space.rows))
+        found = find_rows(reached, model.codec.facts_part(inits))
+        unreachable = np.flatnonzero(found < 0).tolist()
+    for number in unreachable[:1]:
         raise BadInput(
-            f"task {number + 1}: the state {model.state_text(tasks[number].init)} cannot be "
-            "reached "
-            f"from the initial state of {problem.source.name}",
+            f"task {number + 1}: the state {model.state_text(inits[number])} cannot be "
+            f"reached from the initial state of {problems[0].source.name}",
             position=position,
             remedy="Is a fluent missing or one too many?  List all fluents that are true.",
         )
+    if space is None:
+        return _one_by_one(loaded, listed, tasks, position, skip_unsolvable)
+    by_goal: dict[Goal, list[Rows]] = {}
+    for task in tasks:
+        by_goal.setdefault(task.goal, []).append(task.init)
+    goals = [(goal, np.stack(rows)) for goal, rows in by_goal.items()]
+    if model.remembers:  # a task starts with no action to remember: those are states of their own
+        space = explore(model, inits)
+    kept = solvable(space, goals)
+    known = {(goal, init.tobytes()) for goal, inits in kept for init in inits}
+    served = [(task.goal, task.init.tobytes()) in known for task in tasks]
+    skipped = []
+    for number, (text, task, good) in enumerate(zip(listed, tasks, served, strict=True), 1):
+        if not good and not (skip_unsolvable and kept):
+            raise _unsolvable(number, text, position, searched(model, task.goal, space.rows))
+        if not good:
+            skipped.append(_named(number, text))
+    listed = list(compress(listed, served))
+    return Candidates.explored("file", loaded, space, kept, len(reached), listed, skipped)
 
 
 def _one_by_one(
     loaded: PlanningInstance,
-    problem: Problem,
     listed: Sequence[ListedTask],
     tasks: Sequence[PlanningTask],
     position: Position | None,
     skip_unsolvable: bool,
 ) -> Candidates:
     """Listed tasks in a large space, each searched by itself, see `from_listed`."""
-    model = loaded.model
-    starts = [task.init for task in loaded.tasks]
-    inits = np.stack([task.init for task in tasks])
-    _refuse(model, tasks, surely_unreachable(model, starts, inits), problem, position)
-    if unknown := unchecked(starts, inits):
+    known = {task.init.tobytes() for task in loaded.tasks}
+    if unknown := sum(task.init.tobytes() not in known for task in tasks):
         note(
-            f"{len(unknown):,} of {len(tasks):,} tasks start elsewhere than the problem, which has "
+            f"{unknown:,} of {len(tasks):,} tasks start elsewhere than the problem, which has "
             f"more than {MOST_STATES:,} states or many joint steps: that it reaches these states "
             "is not checked",
             position=position,
         )
-    known = SharedSearch(model)
+    found: dict[Goal, list[PlanSpace]] = {}
     spaces: list[PlanSpace] = []
     kept: list[ListedTask] = []
     skipped: list[str] = []
     for number, (text, task) in enumerate(zip(listed, tasks, strict=True), 1):
         try:
-            spaces.append(known.search(task))
+            spaces.append(_search_once(loaded.model, task, found))
         except ProvedImpossible as error:
             if not skip_unsolvable or len(skipped) == len(tasks) - 1:
-                raise _unsolvable(number, text, position, error) from None
-            skipped.append(f"task {number} ({_init_text(text)} -> {_goal_text(text)})")
+                raise _unsolvable(number, text, position, error.remedy) from None
+            skipped.append(_named(number, text))
             continue
         kept.append(text)
-    plans = joined(spaces)
-    return Candidates("file", loaded, tuple(kept), (plans,), Searched(plans), None, tuple(skipped))
+    return Candidates.searched("file", loaded, spaces, kept, skipped)
+
+
+def _search_once(
+    model: JointModel, task: PlanningTask, found: dict[Goal, list[PlanSpace]]
+) -> PlanSpace:
+    """The plan space of a task: part of one that was found before, if it starts on plans there.
+
+    From a state on an optimal plan the plan space holds all optimal plans to that goal; with slack,
+    plans of another task may have used some of it.
+    """
+    if model.slack:
+        return search(model, task)
+    for space in found.setdefault(task.goal, []):
+        state = int(find_rows(space.rows, task.init[None, :])[0])
+        for node in np.flatnonzero(space.state == state)[:1].tolist():
+            cost = int(space.cost[space.first_path(node)].sum())
+            return space.with_tasks(np.array([node]), np.array([cost]))
+    found[task.goal].append(search(model, task))
+    return found[task.goal][-1]
+
+
+def _named(number: int, task: ListedTask) -> str:
+    return f"task {number} ({_init_text(task)} -> {_goal_text(task)})"
 
 
 def _unsolvable(
-    number: int, task: ListedTask, position: Position | None, error: ProvedImpossible
+    number: int, task: ListedTask, position: Position | None, remedy: str | None
 ) -> ProvedImpossible:
     return ProvedImpossible(
         f"task {number}: the goal {_goal_text(task)} cannot be reached from {_init_text(task)}",
         position=position,
-        remedy=error.remedy,
+        remedy=remedy,
     )
-
-
-def _by_goal(tasks: Sequence[PlanningTask]) -> list[tuple[Goal, Rows]]:
-    """Goals, each with the initial states of its tasks."""
-    inits: dict[Goal, list[Rows]] = {}
-    for task in tasks:
-        inits.setdefault(task.goal, []).append(task.init)
-    return [(goal, np.stack(rows)) for goal, rows in inits.items()]
-
-
-def _served(tasks: Sequence[PlanningTask], kept: Sequence[tuple[Goal, Rows]]) -> list[bool]:
-    """Of each task whether it is among goals with initial states."""
-    known = {(goal, init.tobytes()) for goal, inits in kept for init in inits}
-    return [(task.goal, task.init.tobytes()) in known for task in tasks]
 
 
 def _init_text(task: ListedTask) -> str:
@@ -297,8 +304,8 @@ def from_recorded(
     They are searched one by one, without the rest of the space.
     """
     loaded, tasks = model_of_listed(domain, problems, listed, options, position)
-    plans = search_each(loaded.model, tasks)
-    return Candidates("problems", loaded, tuple(listed), (plans,), Searched(plans), None)
+    spaces = [search(loaded.model, task) for task in tasks]
+    return Candidates.searched("problems", loaded, spaces, listed)
 
 
 def describe(space: PlanSpace, task: int) -> str:

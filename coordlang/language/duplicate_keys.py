@@ -7,18 +7,22 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
+from planners.system.errors import BadInput, Position
+from planners.system.messages import echoed
+
 
 class _Twice(Exception):
     pass
 
 
-def duplicate_key(data: bytes, large: bytes | memoryview, entries: int) -> str | None:
-    """A key that an object of a JSON text holds twice, or None.
+def refuse_duplicates(
+    data: bytes, position: Position, large: bytes | memoryview = b"", entries: int = 0
+) -> None:
+    """Raise `BadInput` for a key that an object of a JSON text, which was read before, holds twice.
 
     ``large`` is the text of one big object of texts in ``data``, as it stands there, and
     ``entries`` the number of different keys in it: where it has four quotation marks for each of
-    them, no key occurs twice and it is not read again.  Raises `RecursionError` for a text that is
-    nested too deeply.
+    them, no key occurs twice and it is not read again.
     """
     start = data.find(large)
     end = start + len(large)
@@ -29,8 +33,11 @@ def duplicate_key(data: bytes, large: bytes | memoryview, entries: int) -> str |
             data = data[:start] + b"{}" + data[end:]
         _read(data)
     except _Twice as twice:
-        return str(twice)
-    return None
+        raise BadInput(
+            f"the key {echoed(str(twice))} occurs twice",
+            position=position,
+            remedy="Of two entries one would be lost.",
+        ) from None
 
 
 def _read(data: bytes) -> None:

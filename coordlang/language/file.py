@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,10 +11,11 @@ from typing import Any
 import msgspec
 from msgspec import UNSET
 
-from coordlang.language.duplicate_keys import duplicate_key
+from coordlang.language.duplicate_keys import refuse_duplicates
 from coordlang.language.provenance import Guarantee, Provenance
 from coordlang.language.record import (
     LANGUAGE,
+    GuaranteeRecord,
     LanguageRecord,
     ModelRecord,
     TasksRecord,
@@ -29,11 +30,15 @@ from planners.system.writing import write_compressed
 
 #: What to do about a file that was changed or damaged.
 _BUILD_AGAIN = "Copy the file again, or build the language again: `coordlang build`."
+#: What is wrong with a record, and what to do about it.
+Fault = tuple[str, str]
 
 
 def to_data(language: Language) -> dict[str, Any]:
     """The JSON data of a language file."""
-    provenance = language.provenance
+    provenance, guarantee = language.provenance, asdict(language.guarantee)
+    if language.guarantee.coordination_language:  # that goes without saying
+        del guarantee["coordination_language"]
     data = {
         "format": LANGUAGE.format,
         "version": LANGUAGE.version,
@@ -44,7 +49,7 @@ def to_data(language: Language) -> dict[str, Any]:
         "words": list(language.words),
         "states": dict(language.states),
         "default": language.default,
-        "guarantee": _guarantee_data(language.guarantee),
+        "guarantee": guarantee,
         "producer": dict(provenance.producer),
     }
     if provenance.lifted:
@@ -82,161 +87,134 @@ def read_language(path: str | Path) -> Language:
 def language_from_bytes(data: bytes, position: Position) -> Language:
     """The language in the text of a language file; see `read_language`."""
     record = LANGUAGE.decode(data, position)
-    large = msgspec.json.decode(data, type=_Large)
+    large = msgspec.json.decode(data[data.index(b"{") :], type=_Large)
     if large.also:
         raise BadInput(
             "states have several words here ('also'), which is no longer read",
             position=position,
             remedy="Build the language again, without --overlap.",
         )
-    try:
-        twice = duplicate_key(data, memoryview(large.states), len(record.states))
-    except RecursionError as error:
-        raise BadInput(
-            f"this is no JSON that can be read: {error}", position=position, remedy=_BUILD_AGAIN
-        ) from None
-    if twice is not None:
-        raise BadInput(
-            f"the key {echoed(twice)} occurs twice",
-            position=position,
-            remedy="Of two entries one would be lost.",
-        )
-    _check_words(record, position)
+    refuse_duplicates(data, position, memoryview(large.states), len(record.states))
+    refuse_first(_faults_of_words(record), position)
     _check_seen(record, position)
     robots = [] if record.robots is UNSET else record.robots
-    if len(set(robots)) < len(robots) or (not robots and record.robots is not UNSET):
-        raise BadInput(
-            "the robots must be different, and at least one", position=position, remedy=_BUILD_AGAIN
-        )
-    require_idling(record.model, robots, position, _BUILD_AGAIN)
+    refuse_first(_faults(record, robots), position)
+    guarantee, tolerance = record.guarantee, record.tolerance
     return Language(
         words=tuple(record.words),
         states=record.states,
         default=record.default,
         provenance=Provenance(
             robots=tuple(robots),
-            guarantee=_guarantee(record, position),
+            guarantee=None if guarantee is UNSET else Guarantee(**_plain(guarantee)),
             domain={} if record.domain is UNSET else present(record.domain),
             model=present(record.model),
             tasks=present(TasksRecord("problems", 0) if record.tasks is UNSET else record.tasks),
             producer=record.producer,
-            lifted={} if record.lifted is UNSET else msgspec.to_builtins(record.lifted),
-            tolerance=_tolerance(record, position),
+            lifted={} if record.lifted is UNSET else _plain(record.lifted),
+            tolerance=None if tolerance is UNSET else Tolerance(**_plain(tolerance)),
         ),
     )
 
 
+def _plain(record: msgspec.Struct) -> dict[str, Any]:
+    entries: dict[str, Any] = msgspec.to_builtins(record)
+    return entries
+
+
 def present(record: msgspec.Struct) -> dict[str, Any]:
     """The entries of a record that its file has."""
-    entries = msgspec.to_builtins(record)
-    return {key: value for key, value in entries.items() if value is not None and key != "idle"}
+    return {k: value for k, value in _plain(record).items() if value is not None and k != "idle"}
 
 
-def require_idling(
-    model: ModelRecord, robots: Sequence[str], position: Position, remedy: str
-) -> None:
-    """Raise `BadInput` for a file of an older version, with another rule of idling."""
+def refuse_first(faults: Iterator[Fault], position: Position) -> None:
+    """Raise `BadInput` for the first fault, if there is one."""
+    for what, remedy in faults:
+        raise BadInput(what, position=position, remedy=remedy)
+
+
+def faults_of_robots(model: ModelRecord, robots: Sequence[str], remedy: str) -> Iterator[Fault]:
+    """Robots that are no team, and a file of an older version, with another rule of idling."""
+    if len(set(robots)) < len(robots) or not robots:
+        yield "the robots must be different, and at least one", remedy
+    yield from faults_of_idling(model, robots, remedy)
+
+
+def faults_of_idling(model: ModelRecord, robots: Sequence[str], remedy: str) -> Iterator[Fault]:
+    """A file of an older version, with another rule of idling."""
     if model.idle is not None and set(model.idle) != set(robots):
-        raise BadInput(
+        yield (
             "this file is of an older version, in which some robot might not idle; its words are "
             "of other plans",
-            position=position,
-            remedy=remedy,
+            remedy,
         )
 
 
-def _check_words(record: LanguageRecord, position: Position) -> None:
+def _faults(record: LanguageRecord, robots: Sequence[str]) -> Iterator[Fault]:
+    """What contradicts itself in a record, but for its words."""
+    of_robots = faults_of_idling if record.robots is UNSET else faults_of_robots
+    yield from of_robots(record.model, robots, _BUILD_AGAIN)
+    if record.guarantee is not UNSET:
+        yield from _faults_of_guarantee(record.guarantee, len(record.words))
+    claimed = ToleranceRecord() if record.tolerance is UNSET else record.tolerance
+    for what in _faults_of_tolerance(record, claimed):
+        remedy = "Correct 'tolerance' and 'guarantee', or build the language again."
+        yield f"{what} ('tolerance')", remedy
+
+
+def _faults_of_words(record: LanguageRecord) -> Iterator[Fault]:
     words = set(record.words)
     if len(words) < len(record.words) or not words:
-        raise BadInput(
-            "the words must be different, and at least one", position=position, remedy=_BUILD_AGAIN
-        )
+        yield "the words must be different, and at least one", _BUILD_AGAIN
     for word in record.words:
         if word.split() != [word]:
-            raise BadInput(
-                f"{echoed(word)} is no word",
-                position=position,
-                remedy="Words are not empty and have no blanks in them.",
-            )
+            yield f"{echoed(word)} is no word", "Words are not empty and have no blanks in them."
     if not {*record.states.values(), record.default} <= words:
         given = [*record.states.items(), ("default", record.default)]
         key, word = next((key, word) for key, word in given if word not in words)
-        raise BadInput(
+        yield (
             f"{echoed(word)} (of {echoed(key)}) is not among the words",
-            position=position,
-            remedy="Add it to 'words', or give the state one of them.",
+            "Add it to 'words', or give the state one of them.",
         )
+
+
+def _faults_of_guarantee(g: GuaranteeRecord, size: int) -> Iterator[Fault]:
+    most = g.size if g.coordination_language else max(g.size, g.lower_bound)
+    if g.size != size or not 1 <= g.lower_bound <= most:
+        yield (
+            f"the guarantee (size {g.size}, lower bound {g.lower_bound}) contradicts "
+            f"the {size} words",
+            "Correct 'guarantee', or build the language again.",
+        )
+    if g.proved_minimal != (g.coordination_language and g.lower_bound == g.size):
+        yield (
+            "'proved_minimal' contradicts the lower bound",
+            "It is true exactly where lower_bound is size, and of a coordination language "
+            "only: correct 'guarantee'.",
+        )
+
+
+def _faults_of_tolerance(record: LanguageRecord, claimed: ToleranceRecord) -> Iterator[str]:
+    mean, worst = claimed.failure_mean, claimed.failure_worst
+    if (mean is None) != (worst is None):
+        yield "'failure_mean' and 'failure_worst' belong together"
+    if mean is not None and worst is not None and not 0 <= mean <= worst <= 1:
+        yield f"failures of {mean} on average and {worst} at worst contradict each other"
+    if record.model.words_see_slack is True and not claimed.slack:
+        yield "words see slack, and there is none"
+    is_language = record.guarantee is not UNSET and record.guarantee.coordination_language
+    if mean is not None and is_language:
+        yield "'guarantee' must say that it is no coordination language"
 
 
 def _check_seen(record: LanguageRecord, position: Position) -> None:
     """Raise `BadInput` for what is shown to people with characters that nobody sees."""
-    for word in record.words:
-        require_seen(word, position, "word")
-    if record.robots is not UNSET:
-        for robot in record.robots:
-            require_seen(robot, position, "robot")
-    if record.domain is not UNSET:
-        require_seen(record.domain.name, position, "domain name")
-    if record.guarantee is not UNSET:
-        require_seen(record.guarantee.method, position, "method")
-
-
-def _guarantee(record: LanguageRecord, position: Position) -> Guarantee | None:
-    size = len(record.words)
-    if record.guarantee is UNSET:
-        return None
-    g = record.guarantee
-    most = g.size if g.coordination_language else max(g.size, g.lower_bound)
-    if g.size != size or not 1 <= g.lower_bound <= most:
-        raise BadInput(
-            f"the guarantee (size {g.size}, lower bound {g.lower_bound}) contradicts "
-            f"the {size} words",
-            position=position,
-            remedy="Correct 'guarantee', or build the language again.",
-        )
-    if g.proved_minimal != (g.coordination_language and g.lower_bound == g.size):
-        raise BadInput(
-            "'proved_minimal' contradicts the lower bound",
-            position=position,
-            remedy="It is true exactly where lower_bound is size, and of a coordination language "
-            "only: correct 'guarantee'.",
-        )
-    return Guarantee(g.method, g.size, g.lower_bound, g.proved_minimal, g.coordination_language)
-
-
-def _guarantee_data(guarantee: Guarantee) -> dict[str, Any]:
-    """A guarantee as files hold it: that it is a coordination language goes without saying."""
-    data = asdict(guarantee)
-    if guarantee.coordination_language:
-        del data["coordination_language"]
-    return data
-
-
-def _tolerance(record: LanguageRecord, position: Position) -> Tolerance | None:
-    claimed = ToleranceRecord() if record.tolerance is UNSET else record.tolerance
-    mean, worst = claimed.failure_mean, claimed.failure_worst
-    wrong = None
-    if (mean is None) != (worst is None):
-        wrong = "'failure_mean' and 'failure_worst' belong together"
-    elif mean is not None and worst is not None and not 0 <= mean <= worst <= 1:
-        wrong = f"failures of {mean} on average and {worst} at worst contradict each other"
-    elif claimed.slack is not None and claimed.slack < 0:
-        wrong = f"a slack of {claimed.slack} is none"
-    elif record.model.words_see_slack is True and not claimed.slack:
-        wrong = "words see slack, and there is none"
-    elif mean is not None and _claims_coordination(record):
-        wrong = "'guarantee' must say that it is no coordination language"
-    if wrong is not None:
-        raise BadInput(
-            f"{wrong} ('tolerance')",
-            position=position,
-            remedy="Correct 'tolerance' and 'guarantee', or build the language again.",
-        )
-    return None if record.tolerance is UNSET else Tolerance(mean, worst, claimed.slack)
-
-
-def _claims_coordination(record: LanguageRecord) -> bool:
-    return record.guarantee is not UNSET and record.guarantee.coordination_language
+    names = [("word", word) for word in record.words]
+    names += [] if record.robots is UNSET else [("robot", robot) for robot in record.robots]
+    names += [] if record.domain is UNSET else [("domain name", record.domain.name)]
+    names += [] if record.guarantee is UNSET else [("method", record.guarantee.method)]
+    for what, name in names:
+        require_seen(name, position, what)
 
 
 class _Large(msgspec.Struct):

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from planners.joint.model import JointModel
@@ -43,7 +41,7 @@ def explored_if_small(model: JointModel, inits: Rows) -> Space | None:
     return explore(model, inits)
 
 
-def surely_unreachable(model: JointModel, starts: Sequence[Rows], inits: Rows) -> list[int]:
+def surely_unreachable(model: JointModel, starts: Rows, inits: Rows) -> list[int]:
     """The numbers of states that no start can reach, as far as state variables prove it.
 
     A *state variable* is a group of facts of which exactly one is true in every state that is
@@ -57,9 +55,3 @@ def surely_unreachable(model: JointModel, starts: Sequence[Rows], inits: Rows) -
             own &= true[:, list(variable.facts)].sum(axis=1) == 1
         possible |= own
     return np.flatnonzero(~possible).tolist()
-
-
-def unchecked(starts: Sequence[Rows], inits: Rows) -> list[int]:
-    """The numbers of states that are no start: whether these can be reached is not known."""
-    known = unique_rows(np.stack(starts))[0]
-    return np.flatnonzero(find_rows(known, inits) < 0).tolist()

@@ -8,15 +8,14 @@ links a place with.  ``(distance R)`` of two objects is the number of links betw
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import shortest_path
 
 from coordlang.lifted.world import NONE, Pair, World
-from planners.joint.tables import Ints
-
-Pairs = Sequence[Pair]
+from planners.joint.tables import Bools, Ints
 
 
 def attribute(world: World, name: str, relation: str | None = None) -> Ints:
@@ -25,24 +24,15 @@ def attribute(world: World, name: str, relation: str | None = None) -> Ints:
 
 
 def _attribute(world: World, name: str, relation: str | None) -> Ints:
-    values = np.full(len(world.objects), NONE)
-    for key, value in _values(world, name, relation).items():
-        if key in world.number:
-            values[world.number[key]] = value
-    return values
-
-
-def _values(world: World, name: str, relation: str | None) -> Mapping[str, int]:
-    if relation is None:
-        return _coordinates(world, 0 if name == "column" else 1)
-    pairs = world.relations.get(relation, ())
     if name == "degree":
-        linked: dict[str, set[str]] = {}
-        for one, other in pairs:
-            linked.setdefault(one, set()).add(other)
-            linked.setdefault(other, set()).add(one)
-        return {key: len(own) for key, own in linked.items()}
-    return positions(pairs)
+        degree = _joined(world, relation or "").sum(axis=1)
+        return np.where(degree > 0, degree, NONE)
+    known = (
+        _coordinates(world, 0 if name == "column" else 1)
+        if relation is None
+        else positions(world.relations.get(relation, ()))
+    )
+    return np.array([known.get(name, NONE) for name in world.objects], np.int64)
 
 
 def _coordinates(world: World, axis: int) -> Mapping[str, int]:
@@ -55,7 +45,7 @@ def _coordinates(world: World, axis: int) -> Mapping[str, int]:
     return {name: rank[value] for name, value in own.items()}
 
 
-def positions(pairs: Pairs) -> Mapping[str, int]:
+def positions(pairs: Sequence[Pair]) -> Mapping[str, int]:
     """Places on paths, from 0; empty if the links are no paths."""
     following = dict(pairs)
     before = {other: one for one, other in pairs}
@@ -71,39 +61,34 @@ def positions(pairs: Pairs) -> Mapping[str, int]:
     return found if len(found) == len(following.keys() | before.keys()) else {}
 
 
+def links(world: World, relation: str) -> Bools:
+    """(objects, objects): whether a static relation links the first object with the second."""
+
+    def linked() -> Bools:
+        table = np.zeros((len(world.objects), len(world.objects)), np.bool_)
+        for one, other in world.relations.get(relation, ()):
+            table[world.number[one], world.number[other]] = True
+        return table
+
+    return world.once("links", relation, linked)
+
+
+def _joined(world: World, relation: str) -> Bools:
+    """(objects, objects): whether the relation links two objects in either direction."""
+    linked = links(world, relation)
+    return linked | linked.T
+
+
 def distances(world: World, relation: str) -> Ints:
-    """(objects, objects): links of a static relation from one to another, `NONE` without a way."""
+    """(objects, objects): links of a static relation from one to another, `NONE` without a way.
+
+    What it links with nothing has no distance to itself either.
+    """
     return world.once("distance", relation, lambda: _distances(world, relation))
 
 
-def links(world: World, relation: str) -> Ints:
-    """(objects, objects): 1 where a static relation links the first object with the second."""
-
-    def computed() -> Ints:
-        linked = np.zeros((len(world.objects), len(world.objects)), np.int64)
-        for one, other in world.relations[relation]:
-            linked[world.number[one], world.number[other]] = 1
-        return linked
-
-    return world.once("links", relation, computed)
-
-
 def _distances(world: World, relation: str) -> Ints:
-    count = len(world.objects)
-    linked: list[set[int]] = [set() for _ in range(count)]
-    for one, other in world.relations.get(relation, ()):
-        linked[world.number[one]].add(world.number[other])
-        linked[world.number[other]].add(world.number[one])
-    found = np.full((count, count), NONE)
-    for start in range(count):
-        if not linked[start]:
-            continue
-        found[start, start] = 0
-        queue = deque([start])
-        while queue:
-            here = queue.popleft()
-            for there in linked[here]:
-                if found[start, there] == NONE:
-                    found[start, there] = found[start, here] + 1
-                    queue.append(there)
-    return found
+    joined = _joined(world, relation)
+    steps = shortest_path(csr_matrix(joined), unweighted=True)
+    steps[~joined.any(axis=1)] = np.inf
+    return np.where(np.isfinite(steps), steps, NONE).astype(np.int64)

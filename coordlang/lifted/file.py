@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,8 +13,8 @@ import msgspec
 from msgspec import Meta
 
 from coordlang.language.candidates import Kind
-from coordlang.language.duplicate_keys import duplicate_key
-from coordlang.language.file import present, require_idling
+from coordlang.language.duplicate_keys import refuse_duplicates
+from coordlang.language.file import Fault, faults_of_robots, present, refuse_first
 from coordlang.language.record import DomainRecord, ModelRecord
 from coordlang.lifted.language import LiftedLanguage, Vector, Verified
 from coordlang.lifted.notation import LARGEST, feature_of
@@ -124,16 +124,12 @@ def read_lifted(path: str | Path) -> LiftedLanguage:
 def lifted_from_bytes(data: bytes, position: Position) -> LiftedLanguage:
     """The language in the text of a lifted file; see `read_lifted`."""
     record = LIFTED.decode(data, position)
-    twice = duplicate_key(data, b"", 0)
-    if twice is not None:
-        raise BadInput(
-            f"the key {echoed(twice)} occurs twice",
-            position=position,
-            remedy="Of two entries one would be lost.",
-        )
-    _check_names(record, position)
-    _check_words(record, position)
-    require_idling(record.model, record.robots, position, _LIFT_AGAIN)
+    refuse_duplicates(data, position)
+    names = [*record.words, *record.robots, record.domain.name]
+    names += [own.definition for own in record.features]
+    for name in (*names, *(known.problem for known in record.verified)):
+        require_seen(name, position)
+    refuse_first(_faults(record), position)
     features = tuple(feature_of(own.definition, position) for own in record.features)
     values = read_values(record.values, len(features), position)
     return LiftedLanguage(
@@ -149,41 +145,17 @@ def lifted_from_bytes(data: bytes, position: Position) -> LiftedLanguage:
     )
 
 
-def _check_names(record: LiftedRecord, position: Position) -> None:
-    """Raise `BadInput` for what people cannot see, and for robots that are no team."""
-    names = [*record.words, *record.robots, record.domain.name]
-    names += [own.definition for own in record.features]
-    for name in (*names, *(known.problem for known in record.verified)):
-        require_seen(name, position)
-    if len(set(record.robots)) < len(record.robots) or not record.robots:
-        raise BadInput(
-            "the robots must be different, and at least one",
-            position=position,
-            remedy=_LIFT_AGAIN,
-        )
-
-
-def _check_words(record: LiftedRecord, position: Position) -> None:
+def _faults(record: LiftedRecord) -> Iterator[Fault]:
+    """Robots that are no team, and words that are none."""
+    yield from faults_of_robots(record.model, record.robots, _LIFT_AGAIN)
     words = set(record.words)
     if len(words) < len(record.words) or not words or any(w.split() != [w] for w in words):
-        raise BadInput(
-            "the words must be different, without blanks, and at least one",
-            position=position,
-            remedy=_LIFT_AGAIN,
-        )
-    unknown = sorted({*record.values.values()} - words)
-    if unknown:
-        raise BadInput(
-            f"'values' has the word {echoed(unknown[0])}, which 'words' has not",
-            position=position,
-            remedy=_LIFT_AGAIN,
-        )
-    if own := sorted(filter(_OWN_WORD.fullmatch, words)):
-        raise BadInput(
-            f"{echoed(own[0])} is what states with unknown values are called",
-            position=position,
-            remedy="Give the word another name.",
-        )
+        yield "the words must be different, without blanks, and at least one", _LIFT_AGAIN
+    for word in sorted({*record.values.values()} - words):
+        yield f"'values' has the word {echoed(word)}, which 'words' has not", _LIFT_AGAIN
+    for word in sorted(filter(_OWN_WORD.fullmatch, words)):
+        what = f"{echoed(word)} is what states with unknown values are called"
+        yield what, "Give the word another name."
 
 
 def written_values(values: Mapping[Vector, str]) -> dict[str, str]:

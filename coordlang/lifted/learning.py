@@ -16,11 +16,10 @@ from typing import Literal
 import numpy as np
 
 from coordlang.language.warping import Clause
-from coordlang.lifted.choosing import SimplestHitting
+from coordlang.lifted.choosing import Merged, SimplestHitting, merge_classes
 from coordlang.lifted.features import Feature
 from coordlang.lifted.instance import Instance, Progress
 from coordlang.lifted.language import Vector
-from coordlang.lifted.merging import Merged, merge_classes
 from coordlang.lifted.pool import Pool, pool_of
 from coordlang.lifted.world import States
 from coordlang.required.miscoordination import Inseparable, inseparable
@@ -163,12 +162,6 @@ def _refuted(
     return None
 
 
-def find_vectors(table: Ints, vectors: Ints) -> Ints:
-    """The number of each vector in a table of different ones, which has them all."""
-    number = {tuple(vector): k for k, vector in enumerate(table.tolist())}
-    return np.array([number[tuple(vector)] for vector in vectors.tolist()], np.int64)
-
-
 @dataclass(frozen=True, slots=True)
 class _Words:
     """Words over features.
@@ -266,9 +259,10 @@ class _Learner:
         self, chosen: Sequence[int], prefer: Preference | None, every: Sequence[Instance]
     ) -> _Words:
         features = tuple(self._pool.features[k] for k in chosen)
-        vectors = [own.vectors(features) for own in every]
-        table = np.unique(np.concatenate(vectors), axis=0)
-        classes = [find_vectors(table, own) for own in vectors]
+        vectors = np.concatenate([own.vectors(features) for own in every])
+        table, number = np.unique(vectors, axis=0, return_inverse=True)
+        ends = np.cumsum([len(own.states) for own in every])
+        classes = np.split(number.reshape(-1), ends[:-1])
         merged = Merged(tuple(range(len(table))), len(table) == 1)
         if prefer is not None:
             known = [classes[every.index(own)] for own in self.taken]

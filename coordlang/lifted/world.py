@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -27,6 +27,7 @@ NONE = -1
 ANY = "_"
 
 Pair = tuple[str, str]
+Table = TypeVar("Table", Ints, Bools)
 
 
 @dataclass(frozen=True)
@@ -104,14 +105,15 @@ class World:
         return found
 
     @cached_property
-    def _known(self) -> dict[tuple[str, str], Ints]:
+    def _known(self) -> dict[tuple[str, str], Any]:
         return {}
 
-    def once(self, name: str, relation: str, computed: Callable[[], Ints]) -> Ints:
+    def once(self, name: str, relation: str, computed: Callable[[], Table]) -> Table:
         """A table about a static relation, which is computed once."""
         if (name, relation) not in self._known:
             self._known[name, relation] = computed()
-        return self._known[name, relation]
+        found: Table = self._known[name, relation]
+        return found
 
     @cached_property
     def relations(self) -> Mapping[str, Sequence[Pair]]:

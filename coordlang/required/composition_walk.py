@@ -12,7 +12,7 @@ Propositions 2 and 14 of docs/concepts.md say why this decides what it decides.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +27,10 @@ from planners.system.limits import memory_left, more_memory
 
 #: Bytes for which it is not asked how much memory is left, which takes longer than small layers.
 _ALWAYS_THERE = 1 << 20
+#: Walk edges handled at a time; it changes no result.
+_PIECE = 1_000_000
+#: Walk edges out of one layer; more are hours of work.
+_MOST = 1e10
 #: Mixtures that failed have no state: this in place of ``y``.
 FAILED = -1
 
@@ -44,45 +48,15 @@ class Moves:
     mixed: Ints
 
 
-@dataclass(frozen=True, slots=True)
-class WalkLimits:
-    """How much of a walk is handled at a time, and how much is tried at all.
-
-    Parameters
-    ----------
-    piece
-        Walk edges handled at a time; it changes no result.
-    most
-        Walk edges out of one layer; more are hours of work.
-    memory_left
-        The bytes that are left, asked anew for every estimate.
-    """
-
-    piece: int = 1_000_000
-    most: float = 1e10
-    memory_left: Callable[[], float] = memory_left
-
-
-_LIMITS = WalkLimits()
-
-
-def moves(
-    space: PlanSpace,
-    index: EdgeIndex,
-    nodes: Ints,
-    *,
-    together: bool = False,
-    limits: WalkLimits = _LIMITS,
-) -> Iterator[Moves]:
+def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints, most: float = _MOST) -> Iterator[Moves]:
     """All moves of n plans and their mixture out of walk nodes ``(x_1 .. x_n, y)``, in chunks.
 
-    With ``together`` only those in which all plans reach the same node.
+    Raises `OutOfMemory` where there are more than ``most``, or one node needs too much at once.
     """
     robots = nodes.shape[1] - 1
     sizes = edges_out_of(space, nodes)
-    if not together:
-        _check_size(sizes, space, limits)
-    for span in spans(sizes, limits.piece):
+    _check_size(sizes, space, most)
+    for span in spans(sizes, _PIECE):
         source = np.arange(span.start, span.stop)
         prefix = nodes[span, robots]
         edges: list[Ints] = []
@@ -90,10 +64,6 @@ def moves(
             which, edge = space.edges_from(nodes[source, robot])
             source, prefix = source[which], prefix[which]
             edges = [old[which] for old in edges]
-            if together and robot:
-                same = space.targets(edge) == space.targets(edges[0])
-                source, prefix, edge = source[same], prefix[same], edge[same]
-                edges = [old[same] for old in edges]
             edges.append(edge)
             prefix = index.follow(robot, prefix, space.robot_labels(robot, edge))
         mixed = (
@@ -126,19 +96,19 @@ def edges_out_of(space: PlanSpace, nodes: Ints) -> NDArray[np.float64]:
     return product
 
 
-def _check_size(sizes: NDArray[np.float64], space: PlanSpace, limits: WalkLimits) -> None:
+def _check_size(sizes: NDArray[np.float64], space: PlanSpace, most: float) -> None:
     """Stop before one node needs too much at once, or a layer too much work."""
     largest, total = sizes.max(initial=0), sizes.sum()
     robots, instead = space.robots, space.model.smaller("fewer robots", "smaller tasks")
     # One row of a chunk holds its source, a prefix and an edge for each robot, and copies of them.
     at_once = 100 * largest
-    if at_once > _ALWAYS_THERE and at_once > limits.memory_left():
+    if at_once > _ALWAYS_THERE and at_once > memory_left():
         raise OutOfMemory(
             f"a state has {largest:,.0f} combinations of {robots} plans' next steps: about "
             f"{at_once / 2**30:,.1f} GiB at once",
             remedy=f"Use {instead}, or {more_memory()}.",
         )
-    if total > limits.most:
+    if total > most:
         raise OutOfMemory(
             f"the {len(sizes):,} nodes of one layer of the walk have {total:.1e} combinations "
             f"of {robots} plans' next steps",

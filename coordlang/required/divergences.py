@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coordlang.required.choices import Choices
-from coordlang.required.label_sets import LabelSets
+from coordlang.required.choices import Choices, LabelSets
 from coordlang.required.partings import Partings
 from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace

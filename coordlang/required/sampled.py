@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+from bisect import bisect
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from math import sqrt
 from random import Random
 
@@ -111,21 +113,11 @@ class _Game:
                 self._number(self.space.target_of(edge), rest)
                 for edge, rest in zip(edges, rests, strict=True)
             ]
-            chosen = self._choice(weights, random)
+            chosen = bisect(list(accumulate(weights)), random.randrange(sum(weights)))
             path.append(edges[chosen])
             node, said = self.space.target_of(path[-1]), rests[chosen]
             nodes.append(node)
         return nodes, path
-
-    @staticmethod
-    def _choice(weights: Sequence[int], random: Random) -> int:
-        """A position drawn with exact integer weights."""
-        rank = random.randrange(sum(weights))
-        for position, weight in enumerate(weights):
-            if rank < weight:
-                return position
-            rank -= weight
-        raise AssertionError("the rank is below the sum")
 
     def _rest(self, node: int, target: int, said: Sentence | None) -> Sentence | None:
         """What is left to say from ``target`` on, after ``said`` from ``node`` on."""

@@ -9,10 +9,9 @@ from typing import Annotated, Any
 import msgspec
 from msgspec import Meta
 
-from coordlang.language.duplicate_keys import duplicate_key
-from planners.system.errors import BadInput, Position
+from coordlang.language.duplicate_keys import refuse_duplicates
+from planners.system.errors import Position
 from planners.system.files import FileFormat, read_bytes
-from planners.system.messages import echoed
 from planners.system.writing import write_compressed
 
 FORMAT = "coordlang/certificate"
@@ -93,11 +92,5 @@ def read_certificate(path: str | Path) -> Certificate:
     """
     data, position = read_bytes(path), Position(str(path))
     certificate = CERTIFICATE.decode(data, position)
-    twice = duplicate_key(data.removeprefix(b"\xef\xbb\xbf"), b"", 0)
-    if twice is not None:
-        raise BadInput(
-            f"the key {echoed(twice)} occurs twice",
-            position=position,
-            remedy="Of two entries one would be lost.",
-        )
+    refuse_duplicates(data, position)
     return certificate

@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 
 from coordlang.language.partition import Partition
-from coordlang.required.choices import Choices
-from coordlang.required.composition_walk import WalkLimits, moves
-from coordlang.required.label_sets import LabelSets
+from coordlang.required.choices import Choices, LabelSets
+from coordlang.required.composition_walk import moves
 from coordlang.required.miscoordination import miscoordination
-from coordlang.verification import by_definition as verify
+from coordlang.verification.by_definition import verify
+from coordlang.verification.walk import Walk
 from planners import grounding
 from planners.grounding import instantiate
 from planners.joint.composition import ComposingStepper
@@ -279,7 +279,7 @@ def test_required_coordination_says_how_far_it_got(monkeypatch: pytest.MonkeyPat
 def test_a_size_that_nobody_can_wait_for() -> None:
     space = plans("three-robots-3x3")
     every = np.repeat(np.arange(len(space))[:, None], space.robots + 1, axis=1)
-    walked = moves(space, EdgeIndex.of(space), every, limits=WalkLimits(most=1000.0))
+    walked = moves(space, EdgeIndex.of(space), every, most=1000.0)
     with pytest.raises(
         OutOfMemory,
         match=r"nodes of one layer of the walk have .* combinations of 3 plans' next steps",
@@ -298,9 +298,9 @@ def test_verification_and_the_search_for_a_break_say_how_far_they_got(
     def fail(*_: object, **__: object) -> None:
         raise late()
 
-    monkeypatch.setattr(verify._Walk, "_children", fail)
+    monkeypatch.setattr(Walk, "_children", fail)
     with pytest.raises(OutOfTime) as caught:
-        verify.verify(table, [space])
+        verify(table, [space])
     assert "layer 1 of 5 of the verification, 1 nodes of its walk" in str(caught.value)
     monkeypatch.setattr(Choices, "edges_of", fail)
     with pytest.raises(OutOfTime) as caught:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from coordlang.required.breaks import Trail
-from coordlang.required.composition_walk import FAILED, moves
+from coordlang.required.composition_walk import FAILED, Moves, moves
 from planners.joint.tables import Ints, unique_tuples
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
@@ -30,7 +30,11 @@ def walk_to_a_break(space: PlanSpace, starts: Ints, *, together: bool) -> Trail 
         came = np.concatenate((came, np.full((len(fresh), robots), -1)))
         history.append((table, parents, came))
         found: list[Ints] = []
-        for move in moves(space, index, table, together=together):
+        for move in moves(space, index, table):
+            if together:
+                ends = space.targets(move.edges)
+                same = (ends == ends[:, :1]).all(axis=1)
+                move = Moves(move.source[same], move.edges[same], move.mixed[same])
             broken = np.flatnonzero(move.mixed == FAILED)
             if len(broken):
                 first = broken[0]

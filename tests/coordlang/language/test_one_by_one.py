@@ -180,9 +180,9 @@ def test_what_is_reachable_is_never_refused() -> None:
         world = built(random_model(seed, ("agent", "plain")[seed % 2]))
         model, start = world.model, world.tasks[0].init
         rows = explore(model, start[None, :]).rows
-        assert surely_unreachable(model, [start], rows) == []
+        assert surely_unreachable(model, start[None, :], rows) == []
         every = np.arange(2 ** len(model.codec.facts), dtype=np.uint64)[:, None]
-        refused += len(surely_unreachable(model, [start], every))
+        refused += len(surely_unreachable(model, start[None, :], every))
     assert refused >= 5
 
 

@@ -19,7 +19,7 @@ from coordlang.lifted.choosing import SimplestHitting, undominated
 from coordlang.lifted.features import Feature
 from coordlang.lifted.instance import Instance
 from coordlang.lifted.language import LiftedLanguage
-from coordlang.lifted.learning import Learned, find_vectors, learn
+from coordlang.lifted.learning import Learned, learn
 from coordlang.lifted.pool import pool_of
 from coordlang.verification.by_definition import verify
 from planners.joint.tables import Ints
@@ -135,9 +135,9 @@ def test_the_fewest_words_over_classes() -> None:
     known = [instance("grid", "gw1-2x2"), instance("t-map", "problem")]
     learned = learn(known, complexity=6, prefer="features")
     every = [own.vectors(learned.features) for own in known]
-    table = np.unique(np.concatenate(every), axis=0)
+    table, number = np.unique(np.concatenate(every), axis=0, return_inverse=True)
     assert learned.proved
-    classes = [find_vectors(table, own) for own in every]
+    classes = np.split(number.reshape(-1), [len(every[0])])
     least = next(
         size
         for size in range(1, len(table) + 1)

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from coordlang.language.candidates import all_pairs
-from coordlang.required.choices import Choices
+from coordlang.required.choices import Choices, LabelSets
 from coordlang.required.divergences import first_differences
-from coordlang.required.label_sets import LabelSets
 from coordlang.required.miscoordination import inseparable
 from coordlang.required.partings import Partings, _KnownSets, minimal
 from planners.pddl import parse_domain, parse_problem

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from coordlang.required.fewest_actions import fewest_actions, requiring
+from coordlang.required.task_answers import fewest_actions, requiring
 from planners.loading import PlanningInstance, build
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.model_options import ModelOptions

@@ -8,7 +8,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.required.label_sets import END, LabelSets
+from coordlang.required.choices import END, LabelSets
 
 Sequences = frozenset[tuple[int, ...]]
 
@@ -65,7 +65,7 @@ def test_sets_are_sets(seed: int) -> None:
 @pytest.mark.parametrize("table", [0, 10**6])
 @pytest.mark.parametrize("seed", range(10))
 def test_many_at_once(seed: int, table: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("coordlang.required.label_sets._TABLE", table)
+    monkeypatch.setattr("coordlang.required.choices._TABLE", table)
     random = Random(seed)
     sets = LabelSets()
     groups = [[some_sequences(random, 2) for _ in range(random.randint(1, 4))] for _ in range(9)]
