@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from functools import reduce
 
-from coordlang.required.choices import Choices
-from coordlang.required.label_sets import END, LabelSets
+from coordlang.required.choices import END, Choices, LabelSets
 from coordlang.vocabulary.sentence_sets import NOTHING, SILENCE, SentenceSets, Words
 from planners.joint.tables import Ints
 
