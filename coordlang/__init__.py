@@ -25,14 +25,14 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from coordlang.commands.build import build as build
+    from coordlang.commands.check import check as check
     from coordlang.commands.choices import choices as choices
-    from coordlang.commands.coordination_tasks import coordination as coordination
-    from coordlang.commands.cross_check import check as check
+    from coordlang.commands.coordination import coordination as coordination
     from coordlang.commands.explaining import explain as explain
     from coordlang.commands.exporting import export as export
     from coordlang.commands.inputs import load as load
     from coordlang.commands.inspect import inspect as inspect
-    from coordlang.commands.languages import build as build
     from coordlang.commands.languages import load_language as load_language
     from coordlang.commands.languages import verify as verify
     from coordlang.commands.lifting import ground as ground
@@ -68,9 +68,10 @@ _DEFINED_IN = {
     "coordlang.commands.inputs": ("load",),
     "coordlang.commands.inspect": ("inspect",),
     "coordlang.commands.plans": ("plans",),
-    "coordlang.commands.cross_check": ("check",),
-    "coordlang.commands.coordination_tasks": ("coordination",),
-    "coordlang.commands.languages": ("build", "verify", "load_language"),
+    "coordlang.commands.check": ("check",),
+    "coordlang.commands.coordination": ("coordination",),
+    "coordlang.commands.build": ("build",),
+    "coordlang.commands.languages": ("verify", "load_language"),
     "coordlang.commands.lifting": ("lift", "ground"),
     "coordlang.commands.speaking": ("say", "understand", "plan"),
     "coordlang.commands.choices": ("choices",),

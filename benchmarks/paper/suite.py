@@ -11,7 +11,7 @@ from benchmarks.frame import DOMAINS
 from benchmarks.paper.recipe import Record
 from benchmarks.paper.reported import TABLE_1
 from coordlang.commands.building import build_language
-from coordlang.commands.tolerating import WordLimit, build_few_words
+from coordlang.commands.tolerating import build_few_words
 from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
 from coordlang.language.listed import ListedTask
 from coordlang.language.task_file import read_task_file
@@ -123,8 +123,8 @@ def language_for(
     options = ModelOptions(slack=1, words_see_slack=True) if method == "slack" else None
     candidates = world.candidates(listed, options)
     if method in ("few", "silence"):
-        words = WordLimit({"few": 2, "silence": 1}[method])
-        built = build_few_words(candidates, words, seed=seed)[0]
+        words = {"few": 2, "silence": 1}[method]
+        built = build_few_words(candidates, words, seed=seed)
     elif method == "flexible":
         built = build_language(candidates, "minimal", seed=seed, prefer="flexible")
     else:

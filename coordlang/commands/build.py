@@ -6,142 +6,228 @@ from __future__ import annotations
 import json
 import os
 import sys
-from dataclasses import replace
-from time import monotonic
-from typing import TYPE_CHECKING, Any
-
-import click
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from importlib.metadata import version
+from os import PathLike, fspath
+from time import monotonic, perf_counter
+from typing import Any
 
 import coordlang
+from coordlang.commands.build_text import built_text
+from coordlang.commands.building import MethodOptions, build_language
+from coordlang.commands.built import Built
+from coordlang.commands.command import command_of
 from coordlang.commands.failure import UNPROVED, code_of_interrupt, why_stopped
-from coordlang.commands.files import (
-    FILE,
-    PlanningFiles,
-    check_outputs,
-    never_stdout,
-    planning_files,
+from coordlang.commands.inputs import (
+    DomainSource,
+    PlanningInput,
+    ProblemSource,
+    TasksSource,
+    read_planning,
 )
-from coordlang.commands.shared_options import (
-    JobsKeywords,
-    ModelKeywords,
-    jobs_options,
-    kept_plans,
-    limits,
-    model_options,
-    slack_option,
-    was_given,
-)
+from coordlang.commands.keywords import with_options
+from coordlang.commands.language_inputs import LanguageSource, read_language_source
+from coordlang.commands.languages import Progress
+from coordlang.commands.options import Jobs, Source, Unsolvable, json_option, output_option
+from coordlang.commands.repairing import repair_language
 from coordlang.commands.terminal import echo, line_width, note_single_robot, working
+from coordlang.commands.tolerating import build_few_words
+from coordlang.commands.workers import opened_workers, say_size
+from coordlang.language.candidates import Candidates
+from coordlang.language.file import to_bytes, write_language
+from coordlang.language.recorded import check_domain, with_recorded
+from coordlang.language.words import Language
+from coordlang.required.fewest_actions import requiring
+from coordlang.verification.certificate_file import Certificate, write_certificate
+from planners.pddl.model_options import ModelOptions
+from planners.system.errors import OutOfTime, ProvedImpossible, UsageError
+from planners.system.limits import run_until_stopped, start_clock, stop_clock, time_left
 from planners.system.messages import visible
 from planners.system.notebook import counted
-
-if TYPE_CHECKING:
-    from coordlang.commands.languages import BuiltLanguage
-    from coordlang.verification.certificate_file import Certificate
+from planners.system.options import group, option
+from planners.system.writing import is_device, remove_file
 
 #: Share of the time that a search leaves for its certificate.
 _FOR_CERTIFICATE = 0.25
 
 
-@click.command(name="build")
-@planning_files("DOMAIN PROBLEMS...")
-@click.option(
-    "--tasks",
-    type=FILE,
-    metavar="all|FILE",
-    help="Candidate tasks: every pair of reachable states, or a task file "
-    "(default: the problems' own).",
-)
-@click.option(
-    "--method",
-    type=click.Choice(["greedy", "separating", "minimal", "exhaustive"]),
-    default="greedy",
-    show_default=True,
-    help="greedy: fast.  separating: fewest words that part plans where they differ first or "
-    "last.  minimal: fewest words at all, with proof.  exhaustive: brute force.",
-)
-@click.option(
-    "--alpha-only",
-    is_flag=True,
-    help="separating: part plans where they differ first, never where last.",
-)
-@click.option(
-    "--prefer",
-    type=click.Choice(["flexible", "simple"]),
-    help="Of the languages with the fewest words (--method minimal or exhaustive) one whose .. "
-    "flexible: sentences leave many plans open.  simple: words have short formulas.",
-)
-@click.option(
-    "--words",
-    type=click.IntRange(min=1),
-    metavar="K",
-    help="At most K words, in place of a method: those under which robots that choose by "
-    "themselves fail least often.  1: silence.",
-)
-@click.option(
-    "--worst",
-    is_flag=True,
-    help="With --words: minimise how often they fail in the worst task, not on average.",
-)
-@click.option(
-    "--start",
-    type=FILE,
-    metavar="LANGUAGE",
-    help="Repair this language in place of building one: as few states as possible change their "
-    "word.",
-)
-@click.option(
-    "--certificate",
-    type=FILE,
-    metavar="FILE",
-    help="Also write why fewer words do not suffice, for `verify --certificate`.",
-)
-@click.option(
-    "--unsolvable",
-    type=click.Choice(["fail", "skip"]),
-    default="fail",
-    show_default=True,
-    help="What to do about candidate tasks without plans: stop (exit 11), "
-    "or name and leave them out.",
-)
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=FILE,
-    metavar="LANGUAGE",
-    help="The language file; .json or .json.gz, - for stdout.",
-)
-@click.option("--seed", type=int, default=0, show_default=True)
-@click.option("--json", "as_json", is_flag=True, help="Print the figures as one JSON object.")
-@click.option(
-    "--words-see-slack",
-    is_flag=True,
-    help="States also say how many steps of the slack are left, and words may differ in that.",
-)
-@jobs_options
-@model_options
-@slack_option
-@kept_plans
-@limits
-def command(
-    pddl: PlanningFiles,
-    tasks: str | None,
-    method: str,
-    alpha_only: bool,
-    prefer: str | None,
-    words: int | None,
-    worst: bool,
-    start: str | None,
-    certificate: str | None,
-    unsolvable: str,
-    output: str,
-    seed: int,
-    as_json: bool,
-    words_see_slack: bool,
-    on_workers: JobsKeywords,
-    model: ModelKeywords,
-) -> int:
+@dataclass(frozen=True, slots=True)
+class BuildOptions:
+    """What `build` can be asked for: a method, or a number of words, or a language to repair."""
+
+    tasks: TasksSource | None = option(
+        None,
+        "Candidate tasks: every pair of reachable states, or a task file (default: the problems' "
+        "own).",
+        "all|FILE",
+    )
+    way: MethodOptions = group(MethodOptions)
+    words: int | None = option(
+        None,
+        "At most K words, in place of a method: those under which robots that choose by themselves "
+        "fail least often.  1: silence.",
+        "K",
+        least=1,
+    )
+    worst: bool = option(
+        False, "With --words: minimise how often they fail in the worst task, not on average."
+    )
+    start: LanguageSource | None = option(
+        None,
+        "Repair this language in place of building one: as few states as possible change their "
+        "word.",
+        "LANGUAGE",
+    )
+    unsolvable: Unsolvable = option(
+        "fail",
+        "What to do about candidate tasks without plans: stop (exit 11), or name and leave them "
+        "out.",
+    )
+    output: str = output_option(
+        "The language file; .json or .json.gz, - for stdout.", "LANGUAGE", required=True
+    )
+    certificate: str | None = option(
+        None,
+        "Also write why fewer words do not suffice, for verify --certificate.",
+        "FILE",
+        only="cli",
+        is_output=True,
+    )
+    as_json: bool = json_option("Print the figures as one JSON object.")
+    reserve: float = option(
+        0.0,
+        "The share of a time limit's rest that a search, once there is a language, leaves for its "
+        "certificate.",
+        only="python",
+    )
+    progress: Progress | None = option(
+        None, "Called with a line of text when a phase begins.", only="python"
+    )
+    work: Jobs = group(Jobs)
+    source: Source = group(Source)
+    given: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        if self.words is None and self.worst:
+            raise UsageError("--worst belongs to --words", remedy="Add --words K.")
+        ways = self.given & {"method", "alpha_only", "prefer"}
+        if self.words is not None and (ways or self.certificate or self.start is not None):
+            raise UsageError(
+                "--words finds the words in its own way: without --method or --certificate",
+                remedy="Leave out --method, --alpha-only, --prefer, --start and --certificate.",
+            )
+        if self.start is not None and ways:
+            raise UsageError(
+                "--start changes the words of a language, and no method makes new ones",
+                remedy="Leave out --method, --alpha-only and --prefer, or --start.",
+            )
+
+
+@with_options(BuildOptions)
+def build(
+    domain: DomainSource | None = None, *problems: ProblemSource, options: BuildOptions
+) -> Built:
+    """Build a coordination language for candidate tasks, and verify it by definition.
+
+    Where ``words`` are too few for one, the result is none, and says so (``failures``).  A language
+    to repair (``start``) also serves the tasks that it records, unless the map has changed.  The
+    language does not depend on ``jobs``, ``scheduler`` and ``resume``.
+
+    Raises
+    ------
+    Inseparable
+        If plans that do not mix pass through the same states; ``remember_actions`` helps.
+    ProvedImpossible
+        For a candidate task without a plan, unless such tasks are skipped.
+    OutOfTime, OutOfMemory
+        If a limit was hit before there was any verified language; later the language so far is
+        returned, with ``stopped`` set.
+    """
+    start, seed, say = options.start, options.way.seed, options.progress or _silent
+    begin, deadline = perf_counter(), monotonic() + time_left()
+    files = read_planning(domain, problems, options.source)
+    if start is None:
+        candidates = _candidates(files, options, files.source.model)
+    else:
+        old, candidates = _to_repair(start, files, options)
+    seconds = {"space": perf_counter() - begin}
+    say_size(candidates, options.work.note or options.progress)
+    fewest = requiring(candidates.spaces) if candidates.kind != "all" else None
+    with opened_workers(options.work) as workers:
+        if options.words is not None:
+            built = build_few_words(
+                candidates,
+                options.words,
+                worst=options.worst,
+                seed=seed,
+                progress=say,
+                workers=workers,
+            )
+        elif start is not None:
+            built = repair_language(candidates, old, seed=seed, progress=say, workers=workers)
+        else:
+            reserve = _FOR_CERTIFICATE if options.certificate else options.reserve
+            built = build_language(
+                candidates, **asdict(options.way), reserve=reserve, progress=say, workers=workers
+            )
+    seconds |= built.seconds
+    producer = {
+        "program": "coordlang",
+        "version": coordlang.__version__,
+        "arguments": _arguments(options),
+        "seed": seed,
+        "solver": f"python-sat {version('python-sat')}",
+        "seconds": {name: round(value, 3) for name, value in seconds.items()},
+    }
+    language = _with_producer(built.language, producer)
+    return replace(built, language=language, seconds=seconds, fewest=fewest, deadline=deadline)
+
+
+def _candidates(files: PlanningInput, options: BuildOptions, model: ModelOptions) -> Candidates:
+    try:
+        return files.candidates(options.tasks, model, skip_unsolvable=options.unsolvable == "skip")
+    except ProvedImpossible as error:
+        if options.unsolvable == "fail":
+            advice = (error.remedy, "--unsolvable skip leaves out such tasks.")
+            error.remedy = "\n  ".join(filter(None, advice))
+        raise
+
+
+def _to_repair(
+    start: LanguageSource, files: PlanningInput, options: BuildOptions
+) -> tuple[Language, Candidates]:
+    """Return the language and the tasks that it is to serve."""
+    language, position = read_language_source(start)
+    check_domain(language, files.domain, position)
+    if files.source.model.slack or (language.tolerance is not None and language.tolerance.slack):
+        raise UsageError(
+            "--start does not go with --slack: a language for plans within slack is built anew",
+            remedy="Leave out --start.",
+        )
+    candidates = _candidates(files, options, files.options_of(language))
+    return language, with_recorded(language, candidates, position)
+
+
+def _arguments(options: BuildOptions) -> list[str]:
+    """Return the keywords of a call as a language file records them."""
+    named = {**asdict(options.way), "words": options.words, "worst": options.worst}
+    given = {name: value for name, value in named.items() if value}
+    files = {"tasks": options.tasks, "start": options.start}
+    given |= {k: fspath(file) for k, file in files.items() if isinstance(file, str | PathLike)}
+    return [f"{name}={value}" for name, value in sorted(given.items())]
+
+
+def _with_producer(language: Language, producer: Mapping[str, Any]) -> Language:
+    return replace(language, provenance=replace(language.provenance, producer=producer))
+
+
+def _silent(_: str) -> None:
+    """Report nothing."""
+
+
+@command_of(build, "DOMAIN PROBLEMS...", doing="finding all optimal plans")
+def command(built: Built, options: BuildOptions) -> int:
     """Build a coordination language and verify it before it is written.
 
     With --words K: words that may be too few for that, and how often robots then fail.
@@ -149,79 +235,37 @@ def command(
     Exit 0: written, with the proof that the method promises.  3: written without it (a limit was
     hit).
     """
-    from planners.system.limits import stop_clock, time_left
-
-    if words is not None and (certificate or was_given("method")):
-        raise click.UsageError(
-            "--words finds the words in its own way: without --method or --certificate"
-        )
-    end = monotonic() + time_left()
-    never_stdout("--certificate", certificate)
-    listed = tasks if tasks != "all" else None
-    check_outputs([("-o", output), ("--certificate", certificate)], [*pddl.paths, listed, start])
-    built = _build(
-        pddl,
-        tasks=tasks,
-        method=method,
-        alpha_only=alpha_only,
-        prefer=prefer,
-        words=words,
-        worst=worst,
-        start=start,
-        unsolvable=unsolvable,
-        seed=seed,
-        reserve=_FOR_CERTIFICATE if certificate else 0.0,
-        words_see_slack=words_see_slack,
-        **on_workers,
-        **model,
-    )
-    proof, unproved = _certificate(built, end) if certificate else (None, None)
+    output, certificate = options.output, options.certificate
+    for name in built.skipped:
+        echo(f"coordlang: left out, it has no plan: {name}", err=True)
+    note_single_robot(built.candidates.model.robots)
+    proof, unproved = _certificate(built) if certificate else (None, None)
     stop_clock()  # the work is done; from here on it is saved
     stopped = _save(built, output, certificate) or unproved
     try:
         if certificate and proof is not None and stopped is None:
             _write_certificate(built, proof, output, certificate)
-        figures = built.data()
-        if as_json and output != "-":
-            echo(json.dumps(figures))
+        if options.as_json and output != "-":
+            echo(json.dumps(built.data()))
         else:
-            echo(_summary(built, figures, output), err=output == "-")
+            to_stderr = output == "-"
+            place = "stdout" if to_stderr else visible(output)
+            text = built_text(built, line_width(err=to_stderr))
+            echo(f"{text}written to {place}", err=to_stderr)
     except KeyboardInterrupt as error:
         stopped = error
     return _exit_code(built, output, certificate, stopped)
 
 
-def _build(pddl: PlanningFiles, **keywords: Any) -> BuiltLanguage:
-    """Build with progress shown, and write to stderr what belongs to the tasks."""
-    from coordlang.commands.witness import witness_text
-
-    try:
-        with working("finding all optimal plans") as progress:
-            built = coordlang.build(
-                *pddl.files, factored=pddl.factored, progress=progress, **keywords
-            )
-    except coordlang.Inseparable as error:
-        echo(witness_text(error.witness, line_width(err=True)), err=True)
-        raise
-    for name in built.skipped:
-        echo(f"coordlang: left out, it has no plan: {name}", err=True)
-    note_single_robot(built.candidates.model.robots)
-    return built
-
-
-def _save(built: BuiltLanguage, output: str, certificate: str | None) -> BaseException | None:
+def _save(built: Built, output: str, certificate: str | None) -> BaseException | None:
     """Write the language; its file records the arguments of the command line.
 
     The certificate of a language that stood there before goes with it.  An interrupt does not lose
     the language: it is written, and the interrupt returned.
     """
-    from coordlang.language.file import to_bytes, write_language
-    from planners.system.writing import is_device, remove_file
-
     arguments = [visible(argument) for argument in sys.argv[1:]]
-    provenance = built.language.provenance
-    producer = {**provenance.producer, "arguments": arguments}
-    language = replace(built.language, provenance=replace(provenance, producer=producer))
+    producer = {**built.language.provenance.producer, "arguments": arguments}
+    language = _with_producer(built.language, producer)
     if output == "-":
         remove_file(certificate)
         echo(to_bytes(language).decode(), nl=False)
@@ -236,23 +280,19 @@ def _save(built: BuiltLanguage, output: str, certificate: str | None) -> BaseExc
     return None
 
 
-def _certificate(
-    built: BuiltLanguage, end: float
-) -> tuple[Certificate | None, BaseException | None]:
-    """Return the certificate, checked, or the error that ended it early, until the time ``end``.
+def _certificate(built: Built) -> tuple[Certificate | None, BaseException | None]:
+    """The certificate, checked, or the error that ended it early, within the time limit.
 
     Nothing is written before: a language whose certificate is refused is none.  Of a search that
     was stopped it proves the lower bound that was reached; not after an interrupt, which asks for
     an end.
     """
-    from planners.system.limits import run_until_stopped, start_clock
-
     if isinstance(built.stopped, KeyboardInterrupt):
         return None, built.stopped
     proofs: list[Certificate] = []
 
     def prove() -> None:
-        start_clock(end - monotonic())
+        start_clock(built.deadline - monotonic())
         with working("proving and checking why fewer words do not suffice"):
             proofs.append(built.certificate())
 
@@ -267,12 +307,10 @@ def _certificate(
     return None, stopped
 
 
-def _write_certificate(built: BuiltLanguage, proof: Certificate, output: str, path: str) -> None:
-    from coordlang.verification.certificate_file import write_certificate
-
+def _write_certificate(built: Built, proof: Certificate, output: str, path: str) -> None:
     try:
         write_certificate(proof, path)
-    except coordlang.UsageError as error:
+    except UsageError as error:
         error.reached = _written(built, output)
         raise
     if not built.guarantee.proved_minimal:
@@ -285,20 +323,20 @@ def _write_certificate(built: BuiltLanguage, proof: Certificate, output: str, pa
 
 
 def _exit_code(
-    built: BuiltLanguage, output: str, certificate: str | None, ended: BaseException | None
+    built: Built, output: str, certificate: str | None, ended: BaseException | None
 ) -> int:
-    """Return the exit code, and write to stderr what ended the work early.
+    """The exit code; writes to stderr what ended the work early.
 
     ``ended`` is what ended it after the language was built.
     """
-    proved, exact = built.guarantee.proved_minimal, built.options.is_exact
+    proved, exact = built.guarantee.proved_minimal, built.is_exact
     stopped = ended or built.stopped
     if isinstance(stopped, KeyboardInterrupt):
         echo(f"coordlang: interrupted; {_written(built, output, certificate)}", err=True)
         return code_of_interrupt(stopped)
     if stopped is not None:
         reason = why_stopped(stopped)
-        if certificate and isinstance(stopped, coordlang.OutOfTime) and stopped is built.stopped:
+        if certificate and isinstance(stopped, OutOfTime) and stopped is built.stopped:
             reason += ", a part of it kept for the certificate"
         short_of = "" if proved and exact else ", without proof"
         best = "language" if built.few_words is None else "partition into words"
@@ -308,101 +346,16 @@ def _exit_code(
     return 0 if stopped is None else UNPROVED
 
 
-def _written(built: BuiltLanguage, output: str, certificate: str | None = None) -> str:
+def _written(built: Built, output: str, certificate: str | None = None) -> str:
     """What is written when the work ends early, and what is proved of it."""
-    from planners.system.writing import is_device
-
     where = "" if output == "-" else f" to {output}"
     if built.guarantee.proved_minimal:
         text = f"the language is written{where}: it is verified and proved minimal"
     else:
         text = f"the best language so far is written{where}: it is "
-        text += "verified" if built.built.verdict.holds else "no coordination language"
+        text += "verified" if built.verdict.holds else "no coordination language"
     if certificate is None or is_device(certificate):
         return text
     # The certificate of another language went when this one was written.
     is_there = os.path.isfile(certificate)
     return f"{text}; {'and so is its certificate' if is_there else 'no certificate is written'}"
-
-
-def _summary(built: BuiltLanguage, figures: dict[str, Any], output: str) -> str:
-    total = sum(figures["seconds"].values())
-    proof = f"at least {figures['lower_bound']} needed, "
-    if figures["proved_minimal"]:
-        proof = "proved minimal, "
-    words, tasks = counted(figures["words"], "word"), counted(figures["tasks"], "task")
-    verified = "verified"
-    if built.few_words is not None and not figures["verified"]:
-        proof, verified = "", "no coordination language"
-    return (
-        f"{words} ({figures['method']}, {proof}{verified}) for {tasks}, "
-        f"{figures['tasks_requiring_coordination']:,} of which require coordination\n"
-        f"{figures['states_on_plans']:,} states on {built.candidates.model.kept_plans}, "
-        f"{figures['divergences']:,} divergences, "
-        f"{figures['walk_nodes']:,} nodes of plans, {total:.2f} s\n"
-        f"{_fewest(figures)}{_failures(built)}{_flexibility(figures)}{_readability(figures)}"
-        f"{_repair(built, err=output == '-')}"
-        f"written to {'stdout' if output == '-' else visible(output)}"
-    )
-
-
-def _fewest(figures: dict[str, Any]) -> str:
-    """What another cost would change; a whole line."""
-    fewest = figures.get("tasks_requiring_coordination_with_fewest_actions")
-    if fewest is None:
-        return ""
-    does = figures["tasks_requiring_coordination"]
-    less = ": one word would do" if fewest == 0 else ""
-    would = f"{counted(fewest, 'task')} would require coordination"
-    return f"with --cost makespan+actions {would}, not {does:,}{less}\n"
-
-
-def _failures(built: BuiltLanguage) -> str:
-    """How often robots fail under as many words as were asked for; whole lines."""
-    from coordlang.required.failures import Failures
-
-    found = built.few_words
-    if found is None:
-        return ""
-    line = f"robots that choose by themselves {built.failures.text()}"
-    if built.built.verdict.holds:
-        line = "no robot fails: this is a coordination language"
-    elif found.is_best and len(built.language.words) > 1:
-        line += " (the least of all partitions)"
-    silence = Failures(found.silence.mean, found.silence.worst)
-    return f"{line}\nin silence they {silence.text()}\n"
-
-
-def _repair(built: BuiltLanguage, *, err: bool) -> str:
-    """What became of the language that it started from; whole lines."""
-    if built.repaired is None:
-        return ""
-    from coordlang.commands.repair import repair_text
-
-    return f"{repair_text(built.repaired, line_width(err=err))}\n"
-
-
-def _readability(figures: dict[str, Any]) -> str:
-    """How short formulas are, where that was optimised; whole lines."""
-    if "terms" not in figures:
-        return ""
-    terms, limits = figures["terms"], figures["limits"]
-    proved = (terms, limits) == (figures["terms_lower_bound"], figures["limits_lower_bound"])
-    proof = "proved the shortest" if proved else f"at least {figures['terms_lower_bound']}"
-    before = f"{counted(figures['terms_before'], 'term')}, {figures['limits_before']} limits"
-    return (
-        f"formulas of {counted(terms, 'term')} with {counted(limits, 'limit')} on variables "
-        f"({before} before; {proof})\n"
-    )
-
-
-def _flexibility(figures: dict[str, Any]) -> str:
-    """How many plans the sentences leave open, where that was optimised; whole lines."""
-    if "flexibility" not in figures:
-        return ""
-    return (
-        f"a sentence leaves {figures['flexibility']:,.2f} plans open on average ("
-        f"{figures['flexibility_before']:,.2f} before, "
-        f"{figures['flexibility_bound']:,.2f} at most), "
-        f"communication saving {100 * figures['communication_saving']:.1f} %\n"
-    )

@@ -1,43 +1,229 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``coordlang coordination``: which tasks require coordination, and one miscoordination shown."""
+"""``coordlang coordination``: which tasks require coordination, one miscoordination shown."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
 
-import click
+from coordlang.commands.command import command_of
+from coordlang.commands.inputs import DomainSource, ProblemSource, read_planning
+from coordlang.commands.keywords import with_options
+from coordlang.commands.layout import WIDTH
+from coordlang.commands.options import Jobs, Source, json_option
+from coordlang.commands.terminal import echo, line_width, note_single_robot
+from coordlang.commands.witness import witness_data, witness_text
+from coordlang.commands.workers import opened_workers
+from coordlang.language.tolerance import percent
+from coordlang.required.failure import mean
+from coordlang.required.failures import Failures, estimate_data, estimate_text
+from coordlang.required.miscoordination import Miscoordination
+from coordlang.required.sampled import FailureEstimate
+from coordlang.required.task_answers import FewestActions, answers
+from planners.search.plan_file import json_count
+from planners.system.notebook import Presented, counted, html_table
+from planners.system.options import group
 
-import coordlang
-from coordlang.commands.files import PlanningFiles, planning_files
-from coordlang.commands.shared_options import (
-    JobsKeywords,
-    ModelKeywords,
-    jobs_options,
-    kept_plans,
-    limits,
-    model_options,
-    slack_option,
-)
-from coordlang.commands.terminal import echo, line_width, note_single_robot, working
+
+@dataclass(frozen=True, slots=True, repr=False)
+class TaskCoordination(Presented):
+    """Whether one task requires coordination (RC); true iff it does.
+
+    ``witness`` has two optimal plans whose mixture is none, or is None.  ``failure`` is how often
+    robots miscoordinate that draw their plans uniformly, independently and without a word: exact;
+    None where that is too much to count, and ``estimate`` is drawn.  Plans take up to ``slack``
+    joint steps more than the (least) ``makespan``.  ``fewest`` says what would hold of the plans
+    with the fewest actions alone, if it is better.
+    """
+
+    problem: str
+    makespan: int
+    plans: int
+    witness: Miscoordination | None
+    failure: Fraction | None = Fraction(0)
+    estimate: FailureEstimate | None = None
+    slack: int = 0
+    fewest: FewestActions | None = None
+    shown = ("problem", "makespan", "plans", "required", "failure")
+
+    @property
+    def required(self) -> bool:
+        """Whether some optimal plans of the task do not mix."""
+        return self.witness is not None
+
+    def __bool__(self) -> bool:
+        return self.required
+
+    def data(self) -> dict[str, Any]:
+        """The answer as JSON data."""
+        return {
+            "problem": self.problem,
+            "makespan": self.makespan,
+            "plans": json_count(self.plans),
+            "requires_coordination": self.required,
+            "miscoordination": witness_data(self.witness),
+            "failure": None if self.failure is None else float(self.failure),
+            **({"failure_estimate": estimate_data(self.estimate)} if self.estimate else {}),
+            **({"slack": self.slack} if self.slack else {}),
+            **({"fewest_actions": self.fewest.data()} if self.fewest else {}),
+        }
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def text(self, width: int = WIDTH) -> str:
+        """The answer in lines of at most ``width`` characters, as far as atoms allow."""
+        answer = "is required" if self.required else "is not required"
+        if not self.required and self.plans > 1:
+            answer += f": any mixture of them is {'one' if self.slack else 'optimal'}"
+        plans = f"{counted(self.plans, 'optimal plan')} of {counted(self.makespan, 'step')}"
+        if self.slack:
+            most = counted(self.makespan + self.slack, "step")
+            plans = f"{counted(self.plans, 'plan')} within slack {self.slack}, of at most {most}"
+        line = f"{self.problem}: {plans}; coordination {answer}"
+        if self.witness is None:
+            return line
+        return f"{line}{self._failure_text()}\n\n{witness_text(self.witness, width)}"
+
+    def _failure_text(self) -> str:
+        """How often robots fail in silence, as a line of its own."""
+        fewest = f"\n{self.fewest.text()}" if self.fewest else ""
+        if self.failure is not None:
+            share = percent(float(self.failure))
+        elif self.estimate is not None:
+            share = estimate_text(self.estimate)
+        else:
+            return fewest
+        said = f"\nWithout a word, robots that choose by themselves fail in {share} of all runs."
+        return f"{said}{fewest}"
 
 
-@click.command(name="coordination")
-@planning_files("DOMAIN PROBLEMS...")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object.")
-@jobs_options
-@model_options
-@slack_option
-@kept_plans
-@limits
-def command(
-    pddl: PlanningFiles, as_json: bool, on_workers: JobsKeywords, model: ModelKeywords
-) -> None:
+@dataclass(frozen=True, slots=True, repr=False)
+class Coordination(Presented):
+    """The tasks of the problems, each with its answer; true iff some task requires coordination."""
+
+    robots: tuple[str, ...]
+    tasks: tuple[TaskCoordination, ...]
+    shown = ("tasks", "requiring")
+
+    @property
+    def requiring(self) -> int:
+        """How many tasks require coordination."""
+        return sum(map(bool, self.tasks))
+
+    @property
+    def required(self) -> bool:
+        """Whether some task requires coordination."""
+        return any(self.tasks)
+
+    @property
+    def witness(self) -> Miscoordination | None:
+        """The first task's miscoordination that there is, or None."""
+        return next((task.witness for task in self.tasks if task.witness), None)
+
+    @property
+    def failure_mean(self) -> Fraction | None:
+        """How often robots fail without a word, over all tasks; None where it is not counted."""
+        counted = [task.failure for task in self.tasks if task.failure is not None]
+        return mean(counted) if len(counted) == len(self.tasks) else None
+
+    @property
+    def failure_worst(self) -> Fraction | None:
+        """The same in the worst task."""
+        counted = [task.failure for task in self.tasks if task.failure is not None]
+        return max(counted) if len(counted) == len(self.tasks) else None
+
+    def __bool__(self) -> bool:
+        return self.required
+
+    def __iter__(self) -> Iterator[TaskCoordination]:
+        return iter(self.tasks)
+
+    def __len__(self) -> int:
+        return len(self.tasks)
+
+    def __getitem__(self, number: int) -> TaskCoordination:
+        return self.tasks[number]
+
+    def data(self) -> dict[str, Any]:
+        """The answers as JSON data."""
+        means = {"failure_mean": self.failure_mean, "failure_worst": self.failure_worst}
+        return {
+            "tasks": [task.data() for task in self.tasks],
+            **{key: None if value is None else float(value) for key, value in means.items()},
+        }
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def text(self, width: int = WIDTH) -> str:
+        """The answers in lines of at most ``width`` characters, as far as atoms allow."""
+        lines = [task.text(width) for task in self.tasks]
+        overall = Failures(self.failure_mean, self.failure_worst)
+        if len(lines) > 1 and self.required and overall.mean is not None:
+            lines.append(f"\nOver all tasks, without a word, robots {overall.text()}.")
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        head = ("problem", "makespan", "plans", "coordination")
+        rows = [
+            (t.problem, str(t.makespan), f"{t.plans:,}", "required" if t else "not required")
+            for t in self.tasks
+        ]
+        return html_table(head, rows)
+
+
+@dataclass(frozen=True, slots=True)
+class CoordinationOptions:
+    """What `coordination` can be asked for."""
+
+    as_json: bool = json_option()
+    work: Jobs = group(Jobs)
+    source: Source = group(Source, without=("words_see_slack",))
+
+
+@with_options(CoordinationOptions)
+def coordination(
+    domain: DomainSource | None = None, *problems: ProblemSource, options: CoordinationOptions
+) -> Coordination:
+    """Decide which tasks require coordination, and show how robots then miscoordinate.
+
+    A task requires coordination (RC) if some mixture of its optimal plans is no optimal plan.
+
+    Raises
+    ------
+    ProvedImpossible
+        For a task without a plan.
+    """
+    files = read_planning(domain, problems, options.source)
+    loaded = files.instance()
+    with opened_workers(options.work) as workers:
+        found = answers(loaded, workers)
+    tasks = tuple(
+        TaskCoordination(
+            problem.source.name,
+            answer.makespan,
+            answer.plans,
+            answer.witness,
+            answer.failures.mean,
+            answer.failures.estimate,
+            loaded.model.slack,
+            answer.fewest,
+        )
+        for problem, answer in zip(files.problems, found, strict=True)
+    )
+    return Coordination(loaded.model.robots, tasks)
+
+
+@command_of(coordination, "DOMAIN PROBLEMS...", doing="finding all optimal plans")
+def command(found: Coordination, options: CoordinationOptions) -> None:
     """Decide which tasks require coordination.
 
     Show how robots that follow different optimal plans miscoordinate; with --slack B plans that
     take at most B steps more.
     """
-    with working("finding all optimal plans"):
-        found = coordlang.coordination(*pddl.files, factored=pddl.factored, **on_workers, **model)
     note_single_robot(found.robots)
-    echo(json.dumps(found.data()) if as_json else found.text(line_width()))
+    echo(json.dumps(found.data()) if options.as_json else found.text(line_width()))

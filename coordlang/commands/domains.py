@@ -5,71 +5,89 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
-import click
-
-from coordlang.commands.files import FILE, FOLDER, check_outputs
-from coordlang.commands.shared_options import limits
+from coordlang.commands.command import command_of
+from coordlang.commands.files import check_outputs
+from coordlang.commands.keywords import with_options
+from coordlang.commands.options import json_option
 from coordlang.commands.terminal import echo
-from planners.system.messages import visible
+from coordlang.sites.movingai import planning_files
+from coordlang.sites.shipped import about, domain_names, shipped_domains
+from planners.system.errors import UsageError
+from planners.system.messages import echoed, visible
 from planners.system.notebook import counted
+from planners.system.options import option
+from planners.system.writing import copy_folders, write_texts
 
 ALL = "all"
 
 
-@click.command(name="domains")
-@click.option(
-    "--copy",
-    nargs=2,
-    metavar="NAME|all DIR",
-    help="Copy this domain, or all of them, with problems and README into DIR/NAME.",
-)
-@click.option(
-    "--map",
-    "map_file",
-    type=FILE,
-    metavar="FILE.map",
-    help="A map of movingai.com, to be written as a problem of the grid domain.",
-)
-@click.option(
-    "--scen", type=FILE, metavar="FILE.scen", help="The scenario: where robots start and go."
-)
-@click.option("--agents", type=int, metavar="K", help="The first K robots of the scenario.")
-@click.option(
-    "-o", "output", type=FOLDER, metavar="DIR", help="The folder for a map's domain and problem."
-)
-@click.option("--json", "as_json", is_flag=True, help="One JSON object.")
-@limits
-def command(
-    copy: tuple[str, str] | None,
-    map_file: str | None,
-    scen: str | None,
-    agents: int | None,
-    output: str | None,
-    as_json: bool,
-) -> None:
+@dataclass(frozen=True, slots=True)
+class DomainsOptions:
+    """What `domains` can be asked for: a list, a copy, or a map as a problem."""
+
+    copy: tuple[str, str] | None = option(
+        None,
+        "Copy this domain, or all of them, with problems and README into DIR/NAME.",
+        "NAME|all DIR",
+    )
+    map: str | None = option(
+        None, "A map of movingai.com, to be written as a problem of the grid domain.", "FILE.map"
+    )
+    scen: str | None = option(None, "The scenario: where robots start and go.", "FILE.scen")
+    agents: int | None = option(None, "The first K robots of the scenario.", "K")
+    output: str | None = option(
+        None, "The folder for a map's domain and problem.", "DIR", names=("-o",)
+    )
+    as_json: bool = json_option()
+
+
+@with_options(DomainsOptions)
+def domains(*, options: DomainsOptions) -> list[str]:
+    """The names of the domains that are listed or were copied, or of the files of a map."""
+    copy, parts = options.copy, (options.map, options.scen, options.agents, options.output)
+    if any(part is not None for part in parts):
+        map_file, scen, agents, output = parts
+        if copy or map_file is None or scen is None or agents is None or output is None:
+            raise UsageError(
+                "a map needs --map FILE.map, --scen FILE.scen, --agents K and -o DIR, "
+                "and no --copy",
+                remedy="Give all four of them.",
+            )
+        return _write_map(map_file, scen, agents, output)
+    shipped = shipped_domains()
+    names = domain_names(shipped)
+    if copy is not None:
+        names = _chosen(copy[0], names)
+        _copy(shipped, names, copy[1])
+    return names
+
+
+@command_of(domains, "", doing="copying", keeps_plans=False)
+def command(names: list[str], options: DomainsOptions) -> None:
     """List the domains that come with coordlang, one a line, copy them, or write a map as PDDL."""
-    if map_file is None and scen is None and agents is None and output is None:
-        _list_or_copy(copy, as_json)
-        return
-    if copy is not None or map_file is None or scen is None or agents is None or output is None:
-        raise click.UsageError(
-            "a map needs --map FILE.map, --scen FILE.scen, --agents K and -o DIR, and no --copy"
-        )
-    names = _write_map(map_file, scen, agents, output)
-    if as_json:
-        echo(json.dumps({"folder": output, "files": names}))
+    shipped = shipped_domains()
+    if options.output is not None and options.agents is not None:
+        if options.as_json:
+            echo(json.dumps({"folder": options.output, "files": names}))
+        else:
+            robots, place = counted(options.agents, "robot"), visible(options.output)
+            echo(f"{robots}, written to {place}: {', '.join(names)}")
+    elif options.as_json:
+        echo(json.dumps({"domains": [_data(shipped / name) for name in names]}))
+    elif options.copy is not None:
+        number = counted(len(names), "domain")
+        echo(f"{number} copied to {options.copy[1]}: {', '.join(names)}")
     else:
-        echo(f"{counted(agents, 'robot')}, written to {visible(output)}: {', '.join(names)}")
+        width = max(map(len, names))
+        for name in names:
+            echo(f"{name:<{width}}  {about(shipped / name)}")
 
 
 def _write_map(map_file: str, scen: str, agents: int, output: str) -> list[str]:
     """Write a map's files, over none that says something else; their names are returned."""
-    from coordlang.sites.movingai import planning_files
-    from planners.system.errors import UsageError
-    from planners.system.writing import write_texts
-
     texts = planning_files(Path(map_file), Path(scen), agents)
     paths = {name: os.path.join(output, name) for name in texts}
     check_outputs([("-o", path) for path in paths.values()], [map_file, scen], makes_folder=True)
@@ -90,35 +108,12 @@ def _bytes(path: str) -> bytes | None:
         return None
 
 
-def _list_or_copy(copy: tuple[str, str] | None, as_json: bool) -> None:
-    from coordlang.sites.shipped import about, domain_names, shipped_domains
-
-    shipped = shipped_domains()
-    names = domain_names(shipped)
-    if copy is not None:
-        names = _chosen(copy[0], names)
-        _copy(shipped, names, copy[1])
-    if as_json:
-        echo(json.dumps({"domains": [_data(shipped / name) for name in names]}))
-    elif copy is not None:
-        echo(f"{counted(len(names), 'domain')} copied to {copy[1]}: {', '.join(names)}")
-    else:
-        width = max(map(len, names))
-        for name in names:
-            echo(f"{name:<{width}}  {about(shipped / name)}")
-
-
 def _data(folder: Path) -> dict[str, object]:
-    from coordlang.sites.shipped import about
-
     problems = sorted(path.name for path in folder.glob("*.pddl") if path.name != "domain.pddl")
     return {"name": folder.name, "about": about(folder), "problems": problems}
 
 
 def _chosen(name: str, names: list[str]) -> list[str]:
-    from planners.system.errors import UsageError
-    from planners.system.messages import echoed
-
     if name != ALL and name not in names:
         raise UsageError(
             f"there is no domain {echoed(name)}", remedy=f"There are {', '.join(names)}, or all."
@@ -128,9 +123,6 @@ def _chosen(name: str, names: list[str]) -> list[str]:
 
 def _copy(shipped: Path, names: list[str], target: str) -> None:
     """Copy folders, none of which is there already: nobody's changes are written over."""
-    from planners.system.errors import UsageError
-    from planners.system.writing import copy_folders
-
     for name in names:
         path = os.path.join(target, name)
         if target and os.path.lexists(path):

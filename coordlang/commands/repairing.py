@@ -4,16 +4,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from itertools import count
+from typing import Any
 
 import numpy as np
 
-from coordlang.commands.building import Built, Clock
+from coordlang.commands.built import Built, Clock, Verified, language_of
+from coordlang.commands.layout import WIDTH, wrapped
+from coordlang.commands.witness import witness_data, witness_text
 from coordlang.language.candidates import Candidates, require_solvable
 from coordlang.language.keys import keys_of, read_keys
 from coordlang.language.partition import Partition
-from coordlang.language.provenance import Guarantee, provenance_of
 from coordlang.language.words import Language
 from coordlang.required.all_differences import differences
 from coordlang.required.miscoordination import Miscoordination
@@ -21,11 +23,15 @@ from coordlang.verification.by_definition import Verdict
 from coordlang.verification.candidates import verify_candidates
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.repair import Repair, repair
+from planners.joint.model import NO_FACT
 from planners.joint.tables import Ints, Rows, find_rows
 from planners.parallel.workers import Workers
+from planners.system.notebook import counted
 
 #: What a language file names as the method of a repaired language.
 METHOD = "repair"
+#: Changed states that are shown to a person.
+_SHOWN = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +79,59 @@ class Repaired:
         """Whether the old language serves the tasks as it is."""
         return self.witness is None
 
+    def data(self) -> dict[str, Any]:
+        """The same as JSON data."""
+        return {
+            "still_holds": self.still_holds,
+            "miscoordination": witness_data(self.witness),
+            "changed": [asdict(change) for change in self.changed],
+            "changed_lower_bound": self.changes_bound,
+            "new_words": list(self.new_words),
+            "new_words_lower_bound": self.new_words_bound,
+            "new_states": self.new_states,
+            "states_gone": self.gone,
+        }
+
+    def text(self, width: int = WIDTH) -> str:
+        """Why the language was changed, and which states have other words, as lines."""
+        lines = []
+        if self.gone:
+            lines.append(f"{counted(self.gone, 'state')} of the old language: not on this map")
+        if self.witness is None:
+            return "\n".join(["the old language still holds: no word is changed", *lines])
+        sentence = " ".join(self.witness.sentence or ())
+        lines += [
+            f'the old language fails: plans with the sentence "{sentence}" do not mix',
+            witness_text(self.witness, width),
+            self._how_many(),
+        ]
+        for change in self.changed[:_SHOWN]:
+            text = f"{change.state or NO_FACT}: {change.old} -> {change.new}"
+            lines += wrapped(text, width, "  ", "      ")
+        if len(self.changed) > _SHOWN:
+            lines.append(f"  .. and {len(self.changed) - _SHOWN:,} more; --json has all")
+        return "\n".join(lines)
+
+    def _how_many(self) -> str:
+        """How much was changed, and what is proved of it."""
+        number, bound = len(self.changed), self.changes_bound
+        verb = "changes its word" if number == 1 else "change their word"
+        text = f"{counted(number, 'state')} {verb}{_proof(number, bound)}"
+        if self.new_states:
+            text += f"; {counted(self.new_states, 'new state')}"
+        if words := self.new_words:
+            new = f"{counted(len(words), 'new word')} ({', '.join(words)})"
+            text += f"; {new}{_proof(len(words), self.new_words_bound)}"
+        return text
+
+
+def _proof(number: int, bound: int) -> str:
+    if not number:
+        return ""
+    if number == bound:
+        return ", proved the fewest"
+    return f", at least {bound} are needed" if bound else ", not proved the fewest"
+
 
 def repair_language(
     candidates: Candidates,
@@ -81,7 +140,7 @@ def repair_language(
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
     workers: Workers | None = None,
-) -> tuple[Built, Repaired]:
+) -> Built:
     """Change the words of as few states as makes a language serve candidate tasks.
 
     The result is verified by definition.  States that are on no plan of the candidate tasks keep
@@ -119,20 +178,12 @@ def repair_language(
     job = Job(candidates, states, found.first, seed=seed)
     if verdict.holds:
         kept = Repaired(None, new_states=new_states, gone=old.gone)
-        return _built(old.partition, job, verdict, clock), kept
-    verified: list[tuple[Assignment, Partition, Verdict]] = []
-
-    def check(assignment: Assignment) -> None:
-        partition = old.repaired(assignment)
-        after = verify_candidates(partition, candidates, workers, progress)
-        if not after.holds:
-            raise AssertionError(f"the repaired words are no language: {after.witness}")
-        verified.append((assignment, partition, after))
-
-    job = replace(job, progress=progress, check=check)
+        return _built(old.partition, job, verdict, clock, kept)
+    verified = Verified(candidates, workers, progress, old.repaired)
+    job = replace(job, progress=progress, check=verified.check)
     result = repair(job, old.words_of(states), len(old.partition.words), old.partition.default)
     clock.note("repair")
-    partition, after = next((p, v) for a, p, v in verified if a is result.partition)
+    partition, after = verified.of(result.partition)
     repaired = Repaired(
         verdict.witness,
         old.changes(result, partition),
@@ -142,7 +193,7 @@ def repair_language(
         new_states,
         old.gone,
     )
-    return _built(partition, job, after, clock, result), repaired
+    return _built(partition, job, after, clock, repaired, result)
 
 
 def _built(
@@ -150,22 +201,18 @@ def _built(
     job: Job,
     verdict: Verdict,
     clock: Clock,
+    repaired: Repaired,
     result: Repair | None = None,
 ) -> Built:
     """The language of a partition; what its old file claims of fewer words is not believed."""
-    candidates = job.candidates
-    guarantee = Guarantee.of(METHOD, len(partition.words), job.lower_bound)
-    provenance = provenance_of(candidates, guarantee, {"program": "coordlang"})
     return Built(
-        language=Language.of(partition, candidates.model, provenance),
-        first_differences=job.first_differences,
-        states=len(job.states),
-        verdict=verdict,
-        figures=result.figures if result else {},
-        seconds=clock.seconds,
-        stopped=result.stopped if result else None,
-        job=job,
-        evidence={},
+        language_of(partition, job, METHOD, job.lower_bound),
+        job,
+        verdict,
+        result.figures if result else {},
+        clock.seconds,
+        result.stopped if result else None,
+        repaired=repaired,
     )
 
 

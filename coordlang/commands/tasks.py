@@ -4,66 +4,65 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
-import click
-
-import coordlang
-from coordlang.commands.files import FILE, PlanningFiles, check_outputs, planning_files, write
-from coordlang.commands.shared_options import ModelKeywords, limits, model_options
-from coordlang.commands.terminal import echo, working
+from coordlang.commands.command import command_of
+from coordlang.commands.files import write
+from coordlang.commands.inputs import DomainSource, ProblemSource, read_instance
+from coordlang.commands.keywords import with_options
+from coordlang.commands.options import NO_SLACK, Source, json_option, output_option
+from coordlang.commands.terminal import echo
+from coordlang.language.listed import ListedTask
+from coordlang.language.patterns import varied_tasks
+from coordlang.language.task_file import tasks_text
 from planners.system.notebook import counted
+from planners.system.options import group, option
 
 
-@click.command(name="tasks")
-@planning_files("DOMAIN PROBLEM", most=1)
-@click.option(
-    "--start",
-    "starts",
-    multiple=True,
-    metavar="PATTERN",
-    help="Atoms in which the start may differ from the problem's, as in '(at r1 ?)'.",
-)
-@click.option(
-    "--goal",
-    "goals",
-    multiple=True,
-    metavar="PATTERN",
-    help="Each goal has one atom of this pattern (default: the problem's goal).",
-)
-@click.option(
-    "-o", "--output", required=True, type=FILE, metavar="FILE", help="The task file, - for stdout."
-)
-@click.option("--json", "as_json", is_flag=True, help="Print the figures as one JSON object.")
-@model_options
-@limits
-def command(
-    pddl: PlanningFiles,
-    starts: tuple[str, ...],
-    goals: tuple[str, ...],
-    output: str,
-    as_json: bool,
-    model: ModelKeywords,
-) -> None:
+@dataclass(frozen=True, slots=True)
+class TasksOptions:
+    """What `tasks` can be asked for."""
+
+    start: tuple[str, ...] = option(
+        (), "Atoms in which the start may differ from the problem's, as in '(at r1 ?)'.", "PATTERN"
+    )
+    goal: tuple[str, ...] = option(
+        (), "Each goal has one atom of this pattern (default: the problem's goal).", "PATTERN"
+    )
+    output: str = output_option("The task file, - for stdout.", required=True)
+    as_json: bool = json_option("Print the figures as one JSON object.")
+    source: Source = group(Source, without=NO_SLACK)
+
+
+@with_options(TasksOptions)
+def tasks(
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
+    *,
+    options: TasksOptions,
+) -> Sequence[ListedTask]:
+    """The task of a problem with other starts and other goals."""
+    # Tasks start with no action to remember.
+    model = replace(options.source.model, remember_actions=False)
+    source = replace(options.source, model=model)
+    return varied_tasks(read_instance(domain, problem, source), options.start, options.goal)
+
+
+@command_of(tasks, "DOMAIN PROBLEM", doing="reading and grounding", keeps_plans=False)
+def command(found: Sequence[ListedTask], options: TasksOptions) -> None:
     """Write a task file: the tasks of PROBLEM with other starts and other goals.
 
     In a PATTERN ? stands for any one name.
     """
-    from coordlang.language.patterns import varied_tasks
-    from coordlang.language.task_file import tasks_text
-
-    check_outputs([("-o", output)], pddl.paths)
-    model["remember_actions"] = False  # tasks start with no action to remember
-    with working("reading and grounding"):
-        loaded = coordlang.load(*pddl.files, factored=pddl.factored, **model)
-        tasks = varied_tasks(loaded, starts, goals)
-    write(tasks_text(tasks), output)
+    write(tasks_text(found), options.output)
     figures = {
-        "tasks": len(tasks),
-        "starts": len({task.init for task in tasks}),
-        "goals": len({task.goal for task in tasks}),
+        "tasks": len(found),
+        "starts": len({task.init for task in found}),
+        "goals": len({task.goal for task in found}),
     }
-    if as_json and output != "-":
+    if options.as_json and options.output != "-":
         echo(json.dumps(figures))
         return
     line = ", ".join((counted(figures["starts"], "start"), counted(figures["goals"], "goal")))
-    echo(f"{counted(figures['tasks'], 'task')}: {line}", err=output == "-")
+    echo(f"{counted(figures['tasks'], 'task')}: {line}", err=options.output == "-")

@@ -4,16 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 
 import numpy as np
 
-from coordlang.commands.building import Built, Clock
+from coordlang.commands.built import Built, Clock, language_of
 from coordlang.language.candidates import Candidates, require_solvable
 from coordlang.language.partition import Partition
-from coordlang.language.provenance import Guarantee, provenance_of
-from coordlang.language.tolerance import Tolerance
-from coordlang.language.words import Language
 from coordlang.required.all_differences import differences
 from coordlang.required.choices import Choices
 from coordlang.required.divergences import Divergences, FirstDifferences, states_on_plans
@@ -29,51 +25,21 @@ from coordlang.vocabulary.hidden_slack import hidden_differences
 from coordlang.vocabulary.job import Assignment, Job
 from planners.parallel.workers import Workers
 from planners.search.portions import require_room
-from planners.system.errors import UsageError
 from planners.system.limits import little_time_after
-from planners.system.messages import echoed
 
 #: What a file says of how the words were found.
 METHOD = "few-words"
 
 
-@dataclass(frozen=True, slots=True)
-class WordLimit:
-    """How many words a language may have, and what is then minimised.
-
-    Attributes
-    ----------
-    words
-        The most words; 1 is silence.
-    worst
-        Minimise how often robots fail in the worst task, not over all tasks.
-
-    Raises
-    ------
-    UsageError
-        For what is no number of words, one or more.
-    """
-
-    words: int
-    worst: bool = False
-
-    def __post_init__(self) -> None:
-        is_number = isinstance(self.words, int) and not isinstance(self.words, bool)
-        if not is_number or self.words < 1:
-            raise UsageError(
-                f"a language has a word at least, not {echoed(str(self.words))}",
-                remedy="--words 1 is silence.",
-            )
-
-
 def build_few_words(
     candidates: Candidates,
-    limit: WordLimit,
+    words: int,
     *,
+    worst: bool = False,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
     workers: Workers | None = None,
-) -> tuple[Built, FewWords]:
+) -> Built:
     """Find words, at most so many, under which robots that choose by themselves fail least often.
 
     Where they never do, the words are verified by definition, as every coordination language.
@@ -82,8 +48,10 @@ def build_few_words(
     ----------
     candidates
         The tasks that they are for.  Plans of them may be inseparable.
-    limit
-        How many words.
+    words
+        The most words; 1 is silence.
+    worst
+        Minimise how often robots fail in the worst task, not over all tasks.
     seed
         Of all random choices.
     progress
@@ -110,11 +78,11 @@ def build_few_words(
         candidates.spaces,
         states,
         len(candidates.rows),
-        limit.words,
-        worst=limit.worst,
+        words,
+        worst=worst,
         seed=seed,
         language=language,
-        symmetries=symmetry_group(candidates).permutations if limit.words > 1 else (),
+        symmetries=symmetry_group(candidates).permutations if words > 1 else (),
         progress=progress,
     )
     clock.note("vocabulary")
@@ -127,27 +95,20 @@ def build_few_words(
             raise AssertionError(f"no robot fails, but these words do: {verdict.witness}")
     clock.note("verify")
     is_interrupted = isinstance(found.stopped, KeyboardInterrupt)
-    guarantee = Guarantee.of(METHOD, len(partition.words), job.lower_bound, verdict.holds)
     failures = Failures(found.failures.mean, found.failures.worst)
-    provenance = provenance_of(candidates, guarantee, {"program": "coordlang"})
-    if not verdict.holds:
-        slack = provenance.tolerance.slack if provenance.tolerance else None
-        tolerance = failures.tolerance or Tolerance()
-        provenance = replace(provenance, tolerance=replace(tolerance, slack=slack))
-    built = Built(
-        language=Language.of(partition, candidates.model, provenance),
-        first_differences=first,
-        states=len(states),
-        verdict=verdict,
-        figures=_figures(found),
-        seconds=clock.seconds,
+    return Built(
+        language_of(
+            partition, job, METHOD, job.lower_bound, holds=verdict.holds, failures=failures
+        ),
+        job,
+        verdict,
+        _figures(found),
+        clock.seconds,
         # No search was left where nothing fails.
-        stopped=None if verdict.holds and not is_interrupted else found.stopped,
-        job=job,
-        evidence={},
+        None if verdict.holds and not is_interrupted else found.stopped,
         failures=failures,
+        few_words=found,
     )
-    return built, found
 
 
 def _figures(found: FewWords) -> dict[str, float]:

@@ -14,7 +14,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from coordlang.commands.building import Built, build_language, certificate_of
+from coordlang.commands.building import build_language
+from coordlang.commands.built import Built
 from coordlang.language.file import read_language
 from coordlang.language.task_file import read_task_file
 from coordlang.verification.certificate_clauses import encode
@@ -40,7 +41,7 @@ def built() -> Built:
 
 @pytest.fixture(scope="module")
 def certificate(built: Built) -> Certificate:
-    return certificate_of(built)
+    return built.certificate()
 
 
 # Sizes

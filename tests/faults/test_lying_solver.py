@@ -11,8 +11,8 @@ from typing import Any
 import msgspec
 import pytest
 
-from coordlang.commands.building import Built, certificate_of
 from coordlang.verification.certificate_file import Certificate
+from coordlang.verification.make_certificate import certify
 from planners.search import sat
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
@@ -103,11 +103,11 @@ def test_a_certificate_with_too_few_reasons_is_not_written(
 ) -> None:
     """As a false refutation leaves them; the language, though right, is not written either."""
 
-    def too_few(built: Built) -> Certificate:
-        whole = certificate_of(built)
+    def too_few(*arguments: Any) -> Certificate:
+        whole = certify(*arguments)
         return msgspec.structs.replace(whole, reasons=whole.reasons[:1])
 
-    monkeypatch.setattr("coordlang.commands.languages.certificate_of", too_few)
+    monkeypatch.setattr("coordlang.commands.built.certify", too_few)
     files = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
     built = coordlang(
         *("build", *files, "--tasks", "all", "--method", "minimal", "--jobs", 1),

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from coordlang.commands.built import Built
 from coordlang.language.file import read_language
 from coordlang.verification.certificate_file import read_certificate
 from planners.system.errors import OutOfTime, UsageError
@@ -226,7 +227,7 @@ def test_a_certificate_that_is_not_made_leaves_no_old_one(
     def stop(_: object) -> None:
         raise limit
 
-    monkeypatch.setattr("coordlang.commands.languages.certificate_of", stop)
+    monkeypatch.setattr(Built, "certificate", stop)
     outcome = coordlang(*BUILD, *PAIR)
     assert _pair(old_pair) == "new, alone"
     if limit is KeyboardInterrupt:
@@ -358,15 +359,13 @@ def test_a_language_and_its_certificate_are_written_together(
     coordlang: Command, here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another command writes to the same file while this one works out its certificate."""
-    from coordlang.commands.languages import BuiltLanguage
+    own = Built.certificate
 
-    own = BuiltLanguage.certificate
-
-    def meanwhile(built: BuiltLanguage) -> object:
+    def meanwhile(built: Built) -> object:
         write_atomically("l.json", b"a language of others")
         return own(built)
 
-    monkeypatch.setattr(BuiltLanguage, "certificate", meanwhile)
+    monkeypatch.setattr(Built, "certificate", meanwhile)
     assert coordlang(*BUILD, "-o", "l.json", "--certificate", "c.json").code == 0
     verified = coordlang("verify", "l.json", *CELLS, "--certificate", "c.json")
     assert verified.code == 0, verified.err

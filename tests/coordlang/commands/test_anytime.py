@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from coordlang.commands.building import build_language
+from coordlang.commands.built import Built
 from coordlang.language.file import read_language
 from coordlang.vocabulary.sat import PartitionProblem
 from planners.system.errors import OutOfTime
@@ -116,7 +117,7 @@ def test_the_language_is_written_without_its_certificate(
     def stop(_: object) -> None:
         raise error
 
-    monkeypatch.setattr("coordlang.commands.languages.certificate_of", stop)
+    monkeypatch.setattr(Built, "certificate", stop)
     path, proof = tmp_path / "l.json", tmp_path / "c.json"
     files = [DOMAINS / "three-cells" / name for name in ("domain.pddl", "problem.pddl")]
     outcome = coordlang("build", *files, "--method", "minimal", "-o", path, "--certificate", proof)

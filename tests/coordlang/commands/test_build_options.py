@@ -16,19 +16,17 @@ from tests.support.domains import all_tasks
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"method": "bogus"}, "'bogus'.*greedy, separating, minimal, exhaustive"),
+        ({"method": "bogus"}, "bogus.*greedy, separating, minimal or exhaustive"),
         ({"method": "minimal", "alpha_only": True}, "--alpha-only belongs to --method separating"),
         ({"method": "greedy", "prefer": "flexible"}, "--prefer flexible belongs to --method"),
         ({"method": "separating", "prefer": "flexible"}, "--prefer flexible belongs to --method"),
-        ({"method": "minimal", "prefer": "short"}, "'short'.*flexible, simple"),
+        ({"method": "minimal", "prefer": "short"}, "short.*flexible or simple"),
     ],
 )
 def test_bad_build_options(options: dict[str, Any], said: str) -> None:
     with pytest.raises(UsageError) as raised:
-        MethodOptions(**options)
-    assert raised.match(f"(?s){said}")
-    with pytest.raises(UsageError):
         build_language(all_tasks("three-cells"), **options)
+    assert raised.match(f"(?s){said}")
 
 
 def test_good_build_options() -> None:

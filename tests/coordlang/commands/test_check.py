@@ -42,7 +42,7 @@ def test_both_prove_that_there_is_no_plan(coordlang: Command, tmp_path: Path) ->
 
 def test_a_disagreement_is_refuted(coordlang: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     answer = FastDownwardAnswer((3, 0), "explicit", 1)
-    monkeypatch.setattr("coordlang.commands.cross_check.optimal_cost", lambda *_, **__: answer)
+    monkeypatch.setattr("coordlang.commands.check.optimal_cost", lambda *_, **__: answer)
     outcome = coordlang("check", T_MAP / "domain.pddl", T_MAP / "problem.pddl")
     assert outcome.code == 1
     assert "coordlang      makespan 4" in outcome.out

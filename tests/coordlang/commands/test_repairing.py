@@ -226,7 +226,9 @@ def test_states_on_no_plan_keep_their_words() -> None:
     on_plans = {keys(task.rows[s]) for s in build_language(task).job.states}
     words = {keys(row): "go" if keys(row) in on_plans else "away" for row in candidates.rows}
     old = Language(("away", "go"), words, "away")
-    built, repaired = repair_language(task, old)
+    built = repair_language(task, old)
+    repaired = built.repaired
+    assert repaired is not None
     assert repaired.changed
     changed = {change.state for change in repaired.changed}
     assert changed < on_plans
@@ -250,7 +252,7 @@ def test_a_false_bound_is_not_carried_over() -> None:
     candidates = all_tasks("three-cells")
     false = replace(found, provenance=replace(found.provenance, guarantee=guarantee))
     for start, bound in ((false, 2), (found, 2)):
-        built, _ = repair_language(candidates, start)
+        built = repair_language(candidates, start)
         assert built.language.guarantee.lower_bound == bound
         assert built.verdict.holds
 

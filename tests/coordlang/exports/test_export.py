@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from coordlang.commands.build import build
 from coordlang.commands.building import build_language
 from coordlang.commands.language_inputs import read_task_language
-from coordlang.commands.languages import build
 from coordlang.commands.options import Source
 from coordlang.execution.fitting_plans import NoPlanFits
 from coordlang.execution.task_language import TaskLanguage, languages_in_tasks

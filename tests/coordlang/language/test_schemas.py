@@ -14,7 +14,7 @@ import jsonschema
 import pytest
 
 import coordlang as api
-from coordlang.commands.building import build_language, certificate_of
+from coordlang.commands.building import build_language
 from coordlang.commands.schema import SCHEMAS
 from coordlang.execution.choices import choices
 from coordlang.execution.choices_file import to_bytes
@@ -65,7 +65,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any
     candidates = all_tasks("three-cells")
     built = build_language(candidates, "minimal")
     certificate = tmp_path_factory.mktemp("schemas") / "certificate.json"
-    write_certificate(certificate_of(built), certificate)
+    write_certificate(built.certificate(), certificate)
     plans = Plans.of(candidates.spaces[0])
     task = next(languages_in_tasks(built.language, candidates))
     (words, *_) = (task.words_of(s.words) for s in task_sentences(task.space, 0, task.partition))

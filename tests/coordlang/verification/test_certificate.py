@@ -16,7 +16,8 @@ from typing import Any
 import msgspec
 import pytest
 
-from coordlang.commands.building import Built, build_language, certificate_of
+from coordlang.commands.building import build_language
+from coordlang.commands.built import Built
 from coordlang.commands.languages import verify
 from coordlang.language.candidates import all_pairs, from_listed, from_problems
 from coordlang.language.task_file import read_task_file
@@ -50,7 +51,7 @@ def built() -> Built:
 
 @pytest.fixture(scope="module")
 def certificate(built: Built) -> Certificate:
-    return certificate_of(built)
+    return built.certificate()
 
 
 def test_proves_the_minimum(built: Built, certificate: Certificate, tmp_path: Path) -> None:
@@ -206,7 +207,7 @@ def test_missing_reasons_prove_nothing(built: Built, certificate: Certificate) -
 def test_other_methods(method: str) -> None:
     """A certificate for what the method proves, also where it met no counterexamples itself."""
     built = build_language(all_tasks("three-cells"), method)
-    checked = check(certificate_of(built), built.job.candidates)
+    checked = check(built.certificate(), built.job.candidates)
     assert (
         checked.lower_bound
         == built.language.guarantee.lower_bound
@@ -242,7 +243,7 @@ def test_three_robots(folder: str, remember: bool) -> None:
         from_problems(domain, [problem], ModelOptions(remember_actions=remember)), "minimal"
     )
     assert (
-        check(certificate_of(built), built.job.candidates).lower_bound
+        check(built.certificate(), built.job.candidates).lower_bound
         == built.language.guarantee.size
     )
 
@@ -254,7 +255,7 @@ def test_task_file_with_symmetries() -> None:
     tasks = read_task_file(DOMAINS / "grid" / "gwb5-3x3.tasks.json")
     built = build_language(from_listed(domain, [problem], tasks), "minimal")
     assert built.figures["symmetries"] > 0
-    certificate = certificate_of(built)
+    certificate = built.certificate()
     assert check(certificate, built.job.candidates).lower_bound == 3
     fewer = from_listed(domain, [problem], tasks[:5])
     with pytest.raises(Refuted, match="is no candidate task"):
@@ -278,7 +279,7 @@ def test_random_models(robots: int, number: int) -> None:
         built = build_language(candidates, "minimal")
         if built.language.guarantee.size == 1 and seed % 50:
             continue
-        certificate = certificate_of(built)
+        certificate = built.certificate()
         assert check(certificate, candidates).lower_bound == built.language.guarantee.size
         with pytest.raises(Refuted, match="leave languages"):
             check(msgspec.structs.replace(certificate, refuted=certificate.refuted + 1), candidates)
@@ -461,11 +462,13 @@ def test_a_part_of_the_time_is_left_for_the_certificate(
 ) -> None:
     left: list[float] = []
 
+    own = Built.certificate
+
     def noted(built: Built) -> Certificate:
         left.append(time_left())
-        return certificate_of(built)
+        return own(built)
 
-    monkeypatch.setattr("coordlang.commands.languages.certificate_of", noted)
+    monkeypatch.setattr(Built, "certificate", noted)
     output = "-o", tmp_path / "l.json", "--time-limit", "1000"
     made = coordlang("build", *GW2, *MINIMAL, *output, "--certificate", tmp_path / "c.json")
     assert made.code == 3
@@ -485,7 +488,7 @@ def test_no_time_is_left_for_the_certificate(
         os.kill(os.getpid(), signal.SIGALRM)
         raise AssertionError
 
-    monkeypatch.setattr("coordlang.commands.languages.certificate_of", endless)
+    monkeypatch.setattr(Built, "certificate", endless)
     output = "-o", tmp_path / "l.json", "--time-limit", "1000"
     made = coordlang("build", *GW2, *MINIMAL, *output, "--certificate", tmp_path / "c.json")
     assert (made.code, [p.name for p in tmp_path.iterdir()]) == (3, ["l.json"])

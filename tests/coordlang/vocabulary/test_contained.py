@@ -15,7 +15,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.commands.building import build_language, certificate_of
+from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates, all_pairs
 from coordlang.language.warping import pair
 from coordlang.symmetry.group import Symmetry, symmetry_group
@@ -304,7 +304,7 @@ def test_certificates_rest_on_parts(folder: str, stem: str, words: int) -> None:
     candidates = all_tasks(folder, stem)
     built = build_language(candidates, "minimal")
     assert built.language.guarantee.lower_bound == words
-    assert check(certificate_of(built), candidates).lower_bound == words
+    assert check(built.certificate(), candidates).lower_bound == words
 
 
 def ring(cells: int) -> list[tuple[int, int]]:
@@ -362,7 +362,7 @@ def test_two_words_are_too_few_on_a_ring_and_states_of_one_distance_show_it(cell
     assert check(certificate, candidates).lower_bound == 3
     built = build_language(candidates, "minimal")
     assert built.language.guarantee.lower_bound == 3
-    assert check(certificate_of(built), candidates).lower_bound == 3
+    assert check(built.certificate(), candidates).lower_bound == 3
 
 
 def test_symmetries_of_parts_are_in_one_order_in_every_run() -> None:

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import pytest
 
 from coordlang.commands.building import build_language
+from coordlang.commands.built import Verified
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.required.miscoordination import inseparable
 from coordlang.vocabulary import METHODS, Job, Outcome
@@ -88,19 +88,17 @@ def test_stopped_while_it_checks(
     method: str, error: BaseException, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A limit while a better partition is verified: the one before it is left."""
-    import coordlang.commands.building
-
     candidates = all_tasks("grid", "gw1-2x2")
-    verified = coordlang.commands.building._verified
+    check = Verified.check
     checked: list[Assignment] = []
 
-    def late(given: Candidates, partition: Assignment, *others: Any) -> object:
+    def late(verified: Verified, partition: Assignment) -> None:
         if checked:
             raise error
         checked.append(partition)
-        return verified(given, partition, *others)
+        check(verified, partition)
 
-    monkeypatch.setattr(coordlang.commands.building, "_verified", late)
+    monkeypatch.setattr(Verified, "check", late)
     built = build_language(candidates, method)
     assert built.verdict.holds
     assert len(built.language.words) == len(set(checked[0].values()))

@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from coordlang.commands.building import Built, build_language
+from coordlang.commands.building import build_language
+from coordlang.commands.built import Built
 from coordlang.vocabulary.equivariant import EquivariantSearch
 from coordlang.vocabulary.from_above import SearchFromAbove
 from coordlang.vocabulary.job import Assignment, Outcome

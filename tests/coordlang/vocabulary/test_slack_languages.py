@@ -10,7 +10,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.commands.building import build_language, certificate_of
+from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.language.partition import Partition
 from coordlang.required.divergences import first_differences, states_on_plans
@@ -185,11 +185,11 @@ def test_a_language_within_slack_is_one_within_less() -> None:
 def test_lower_bounds_are_certified() -> None:
     found = shipped("three-cells", "problem", slack=1, words_see_slack=True, every=True)
     built = build_language(found, "minimal")
-    checked = check(certificate_of(built), found)
+    checked = check(built.certificate(), found)
     assert checked.lower_bound == built.language.guarantee.size == 6
     # For optimal plans its reasons are none.
     with pytest.raises(Refuted):
-        check(certificate_of(built), shipped("three-cells", "problem", every=True))
+        check(built.certificate(), shipped("three-cells", "problem", every=True))
 
 
 def test_states_repeat_on_plans_and_nodes_do_not() -> None:
