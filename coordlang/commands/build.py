@@ -38,7 +38,7 @@ from coordlang.language.candidates import Candidates
 from coordlang.language.file import to_bytes, write_language
 from coordlang.language.recorded import check_domain, with_recorded
 from coordlang.language.words import Language
-from coordlang.required.fewest_actions import requiring
+from coordlang.required.task_answers import requiring
 from coordlang.verification.certificate_file import Certificate, write_certificate
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import OutOfTime, ProvedImpossible, UsageError

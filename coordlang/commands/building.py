@@ -46,7 +46,7 @@ class MethodOptions:
         "greedy: fast.  separating: fewest words that part plans where they differ first or last.  "
         "minimal: fewest words at all, with proof.  exhaustive: brute force.",
     )
-    seed: int = option(0, "Seed of all random choices.")
+    seed: int = option(0, "Seed of all random choices.", least=0)
     alpha_only: bool = option(
         False, "separating: part plans where they differ first, never where last."
     )

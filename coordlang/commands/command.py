@@ -180,7 +180,7 @@ def _click_option(given: Given) -> click.Option:
     elif given.values:
         keywords["type"] = click.Choice(given.values)
     elif given.kind is int:
-        keywords["type"] = int if option.least is None else click.IntRange(min=option.least)
+        keywords["type"] = int  # the record checks its range
     elif given.kind is float:
         keywords["type"] = click.FloatRange(min=option.least or 0, min_open=option.least is None)
     elif get_origin(given.kind) is tuple and Ellipsis not in get_args(given.kind):

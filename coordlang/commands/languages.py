@@ -31,7 +31,6 @@ from coordlang.language.words import Language
 from coordlang.required.failure import TooManyToCount
 from coordlang.required.failures import NONE, Failures, failures_under
 from coordlang.required.miscoordination import Miscoordination
-from coordlang.required.task_answers import requiring
 from coordlang.verification.candidates import verify_candidates
 from coordlang.verification.certificate_file import Certificate, read_certificate
 from coordlang.verification.check_certificate import Checked
