@@ -29,19 +29,19 @@ if TYPE_CHECKING:
     from coordlang.commands.check import check as check
     from coordlang.commands.choices import choices as choices
     from coordlang.commands.coordination import coordination as coordination
-    from coordlang.commands.explaining import explain as explain
-    from coordlang.commands.exporting import export as export
+    from coordlang.commands.explain import explain as explain
+    from coordlang.commands.export import export as export
+    from coordlang.commands.ground import ground as ground
     from coordlang.commands.inputs import load as load
+    from coordlang.commands.inputs import load_language as load_language
     from coordlang.commands.inspect import inspect as inspect
-    from coordlang.commands.languages import load_language as load_language
-    from coordlang.commands.languages import verify as verify
-    from coordlang.commands.lifting import ground as ground
-    from coordlang.commands.lifting import lift as lift
+    from coordlang.commands.lift import lift as lift
+    from coordlang.commands.plan import plan as plan
     from coordlang.commands.plans import plans as plans
-    from coordlang.commands.simulating import simulate as simulate
-    from coordlang.commands.speaking import plan as plan
-    from coordlang.commands.speaking import say as say
-    from coordlang.commands.speaking import understand as understand
+    from coordlang.commands.say import say as say
+    from coordlang.commands.simulate import simulate as simulate
+    from coordlang.commands.understand import understand as understand
+    from coordlang.commands.verify import verify as verify
     from coordlang.execution.fitting_plans import NoPlanFits as NoPlanFits
     from coordlang.execution.monitor import Monitor as Monitor
     from coordlang.execution.monitor import MonitorError as MonitorError
@@ -65,19 +65,22 @@ __version__ = "0.1.0"
 
 #: Module -> the public names that it defines.
 _DEFINED_IN = {
-    "coordlang.commands.inputs": ("load",),
+    "coordlang.commands.inputs": ("load", "load_language"),
     "coordlang.commands.inspect": ("inspect",),
     "coordlang.commands.plans": ("plans",),
     "coordlang.commands.check": ("check",),
     "coordlang.commands.coordination": ("coordination",),
     "coordlang.commands.build": ("build",),
-    "coordlang.commands.languages": ("verify", "load_language"),
-    "coordlang.commands.lifting": ("lift", "ground"),
-    "coordlang.commands.speaking": ("say", "understand", "plan"),
+    "coordlang.commands.verify": ("verify",),
+    "coordlang.commands.lift": ("lift",),
+    "coordlang.commands.ground": ("ground",),
+    "coordlang.commands.say": ("say",),
+    "coordlang.commands.understand": ("understand",),
+    "coordlang.commands.plan": ("plan",),
     "coordlang.commands.choices": ("choices",),
-    "coordlang.commands.simulating": ("simulate",),
-    "coordlang.commands.explaining": ("explain",),
-    "coordlang.commands.exporting": ("export",),
+    "coordlang.commands.simulate": ("simulate",),
+    "coordlang.commands.explain": ("explain",),
+    "coordlang.commands.export": ("export",),
     "coordlang.language.words": ("Language",),
     "coordlang.execution.monitor": ("Monitor", "MonitorError", "NotAllowed", "NotPossible"),
     "coordlang.execution.fitting_plans": ("NoPlanFits",),

@@ -19,17 +19,20 @@ from coordlang.commands.building import MethodOptions, build_language
 from coordlang.commands.built import Built
 from coordlang.commands.command import command_of
 from coordlang.commands.failure import UNPROVED, code_of_interrupt, why_stopped
-from coordlang.commands.inputs import (
-    DomainSource,
-    PlanningInput,
-    ProblemSource,
-    TasksSource,
-    read_planning,
-)
+from coordlang.commands.inputs import PlanningInput, read_plain_language, read_planning
 from coordlang.commands.keywords import with_options
-from coordlang.commands.language_inputs import LanguageSource, read_language_source
-from coordlang.commands.languages import Progress
-from coordlang.commands.options import Jobs, Source, Unsolvable, json_option, output_option
+from coordlang.commands.options import (
+    DomainSource,
+    Jobs,
+    LanguageSource,
+    ProblemSource,
+    Progress,
+    Source,
+    TasksSource,
+    Unsolvable,
+    json_option,
+    output_option,
+)
 from coordlang.commands.repairing import repair_language
 from coordlang.commands.terminal import echo, line_width, note_single_robot, working
 from coordlang.commands.tolerating import build_few_words
@@ -198,7 +201,7 @@ def _to_repair(
     start: LanguageSource, files: PlanningInput, options: BuildOptions
 ) -> tuple[Language, Candidates]:
     """Return the language and the tasks that it is to serve."""
-    language, position = read_language_source(start)
+    language, position = read_plain_language(start)
     check_domain(language, files.domain, position)
     if files.source.model.slack or (language.tolerance is not None and language.tolerance.slack):
         raise UsageError(

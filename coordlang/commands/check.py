@@ -9,9 +9,9 @@ from typing import Any
 
 from coordlang.commands.command import command_of
 from coordlang.commands.failure import IMPOSSIBLE, REFUTED
-from coordlang.commands.inputs import DomainSource, ProblemSource, read_instance
+from coordlang.commands.inputs import read_instance
 from coordlang.commands.keywords import with_options
-from coordlang.commands.options import NO_SLACK, Source, json_option
+from coordlang.commands.options import NO_SLACK, DomainSource, ProblemSource, Source, json_option
 from coordlang.commands.terminal import echo
 from planners.classical.fast_downward import optimal_cost
 from planners.search.optimal_plans import search

@@ -17,12 +17,20 @@ from coordlang.commands.choices_text import choices_text
 from coordlang.commands.command import command_of
 from coordlang.commands.failure import REFUTED
 from coordlang.commands.files import write
-from coordlang.commands.inputs import DomainSource, File, ProblemSource
+from coordlang.commands.inputs import given_sentence, read_task
 from coordlang.commands.keywords import with_options
-from coordlang.commands.language_inputs import LanguageSource, read_task_language
 from coordlang.commands.listing import form_of
-from coordlang.commands.options import NO_SLACK, Source, json_option, output_option
-from coordlang.commands.speaking import SentenceSource, given_sentence
+from coordlang.commands.options import (
+    NO_SLACK,
+    DomainSource,
+    File,
+    LanguageSource,
+    ProblemSource,
+    SentenceSource,
+    Source,
+    json_option,
+    output_option,
+)
 from coordlang.commands.terminal import covered_code, echo, line_width, note
 from coordlang.commands.witness import witness_text
 from coordlang.execution.choices import MOST, Choices
@@ -214,7 +222,7 @@ def choices(
         If the automata, or with ``check`` the combinations, do not fit into the memory.
     """
     said = given_sentence(sentence)
-    used = read_task_language(language, domain, problem, options.source)
+    used = read_task(language, domain, problem, options.source).used
     chosen = _numbers(used.model.robots, options.robot) or tuple(range(len(used.model.robots)))
     found = choices_under(used, used.words_of(said), most=None if options.check else MOST)
     return RobotsChoices(found, chosen)

@@ -14,7 +14,7 @@ from typing import Any, get_args, get_origin
 
 import click
 
-from coordlang.commands.files import FILE, FOLDER, beside, check_outputs, never_stdout
+from coordlang.commands.files import FILE, FOLDER, OutputFile, beside, check_outputs, never_stdout
 from coordlang.commands.shared import Kept, Limits, keeping, limited
 from coordlang.commands.terminal import echo, line_width, note, working
 from planners.system.errors import CoordlangError, OutOfTime
@@ -26,15 +26,21 @@ Show = Callable[[Any, Any], int | None]
 #: Arguments that --factored stands for.
 _PDDL = ("DOMAIN", "PROBLEM", "PROBLEMS...")
 #: Options whose metavar has one of these name a file that is read or written.
-_FILES = ("FILE", "LANGUAGE", "PROBLEM")
+_FILES = ("FILE", "LANGUAGE", "PROBLEM", "RECORD", "RUN.json")
 
 
 def command_of(
-    function: Callable[..., Any], takes: str, *, doing: str, keeps_plans: bool = True
+    function: Callable[..., Any],
+    takes: str,
+    *,
+    doing: str,
+    keeps_plans: bool = True,
+    alone: str | None = None,
 ) -> Callable[[Show], click.Command]:
     """Make a command of a Python function and of what shows its result, which this decorates.
 
-    Its help is the docstring of what shows the result.
+    Its help is the docstring of what shows the result.  A record whose files depend on several of
+    its options has a method ``outputs``, which says what is written.
 
     Parameters
     ----------
@@ -47,6 +53,8 @@ def command_of(
         What a terminal shows while the function works.
     keeps_plans
         Whether it searches no task again that was searched before, unless ``--no-cache`` is given.
+    alone
+        The option in whose presence there are no arguments.
     """
     name = function.__name__
     record = function.record  # type: ignore[attr-defined]
@@ -58,8 +66,15 @@ def command_of(
         def called(arguments: tuple[str, ...], **values: object) -> int | None:
             given = {key: value for key, value in values.items() if _was_given(key)}
             factored = given.get("factored")
-            read = positional(takes, arguments, is_factored=factored is not None)
-            _check_outputs(on_cli, given, _read_files(arguments, factored))
+            if alone is None or alone not in given:
+                read = positional(takes, arguments, is_factored=factored is not None)
+            elif arguments or factored is not None:
+                instead = f"{named[alone].spelling} {named[alone].option.metavar} alone"
+                raise click.UsageError(f"expected {instead}, without {takes}")
+            else:
+                read = []
+            files = _read_files(arguments, factored)
+            _check_outputs(on_cli, given, files)
             own, kept, limits = (
                 {each.name: given[each.name] for each in options_of(kind) if each.name in given}
                 for kind in (record, Kept, Limits)
@@ -70,9 +85,11 @@ def command_of(
                     own |= {
                         key: value
                         for key, value in (("progress", progress), ("note", note))
-                        if key in named
+                        if key in named and named[key].kind == Callable[[str], None]
                     }
                     options = record_from(record, own, name, on_cli=True)
+                    if hasattr(options, "outputs"):
+                        check_outputs(options.outputs(), files)
                     result = function.with_record(*read, options=options)  # type: ignore[attr-defined]
                 return show(result, options)
 
@@ -130,18 +147,20 @@ def _check_outputs(named: Iterable[Given], given: dict[str, object], inputs: lis
             and not each.option.is_output
         ):
             inputs += value if isinstance(value, tuple) else [str(value)]
-    outputs = []
+    outputs: list[OutputFile] = []
     for each, value in options:
-        path = str(value)
         if not each.option.is_output:
             continue
-        if each.option.metavar == "DIR":
-            inside = [os.path.join(path, file) if path else "" for file in each.option.files]
-            check_outputs([(each.spelling, file) for file in inside], inputs, makes_folder=True)
-            continue
-        if each.name != "output":
-            never_stdout(each.spelling, path)
-        outputs.append((each.spelling, path))
+        paths = value if isinstance(value, tuple) else (str(value),)
+        for number, path in enumerate(paths, 1):
+            spelling = each.spelling if len(paths) == 1 else f"{each.spelling} {number}"
+            if each.option.metavar == "DIR":
+                inside = (os.path.join(path, file) if path else "" for file in each.option.files)
+                outputs += [OutputFile(spelling, file, makes_folder=True) for file in inside]
+            else:
+                if each.name != "output":
+                    never_stdout(spelling, path)
+                outputs.append(OutputFile(spelling, path))
     check_outputs(outputs, inputs)
 
 
@@ -176,19 +195,20 @@ def _click_option(given: Given) -> click.Option:
         "multiple": given.default == (),
     }
     if given.kind is bool:
-        keywords["is_flag"] = True
+        keywords |= {"is_flag": True, "default": given.default, "flag_value": not given.default}
     elif given.values:
         keywords["type"] = click.Choice(given.values)
     elif given.kind is int:
         keywords["type"] = int  # the record checks its range
     elif given.kind is float:
-        keywords["type"] = click.FloatRange(min=option.least or 0, min_open=option.least is None)
+        keywords["type"] = float
     elif get_origin(given.kind) is tuple and Ellipsis not in get_args(given.kind):
         keywords["nargs"] = len(get_args(given.kind))
     elif option.metavar == "DIR":
         keywords["type"] = FOLDER
     elif _names_file(given):
         keywords["type"] = FILE
-    if given.default not in (None, ()) and given.default is not False and not option.required:
+    is_shown = given.default not in (None, ()) and not isinstance(given.default, bool)
+    if is_shown and not option.required:
         keywords |= {"default": given.default, "show_default": True}
     return click.Option([*given.spellings, given.name], **keywords)

@@ -10,10 +10,10 @@ from fractions import Fraction
 from typing import Any
 
 from coordlang.commands.command import command_of
-from coordlang.commands.inputs import DomainSource, ProblemSource, read_planning
+from coordlang.commands.inputs import read_planning
 from coordlang.commands.keywords import with_options
 from coordlang.commands.layout import WIDTH
-from coordlang.commands.options import Jobs, Source, json_option
+from coordlang.commands.options import DomainSource, Jobs, ProblemSource, Source, json_option
 from coordlang.commands.terminal import echo, line_width, note_single_robot
 from coordlang.commands.witness import witness_data, witness_text
 from coordlang.commands.workers import opened_workers

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coordlang.commands.command import command_of
-from coordlang.commands.files import check_outputs
+from coordlang.commands.files import OutputFile, check_outputs
 from coordlang.commands.keywords import with_options
 from coordlang.commands.options import json_option
 from coordlang.commands.terminal import echo
@@ -90,7 +90,7 @@ def _write_map(map_file: str, scen: str, agents: int, output: str) -> list[str]:
     """Write a map's files, over none that says something else; their names are returned."""
     texts = planning_files(Path(map_file), Path(scen), agents)
     paths = {name: os.path.join(output, name) for name in texts}
-    check_outputs([("-o", path) for path in paths.values()], [map_file, scen], makes_folder=True)
+    check_outputs([OutputFile("-o", path, True) for path in paths.values()], [map_file, scen])
     for name, path in paths.items():
         if os.path.lexists(path) and _bytes(path) != texts[name].encode():
             raise UsageError(
@@ -129,5 +129,5 @@ def _copy(shipped: Path, names: list[str], target: str) -> None:
             raise UsageError(
                 f"{path} is there already", remedy="Remove it, or name another folder."
             )
-        check_outputs([("--copy", path if target else "")], [], makes_folder=True)
+        check_outputs([OutputFile("--copy", path if target else "", makes_folder=True)], [])
     copy_folders([shipped / name for name in names], target)

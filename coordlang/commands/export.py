@@ -5,91 +5,320 @@ from __future__ import annotations
 
 import json
 import os
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import dataclass
+from os import fspath
+from typing import Any, Literal
 
-import click
-
-import coordlang
-from coordlang.commands.files import (
-    FILE,
-    PlanningFiles,
-    check_outputs,
-    language_argument,
-    planning_files,
-    write,
+from coordlang.commands.command import command_of
+from coordlang.commands.files import OutputFile, write
+from coordlang.commands.inputs import InTask, given_sentence, read_task
+from coordlang.commands.keywords import with_options
+from coordlang.commands.options import (
+    NO_SLACK,
+    DomainSource,
+    File,
+    LanguageSource,
+    ProblemSource,
+    SentenceSource,
+    Source,
+    json_option,
 )
-from coordlang.commands.shared_options import (
-    ModelKeywords,
-    kept_plans,
-    limits,
-    model_options,
-    was_given,
-)
-from coordlang.commands.terminal import covered_code, echo, working
+from coordlang.commands.plans import PlanSteps
+from coordlang.commands.terminal import covered_code, echo
+from coordlang.commands.understand import SentencePlans
+from coordlang.execution.choices import choices as choices_under
+from coordlang.execution.open_plans import OpenPlans
+from coordlang.execution.task_language import TaskLanguage
+from coordlang.exports.behaviour_tree import behaviour_trees
+from coordlang.exports.ltlf import export_ltlf
+from coordlang.exports.pddl import PddlExport, export_pddl, plan_names
+from coordlang.language.tolerance import tolerance_data
+from planners.joint.model import JointModel
+from planners.search.plan_file import json_count, only_one_plan
+from planners.system.errors import BadInput, Position, Refuted, UsageError
+from planners.system.files import read_text
 from planners.system.messages import visible
 from planners.system.notebook import counted
+from planners.system.options import group, option
+from planners.system.writing import write_texts
 
-if TYPE_CHECKING:
-    from coordlang.commands.exporting import ExportedFormula, ExportedTask
+#: Beyond this many joint actions robots choose one after another in the exported PDDL.
+MAX_ACTIONS = 2000
+#: The files of an exported task.
+WRITTEN = ("domain.pddl", "problem.pddl")
+
+Target = Literal["pddl", "ltlf", "bt"]
+#: Planners whose PDDL differs: what Fast Downward and K* read, or STRIPS alone.
+Reader = Literal["fd", "kstar", "pyperplan"]
 
 
-@click.command(name="export")
-@language_argument
-@planning_files("DOMAIN PROBLEM SENTENCE", most=1, then="sentence")
-@click.option(
-    "--to",
-    "target",
-    type=click.Choice(["pddl", "ltlf", "bt"]),
-    default="pddl",
-    show_default=True,
-    help="pddl: a planning problem.  ltlf: a temporal formula over plans.  bt: each robot's "
-    "choices as a behaviour tree.",
-)
-@click.option(
-    "-o",
-    "--output",
-    type=FILE,
-    metavar="PATH",
-    help="pddl: a folder for domain.pddl and problem.pddl; ltlf, bt: a file.",
-)
-@click.option(
-    "--max-actions",
-    type=click.IntRange(min=0),
-    default=2000,
-    show_default=True,
-    metavar="N",
-    help="Beyond N joint actions robots choose one after another in the PDDL.",
-)
-@click.option(
-    "--for",
-    "reader",
-    type=click.Choice(["fd", "kstar", "pyperplan"]),
-    default="fd",
-    show_default=True,
-    help="Who reads the PDDL: fd (Fast Downward) and kstar the same, pyperplan STRIPS only.",
-)
-@click.option(
-    "--translate-plan",
-    type=FILE,
-    metavar="PLAN",
-    help="Do not export: translate a plan of the exported problem into a plan file.",
-)
-@click.option("--json", "as_json", is_flag=True, help="One JSON object.")
-@model_options
-@kept_plans
-@limits
-def command(
-    language: str,
-    pddl: PlanningFiles,
-    sentence: str,
-    target: str,
-    output: str | None,
-    max_actions: int,
-    reader: str,
-    translate_plan: str | None,
-    as_json: bool,
-    model: ModelKeywords,
-) -> int:
+@dataclass(frozen=True, slots=True, repr=False)
+class ExportedTask(InTask):
+    """A task under a sentence as plain PDDL, whose optimal plans are exactly the plans that fit.
+
+    ``exported`` has its actions as data.
+    """
+
+    used: TaskLanguage
+    open_plans: SentencePlans
+    exported: PddlExport
+    shown = ("form", "actions", "cost")
+
+    @property
+    def domain(self) -> str:
+        """The text of the PDDL domain."""
+        return self.exported.domain
+
+    @property
+    def problem(self) -> str:
+        """The text of the PDDL problem."""
+        return self.exported.problem
+
+    @property
+    def cost(self) -> int:
+        """The total cost of its optimal plans."""
+        return self.exported.cost
+
+    @property
+    def form(self) -> str:
+        """How joint steps are written: ``explicit`` (one action each) or robot after robot."""
+        return self.exported.classical.form
+
+    @property
+    def actions(self) -> int:
+        """The number of actions."""
+        return len(self.exported.classical.actions)
+
+    @property
+    def terms(self) -> int:
+        """The number of terms that tell which word a state belongs to."""
+        return self.exported.terms
+
+    def save(self, folder: File) -> None:
+        """Write ``domain.pddl`` and ``problem.pddl`` into a folder, which is made if it is missing.
+
+        Raises
+        ------
+        UsageError
+            If it cannot be written to.
+        """
+        texts = dict(zip(WRITTEN, (self.domain, self.problem), strict=True))
+        write_texts(fspath(folder), texts)
+
+    def translate_plan(self, actions: Sequence[str]) -> PlanSteps:
+        """Translate a plan of the exported problem, the names of its actions, into joint steps.
+
+        Raises
+        ------
+        BadInput
+            For an action that the exported problem does not have, or a plan that ends in a step.
+        Refuted
+            If it is no optimal plan of the exported problem.
+        """
+        numbers = self.exported.joint_plan(actions)
+        plan = tuple(self.exported.model.texts(step) for step in numbers)
+        if self.open_plans.rank(plan) is None:
+            kind = self.exported.model.kept_plan
+            raise Refuted(
+                f"this is no {kind} of the exported problem",
+                remedy="Ask the planner for an optimal plan: the one of least total-cost.",
+            )
+        return plan
+
+    def translate_text(self, text: str, name: str) -> PlanSteps:
+        """Translate the text of a plan file; ``name`` is what messages call it."""
+        position = Position(name)
+        only_one_plan(text, position)
+        try:
+            return self.translate_plan(plan_names(text))
+        except (BadInput, Refuted) as error:
+            error.position = error.position or position
+            raise
+
+    def data(self) -> dict[str, Any]:
+        """The PDDL, and what each action stands for, as ``--json`` has them."""
+        model = self.exported.model
+        return {
+            "domain": self.domain,
+            "problem": self.problem,
+            "form": self.form,
+            "step_cost": self.exported.classical.step_cost,
+            "optimal_cost": self.cost,
+            "robots": list(model.robots),
+            "actions": {
+                name: {model.robots[r]: _label_text(model, r, label) for r, label in chosen}
+                for name, chosen in self.exported.labels.items()
+            },
+        }
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class ExportedFormula(InTask):
+    """A sentence as an LTLf formula over the states of a plan, the initial state first.
+
+    A plan satisfies ``formula`` exactly if it has the sentence; ``over_words`` is the same with
+    words as symbols, ``words`` has each word's formula, ``symbols`` says which atom each symbol
+    stands for.
+    """
+
+    used: TaskLanguage
+    formula: str
+    over_words: str
+    words: dict[str, str]
+    symbols: dict[str, str]
+    shown = ("over_words",)
+
+    def __str__(self) -> str:
+        return self.formula
+
+    def data(self) -> dict[str, Any]:
+        """The formulas, as ``--json`` has them."""
+        return {
+            "formula": self.formula,
+            "over_words": self.over_words,
+            "words": self.words,
+            "symbols": self.symbols,
+            **tolerance_data(self.tolerance),
+        }
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class ExportedTrees(InTask):
+    """Each robot's choices under a sentence as a behaviour tree of its name.
+
+    ``xml`` is a document of BehaviorTree.CPP 4; ``subplans``: how many ways each robot has.
+    """
+
+    used: TaskLanguage
+    xml: str
+    subplans: dict[str, int]
+    guaranteed: bool
+    shown = ("subplans", "guaranteed")
+
+    def __str__(self) -> str:
+        return self.xml
+
+    def data(self) -> dict[str, Any]:
+        """The document, and how many ways each robot has, as ``--json`` has them."""
+        return {
+            "xml": self.xml,
+            "subplans": {robot: json_count(n) for robot, n in self.subplans.items()},
+            "guaranteed": self.guaranteed,
+            **tolerance_data(self.tolerance),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class ExportOptions:
+    """What `export` can be asked for."""
+
+    to: Target = option(
+        "pddl",
+        "pddl: a planning problem.  ltlf: a temporal formula over plans.  bt: each robot's "
+        "choices as a behaviour tree.",
+    )
+    output: str | None = option(
+        None,
+        "pddl: a folder for domain.pddl and problem.pddl; ltlf, bt: a file.",
+        "PATH",
+        names=("-o", "--output"),
+        only="cli",
+    )
+    max_actions: int = option(
+        MAX_ACTIONS,
+        "Beyond N joint actions robots choose one after another in the PDDL.",
+        "N",
+        least=0,
+    )
+    for_planner: Reader = option(
+        "fd",
+        "Who reads the PDDL: fd (Fast Downward) and kstar the same, pyperplan STRIPS only.",
+        names=("--for",),
+    )
+    translate_plan: str | None = option(
+        None,
+        "Do not export: translate a plan of the exported problem into a plan file (FILE).",
+        "FILE",
+        only="cli",
+    )
+    as_json: bool = json_option()
+    source: Source = group(Source, without=NO_SLACK)
+    given: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        pddl_only = {"max_actions": "--max-actions", "for_planner": "--for"}
+        pddl_only["translate_plan"] = "--translate-plan"
+        for name, spelling in pddl_only.items():
+            if self.to != "pddl" and name in self.given:
+                raise UsageError(
+                    f"{spelling} belongs to --to pddl",
+                    remedy=f"Leave out {spelling}, or --to {self.to}.",
+                )
+
+    @property
+    def writes_folder(self) -> bool:
+        """Whether ``output`` is a folder for two files."""
+        is_text = self.as_json or self.translate_plan is not None or self.output in (None, "-")
+        return self.to == "pddl" and not is_text
+
+    def outputs(self) -> list[OutputFile]:
+        """The files that are written."""
+        if not self.writes_folder:
+            return [OutputFile("-o", self.output)]
+        folder = self.output
+        paths = [os.path.join(folder, name) if folder else "" for name in WRITTEN]
+        return [OutputFile("-o", path, makes_folder=True) for path in paths]
+
+
+@with_options(ExportOptions)
+def export(
+    language: LanguageSource,
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
+    sentence: SentenceSource | None = None,
+    *,
+    options: ExportOptions,
+) -> Any:
+    """Write a task under a sentence for other programs.
+
+    Returns
+    -------
+    ExportedTask
+        A planning problem whose optimal plans are exactly the plans that fit.
+    ExportedFormula
+        With ``to="ltlf"``: a temporal formula over plans.
+    ExportedTrees
+        With ``to="bt"``: each robot's choices as a behaviour tree.
+
+    Raises
+    ------
+    UsageError
+        For pyperplan, where STRIPS cannot say what is optimal.
+    NoPlanFits
+        If no optimal plan has the sentence.
+    """
+    said = given_sentence(sentence)
+    used = read_task(language, domain, problem, options.source).used
+    words = used.words_of(said)
+    if options.to == "pddl":
+        strips_only = options.for_planner == "pyperplan"
+        exported = export_pddl(used, words, options.max_actions, strips_only=strips_only)
+        return ExportedTask(used, SentencePlans(OpenPlans.of(used, words)), exported)
+    if options.to == "bt":
+        found = choices_under(used, words)
+        counts = {used.model.robots[own.robot]: own.automaton.count for own in found.robots}
+        return ExportedTrees(used, behaviour_trees(found), counts, found.guaranteed)
+    ltlf = export_ltlf(used, words)
+    return ExportedFormula(used, ltlf.formula, ltlf.over_words, ltlf.words, ltlf.symbols)
+
+
+def _label_text(model: JointModel, robot: int, label: int) -> str | None:
+    return model.labels[robot][label] if label else None
+
+
+@command_of(export, "LANGUAGE DOMAIN PROBLEM SENTENCE", doing="compiling the task")
+def command(found: ExportedTask | ExportedFormula | ExportedTrees, options: ExportOptions) -> int:
     """Write the task under SENTENCE ("w1 w0") for other programs.
 
     The optimal plans of the exported PDDL are exactly the plans that fit, one to one; a plan
@@ -98,81 +327,25 @@ def command(
 
     Exit 1: no plan fits, or the language does not cover the task and guarantees nothing for it.
     """
-    if target != "pddl":
-        _check_not_pddl(target, translate_plan)
-    inputs = [language, *pddl.paths, translate_plan]
-    writes_folder = target == "pddl" and translate_plan is None and not as_json
-    if output is not None and output != "-" and writes_folder:
-        names = ("domain.pddl", "problem.pddl")
-        written = [("-o", os.path.join(output, name) if output else output) for name in names]
-        check_outputs(written, inputs, makes_folder=True)
+    output, as_json = options.output, options.as_json
+    if isinstance(found, ExportedTask) and options.translate_plan is not None:
+        path = options.translate_plan
+        plan, plans = found.translate_text(read_text(path), path), found.open_plans
+        write(json.dumps(plans.data([plan])) + "\n" if as_json else plans.ipc(plan), output)
+    elif as_json:
+        write(json.dumps(found.data()) + "\n", output)
+    elif isinstance(found, ExportedTrees):
+        write(found.xml, output)
+    elif isinstance(found, ExportedFormula):
+        write(found.formula + "\n", output)
+        if output in (None, "-"):
+            symbols = counted(len(found.symbols), "symbol")
+            echo(f"{symbols}; --json says which atom each stands for", err=True)
+    elif output is not None and options.writes_folder:
+        found.save(output)
+        size = f"{counted(found.actions, 'action')} ({found.form})"
+        terms = f"{counted(found.terms, 'term')} for the words"
+        echo(f"written to {visible(output)}: {', '.join(WRITTEN)}: {size}, {terms}")
     else:
-        check_outputs([("-o", output)], inputs)
-    files = language, pddl.domain, pddl.problem, sentence
-    if target == "ltlf":
-        with working("finding formulas of the words"):
-            formula = coordlang.export(*files, factored=pddl.factored, to="ltlf", **model)
-        _write_formula(formula, output, as_json)
-        return covered_code(formula.covered, formula.tolerance)
-    if target == "bt":
-        with working("finding the robots' choices"):
-            trees = coordlang.export(*files, factored=pddl.factored, to="bt", **model)
-        write(json.dumps(trees.data()) + "\n" if as_json else trees.xml, output)
-        return covered_code(trees.covered, trees.tolerance)
-    with working("compiling the task"):
-        exported = coordlang.export(
-            *files,
-            factored=pddl.factored,
-            to="pddl",
-            max_actions=max_actions,
-            for_planner=reader,
-            **model,
-        )
-    if translate_plan is not None:
-        _write_plan(exported, translate_plan, output, as_json)
-    else:
-        _write_pddl(exported, output, as_json)
-    return covered_code(exported.covered, exported.tolerance)
-
-
-def _check_not_pddl(target: str, translate_plan: str | None) -> None:
-    """Refuse what has an effect on PDDL only."""
-    if translate_plan is not None:
-        raise click.UsageError(
-            f"--translate-plan translates plans of the exported PDDL: leave out --to {target}"
-        )
-    if was_given("max_actions"):
-        raise click.UsageError("--max-actions belongs to --to pddl")
-    if was_given("reader"):
-        raise click.UsageError("--for belongs to --to pddl")
-
-
-def _write_pddl(exported: ExportedTask, output: str | None, as_json: bool) -> None:
-    if as_json:
-        write(json.dumps(exported.data()) + "\n", output)
-    elif output is None or output == "-":
-        echo(exported.domain + exported.problem, nl=False)
-    else:
-        exported.save(output)
-        size = f"{counted(exported.actions, 'action')} ({exported.form})"
-        terms = f"{counted(exported.terms, 'term')} for the words"
-        echo(f"written to {visible(output)}: domain.pddl, problem.pddl: {size}, {terms}")
-
-
-def _write_formula(formula: ExportedFormula, output: str | None, as_json: bool) -> None:
-    if as_json:
-        write(json.dumps(formula.data()) + "\n", output)
-        return
-    write(formula.formula + "\n", output)
-    if output is None or output == "-":
-        symbols = counted(len(formula.symbols), "symbol")
-        echo(f"{symbols}; --json says which atom each stands for", err=True)
-
-
-def _write_plan(exported: ExportedTask, path: str, output: str | None, as_json: bool) -> None:
-    """Write a plan of the exported problem, which must be an optimal one, as a plan file."""
-    from planners.system.files import read_text
-
-    plan = exported.translate_text(read_text(path), path)
-    plans = exported.open_plans
-    write(json.dumps(plans.data([plan])) + "\n" if as_json else plans.ipc(plan), output)
+        echo(found.domain + found.problem, nl=False)
+    return covered_code(found.covered, found.tolerance)

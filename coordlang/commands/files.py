@@ -1,18 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arguments that name input files, and checks of output files before the work."""
+"""Files that a command reads and writes: what may be written is checked before the work."""
 
 from __future__ import annotations
 
-import functools
 import os
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 import click
 from click.shell_completion import CompletionItem
 
-from coordlang.commands.shared_options import CommandFunction
 from coordlang.commands.terminal import echo
 
 
@@ -36,135 +34,40 @@ class _Named(click.ParamType):  # type: ignore[type-arg]  # generic in newer ver
 
 FILE, FOLDER = _Named("file"), _Named("dir")
 
-language_argument = click.argument("language", type=FILE)
-
-
-@dataclass(frozen=True, slots=True)
-class PlanningFiles:
-    """DOMAIN PROBLEM.., or ``--factored DIR`` in their place."""
-
-    files: tuple[str, ...]
-    factored: str | None
-
-    @property
-    def domain(self) -> str | None:
-        """The domain file; None under ``--factored``."""
-        return self.files[0] if self.files else None
-
-    @property
-    def problem(self) -> str | None:
-        """The only problem file; None under ``--factored``."""
-        return self.files[1] if self.files else None
-
-    @property
-    def problems(self) -> tuple[str, ...]:
-        """The problem files; none under ``--factored``."""
-        return self.files[1:]
-
-    @property
-    def paths(self) -> list[str]:
-        """All files that are read."""
-        if self.factored:
-            return [str(path) for path in Path(self.factored).glob("*.pddl")]
-        return list(self.files)
-
 
 def beside(problem: str) -> str:
     """Where coordinates of a problem's places are read from, if there is such a file."""
     return str(Path(problem).parent / "coordinates.json")
 
 
-def planning_files(
-    metavar: str, most: int | None = None, *, then: str | None = None, optional: bool = False
-) -> Callable[[CommandFunction], CommandFunction]:
-    """DOMAIN and at most so many problems, or ``--factored DIR``.
+class OutputFile(NamedTuple):
+    """A file that is written: the option that names it, and its path.
 
-    The command gets them as ``pddl``, a `PlanningFiles`.
-
-    Parameters
-    ----------
-    metavar
-        All that is named here, as the usage line shows it.
-    most
-        The greatest number of problems; None: any number.
-    then
-        An argument that comes last, by the name under which the command gets it.
-    optional
-        Whether that argument may be left out: then the command gets None.
+    None is no file, ``-`` is stdout and not looked at.  ``makes_folder``: its folder is made where
+    it is missing.
     """
 
-    def decorate(function: CommandFunction) -> CommandFunction:
-        @click.argument("files", nargs=-1, type=FILE, metavar=metavar)
-        @click.option(
-            "--factored",
-            type=FOLDER,
-            metavar="DIR",
-            help="In place of DOMAIN and PROBLEM: the folder of each robot's own domain and "
-            "problem file.",
-        )
-        @functools.wraps(function)
-        def wrapped(
-            files: tuple[str, ...], factored: str | None, **arguments: object
-        ) -> int | None:
-            least = 0 if factored else 2
-            if then is not None:
-                files, arguments[then] = _without_last(files, least, is_optional=optional)
-            if _misses(files, least, most) or (then and not optional and arguments[then] is None):
-                without = "DOMAIN PROBLEM" if then else "them"
-                raise click.UsageError(f"expected {metavar}, or --factored DIR without {without}")
-            return function(pddl=PlanningFiles(files, factored), **arguments)
-
-        return wrapped
-
-    return decorate
-
-
-def _misses(files: tuple[str, ...], least: int, most: int | None) -> bool:
-    """Whether these are too few files, or too many: none where none is needed."""
-    too_many = most is not None and len(files) > 1 + most
-    return len(files) < least or too_many or (bool(files) and not least)
-
-
-def _without_last(
-    files: tuple[str, ...], least: int, *, is_optional: bool
-) -> tuple[tuple[str, ...], str | None]:
-    """Split off the last argument; None where it is left out."""
-    if is_optional and len(files) <= least:
-        return files, None
-    return files[:-1], files[-1] if files else None
+    option: str
+    path: str | None
+    makes_folder: bool = False
 
 
 def check_outputs(
-    outputs: Sequence[tuple[str, str | None]],
-    inputs: Iterable[str | None],
-    *,
-    makes_folder: bool = False,
+    outputs: Iterable[OutputFile | tuple[str, str | None]], inputs: Iterable[str | None]
 ) -> None:
     """Refuse outputs that cannot be written, or overwrite an input file or one another.
 
-    Before the work, not after it.
-
-    Parameters
-    ----------
-    outputs
-        Pairs (option, path).  None is no file, ``-`` is stdout and not looked at.
-    inputs
-        The files that are read; None and ``-`` are left out.
-    makes_folder
-        Whether the command makes the folder itself where it is missing.
-
-    Raises
-    ------
-    UsageError
-        For an output that cannot be written, or that would overwrite something.
+    Before the work, not after it.  Of the ``inputs`` None and ``-`` are left out.  Raises
+    `UsageError`.
     """
     from planners.system.errors import UsageError
     from planners.system.writing import is_device, why_unwritable
 
     read = [path for path in inputs if path is not None and path != "-" and os.path.isfile(path)]
-    named = [(option, path) for option, path in outputs if path is not None and path != "-"]
     written: dict[str, str] = {}
-    for option, path in named:
+    for option, path, makes_folder in (OutputFile(*each) for each in outputs):
+        if path is None or path == "-":
+            continue
         if reason := why_unwritable(path, makes_folder=makes_folder):
             what = f"{option} {path} cannot be written: {reason}"
             raise UsageError(what, remedy="Name a file in a folder that you may write to.")

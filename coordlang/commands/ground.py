@@ -1,88 +1,189 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``coordlang ground``: lifted language and problem -> language file."""
+"""``coordlang ground``: a lifted language and a problem -> the problem's language file."""
 
 from __future__ import annotations
 
-import click
+from collections.abc import Mapping
+from dataclasses import dataclass
+from os import fspath
 
 import coordlang
+from coordlang.commands.command import command_of
 from coordlang.commands.failure import UNPROVED
-from coordlang.commands.files import FILE, PlanningFiles, beside, check_outputs, planning_files
-from coordlang.commands.shared_options import ModelKeywords, kept_plans, limits, model_options
-from coordlang.commands.terminal import echo, working
+from coordlang.commands.inputs import PlanningInput, read_coordinates_of, read_planning
+from coordlang.commands.keywords import with_options
+from coordlang.commands.options import (
+    NO_SLACK,
+    DomainSource,
+    Jobs,
+    LiftedSource,
+    LiftedWork,
+    ProblemSource,
+    Progress,
+    Source,
+    TasksSource,
+    no_progress,
+    output_option,
+)
+from coordlang.commands.terminal import echo
+from coordlang.commands.workers import opened_workers
+from coordlang.language.candidates import Candidates, require_solvable
+from coordlang.language.file import to_bytes
+from coordlang.language.partition import Partition
+from coordlang.language.recorded import check_domain
+from coordlang.language.words import Language
+from coordlang.lifted.file import read_lifted
+from coordlang.lifted.grounding import Known, described, grounded, require_robots
+from coordlang.lifted.language import LiftedLanguage
+from coordlang.lifted.world import States, World
+from coordlang.sites.coordinates import Point
+from coordlang.verification.candidates import verify_candidates
+from planners.parallel.workers import Workers
+from planners.system.errors import OutOfMemory, Position, Refuted, note
+from planners.system.limits import stop_clock
 from planners.system.notebook import counted
+from planners.system.options import group, option
 
 
-@click.command(name="ground")
-@click.argument("lifted", type=FILE)
-@planning_files("DOMAIN PROBLEM", most=1)
-@click.option(
-    "--tasks",
-    type=FILE,
-    metavar="all|FILE|own",
-    default="all",
-    show_default=True,
-    help="Candidate tasks: every pair of reachable states, a task file, or the problem's own task.",
-)
-@click.option("--unverified", is_flag=True, help="Do not verify it here; the file says so.")
-@click.option(
-    "--coordinates",
-    type=FILE,
-    metavar="FILE",
-    help="Where places lie (default: coordinates.json beside PROBLEM, else what names say).",
-)
-@click.option("--jobs", type=int, metavar="N", help="Processes that verify (default: the cores).")
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=FILE,
-    metavar="LANGUAGE",
-    help="The language file; .json or .json.gz, - for stdout.",
-)
-@model_options
-@kept_plans
-@limits
-def command(
-    lifted: str,
-    pddl: PlanningFiles,
-    tasks: str,
-    unverified: bool,
-    coordinates: str | None,
-    jobs: int | None,
-    output: str,
-    model: ModelKeywords,
-) -> int:
+@dataclass(frozen=True, slots=True)
+class Grounded:
+    """The language of one problem, and what is known of it there."""
+
+    language: Language
+    known: Known
+
+
+def ground_in(
+    lifted: LiftedLanguage,
+    files: PlanningInput,
+    position: Position,
+    *,
+    tasks: TasksSource | None,
+    is_verified: bool,
+    points: Mapping[str, Point],
+    workers: Workers,
+    progress: Progress,
+    every_word: bool = False,
+) -> Grounded:
+    """The words of a problem's states, verified there unless that is not wanted or does not fit.
+
+    With ``every_word`` the language has the words that no state here has, too.
+
+    Raises
+    ------
+    BadInput
+        If the lifted language belongs to another domain or other robots.
+    UsageError
+        For model options that contradict it.
+    """
+    shape = described(lifted)
+    check_domain(shape, files.domain, position)
+    progress(f"finding all optimal plans of {files.problems[0].name}")
+    candidates = files.candidates(tasks, files.options_of(shape))
+    require_solvable(candidates)
+    require_robots(lifted, candidates.model.robots, position)
+    states = States(World.loaded(candidates.loaded, points), candidates.rows)
+    known: Known = "unknown"
+    if is_verified:
+        known = _known(lifted.partition(states), candidates, workers, progress)
+    producer = {"program": "coordlang", "version": coordlang.__version__}
+    return Grounded(
+        grounded(lifted, candidates, states, known, producer, every_word=every_word), known
+    )
+
+
+def _known(
+    partition: Partition, candidates: Candidates, workers: Workers, progress: Progress
+) -> Known:
+    try:
+        verdict = verify_candidates(partition, candidates, workers, progress)
+    except OutOfMemory as error:
+        note(f"the words are not verified here: {error.what}")
+        return "unknown"
+    return "verified" if verdict.holds else "refuted"
+
+
+@dataclass(frozen=True, slots=True)
+class GroundOptions:
+    """What `ground` can be asked for."""
+
+    tasks: TasksSource | None = option(
+        "all",
+        "Candidate tasks: every pair of reachable states, a task file, or the problem's own task.",
+        "all|FILE|own",
+    )
+    verified: bool = option(
+        True, "Do not verify it here; the file says so.", names=("--unverified",)
+    )
+    work: LiftedWork = group(LiftedWork)
+    output: str = output_option(
+        "The language file; .json or .json.gz, - for stdout.", "LANGUAGE", required=True
+    )
+    source: Source = group(Source, without=NO_SLACK)
+
+
+@with_options(GroundOptions)
+def ground(
+    lifted: LiftedSource,
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
+    *,
+    options: GroundOptions,
+) -> Language:
+    """The language of one problem, an ordinary one, from a lifted language of its domain.
+
+    If it is not verified here, or if the memory does not suffice, the language covers no task, and
+    its method says on which problems the words were verified.
+
+    Raises
+    ------
+    Refuted
+        If it is no coordination language for these tasks.
+    BadInput
+        If the lifted language belongs to another domain or other robots.
+    """
+    if isinstance(lifted, LiftedLanguage):
+        own, position = lifted, Position("the lifted language")
+    else:
+        own, position = read_lifted(fspath(lifted)), Position(fspath(lifted))
+    files = read_planning(domain, [problem], options.source, most=1)
+    work = options.work
+    with opened_workers(Jobs(work.jobs)) as workers:
+        found = ground_in(
+            own,
+            files,
+            position,
+            tasks=None if options.tasks == "own" else options.tasks,
+            is_verified=options.verified,
+            points=read_coordinates_of(work.coordinates, files.problems[0]),
+            workers=workers,
+            progress=work.progress or no_progress,
+        )
+    if found.known == "refuted":
+        known = ", ".join(v.problem for v in own.verified)
+        placed = any(f"({axis} " in str(f) for axis in ("row", "column") for f in own.features)
+        asks = " It is about where places lie: are they known here (--coordinates)?" * placed
+        raise Refuted(
+            f"the lifted language is no coordination language for {files.problems[0].name}; it was "
+            f"verified on {known or 'no problem'}",
+            remedy=f"Learn from this problem, too: `coordlang lift .. --check PROBLEM`.{asks}",
+        )
+    return found.language
+
+
+@command_of(ground, "LIFTED DOMAIN PROBLEM", doing="finding all optimal plans")
+def command(found: Language, options: GroundOptions) -> int:
     """Write the language of one problem, an ordinary language file, from LIFTED.
 
     Exit 0: written, and verified by definition unless --unverified.  1: refuted for this problem;
     nothing is written.  3: written, but not verified, for the memory did not suffice.
     """
-    from coordlang.language.file import to_bytes
-    from planners.system.limits import stop_clock
-
-    listed = tasks if tasks not in ("all", "own") else None
-    places = [coordinates] if coordinates else map(beside, pddl.problems)
-    check_outputs([("-o", output)], [lifted, *pddl.paths, listed, *places])
-    with working("finding all optimal plans") as progress:
-        language = coordlang.ground(
-            lifted,
-            *pddl.files,
-            factored=pddl.factored,
-            tasks=None if tasks == "own" else tasks,
-            verified=not unverified,
-            coordinates=coordinates,
-            progress=progress,
-            jobs=jobs,
-            **model,
-        )
     stop_clock()  # the work is done; from here on it is saved
-    if output == "-":
-        echo(to_bytes(language).decode(), nl=False)
+    if options.output == "-":
+        echo(to_bytes(found).decode(), nl=False)
     else:
-        language.save(output)
-    size = counted(len(language.words), "word")
-    count = language.provenance.tasks["count"]
-    tasks_text = f" for {counted(count, 'task')}" if count else ""
-    echo(f"{size} ({language.guarantee.method}){tasks_text}", err=True)
-    return 0 if count or unverified else UNPROVED
+        found.save(options.output)
+    count = found.provenance.tasks["count"]
+    tasks = f" for {counted(count, 'task')}" if count else ""
+    echo(f"{counted(len(found.words), 'word')} ({found.guarantee.method}){tasks}", err=True)
+    return 0 if count or not options.verified else UNPROVED

@@ -1,17 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Domains, problems and tasks that the functions read: paths, or objects parsed before."""
+"""What the functions read: domains, problems, tasks, languages; paths, or objects read before."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from coordlang.commands.keywords import with_options
-from coordlang.commands.options import Source
-from coordlang.language.listed import ListedTask
-from coordlang.language.task_file import TASKS, read_task_file, tasks_from_data
+from coordlang.commands.options import (
+    CoordinatesSource,
+    DomainSource,
+    File,
+    LanguageSource,
+    ProblemSource,
+    SentenceSource,
+    Source,
+    TasksSource,
+    no_progress,
+)
 from planners.loading import PlanningInstance, build
 from planners.pddl import read_domain, read_problem
 from planners.pddl.factored import read_factored
@@ -19,17 +28,20 @@ from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
 from planners.search.doubled import note_doubled
 from planners.system.errors import Position, UsageError
+from planners.system.files import names_format, read_bytes
+from planners.system.notebook import Presented
 
 if TYPE_CHECKING:
+    from coordlang.execution.task_language import TaskLanguage
     from coordlang.language.candidates import Candidates
+    from coordlang.language.listed import ListedTask
+    from coordlang.language.tolerance import Tolerance
     from coordlang.language.words import Language
+    from coordlang.lifted.language import LiftedLanguage
+    from coordlang.sites.coordinates import Point
 
-File = str | PathLike[str]
-#: A domain file, a parsed domain, or domain and problems together (`coordlang.load`).
-DomainSource = File | Domain | PlanningInstance
-ProblemSource = File | Problem
-#: ``"all"``, a task file, its data, or tasks: each with ``init`` and ``goal``, lists of PDDL texts.
-TasksSource = File | Mapping[str, Any] | Sequence[ListedTask | Mapping[str, Any]]
+#: Options that are fixed in a loaded domain.
+_FIXED = frozenset({"cost", "unowned", "remember_actions", "slack", "words_see_slack"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +108,10 @@ def read_planning(
     """
     found = [problem for problem in problems if problem is not None]
     if source.factored is not None:
-        return _from_factored(source, [domain, *found])
+        if domain is not None or found:
+            raise UsageError("--factored names all files", remedy="Leave out domain and problem.")
+        domain, problem = read_factored(fspath(source.factored))
+        return PlanningInput(domain, [problem], source)
     if isinstance(domain, PlanningInstance):
         return _from_instance(domain, found, source, most)
     if domain is None or not found or (most is not None and len(found) > most):
@@ -129,6 +144,19 @@ def load(
     return read_planning(domain, problems, options).instance()
 
 
+def load_language(path: File) -> Language:
+    """Read a language file (docs/formats.md).
+
+    Raises
+    ------
+    BadInput
+        For a file that is missing, cut off, no language, or of another version.
+    """
+    from coordlang.language.file import read_language as read_language_file
+
+    return read_language_file(fspath(path))
+
+
 def read_instance(
     domain: DomainSource | None, problem: ProblemSource | None, source: Source
 ) -> PlanningInstance:
@@ -140,6 +168,9 @@ def read_instance(
 
 def read_tasks(tasks: TasksSource) -> tuple[tuple[ListedTask, ...], Position]:
     """Read a task list, with what messages call it."""
+    from coordlang.language.listed import ListedTask
+    from coordlang.language.task_file import TASKS, read_task_file, tasks_from_data
+
     if isinstance(tasks, str | PathLike):
         return read_task_file(fspath(tasks)), Position(fspath(tasks))
     position = Position("the tasks")
@@ -155,13 +186,135 @@ def read_tasks(tasks: TasksSource) -> tuple[tuple[ListedTask, ...], Position]:
     return tasks_from_data(data, position), position
 
 
-def _from_factored(source: Source, others: Sequence[object]) -> PlanningInput:
-    """Read a folder of factored files, which stands in the place of all ``others``."""
-    if any(other is not None for other in others):
-        raise UsageError("--factored names all files", remedy="Leave out domain and problem.")
-    assert source.factored is not None
-    domain, problem = read_factored(fspath(source.factored))
-    return PlanningInput(domain, [problem], source)
+def read_language(language: LanguageSource) -> tuple[Language | LiftedLanguage, Position]:
+    """Read a language or a lifted language, with what messages call it."""
+    from coordlang.language.file import language_from_bytes
+    from coordlang.language.words import Language
+
+    if isinstance(language, Language):
+        return language, Position("the language")
+    if not isinstance(language, str | PathLike):
+        return language, Position("the lifted language")
+    data, position = read_bytes(fspath(language)), Position(fspath(language))
+    if names_format(data, "coordlang/lifted"):
+        from coordlang.lifted.file import lifted_from_bytes
+
+        return lifted_from_bytes(data, position), position
+    return language_from_bytes(data, position), position
+
+
+def read_plain_language(language: LanguageSource) -> tuple[Language, Position]:
+    """Read a language, with what messages call it; `UsageError` for a lifted one."""
+    from coordlang.language.words import Language
+
+    read, position = read_language(language)
+    if not isinstance(read, Language):
+        raise UsageError(
+            f"{position} is a lifted language",
+            remedy="`coordlang ground` makes it an ordinary one, of one problem.",
+        )
+    return read, position
+
+
+def read_coordinates_of(given: CoordinatesSource | None, problem: Problem) -> Mapping[str, Point]:
+    """Coordinates of places: those given, else those of a file beside the problem, else none."""
+    from coordlang.sites.coordinates import checked, read_coordinates
+
+    if isinstance(given, str | PathLike):
+        return read_coordinates(fspath(given))
+    if given is not None:
+        return checked(given, Position("the coordinates"))
+    file = Path(problem.source.name)
+    beside = (file if file.is_dir() else file.parent) / "coordinates.json"
+    return read_coordinates(beside) if file.exists() and beside.is_file() else {}
+
+
+def language_for(
+    language: LanguageSource,
+    files: PlanningInput,
+    tasks: TasksSource | None = None,
+    *,
+    is_verified: bool = True,
+    coordinates: CoordinatesSource | None = None,
+) -> tuple[Language, Position]:
+    """Read a language; a lifted one is put into the problems, and verified there for tasks.
+
+    Without ``tasks`` for the problems' own ones.  One that is to be used, and verified for that,
+    keeps the words that no state here has, so that words look the same in all problems.
+    """
+    from coordlang.language.words import Language
+
+    read, position = read_language(language)
+    if isinstance(read, Language):
+        return read, position
+    from coordlang.commands.ground import ground_in
+    from planners.parallel.workers import Workers
+
+    found = ground_in(
+        read,
+        files,
+        position,
+        tasks=tasks,
+        is_verified=is_verified,
+        points=read_coordinates_of(coordinates, files.problems[0]),
+        workers=Workers(),
+        progress=no_progress,
+        every_word=is_verified,
+    )
+    return found.language, position
+
+
+class InTask(Presented):
+    """A result about one task under a language.
+
+    ``used`` is the language in the task.
+    """
+
+    __slots__ = ()
+    used: TaskLanguage
+
+    @property
+    def covered(self) -> bool:
+        """Whether the task is one that the language guarantees."""
+        return self.used.covered
+
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """What may go wrong, or be longer, under the language; None: nothing."""
+        return self.used.tolerance
+
+
+@dataclass(frozen=True, slots=True)
+class ReadTask:
+    """The files of one problem, and a language in its task."""
+
+    files: PlanningInput
+    used: TaskLanguage
+    position: Position
+
+
+def read_task(
+    language: LanguageSource,
+    domain: DomainSource | None,
+    problem: ProblemSource | None,
+    source: Source,
+    coordinates: CoordinatesSource | None = None,
+) -> ReadTask:
+    """Read a language and put it into the task of a problem."""
+    from coordlang.execution.task_language import language_in_task
+
+    files = read_planning(domain, [problem], source, most=1)
+    read, position = language_for(language, files, coordinates=coordinates)
+    options = files.options_of(read)
+    used = language_in_task(read, files.domain, files.problems[0], options, position)
+    return ReadTask(files, used, position)
+
+
+def given_sentence(sentence: SentenceSource | None) -> SentenceSource:
+    """Return the sentence; `UsageError` where none is given."""
+    if sentence is None:
+        raise UsageError("expected a sentence", remedy='Give its words, as in "w1 w0".')
+    return sentence
 
 
 def _from_instance(
@@ -180,9 +333,8 @@ def _from_instance(
             remedy="Give the problem that is meant as the second argument.",
         )
     # A language must have been built with the same options; its robots may be named there alone.
-    fixed = {"cost", "unowned", "remember_actions", "slack", "words_see_slack"}
-    given = fixed | ({"robots"} if loaded.options.names else set())
-    return PlanningInput(loaded.domain, read, Source(None, loaded.options, frozenset(given)))
+    given = _FIXED | ({"robots"} if loaded.options.names else set())
+    return PlanningInput(loaded.domain, read, Source(None, loaded.options, given))
 
 
 def _problem(problem: ProblemSource, domain: Domain) -> Problem:

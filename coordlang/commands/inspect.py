@@ -10,10 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 from coordlang.commands.command import command_of
 from coordlang.commands.feasibility import feasibility
-from coordlang.commands.inputs import DomainSource, File, ProblemSource, read_instance
+from coordlang.commands.inputs import read_instance
 from coordlang.commands.keywords import with_options
 from coordlang.commands.layout import WIDTH, wrapped
-from coordlang.commands.options import NO_SLACK, Source, json_option
+from coordlang.commands.options import (
+    NO_SLACK,
+    DomainSource,
+    File,
+    ProblemSource,
+    Source,
+    json_option,
+)
 from coordlang.commands.terminal import echo, line_width, note, note_single_robot
 from planners.system.notebook import Presented, counted, html_table
 from planners.system.options import group, option

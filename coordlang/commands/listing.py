@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from coordlang.commands.shared_options import CommandFunction, was_given
 from coordlang.commands.terminal import echo
 from planners.system.options import option
 
@@ -77,36 +76,8 @@ class Listing:
             echo(f"{len(listed)} of {plans.count} {what} listed; --max N lists more", err=True)
 
 
-def listing_options(function: CommandFunction) -> CommandFunction:
-    """``--count``, ``--max``, ``--sample`` and ``--seed``."""
-    for each in (
-        click.option("--seed", type=int, default=0, show_default=True, help="Seed of --sample."),
-        click.option(
-            "--sample",
-            type=click.IntRange(min=1),
-            metavar="N",
-            help="Draw N plans uniformly instead of the first ones.",
-        ),
-        click.option(
-            "--max",
-            "most",
-            type=click.IntRange(min=0),
-            help=f"List at most this many plans (default: {DEFAULT_MAX}).",
-        ),
-        click.option(
-            "--count",
-            "only_count",
-            is_flag=True,
-            help="Print the exact number of plans only.",
-        ),
-    ):
-        function = each(function)
-    return function
-
-
-def form_of(form: str, as_json: bool, given: frozenset[str] | None = None) -> str:
-    """``--format``, for which ``--json`` may stand."""
-    was = was_given("form") if given is None else "form" in given
-    if as_json and form != "json" and was:
+def form_of(form: str, as_json: bool, given: frozenset[str]) -> str:
+    """``--format``, for which ``--json`` may stand; ``given`` are the options that were."""
+    if as_json and form != "json" and "form" in given:
         raise click.UsageError(f"--json is short for --format json: leave out --format {form}")
     return "json" if as_json else form

@@ -1,18 +1,46 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Options that several functions and commands share."""
+"""What several functions and commands take: files or parsed objects, and options.
+
+Nothing heavy is imported here: ``--help`` needs the records.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike, fspath
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Union
 
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import UsageError
 from planners.system.options import group, option
 
+if TYPE_CHECKING:
+    from coordlang.language.listed import ListedTask
+    from coordlang.language.words import Language
+    from coordlang.lifted.language import LiftedLanguage
+    from coordlang.sites.coordinates import Point
+    from planners.loading import PlanningInstance
+    from planners.pddl.lifted import Domain, Problem
+
+File = str | PathLike[str]
+#: A domain file, a parsed domain, or domain and problems together (`coordlang.load`).
+DomainSource = Union[File, "Domain", "PlanningInstance"]
+ProblemSource = Union[File, "Problem"]
+#: ``"all"``, a task file, its data, or tasks: each with ``init`` and ``goal``, lists of PDDL texts.
+TasksSource = Union[File, Mapping[str, Any], "Sequence[ListedTask | Mapping[str, Any]]"]
+LanguageSource = Union[File, "Language", "LiftedLanguage"]
+LiftedSource = Union[File, "LiftedLanguage"]
+#: A file of coordinates, or place -> (x, y).
+CoordinatesSource = Union[File, "Mapping[str, Point]"]
+#: A sentence: ``"w1 w0"``, its words ``("w1", "w0")``, or one of `explain`.
+SentenceSource = str | Iterable[str]
+
+#: What to do about a candidate task without a plan.
 Unsolvable = Literal["fail", "skip"]
+#: Called with what is being done, now and then.
+Progress = Callable[[str], None]
+
 
 #: What the command line has not where plans take no slack, or a language file says how much.
 NO_SLACK = ("slack", "words_see_slack")
@@ -34,6 +62,15 @@ def output_option(
     default = "" if required else None
     return option(
         default, help, metavar, names=names, only="cli", is_output=True, required=required
+    )
+
+
+def coordinates_option() -> Any:
+    """The field of an options record for ``--coordinates``."""
+    return option(
+        None,
+        "Where places lie (default: coordinates.json beside PROBLEM, else what names say).",
+        "FILE",
     )
 
 
@@ -83,3 +120,18 @@ class Jobs:
             )
         if self.scheduler is not None:
             object.__setattr__(self, "scheduler", fspath(self.scheduler))
+
+
+@dataclass(frozen=True, slots=True)
+class LiftedWork:
+    """How words over features are put into problems."""
+
+    coordinates: CoordinatesSource | None = coordinates_option()
+    jobs: int | None = option(None, "Processes that verify (default: the cores).", "N", least=1)
+    progress: Progress | None = option(
+        None, "Called with a line of text now and then.", only="python"
+    )
+
+
+def no_progress(_: str) -> None:
+    """Report nothing."""

@@ -4,101 +4,234 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
 
-import click
-
-import coordlang
-from coordlang.commands.files import PlanningFiles, language_argument, planning_files
+from coordlang.commands.command import command_of
+from coordlang.commands.inputs import InTask, read_task
+from coordlang.commands.keywords import with_options
 from coordlang.commands.listing import form_of
-from coordlang.commands.shared_options import ModelKeywords, kept_plans, limits, model_options
-from coordlang.commands.terminal import covered_code, echo, working
-from planners.search.heuristics import HEURISTICS
+from coordlang.commands.options import (
+    NO_SLACK,
+    DomainSource,
+    LanguageSource,
+    ProblemSource,
+    SentenceSource,
+    Source,
+    json_option,
+)
+from coordlang.commands.plans import PlanSteps
+from coordlang.commands.terminal import covered_code, echo
+from coordlang.commands.understand import SentencePlans
+from coordlang.execution.best_sentence import BestSentence, best_sentence
+from coordlang.execution.guided_search import ExpandedStates, GuidedPlan, plan_under_sentence
+from coordlang.execution.open_plans import OpenPlans
+from coordlang.execution.preferences import Preference, read_preference
+from coordlang.execution.task_language import TaskLanguage
+from planners.search.heuristics import HeuristicName
+from planners.search.plan_file import Texts, json_count
+from planners.system.errors import UsageError
 from planners.system.notebook import counted
-
-if TYPE_CHECKING:
-    from coordlang.commands.speaking import Fulfilled
+from planners.system.options import group, option
 
 
-@click.command(name="plan")
-@language_argument
-@planning_files("DOMAIN PROBLEM [SENTENCE]", most=1, then="sentence", optional=True)
-@click.option(
-    "--prefer",
-    multiple=True,
-    metavar="PREFERENCE",
-    help='Instead of SENTENCE: shortest, most-plans, first:ROBOT or avoid:"(ATOM)"; '
-    "a second one decides among equals.",
-)
-@click.option(
-    "--heuristic",
-    type=click.Choice(tuple(HEURISTICS)),
-    default="relaxed",
-    show_default=True,
-    help="The lower bound of A*.",
-)
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["ipc", "json", "plansys2"]),
-    default="ipc",
-    show_default=True,
-    help="How the plan is written.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Short for --format json.")
-@model_options
-@kept_plans
-@limits
-def command(
-    language: str,
-    pddl: PlanningFiles,
-    sentence: str | None,
-    prefer: tuple[str, ...],
-    heuristic: str,
-    form: str,
-    as_json: bool,
-    model: ModelKeywords,
-) -> int:
+@dataclass(frozen=True, slots=True)
+class Fulfilled:
+    """What became of one preference.
+
+    ``value`` is the number of words or plans (``shortest``, ``most-plans``); for a preference over
+    plans it is None, and ``worst_plan`` and ``best_plan`` say how the plans of the sentence meet
+    it.
+    """
+
+    preference: str
+    value: int | None = None
+    is_granted: bool = True
+    worst_plan: str = ""
+    best_plan: str = ""
+
+    def data(self) -> dict[str, Any]:
+        """An entry of ``wishes`` in the JSON plan file."""
+        if self.value is not None:
+            return {"wish": self.preference, "value": json_count(self.value)}
+        return {
+            "wish": self.preference,
+            "granted": self.is_granted,
+            "worst_plan": self.worst_plan,
+            "best_plan": self.best_plan,
+        }
+
+    def text(self) -> str:
+        """How the sentence meets the preference, in a line or two."""
+        if self.preference == "shortest":
+            return f"{self.preference}: {counted(self.value or 0, 'word')}"
+        if self.value is not None:
+            return f"{self.preference}: leaves {counted(self.value, 'plan')} open"
+        if self.worst_plan == self.best_plan:
+            return f"{self.preference}: in every plan {self.worst_plan}"
+        worst = f"{self.preference}: at worst {self.worst_plan}"
+        return f"{worst}\n{self.preference}: at best {self.best_plan}"
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class PlanUnderSentence(InTask):
+    """One optimal plan with a sentence, and the work of the A* search.
+
+    ``steps`` is the plan; ``without_sentence`` the same search with no sentence to keep to;
+    ``fulfilled`` has one entry for each preference.
+    """
+
+    used: TaskLanguage
+    sentence: str
+    steps: PlanSteps
+    heuristic: HeuristicName
+    search: GuidedPlan
+    without_sentence: GuidedPlan
+    fulfilled: tuple[Fulfilled, ...]
+    open_plans: SentencePlans
+
+    @property
+    def cost(self) -> tuple[int, int]:
+        """The optimal cost: joint steps, second component."""
+        return self.search.cost
+
+    @property
+    def expanded(self) -> int:
+        """The number of nodes that the search expanded."""
+        return self.search.expanded
+
+    def __iter__(self) -> Iterator[Texts]:
+        return iter(self.steps)
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+    def facts(self) -> Mapping[str, object]:
+        """The sentence, and how much work the plan was with and without it."""
+        return {
+            "sentence": self.sentence,
+            "makespan": self.cost[0],
+            "expanded": self.expanded,
+            "without_sentence": self.without_sentence.expanded,
+            "covered": self.covered,
+        }
+
+    def ipc(self) -> str:
+        """Return the plan as an IPC plan file, with its sentence in a comment."""
+        return f"{self.open_plans.ipc(self.steps)}; sentence = {self.sentence}\n"
+
+    def plansys2(self) -> str:
+        """Return the plan as PlanSys2 reads it."""
+        return self.open_plans.plansys2(self.steps)
+
+    def data(self) -> dict[str, Any]:
+        """A JSON plan file (docs/formats.md) with the search and the preferences."""
+        data = self.open_plans.data_with([self.steps], None)
+        data["search"] = {
+            "heuristic": self.heuristic,
+            **_work(self.search),
+            "without_sentence": _work(self.without_sentence),
+        }
+        if self.fulfilled:
+            data["wishes"] = [entry.data() for entry in self.fulfilled]
+        return data
+
+
+@dataclass(frozen=True, slots=True)
+class PlanOptions:
+    """What `plan` can be asked for."""
+
+    prefer: str | Sequence[str] = option(
+        (),
+        'In place of SENTENCE: shortest, most-plans, first:ROBOT or avoid:"(ATOM)"; '
+        "a second one decides among equals.",
+        "PREFERENCE",
+    )
+    heuristic: HeuristicName = option("relaxed", "The lower bound of A*.")
+    form: Literal["ipc", "json", "plansys2"] = option(
+        "ipc", "How the plan is written.", names=("--format",), only="cli"
+    )
+    as_json: bool = json_option("Short for --format json.")
+    source: Source = group(Source, without=NO_SLACK)
+    given: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "form", form_of(self.form, self.as_json, self.given))
+        if isinstance(self.prefer, str):
+            object.__setattr__(self, "prefer", (self.prefer,))
+
+
+@with_options(PlanOptions)
+def plan(
+    language: LanguageSource,
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
+    sentence: SentenceSource | None = None,
+    *,
+    options: PlanOptions,
+) -> PlanUnderSentence:
+    """Find one optimal plan that has a sentence, by A* that prunes what does not fit.
+
+    Raises
+    ------
+    NoPlanFits
+        If no optimal plan has the sentence.
+    UsageError
+        For an unknown preference, and for both or neither of sentence and ``prefer``.
+    """
+    if (sentence is None) == (not options.prefer):
+        raise UsageError(
+            "expected a SENTENCE or --prefer, one of the two",
+            remedy="--prefer shortest finds the sentence with the fewest words.",
+        )
+    used = read_task(language, domain, problem, options.source).used
+    preferences = [read_preference(used, text) for text in options.prefer]
+    best = best_sentence(used, preferences) if preferences else None
+    words = best.words if best else used.words_of(sentence or ())
+    expanded = ExpandedStates(used.model, used.partition)
+    found = plan_under_sentence(used, words, options.heuristic, expanded)
+    return PlanUnderSentence(
+        used,
+        used.text(words),
+        tuple(used.model.texts(step) for step in found.plan),
+        options.heuristic,
+        found,
+        plan_under_sentence(used, None, options.heuristic, expanded),
+        tuple(_fulfilled(preferences, best)) if best else (),
+        SentencePlans(OpenPlans.of(used, words)),
+    )
+
+
+def _fulfilled(preferences: Sequence[Preference], best: BestSentence) -> Iterator[Fulfilled]:
+    for preference, value in zip(preferences, best.values, strict=True):
+        if isinstance(preference, str):
+            assert isinstance(value, int)
+            yield Fulfilled(preference, value)
+        else:
+            assert not isinstance(value, int)
+            worst, well = (preference.grades[grade] for grade in value)
+            yield Fulfilled(preference.text, None, value[0] == 0, worst, well)
+
+
+def _work(search: GuidedPlan) -> dict[str, int]:
+    return {"expanded": search.expanded, "generated": search.generated, "states": search.states}
+
+
+@command_of(plan, "LANGUAGE DOMAIN PROBLEM [SENTENCE]", doing="searching for a plan")
+def command(found: PlanUnderSentence, options: PlanOptions) -> int:
     """Find one optimal plan that has SENTENCE ("w1 w0"), by A* that prunes what does not fit.
 
     With --prefer the best sentence of the task is found first.  The nodes expanded with and without
     the sentence go to stderr.
     """
-    form = form_of(form, as_json)
-    with working("searching for a plan"):
-        found = coordlang.plan(
-            language,
-            pddl.domain,
-            pddl.problem,
-            sentence,
-            factored=pddl.factored,
-            prefer=prefer,
-            heuristic=heuristic,
-            **model,
-        )
-    if form == "json":
+    if options.form == "json":
         echo(json.dumps(found.data()))
         return covered_code(found.covered, found.tolerance)
-    echo(found.plansys2() if form == "plansys2" else found.ipc(), nl=False)
+    echo(found.plansys2() if options.form == "plansys2" else found.ipc(), nl=False)
     for entry in found.fulfilled:
-        _comment(entry)
+        echo(entry.text(), err=True)
     expanded = counted(found.expanded, "node")
     without = f"without the sentence {found.without_sentence.expanded:,}"
-    echo(f"A* ({heuristic}) expanded {expanded}; {without}", err=True)
+    echo(f"A* ({found.heuristic}) expanded {expanded}; {without}", err=True)
     return covered_code(found.covered, found.tolerance)
-
-
-def _comment(entry: Fulfilled) -> None:
-    """Write to stderr how the sentence meets a preference."""
-    lines = []
-    if entry.value is None:
-        every = "in every plan" if entry.worst_plan == entry.best_plan else "at worst"
-        lines.append(f"{every} {entry.worst_plan}")
-        if entry.worst_plan != entry.best_plan:
-            lines.append(f"at best {entry.best_plan}")
-    elif entry.preference == "shortest":
-        lines.append(counted(entry.value, "word"))
-    else:
-        lines.append(f"leaves {counted(entry.value, 'plan')} open")
-    for line in lines:
-        echo(f"{entry.preference}: {line}", err=True)

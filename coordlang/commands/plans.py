@@ -7,13 +7,13 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from coordlang.commands.command import command_of
-from coordlang.commands.inputs import DomainSource, ProblemSource, read_instance
+from coordlang.commands.inputs import read_instance
 from coordlang.commands.keywords import with_options
 from coordlang.commands.listing import Listing, form_of
-from coordlang.commands.options import Source, json_option
+from coordlang.commands.options import DomainSource, ProblemSource, Source, json_option
 from coordlang.commands.terminal import echo, note_single_robot
 from planners.search.heuristics import SearchHeuristic
 from planners.search.kept_plans import search
@@ -44,7 +44,7 @@ class OptimalPlans(Presented):
     """
 
     __slots__ = ("_plans",)
-    shown = ("count", "makespan", "robots")
+    shown: ClassVar[tuple[str, ...]] = ("count", "makespan", "robots")
 
     def __init__(self, plans: Plans) -> None:
         self._plans = plans

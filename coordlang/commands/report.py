@@ -3,137 +3,114 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-import click
-
-from coordlang.commands.files import (
-    FILE,
-    PlanningFiles,
-    check_outputs,
-    language_argument,
-    planning_files,
+from coordlang.commands.command import command_of
+from coordlang.commands.files import OutputFile
+from coordlang.commands.inputs import language_for, read_coordinates_of, read_planning
+from coordlang.commands.keywords import with_options
+from coordlang.commands.options import (
+    NO_SLACK,
+    DomainSource,
+    LanguageSource,
+    ProblemSource,
+    Source,
+    coordinates_option,
+    output_option,
 )
-from coordlang.commands.shared_options import ModelKeywords, kept_plans, limits, model_options
-from coordlang.commands.terminal import echo, warn_of_failures, working
+from coordlang.commands.terminal import echo, warn_of_failures
+from coordlang.language.recorded import check_source
+from coordlang.language.tolerance import Tolerance
+from coordlang.report.page import Report, make_report
+from coordlang.report.planviz import planviz
+from coordlang.report.simulated import require_of
+from coordlang.simulation.record import SimulationRecord, read_simulation
+from planners.pddl.lifted import Domain
+from planners.system.errors import Position, UsageError
 from planners.system.messages import visible
 from planners.system.notebook import counted
-
-if TYPE_CHECKING:
-    from coordlang.simulation.record import SimulationRecord
-    from coordlang.sites.coordinates import Point
-    from planners.pddl.lifted import Domain
+from planners.system.options import group, option
+from planners.system.writing import write_atomically
 
 
-@click.command(name="report")
-@language_argument
-@planning_files("DOMAIN PROBLEMS...")
-@click.option(
-    "-o", "--output", required=True, type=FILE, metavar="PAGE", help="The HTML file; - for stdout."
-)
-@click.option(
-    "--tasks-shown",
-    type=click.IntRange(1, 500),
-    default=30,
-    show_default=True,
-    metavar="N",
-    help="Show at most this many tasks: those of PROBLEM.., then candidate tasks, drawn.",
-)
-@click.option(
-    "--coordinates",
-    type=FILE,
-    metavar="FILE",
-    help="Where the places are drawn (default: coordinates.json beside the "
-    "first PROBLEM, else by their names, else laid out).",
-)
-@click.option(
-    "--run",
-    "run_file",
-    type=FILE,
-    metavar="RUN.json",
-    help="Also play these runs of `coordlang simulate -o RUN.json`.",
-)
-@click.option(
-    "--planviz",
-    "with_planviz",
-    is_flag=True,
-    help="Also write a plan of the first task for PlanViz, and its map, beside PAGE.",
-)
-@click.option("--seed", type=int, default=0, show_default=True, help="Draws the tasks.")
-@model_options
-@kept_plans
-@limits
-def command(
-    language: str,
-    pddl: PlanningFiles,
-    output: str,
-    tasks_shown: int,
-    coordinates: str | None,
-    run_file: str | None,
-    with_planviz: bool,
-    seed: int,
-    model: ModelKeywords,
-) -> None:
-    """Write a self-contained HTML page that shows LANGUAGE.
+@dataclass(frozen=True, slots=True)
+class Page:
+    """A page, what the language tolerates, and the texts of what is written beside the page."""
 
-    It has the words, and the sentences and plans in the tasks of PROBLEM.. and in some of the
-    candidate tasks.
-    """
-    from coordlang.commands.inputs import read_planning
-    from coordlang.commands.language_inputs import language_for
-    from coordlang.commands.options import Source
-    from coordlang.language.recorded import check_source
-    from coordlang.report.page import make_report
-    from coordlang.report.planviz import planviz
-    from planners.system.options import record_from
-    from planners.system.writing import write_atomically
+    report: Report
+    tolerance: Tolerance | None
+    beside: tuple[str, ...]
 
-    places = coordinates if coordinates is not None else str(_beside(pddl))
-    inputs = [language, *pddl.paths, places, *([run_file] if run_file else [])]
-    beside = _planviz_paths(output) if with_planviz else []
-    check_outputs([("-o", output), *(("--planviz", path) for path in beside)], inputs)
-    files = read_planning(
-        pddl.domain,
-        pddl.problems,
-        record_from(Source, {**model, "factored": pddl.factored}, "report"),
+
+@dataclass(frozen=True, slots=True)
+class ReportOptions:
+    """What `report` can be asked for."""
+
+    output: str = output_option("The HTML file; - for stdout.", "PAGE", required=True)
+    tasks_shown: int = option(
+        30,
+        "Show at most this many tasks: those of PROBLEM.., then candidate tasks, drawn.",
+        "N",
+        least=1,
     )
-    known = _coordinates(coordinates, pddl)
-    read, position = language_for(language, files, coordinates=known)
+    coordinates: str | None = coordinates_option()
+    run: str | None = option(
+        None, "Also play these runs of `coordlang simulate -o RUN.json`.", "RUN.json"
+    )
+    planviz: bool = option(
+        False, "Also write a plan of the first task for PlanViz, and its map, beside PAGE."
+    )
+    seed: int = option(0, "Draws the tasks.")
+    source: Source = group(Source, without=NO_SLACK)
+
+    def __post_init__(self) -> None:
+        if self.tasks_shown > 500:
+            raise UsageError(
+                f"--tasks-shown {self.tasks_shown}: a page shows at most 500 tasks",
+                remedy="Make a page for each of several problems.",
+            )
+        if self.planviz and self.output == "-":
+            raise UsageError("--planviz writes files beside PAGE", remedy="Give -o a file.")
+
+    def outputs(self) -> list[OutputFile]:
+        """Beside the page and under its name: a plan for PlanViz, and its map."""
+        kinds = ("json", "map") if self.planviz else ()
+        paths = (str(Path(self.output).with_suffix(f".planviz.{kind}")) for kind in kinds)
+        return [OutputFile("--planviz", path) for path in paths]
+
+
+@with_options(ReportOptions)
+def report(
+    language: LanguageSource,
+    domain: DomainSource | None = None,
+    *problems: ProblemSource,
+    options: ReportOptions,
+) -> Page:
+    """Make the page of a language: its words, and sentences and plans of tasks."""
+    files = read_planning(domain, problems, options.source)
+    points = read_coordinates_of(options.coordinates, files.problems[0])
+    read, position = language_for(language, files, coordinates=points)
     check_source(read, files.domain, files.problems, position)
-    simulated = _simulated(run_file, files.domain)
-    with working("drawing the page"):
-        report = make_report(
-            read,
-            files.domain,
-            files.problems,
-            tasks_shown=tasks_shown,
-            seed=seed,
-            options=files.options_of(read),
-            coordinates=known,
-            position=position,
-            simulated=simulated,
-        )
-        shown_plan = planviz(report.first, known) if with_planviz else None
-    if output == "-":
-        echo(report.html.decode(), nl=False)
-    else:
-        write_atomically(output, report.html)
-    if shown_plan is not None:
-        for path, text in zip(beside, (shown_plan.plan, shown_plan.map), strict=True):
-            write_atomically(path, text.encode())
-    shown = f"{counted(report.tasks, 'task')} of {report.candidates:,}"
-    place = "stdout" if output == "-" else visible(output)
-    warn_of_failures(read.tolerance)
-    echo(f"{shown}, {len(report.html):,} bytes, written to {place}", err=output == "-")
+    page = make_report(
+        read,
+        files.domain,
+        files.problems,
+        tasks_shown=options.tasks_shown,
+        seed=options.seed,
+        options=files.options_of(read),
+        coordinates=points,
+        position=position,
+        simulated=_simulated(options.run, files.domain),
+    )
+    if not options.planviz:
+        return Page(page, read.tolerance, ())
+    shown = planviz(page.first, points)
+    return Page(page, read.tolerance, (shown.plan, shown.map))
 
 
 def _simulated(path: str | None, domain: Domain) -> SimulationRecord | None:
     """The runs that the page is to play."""
-    from coordlang.report.simulated import require_of
-    from coordlang.simulation.record import read_simulation
-    from planners.system.errors import Position
-
     if path is None:
         return None
     record = read_simulation(path)
@@ -141,22 +118,22 @@ def _simulated(path: str | None, domain: Domain) -> SimulationRecord | None:
     return record
 
 
-def _planviz_paths(output: str) -> list[str]:
-    """Where the plan and the map for PlanViz are written: beside the page, under its name."""
-    if output == "-":
-        raise click.UsageError("--planviz writes files beside PAGE: give -o a file")
-    return [str(Path(output).with_suffix(f".planviz.{kind}")) for kind in ("json", "map")]
+@command_of(report, "LANGUAGE DOMAIN PROBLEMS...", doing="drawing the page")
+def command(found: Page, options: ReportOptions) -> None:
+    """Write a self-contained HTML page that shows LANGUAGE.
 
-
-def _beside(pddl: PlanningFiles) -> Path:
-    folder = Path(pddl.factored) if pddl.factored else Path(pddl.files[1]).parent
-    return folder / "coordinates.json"
-
-
-def _coordinates(given: str | None, pddl: PlanningFiles) -> dict[str, Point] | None:
-    from coordlang.sites.coordinates import read_coordinates
-
-    if given is not None:
-        return read_coordinates(given)
-    beside = _beside(pddl)
-    return read_coordinates(beside) if beside.is_file() else None
+    It has the words, and the sentences and plans in the tasks of PROBLEM.. and in some of the
+    candidate tasks.
+    """
+    page = found.report
+    to_stdout = options.output == "-"
+    if to_stdout:
+        echo(page.html.decode(), nl=False)
+    else:
+        write_atomically(options.output, page.html)
+    for file, text in zip(options.outputs(), found.beside, strict=True):
+        write_atomically(file.path or "", text.encode())
+    warn_of_failures(found.tolerance)
+    shown = f"{counted(page.tasks, 'task')} of {page.candidates:,}"
+    place = "stdout" if to_stdout else visible(options.output)
+    echo(f"{shown}, {len(page.html):,} bytes, written to {place}", err=to_stdout)

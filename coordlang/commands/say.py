@@ -1,36 +1,126 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``coordlang say``: plan -> sentence."""
+"""``coordlang say``: an optimal plan -> its sentence."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike, fspath
+from typing import Any
 
-import click
+from coordlang.commands.command import command_of
+from coordlang.commands.inputs import InTask, read_task
+from coordlang.commands.keywords import with_options
+from coordlang.commands.options import (
+    NO_SLACK,
+    DomainSource,
+    File,
+    LanguageSource,
+    ProblemSource,
+    Source,
+    json_option,
+)
+from coordlang.commands.terminal import covered_code, echo
+from coordlang.execution.plan_sentence import read_plan_file, sentence_of_plan
+from coordlang.execution.task_language import TaskLanguage
+from coordlang.language.tolerance import tolerance_data
+from planners.search.plan_file import Texts
+from planners.system.errors import CoordlangError, UsageError
+from planners.system.options import group
 
-import coordlang
-from coordlang.commands.files import PlanningFiles, language_argument, planning_files
-from coordlang.commands.shared_options import ModelKeywords, kept_plans, limits, model_options
-from coordlang.commands.terminal import covered_code, echo, working
+#: A plan file, or the steps of one plan, each with one text or None for every robot.
+PlanSource = File | Sequence[Texts]
 
 
-@click.command(name="say")
-@language_argument
-@planning_files("DOMAIN PROBLEM PLAN", most=1, then="plan")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object.")
-@model_options
-@kept_plans
-@limits
-def command(
-    language: str, pddl: PlanningFiles, plan: str, as_json: bool, model: ModelKeywords
-) -> int:
+@dataclass(frozen=True, slots=True, repr=False)
+class Said(InTask):
+    """The sentence of each plan."""
+
+    used: TaskLanguage
+    sentences: tuple[str, ...]
+    shown = ("sentences", "covered")
+
+    @property
+    def sentence(self) -> str:
+        """The sentence of the only plan; raises `ValueError` where there are several plans."""
+        if len(self.sentences) != 1:
+            raise ValueError(f"there are {len(self.sentences)} plans: use .sentences")
+        return self.sentences[0]
+
+    def __str__(self) -> str:
+        return "\n".join(self.sentences)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.sentences)
+
+    def data(self) -> dict[str, Any]:
+        """The sentences, and what is guaranteed, as ``--json`` has them."""
+        return {
+            "sentences": list(self.sentences),
+            "covered": self.covered,
+            **tolerance_data(self.tolerance),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class SayOptions:
+    """What `say` can be asked for."""
+
+    as_json: bool = json_option()
+    source: Source = group(Source, without=NO_SLACK)
+
+
+@with_options(SayOptions)
+def say(
+    language: LanguageSource,
+    domain: DomainSource | None = None,
+    problem: ProblemSource | None = None,
+    plan: PlanSource | None = None,
+    *,
+    options: SayOptions,
+) -> Said:
+    """Say optimal plans: the sentence of a plan is the sequence of words that it passes through.
+
+    ``plan`` is a plan file (which may hold several plans), or the steps of one plan.
+
+    Raises
+    ------
+    NotAPlan, NotOptimal
+        With the first step that breaks: only optimal plans have a sentence.
+    """
+    if plan is None:
+        raise UsageError("expected a plan", remedy="Give a plan file or the steps of one plan.")
+    used = read_task(language, domain, problem, options.source).used
+    plans = _plans(plan, used)
+    sentences = []
+    for number, steps in enumerate(plans, 1):
+        try:
+            sentences.append(used.text(sentence_of_plan(used, steps)))
+        except CoordlangError as error:
+            if len(plans) > 1:
+                error.what = f"plan {number} of {len(plans)}: {error.what}"
+            raise
+    return Said(used, tuple(sentences))
+
+
+def _plans(plan: PlanSource, used: TaskLanguage) -> Sequence[Sequence[Texts]]:
+    if isinstance(plan, str | PathLike):
+        return read_plan_file(fspath(plan), used.model)
+    if isinstance(plan, Mapping):
+        raise UsageError(
+            "expected a plan file or the steps of one plan",
+            remedy="A step has one text for each robot, None where it idles.",
+        )
+    return [plan]
+
+
+@command_of(say, "LANGUAGE DOMAIN PROBLEM PLAN", doing="finding all optimal plans")
+def command(found: Said, options: SayOptions) -> int:
     """Print the sentence of an optimal plan, the words on one line.
 
     PLAN is a plan file, IPC text or JSON, or - for stdin; a JSON file with several plans gives one
     sentence a line.
     """
-    with working("finding all optimal plans"):
-        said = coordlang.say(
-            language, pddl.domain, pddl.problem, plan, factored=pddl.factored, **model
-        )
-    echo(json.dumps(said.data()) if as_json else str(said))
-    return covered_code(said.covered, said.tolerance)
+    echo(json.dumps(found.data()) if options.as_json else str(found))
+    return covered_code(found.covered, found.tolerance)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -57,8 +56,8 @@ def limited(limits: Limits) -> Iterator[None]:
     """Run a block under limits."""
     from planners.system.limits import limited_memory, require_memory, time_limit
 
-    if limits.time_limit is not None and math.isnan(limits.time_limit):
-        raise click.UsageError("--time-limit: expected a number of seconds")
+    if limits.time_limit is not None and not limits.time_limit > 0:
+        raise click.UsageError("--time-limit: expected a number of seconds above 0")
     most = limits.bytes
     if limits.memory_limit is not None and most is not None:
         require_memory(most)

@@ -9,9 +9,16 @@ from dataclasses import dataclass, replace
 
 from coordlang.commands.command import command_of
 from coordlang.commands.files import write
-from coordlang.commands.inputs import DomainSource, ProblemSource, read_instance
+from coordlang.commands.inputs import read_instance
 from coordlang.commands.keywords import with_options
-from coordlang.commands.options import NO_SLACK, Source, json_option, output_option
+from coordlang.commands.options import (
+    NO_SLACK,
+    DomainSource,
+    ProblemSource,
+    Source,
+    json_option,
+    output_option,
+)
 from coordlang.commands.terminal import echo
 from coordlang.language.listed import ListedTask
 from coordlang.language.patterns import varied_tasks

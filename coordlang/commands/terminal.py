@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import click
 
-from coordlang.commands.failure import REFUTED
+from coordlang.commands.failure import REFUTED, UNPROVED, code_of_interrupt, why_stopped
 from coordlang.commands.layout import WIDTH
 from planners.system.limits import Underway, underway
 from planners.system.messages import visible
@@ -80,6 +80,17 @@ def covered_code(is_covered: bool, tolerance: Tolerance | None) -> int:
     what = "the language does not cover this task: it guarantees nothing here"
     echo(f"coordlang: warning: {what}", err=True)
     return REFUTED
+
+
+def ended_early(stopped: BaseException | None, what: str) -> int:
+    """The exit code of work whose best result is kept; says what ended it, and ``what`` there is.
+
+    0 if nothing did.
+    """
+    if stopped is None:
+        return 0
+    echo(f"coordlang: {why_stopped(stopped)}; {what}", err=True)
+    return code_of_interrupt(stopped) if isinstance(stopped, KeyboardInterrupt) else UNPROVED
 
 
 def line_width(*, err: bool = False) -> int:
@@ -149,26 +160,6 @@ class _Spinner(threading.Thread):
         if known is not part or now <= begin:
             return ""
         return f", {(work - before) / (now - begin):,.0f} {part.unit} a second"
-
-
-@contextmanager
-def bar() -> Iterator[Callable[[int, int, str], None]]:
-    """Show a progress bar on a terminal, until the block ends.
-
-    Yields a function that is told the number done, the number of all, and what is under way.
-    """
-    if sys.stderr is None or not sys.stderr.isatty():
-        yield lambda done, number, text: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-    columns = MofNCompleteColumn(), BarColumn(), TextColumn("{task.description}", markup=False)
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("")
-        yield lambda done, number, text: progress.update(
-            task, completed=done, total=number, description=visible(text)
-        )
 
 
 def whatever_stderr() -> TextIO:

@@ -4,72 +4,264 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import dataclass
+from os import PathLike, fspath
+from typing import Any
 
-import click
-
-import coordlang
+from coordlang.commands.command import command_of
 from coordlang.commands.failure import REFUTED
-from coordlang.commands.files import (
-    FILE,
-    PlanningFiles,
-    check_outputs,
-    language_argument,
-    never_stdout,
-    planning_files,
+from coordlang.commands.inputs import language_for, read_planning
+from coordlang.commands.keywords import with_options
+from coordlang.commands.options import (
+    NO_SLACK,
+    DomainSource,
+    File,
+    Jobs,
+    LanguageSource,
+    ProblemSource,
+    Progress,
+    Source,
+    TasksSource,
+    json_option,
+    no_progress,
 )
-from coordlang.commands.shared_options import (
-    JobsKeywords,
-    ModelKeywords,
-    jobs_options,
-    kept_plans,
-    limits,
-    model_options,
-)
-from coordlang.commands.terminal import echo, line_width, working
-from planners.system.notebook import counted
+from coordlang.commands.terminal import echo, line_width
+from coordlang.commands.witness import witness_data, witness_text
+from coordlang.commands.workers import opened_workers, say_size
+from coordlang.language.candidates import require_solvable
+from coordlang.language.recorded import check_source, recorded_candidates
+from coordlang.language.tolerance import Tolerance, tolerance_data
+from coordlang.required.failure import TooManyToCount
+from coordlang.required.failures import NONE, Failures, failures_under
+from coordlang.required.miscoordination import Miscoordination
+from coordlang.verification.candidates import verify_candidates
+from coordlang.verification.certificate_file import Certificate, read_certificate
+from coordlang.verification.check_certificate import Checked
+from coordlang.verification.check_certificate import check as check_certificate
+from planners.pddl.model_options import ModelOptions
+from planners.system.errors import Refuted, UsageError
+from planners.system.notebook import Presented, counted
+from planners.system.options import group, option
+from planners.system.writing import write_atomically
 
-if TYPE_CHECKING:
-    from coordlang.commands.languages import Verification
-    from coordlang.verification.check_certificate import Checked
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Verification(Presented):
+    """Whether a language is a coordination language for its tasks; true iff it is.
+
+    Or iff it is none and robots fail no more often than it claims (``tolerance``; ``failures`` says
+    how often they do).
+
+    ``witness`` has plans of one sentence that miscoordinate, or is None.  ``certificate`` is the
+    checked one, where one was given, and ``claimed`` the lower bound that the language file claims.
+    ``options`` are those of the model, which the file chooses, ``language`` what messages call it.
+    """
+
+    holds: bool
+    words: int
+    tasks: int
+    nodes: int
+    witness: Miscoordination | None
+    certificate: Checked | None
+    claimed: int
+    options: ModelOptions
+    failures: Failures = NONE
+    tolerance: Tolerance | None = None
+    language: str = "the language"
+
+    def __bool__(self) -> bool:
+        return (self.holds or self.is_tolerated) and self.proves_claim
+
+    @property
+    def is_tolerated(self) -> bool:
+        """Whether robots fail, and no more often than the language claims."""
+        found, claimed = self.failures.tolerance, self.tolerance
+        if self.holds or found is None or claimed is None:
+            return False
+        pairs = (
+            (found.failure_mean, claimed.failure_mean),
+            (found.failure_worst, claimed.failure_worst),
+        )
+        return all(own is not None and said is not None and own <= said for own, said in pairs)
+
+    @property
+    def unchecked(self) -> str | None:
+        """What the language file claims and nothing proved, None if there is nothing."""
+        if self.claimed == 1 or self.certificate or not self.holds:
+            return None
+        return (
+            f"not checked: the file claims that at least {self.claimed:,} words are needed, "
+            "which a certificate would prove"
+        )
+
+    @property
+    def lower_bound(self) -> int | None:
+        """The lower bound that the certificate proves, None without one."""
+        return self.certificate.lower_bound if self.certificate else None
+
+    @property
+    def proves_claim(self) -> bool:
+        """Whether the certificate, if any, proves the lower bound that the language claims."""
+        return self.certificate is None or self.certificate.lower_bound >= self.claimed
+
+    @property
+    def proved_minimal(self) -> bool | None:
+        """Whether the certificate proves that fewer words do not suffice, None without one."""
+        return None if self.lower_bound is None else self.lower_bound == self.words
+
+    def data(self) -> dict[str, Any]:
+        """The answer, as ``--json`` has it."""
+        return {
+            "holds": self.holds,
+            "tasks": self.tasks,
+            "words": self.words,
+            "nodes": self.nodes,
+            "model": self.options.data(),
+            "unchecked": self.unchecked,
+            "miscoordination": witness_data(self.witness),
+            "lower_bound": self.lower_bound,
+            "reasons": self.certificate.reasons if self.certificate else None,
+            "proved_minimal": self.proved_minimal,
+            **self.failures.data(),
+            **tolerance_data(self.tolerance),
+        }
+
+    def facts(self) -> Mapping[str, object]:
+        """The answer, and what the certificate or the witness shows."""
+        found: dict[str, object] = {"holds": self.holds, "words": self.words, "tasks": self.tasks}
+        if self.certificate:
+            found["lower_bound"] = self.lower_bound
+        if self.witness:
+            found["sentence"] = " ".join(self.witness.sentence or ())
+            found["reason"] = self.witness.reason
+        return found
+
+    def text(self, width: int) -> str:
+        """The answer for people, in lines of at most ``width`` characters."""
+        words = counted(self.words, "word")
+        tasks = f"{counted(self.tasks, 'task')}, {self.options}"
+        fail = f"robots that choose by themselves {self.failures.text()}"
+        if self.is_tolerated:
+            return (
+                f"as claimed: {words}, {tasks}: this is no coordination language, and {fail} "
+                f"({self.nodes:,} walk nodes)"
+            )
+        if self.witness:
+            sentence = " ".join(self.witness.sentence or ())
+            head = f'refuted: plans with the sentence "{sentence} .." miscoordinate'
+            if self.tolerance is not None and self.tolerance.may_fail:
+                fail += f".\nThe file claims less: {self.tolerance.warning}"
+            text = witness_text(self.witness, width)
+            return f"{head}\n{text}\n\nOn the whole ({self.options}) {fail}."
+        slack = self.tolerance.slack if self.tolerance else None
+        plans = f"plans within slack {slack}" if slack else "optimal plans"
+        mixing = f"all {plans} of one sentence mix freely"
+        return f"verified: {words}, {tasks}: {mixing} ({self.nodes:,} walk nodes)"
 
 
-@click.command(name="verify")
-@language_argument
-@planning_files("DOMAIN PROBLEMS...")
-@click.option(
-    "--tasks",
-    type=FILE,
-    metavar="all|FILE",
-    help="Check these tasks (default: those that the language file records).",
-)
-@click.option(
-    "--certificate",
-    type=FILE,
-    metavar="FILE",
-    help="Also check why fewer words do not suffice (a file of `build --certificate`).",
-)
-@click.option(
-    "--dimacs",
-    type=FILE,
-    metavar="FILE",
-    help="With --certificate: write the formula that was refuted, for any SAT solver.",
-)
-@click.option("--json", "as_json", is_flag=True, help="One JSON object.")
-@jobs_options
-@model_options
-@kept_plans
-@limits
-def command(
-    language: str,
-    pddl: PlanningFiles,
-    tasks: str | None,
-    certificate: str | None,
-    dimacs: str | None,
-    as_json: bool,
-    on_workers: JobsKeywords,
-    model: ModelKeywords,
-) -> int:
+@dataclass(frozen=True, slots=True)
+class VerifyOptions:
+    """What `verify` can be asked for."""
+
+    tasks: TasksSource | None = option(
+        None, "Check these tasks (default: those that the language file records).", "all|FILE"
+    )
+    certificate: File | Certificate | None = option(
+        None, "Also check why fewer words do not suffice (a file of `build --certificate`).", "FILE"
+    )
+    dimacs: str | None = option(
+        None,
+        "With --certificate: write the formula that was refuted, for any SAT solver.",
+        "FILE",
+        only="cli",
+        is_output=True,
+    )
+    as_json: bool = json_option()
+    progress: Progress | None = option(
+        None, "Called with a line of text when a phase begins.", only="python"
+    )
+    work: Jobs = group(Jobs)
+    source: Source = group(Source, without=NO_SLACK)
+
+    def __post_init__(self) -> None:
+        if self.dimacs is not None and self.certificate is None:
+            raise UsageError("--dimacs belongs to --certificate", remedy="Add --certificate FILE.")
+
+
+@with_options(VerifyOptions)
+def verify(
+    language: LanguageSource,
+    domain: DomainSource | None = None,
+    *problems: ProblemSource,
+    options: VerifyOptions,
+) -> Verification:
+    """Check by definition that a language is a coordination language.
+
+    All plans of one sentence then mix freely.  A lifted language is checked for ``tasks``, or the
+    problems' own.
+
+    Raises
+    ------
+    BadInput
+        If the language belongs to another domain or world.
+    ProvedImpossible
+        If there is no candidate task.
+    Refuted
+        If a reason of the certificate is none.
+    """
+    tasks, progress = options.tasks, options.progress or no_progress
+    proof = options.certificate
+    if isinstance(proof, str | PathLike):
+        proof = read_certificate(fspath(proof))
+    files = read_planning(domain, problems, options.source)
+    read, position = language_for(language, files, tasks, is_verified=False)
+    check_source(read, files.domain, files.problems, position)
+    model = files.options_of(read)
+    if tasks is None:
+        candidates = recorded_candidates(read, files.domain, files.problems, model, position)
+    else:
+        candidates = files.candidates(tasks, model)
+    require_solvable(candidates)
+    partition = read.partition(candidates.model)
+    say_size(candidates, options.work.note or options.progress)
+    with opened_workers(options.work) as workers:
+        verdict = verify_candidates(partition, candidates, workers, progress)
+        found = NONE
+        if not verdict.holds:
+            progress("counting how often robots fail")
+            claims = read.tolerance is not None and read.tolerance.may_fail
+            found = failures_under(partition, candidates, is_claimed=claims)
+            if claims and found.mean is None:
+                raise TooManyToCount(
+                    f"what the language tolerates cannot be checked: {found.why_not}",
+                    remedy="Say --tasks FILE with fewer tasks.",
+                )
+    checked = None
+    if proof and verdict.holds:
+        checked = check_certificate(proof, candidates, progress)
+        if checked.lower_bound > len(read.words):
+            raise AssertionError(
+                f"a language of {len(read.words)} words is verified, and a certificate that "
+                f"{checked.lower_bound} are needed: one of the two is wrong"
+            )
+    return Verification(
+        verdict.holds,
+        len(read.words),
+        verdict.tasks,
+        verdict.nodes,
+        verdict.witness,
+        checked,
+        read.guarantee.lower_bound,
+        model,
+        found,
+        read.tolerance,
+        str(position),
+    )
+
+
+@command_of(verify, "LANGUAGE DOMAIN PROBLEMS...", doing="verifying by definition")
+def command(found: Verification, options: VerifyOptions) -> int:
     """Check by definition that LANGUAGE is a coordination language.
 
     All plans of one sentence then mix freely.
@@ -77,88 +269,36 @@ def command(
     Exit 0: it is, or robots fail as rarely as its file claims.  1: neither, and two plans that
     miscoordinate are shown.
     """
-    if dimacs and not certificate:
-        raise click.UsageError("--dimacs belongs to --certificate")
-    never_stdout("--dimacs", dimacs)
-    listed = tasks if tasks != "all" else None
-    check_outputs([("--dimacs", dimacs)], [language, *pddl.paths, listed, certificate])
-    with working("verifying by definition") as progress:
-        found = coordlang.verify(
-            language,
-            *pddl.files,
-            factored=pddl.factored,
-            tasks=tasks,
-            certificate=certificate,
-            progress=progress,
-            **on_workers,
-            **model,
-        )
-    echo(json.dumps(found.data()) if as_json else _text(found))
-    if found.unchecked and not as_json:
+    echo(json.dumps(found.data()) if options.as_json else found.text(line_width()))
+    if found.unchecked and not options.as_json:
         echo(found.unchecked)
     if not found.holds:
         return 0 if found.is_tolerated else REFUTED
     if found.certificate is not None:
-        _show_bound(found, found.certificate, language, dimacs, as_json)
+        _show_bound(found, found.certificate, options)
     return 0
 
 
-def _text(found: Verification) -> str:
-    from coordlang.commands.witness import witness_text
-
-    words = counted(found.words, "word")
-    tasks = f"{counted(found.tasks, 'task')}, {found.options}"
-    fail = f"robots that choose by themselves {found.failures.text()}"
-    if found.is_tolerated:
-        return (
-            f"as claimed: {words}, {tasks}: this is no coordination language, and {fail} "
-            f"({found.nodes:,} walk nodes)"
-        )
-    if found.witness:
-        sentence = " ".join(found.witness.sentence or ())
-        head = f'refuted: plans with the sentence "{sentence} .." miscoordinate'
-        if found.tolerance is not None and found.tolerance.may_fail:
-            fail += f".\nThe file claims less: {found.tolerance.warning}"
-        text = witness_text(found.witness, line_width())
-        return f"{head}\n{text}\n\nOn the whole ({found.options}) {fail}."
-    slack = found.tolerance.slack if found.tolerance else None
-    plans = f"plans within slack {slack}" if slack else "optimal plans"
-    mixing = f"all {plans} of one sentence mix freely"
-    return f"verified: {words}, {tasks}: {mixing} ({found.nodes:,} walk nodes)"
-
-
-def _show_bound(
-    found: Verification, checked: Checked, language: str, dimacs: str | None, as_json: bool
-) -> None:
-    """Show what the certificate proves.
-
-    Raises
-    ------
-    Refuted
-        If that is less than the language claims.
-    """
-    from planners.system.writing import write_atomically
-
-    if dimacs:
-        write_atomically(dimacs, checked.dimacs().encode())
+def _show_bound(found: Verification, checked: Checked, options: VerifyOptions) -> None:
+    """Show what the certificate proves; `Refuted` if that is less than the language claims."""
+    bound = checked.lower_bound
+    if options.dimacs:
+        write_atomically(options.dimacs, checked.dimacs().encode())
     if not found.proves_claim:
-        raise coordlang.Refuted(
-            f"{language} claims that {counted(found.claimed, 'word')} are needed; "
-            f"the certificate proves {checked.lower_bound} only",
+        raise Refuted(
+            f"{found.language} claims that {counted(found.claimed, 'word')} are needed; "
+            f"the certificate proves {bound} only",
             remedy="Give the certificate that was written with this language, or build both again.",
         )
-    if as_json:
+    if options.as_json:
         return
     why = "every language has a word"
-    if checked.lower_bound > 1:
+    if bound > 1:
         why = (
-            f"{counted(checked.reasons, 'reason')} checked, and with "
-            f"{counted(checked.lower_bound - 1, 'word')} they contradict each other "
-            f"({counted(len(checked.cnf.clauses), 'clause')})"
+            f"{counted(checked.reasons, 'reason')} checked, and with {counted(bound - 1, 'word')} "
+            f"they contradict each other ({counted(len(checked.cnf.clauses), 'clause')})"
         )
-    echo(f"lower bound {checked.lower_bound}: {why}")
+    echo(f"lower bound {bound}: {why}")
     if not found.proved_minimal:
-        echo(
-            "not proved minimal: the least number of words is at least "
-            f"{checked.lower_bound:,} and at most {found.words:,}"
-        )
+        least = f"at least {bound:,} and at most {found.words:,}"
+        echo(f"not proved minimal: the least number of words is {least}")

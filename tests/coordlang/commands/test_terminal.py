@@ -28,9 +28,6 @@ with terminal.working("first thing") as say:
     say("[second] thing")
     time.sleep(1)
 print("answer")
-with terminal.bar() as show:
-    show(1, 3, "piece")
-    time.sleep(1)
 """
 
 
@@ -61,8 +58,6 @@ def test_progress_on_a_terminal() -> None:
     assert out == "answer\n"
     assert "first thing .." in shown
     assert "[second] thing .." in shown
-    assert "1/3" in shown
-    assert "piece" in shown
 
 
 def test_how_far_the_work_got() -> None:
@@ -122,8 +117,6 @@ def test_no_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(sys, "stderr", stderr)
         with terminal.working("x") as say:
             say("y")
-        with terminal.bar() as show:
-            show(1, 2, "z")
         if stderr is not None:
             assert stderr.getvalue() == ""
 

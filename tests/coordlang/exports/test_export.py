@@ -23,7 +23,7 @@ import pytest
 
 from coordlang.commands.build import build
 from coordlang.commands.building import build_language
-from coordlang.commands.language_inputs import read_task_language
+from coordlang.commands.inputs import read_task
 from coordlang.commands.options import Source
 from coordlang.execution.fitting_plans import NoPlanFits
 from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
@@ -566,7 +566,7 @@ def within_slack(folder: str, slack: int, **given: Any) -> TaskLanguage:
     """Three words for the plans within slack of a shipped problem; they may be inseparable."""
     domain, problem = (DOMAINS / folder / f"{name}.pddl" for name in ("domain", "problem"))
     built = build(domain, problem, slack=slack, words=3, seed=1, **given)
-    return read_task_language(built.language, domain, problem, Source())
+    return read_task(built.language, domain, problem, Source()).used
 
 
 def every_plan(task: ClassicalTask) -> Iterator[tuple[int, ...]]:

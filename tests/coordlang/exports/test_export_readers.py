@@ -15,7 +15,7 @@ import pytest
 
 import coordlang as door
 from coordlang.commands.building import build_language
-from coordlang.commands.exporting import ExportedTask
+from coordlang.commands.export import ExportedTask
 from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
 from coordlang.language.candidates import from_problems
 from planners.classical import ClassicalTask, with_positive_conditions, with_positive_goal

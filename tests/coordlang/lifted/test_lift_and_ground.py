@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import coordlang
-from coordlang.commands.grounding import coordinates_of
-from coordlang.commands.lifting import Lifted
+from coordlang.commands.inputs import read_coordinates_of
+from coordlang.commands.lift import Lifted
 from coordlang.lifted.file import lifted_from_bytes, read_lifted, to_bytes
 from coordlang.lifted.language import LiftedLanguage
 from coordlang.required.miscoordination import Inseparable
@@ -346,7 +346,7 @@ def test_plans_with_the_same_states(tmp_path: Path) -> None:
 def test_coordinates_given_as_objects() -> None:
     """As those of a file: names in any case, and numbers."""
     small = parse_problem(Source("small", SMALL.read_text()), read_domain(GRID))
-    assert coordinates_of({"C0-0": (0.0, 1.0)}, small) == {"c0-0": (0.0, 1.0)}
+    assert read_coordinates_of({"C0-0": (0.0, 1.0)}, small) == {"c0-0": (0.0, 1.0)}
     with pytest.raises(BadInput, match="the coordinates must be between"):
         coordlang.lift(GRID, SMALL, coordinates={"c0-0": (float("nan"), 0.0)}, jobs=1)
 

@@ -18,7 +18,7 @@ import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.commands.built import Built
-from coordlang.commands.languages import verify
+from coordlang.commands.verify import verify
 from coordlang.language.candidates import all_pairs, from_listed, from_problems
 from coordlang.language.task_file import read_task_file
 from coordlang.required.miscoordination import inseparable
@@ -452,7 +452,7 @@ def test_a_bound_above_a_verified_language_is_no_answer(
 ) -> None:
     """A language of 7 words and a proof that 8 are needed: one of the two is wrong."""
     wrong = Checked(8, 1, encode([], 1), {})
-    monkeypatch.setattr("coordlang.commands.languages.check_certificate", lambda *_: wrong)
+    monkeypatch.setattr("coordlang.commands.verify.check_certificate", lambda *_: wrong)
     with pytest.raises(AssertionError, match="one of the two is wrong"):
         verify(pair[0], *GW2, certificate=pair[1])
 

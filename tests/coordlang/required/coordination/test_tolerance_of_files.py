@@ -72,7 +72,7 @@ def test_what_cannot_be_counted_cannot_be_claimed(
 ) -> None:
     path = silent(tmp_path / "l.json", SILENCE)
     few = partial(failures_under, most=100)
-    monkeypatch.setattr("coordlang.commands.languages.failures_under", few)
+    monkeypatch.setattr("coordlang.commands.verify.failures_under", few)
     found = coordlang("verify", path, *SQUARE)
     assert found.code == 22
     assert "what the language tolerates cannot be checked" in found.err
