@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coordlang.commands.feasibility import feasibility
+from coordlang.commands.inspect import feasibility
 from planners.joint.model import JointModel
 from planners.joint.tables import Rows, find_rows, unique_rows
 from planners.loading import PlanningInstance, build, load
