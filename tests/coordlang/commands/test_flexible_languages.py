@@ -15,20 +15,9 @@ SQUARE = GRID / "domain.pddl", GRID / "gw1-2x2.pddl"
 
 
 def test_prefer_flexible(tmp_path: Path, coordlang: Command) -> None:
-    path = tmp_path / "l.json"
-    outcome = coordlang(
-        "build",
-        *SQUARE,
-        "--tasks",
-        "all",
-        "--method",
-        "minimal",
-        "--prefer",
-        "flexible",
-        "-o",
-        path,
-        "--json",
-    )
+    path, again = tmp_path / "l.json", tmp_path / "again.json"
+    chosen = (*SQUARE, "--tasks", "all", "--method", "minimal", "--prefer", "flexible")
+    outcome = coordlang("build", *chosen, "-o", path, "--json")
     figures = json.loads(outcome.out)
     assert outcome.code == 0
     assert figures["words"] == figures["lower_bound"] == 3
@@ -39,19 +28,7 @@ def test_prefer_flexible(tmp_path: Path, coordlang: Command) -> None:
     )
     assert 0 < figures["communication_saving"] < 1
     assert coordlang("verify", path, *SQUARE).code == 0
-    again = tmp_path / "again.json"
-    coordlang(
-        "build",
-        *SQUARE,
-        "--tasks",
-        "all",
-        "--method",
-        "minimal",
-        "--prefer",
-        "flexible",
-        "-o",
-        again,
-    )
+    coordlang("build", *chosen, "-o", again)
     first, second = (json.loads(p.read_text()) for p in (path, again))
     assert first["states"] == second["states"]
 
@@ -79,10 +56,3 @@ def test_prefer_simple(tmp_path: Path, coordlang: Command) -> None:
     terms = sorted(len(formula["terms"]) for formula in shown.values())
     assert sum(terms[:-1]) == 4
     assert coordlang("verify", path, *ring).code == 0
-
-
-def test_prefer_belongs_to_the_exact_methods(tmp_path: Path, coordlang: Command) -> None:
-    outcome = coordlang("build", *SQUARE, "--prefer", "flexible", "-o", tmp_path / "l.json")
-    assert outcome.code == 2
-    assert "--prefer flexible belongs to --method minimal or exhaustive" in outcome.err
-    assert not (tmp_path / "l.json").exists()

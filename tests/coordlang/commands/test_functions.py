@@ -371,23 +371,21 @@ def test_results_show_themselves(language: Path) -> None:
     ],
     ids=str,
 )
-def test_a_wrong_value_is_an_error_and_never_another_answer(wrong: dict[str, Any]) -> None:
+def test_a_wrong_value_is_an_error_and_never_another_answer(
+    wrong: dict[str, Any], language: Path
+) -> None:
     """Users met remember_actions="no", which was taken for True, and cost="", for the default."""
-    files = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
     with pytest.raises(coordlang.UsageError) as caught:
-        coordlang.plans(*files, **wrong)
+        coordlang.plans(*T_MAP, **wrong)
     assert caught.value.remedy
     with pytest.raises(coordlang.UsageError):  # where a language says how the files are understood
-        coordlang.explain(coordlang.build(*files).language, *files, **wrong)
+        coordlang.explain(language, *T_MAP, **wrong)
 
 
 @pytest.mark.parametrize("robot", [3, [3], "r9", ["r1", "r9"]], ids=str)
-def test_a_robot_that_is_none(robot: Any) -> None:
-    files = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
-    language = coordlang.build(*files).language
-    sentence = coordlang.explain(language, *files).sentences[0].words
+def test_a_robot_that_is_none(robot: Any, language: Path) -> None:
     with pytest.raises(coordlang.UsageError):
-        coordlang.choices(language, *files, sentence, robot=robot)
+        coordlang.choices(language, *T_MAP, "w0", robot=robot)
 
 
 @pytest.mark.parametrize(

@@ -12,34 +12,40 @@ from pathlib import Path
 
 import pytest
 
+import coordlang as door
 from tests.support.command import Command
+from tests.support.domains import DOMAINS
 
 ALL = ("l.json", "d.pddl", "p.pddl")
 SENTENCE = "w0"
 
 
-@pytest.fixture
-def folder(
-    language: Path,
-    t_map: tuple[Path, Path],
-    coordlang: Command,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> Path:
-    """A working folder with a file of each kind; `in/` holds the PDDL files by the names that
-    `export` writes.
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a file of each kind; `in/` holds the PDDL files by the names that `export`
+    writes.
     """
-    monkeypatch.chdir(tmp_path)
-    language.rename("l.json")
-    Path("in").mkdir()
-    for name, source in zip(("domain", "problem"), t_map, strict=True):
-        shutil.copy(source, f"{name[0]}.pddl")
-        shutil.copy(source, f"in/{name}.pddl")
-    assert coordlang("tasks", "d.pddl", "p.pddl", "--goal", "(at r1 ?)", "-o", "t.json").code == 0
-    Path("proof.json").write_text("{}")
-    Path("coordinates.json").write_text("{}")
-    Path("plan").write_text("(noop)\n")
-    return tmp_path
+    folder = tmp_path_factory.mktemp("outputs")
+    (folder / "in").mkdir()
+    sources = [DOMAINS / "t-map" / name for name in ("domain.pddl", "problem.pddl")]
+    for source in sources:
+        shutil.copy(source, folder / f"{source.name[0]}.pddl")
+        shutil.copy(source, folder / "in" / source.name)
+    door.build(*sources, tasks="all").language.save(folder / "l.json")
+    task = {"init": ["(at r1 c0-1)", "(at r2 c1-0)"], "goal": ["(at r1 c1-0)"]}
+    tasks = {"format": "coordlang/tasks", "version": 1, "tasks": [task]}
+    for name, data in (("t.json", tasks), ("proof.json", {}), ("coordinates.json", {})):
+        (folder / name).write_text(json.dumps(data))
+    (folder / "plan").write_text("(noop)\n")
+    return folder
+
+
+@pytest.fixture
+def folder(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of it, to work in."""
+    shutil.copytree(made, tmp_path / "here")
+    monkeypatch.chdir(tmp_path / "here")
+    return tmp_path / "here"
 
 
 BUILD = ("build", "d.pddl", "p.pddl", "--tasks", "t.json")
@@ -50,19 +56,19 @@ VERIFY = ("verify", *ALL, "--tasks", "t.json", "--certificate", "proof.json", "-
 REPORT = ("report", *ALL, "-o")
 OVERWRITING = [
     *((*BUILD, "-o", name) for name in ("d.pddl", "p.pddl", "t.json", "in/../d.pddl")),
-    *((*BUILD, "-o", "x.json", "--certificate", name) for name in ("d.pddl", "p.pddl", "t.json")),
-    *((*UNDERSTAND, "-o", name) for name in ALL),
-    *((*CHOICES, "-o", name) for name in ALL),
-    *((*EXPORT, "--to", "ltlf", "-o", name) for name in ALL),
-    *((*EXPORT, "--json", "-o", name) for name in ALL),
+    (*BUILD, "-o", "x.json", "--certificate", "t.json"),
+    (*UNDERSTAND, "-o", "l.json"),
+    (*CHOICES, "-o", "d.pddl"),
+    (*EXPORT, "--to", "ltlf", "-o", "l.json"),
+    (*EXPORT, "--json", "-o", "p.pddl"),
     (*EXPORT, "--translate-plan", "plan", "-o", "plan"),
     ("export", "l.json", "in/domain.pddl", "p.pddl", SENTENCE, "-o", "in"),
     ("export", "l.json", "d.pddl", "in/problem.pddl", SENTENCE, "-o", "in"),
-    *(("tasks", "d.pddl", "p.pddl", "-o", name) for name in ("d.pddl", "p.pddl")),
+    ("tasks", "d.pddl", "p.pddl", "-o", "p.pddl"),
     *((*VERIFY, name) for name in (*ALL, "t.json", "proof.json")),
-    *((*REPORT, name) for name in (*ALL, "coordinates.json")),
-    *(("lift", *ALL[1:], "-o", name) for name in (*ALL[1:], "coordinates.json")),
-    *(("ground", *ALL, "-o", name) for name in (*ALL, "coordinates.json")),
+    *((*REPORT, name) for name in ("l.json", "coordinates.json")),
+    *(("lift", *ALL[1:], "-o", name) for name in ("p.pddl", "coordinates.json")),
+    *(("ground", *ALL, "-o", name) for name in ("l.json", "coordinates.json")),
 ]
 
 
@@ -105,14 +111,13 @@ TO_FILE = [
 ]
 
 
-@pytest.mark.parametrize("arguments", TO_FILE, ids=" ".join)
 @pytest.mark.parametrize(
-    ("place", "reason"),
+    ("arguments", "place", "reason"),
     [
-        ("no/x", "there is no folder no"),
-        ("plan/x", "there is no folder plan"),
-        ("in", "Is a directory"),
-        ("shut/x", "Permission denied"),
+        *((arguments, "no/x", "there is no folder no") for arguments in TO_FILE),
+        (TO_FILE[0], "plan/x", "there is no folder plan"),
+        (TO_FILE[0], "in", "Is a directory"),
+        (TO_FILE[0], "shut/x", "Permission denied"),
     ],
 )
 def test_the_place_is_looked_at_before_the_work(
