@@ -46,14 +46,13 @@ def options(name: str) -> dict[str, click.Option]:
 
 
 def cell_of(option: click.Option) -> str:
-    """The option as the first cell of its row has it: `-o, --output FILE`."""
-    value = option.metavar or ""
+    """The option as the first cell of its row has it."""
+    value = option.metavar or option.type.name.upper()
     if isinstance(option.type, click.Choice):
         value = "|".join(option.type.choices)
-    elif not option.is_flag:
-        value = option.metavar or option.type.name.upper()
-    spelled = f"{', '.join(option.opts)} {value}".strip()
-    return f"`{spelled}`".replace("|", r"\|")
+    *others, last = option.opts
+    spelled = [*others, last if option.is_flag else f"{last} {value}"]
+    return ", ".join(f"`{each}`" for each in spelled).replace("|", r"\|")
 
 
 def told(option: click.Option) -> str:
