@@ -80,7 +80,6 @@ class Built(Presented):
     few_words: FewWords | None = None
     fewest: int | None = None
     deadline: float = inf
-    shown = ("words", "lower_bound", "method", "tasks", "total_seconds")
 
     @property
     def candidates(self) -> Candidates:
@@ -93,29 +92,9 @@ class Built(Presented):
         return self.language.guarantee
 
     @property
-    def words(self) -> int:
-        """The number of words."""
-        return self.guarantee.size
-
-    @property
-    def lower_bound(self) -> int:
-        """No language for these tasks has fewer words."""
-        return self.guarantee.lower_bound
-
-    @property
-    def method(self) -> str:
-        """How the words were found."""
-        return self.guarantee.method
-
-    @property
     def is_exact(self) -> bool:
         """Whether the method finds the least number of words, if it comes to its end."""
-        return self.method in EXACT
-
-    @property
-    def total_seconds(self) -> float:
-        """The time that it took."""
-        return round(sum(self.seconds.values()), 3)
+        return self.guarantee.method in EXACT
 
     @property
     def tasks(self) -> int:
@@ -132,6 +111,16 @@ class Built(Presented):
         """Where coordination is required."""
         return self.job.first_differences
 
+    def facts(self) -> Mapping[str, object]:
+        """What the method found, and how long that took."""
+        return {
+            "words": self.guarantee.size,
+            "lower_bound": self.guarantee.lower_bound,
+            "method": self.guarantee.method,
+            "tasks": self.tasks,
+            "seconds": round(sum(self.seconds.values()), 3),
+        }
+
     def certificate(self) -> Certificate:
         """Why no partition with fewer words than the proved lower bound is a language.
 
@@ -144,7 +133,7 @@ class Built(Presented):
         AssertionError
             If it does not prove the bound: a solver has erred.
         """
-        refuted = self.lower_bound - 1
+        refuted = self.guarantee.lower_bound - 1
         evidence = self.refuting or (refuting_clauses(self.job, refuted) if refuted else {})
         proof = certify(self.candidates, evidence, refuted)
         try:
@@ -156,7 +145,11 @@ class Built(Presented):
     def data(self) -> dict[str, Any]:
         """The figures of the making as JSON data."""
         first, guarantee = self.first_differences, self.guarantee
-        fewest = None if self.fewest == first.requiring else self.fewest
+        more: dict[str, Any] = {}
+        if self.repaired is not None:
+            more["repair"] = self.repaired.data()
+        if self.fewest not in (None, first.requiring):
+            more["tasks_requiring_coordination_with_fewest_actions"] = self.fewest
         return {
             "tasks": self.tasks,
             "states": self.candidates.states,
@@ -175,12 +168,7 @@ class Built(Presented):
             **self.failures.data(),
             "proved_minimal": guarantee.proved_minimal,
             **self.figures,
-            **({} if self.repaired is None else {"repair": self.repaired.data()}),
-            **(
-                {}
-                if fewest is None
-                else {"tasks_requiring_coordination_with_fewest_actions": fewest}
-            ),
+            **more,
             "seconds": {name: round(value, 3) for name, value in self.seconds.items()},
         }
 

@@ -7,18 +7,25 @@ A command calls the Python function of its name; nothing else is computed here.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
 import click
 
 from coordlang.commands.files import FILE, FOLDER, OutputFile, beside, check_outputs, never_stdout
-from coordlang.commands.shared import Kept, Limits, keeping, limited
 from coordlang.commands.terminal import echo, line_width, note, working
 from planners.system.errors import CoordlangError, OutOfTime
-from planners.system.options import Given, options_of, record_from
+from planners.system.limits import (
+    default_memory_limit,
+    limited_memory,
+    require_memory,
+    time_limit,
+)
+from planners.system.options import Given, option, options_of, record_from
 
 #: Shows a result: gets it and the options, writes, and returns the exit code, None for 0.
 Show = Callable[[Any, Any], int | None]
@@ -27,6 +34,67 @@ Show = Callable[[Any, Any], int | None]
 _PDDL = ("DOMAIN", "PROBLEM", "PROBLEMS...")
 #: Options whose metavar has one of these name a file that is read or written.
 _FILES = ("FILE", "LANGUAGE", "PROBLEM", "RECORD", "RUN.json")
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What bounds the work of a command."""
+
+    time_limit: float | None = option(None, "Stop after this long (exit 23).", "SECONDS")
+    memory_limit: str | None = option(
+        None,
+        "Stop before using more, e.g. 4G (exit 22); none: no limit.  Default: 80 % of what is "
+        "free.",
+        "SIZE",
+    )
+    debug: bool = option(False, "Show tracebacks.")
+
+    @property
+    def bytes(self) -> int | None:
+        """The most memory, None for no limit; `click.BadParameter` for what is no size."""
+        if self.memory_limit is None:
+            return default_memory_limit()
+        text = self.memory_limit.strip().lower()
+        if text == "none":
+            return None
+        match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([kmgt]?)i?b?", text)
+        if not match:
+            raise click.BadParameter(
+                "expected a size such as 500M or 4G, or none", param_hint="'--memory-limit'"
+            )
+        return int(float(match[1]) * 1024 ** " kmgt".index(match[2] or " "))
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """Whether plans that were found before are read from the user's cache."""
+
+    no_cache: bool = option(False, "Search anew: read no plans that were found before.")
+
+
+@contextmanager
+def limited(limits: Limits) -> Iterator[None]:
+    """Run a block under limits."""
+    if limits.time_limit is not None and not limits.time_limit > 0:
+        raise click.UsageError("--time-limit: expected a number of seconds above 0")
+    most = limits.bytes
+    if limits.memory_limit is not None and most is not None:
+        require_memory(most)
+    with limited_memory(most), time_limit(limits.time_limit):
+        yield
+
+
+@contextmanager
+def keeping(kept: Kept) -> Iterator[None]:
+    """Run a block that searches no task again that it finds in the user's cache."""
+    if kept.no_cache:
+        yield
+        return
+    from planners.search.kept_plans import default_folder, keeping_plans, plan_store
+
+    place = default_folder()
+    with keeping_plans(None if place is None else plan_store(place)):
+        yield
 
 
 def command_of(
@@ -142,10 +210,7 @@ def _check_outputs(named: Iterable[Given], given: dict[str, object], inputs: lis
     """Refuse files that cannot be written, or that would overwrite one that is read."""
     options = [(each, given[each.name]) for each in named if given.get(each.name) is not None]
     for each, value in options:
-        if (
-            any(part in (each.option.metavar or "") for part in _FILES)
-            and not each.option.is_output
-        ):
+        if _names_file(each) and not each.option.is_output:
             inputs += value if isinstance(value, tuple) else [str(value)]
     outputs: list[OutputFile] = []
     for each, value in options:
@@ -187,11 +252,11 @@ def _names_file(given: Given) -> bool:
 
 def _click_option(given: Given) -> click.Option:
     """The option of click's: what it takes comes from the type of the record's field."""
-    option = given.option
+    described = given.option
     keywords: dict[str, Any] = {
-        "help": option.help,
-        "metavar": option.metavar,
-        "required": option.required,
+        "help": described.help,
+        "metavar": described.metavar,
+        "required": described.required,
         "multiple": given.default == (),
     }
     if given.kind is bool:
@@ -204,11 +269,11 @@ def _click_option(given: Given) -> click.Option:
         keywords["type"] = float
     elif get_origin(given.kind) is tuple and Ellipsis not in get_args(given.kind):
         keywords["nargs"] = len(get_args(given.kind))
-    elif option.metavar == "DIR":
+    elif described.metavar == "DIR":
         keywords["type"] = FOLDER
     elif _names_file(given):
         keywords["type"] = FILE
     is_shown = given.default not in (None, ()) and not isinstance(given.default, bool)
-    if is_shown and not option.required:
+    if is_shown and not described.required:
         keywords |= {"default": given.default, "show_default": True}
     return click.Option([*given.spellings, given.name], **keywords)

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+import msgspec
+
 from coordlang.commands.layout import WIDTH, alike, atoms_of, named, packed, wrapped
 from coordlang.required.miscoordination import Miscoordination
 from planners.joint.model import IDLE, NO_FACT
@@ -18,21 +20,13 @@ _NUMBER = " " * 9
 
 
 def witness_data(witness: Miscoordination | None) -> dict[str, Any] | None:
-    """Return a miscoordination as JSON data; None for none."""
+    """A miscoordination as JSON data; None for none."""
     if witness is None:
         return None
-    data: dict[str, Any] = {
-        "task": witness.task,
-        "robots": list(witness.robots),
-        "plans": [[list(step) for step in plan] for plan in witness.plans],
-        "states": [list(states) for states in witness.states],
-        "mixture": [list(step) for step in witness.mixture],
-        "mixed_states": list(witness.mixed_states),
-        "step": witness.step,
-        "reason": witness.reason,
-    }
-    if witness.sentence is not None:
-        data["sentence"] = list(witness.sentence)
+    data: dict[str, Any] = msgspec.to_builtins(witness)
+    del data["kind"]
+    if witness.sentence is None:
+        del data["sentence"]
     return data
 
 
