@@ -223,7 +223,7 @@ def test_same_input_same_bytes() -> None:
     arguments = [
         "build",
         str(GRID / "domain.pddl"),
-        str(GRID / "gw2-2x3.pddl"),
+        str(GRID / "gw1-2x2.pddl"),
         "--tasks",
         "all",
         "-o",

@@ -44,15 +44,14 @@ def test_the_summary_says_what_is_left_open(tmp_path: Path, coordlang: Command) 
 def test_prefer_simple(tmp_path: Path, coordlang: Command) -> None:
     """The formulas are those that `explain` then shows, and proved the shortest."""
     path = tmp_path / "l.json"
-    ring = GRID / "domain.pddl", GRID / "gw2-2x3.pddl"
     chosen = ("--tasks", "all", "--method", "minimal", "--prefer", "simple")
-    outcome = coordlang("build", *ring, *chosen, "-o", path)
+    outcome = coordlang("build", *SQUARE, *chosen, "-o", path)
     assert outcome.code == 0
     # What it had before depends on which of the smallest languages was found first.
-    said = r"formulas of 4 terms with 6 limits on variables \(\d+ terms, \d+ limits before"
+    said = r"formulas of 2 terms with 2 limits on variables \(\d+ terms, \d+ limits before"
     assert re.search(said, outcome.out)
     assert "proved the shortest)" in outcome.out
-    shown = json.loads(coordlang("explain", path, *ring, "--json").out)["formulas"]
+    shown = json.loads(coordlang("explain", path, *SQUARE, "--json").out)["formulas"]
     terms = sorted(len(formula["terms"]) for formula in shown.values())
-    assert sum(terms[:-1]) == 4
-    assert coordlang("verify", path, *ring).code == 0
+    assert sum(terms[:-1]) == 2
+    assert coordlang("verify", path, *SQUARE).code == 0
