@@ -473,7 +473,11 @@ def test_the_command_as_json(
         ((SENTENCE, "--translate-plan", "other"), 31, "none of the exported problem"),
         ((SENTENCE, "--translate-plan", "empty"), 1, "no optimal plan"),
         ((SENTENCE, "--translate-plan", "two"), 31, "two:3:1: this file holds several plans"),
-        ((SENTENCE, "--to", "ltlf", "--translate-plan", "empty"), 2, "leave out --to ltlf"),
+        (
+            (SENTENCE, "--to", "ltlf", "--translate-plan", "empty"),
+            2,
+            "--translate-plan belongs to --to pddl",
+        ),
         ((SENTENCE, "-o", "other"), 2, "the folder other cannot be made"),
         ((SENTENCE, "-o", "missing/x", "--to", "ltlf"), 2, "cannot be written"),
         (("w0 w1 w0",), 1, "no optimal plan has the sentence"),
