@@ -24,9 +24,13 @@ from coordlang.vocabulary.spoken_choices import SpokenChoices
 from planners.joint.tables import Ints
 
 #: Ways to a failing step that are taken from one node at most, beside the first.
-_RANDOM_WAYS = 12
+_RANDOM_WAYS = 40
 #: What each robot can still do and say: words that others have not said yet, and a set.
 _Ahead = tuple[tuple[Words, int], ...]
+#: Plans of which a mixture is made, as edges.
+_Plans = tuple[tuple[int, ...], ...]
+#: Draws in a row that bring nothing new, after which a node is left.
+_FAMILIAR = 4
 #: A mixture that fails: each robot's steps (codes) so far, and a sentence that all can say.
 _Failing = tuple[list[list[int]], Words]
 
@@ -116,25 +120,24 @@ def many_counterexamples(
     mixtures = _Mixtures(choices, word)
     nodes = np.flatnonzero(choices.requires & space.descendants(space.starts)).tolist()
     random = Random(0)  # always the same ones
-    found: dict[int, list[list[list[int]]]] = {}
+    found: dict[int, list[_Plans]] = {}
     for node in nodes:
         failing = mixtures.failing(node, random)
         if failing is not None:
-            found[node] = [mixtures.plans(node, failing)]
+            found[node] = [mixtures.near_plans(node, failing, random)]
             if len(found) >= most:
                 break
     for node, plans in found.items():
-        for _ in range(min(ways * _RANDOM_WAYS, most // len(found) - 1)):
-            failing = mixtures.failing(node, random)
-            assert failing is not None, "it was found once"
-            plans.append(mixtures.plans(node, failing))
-    by_steps: dict[int, list[tuple[int, list[list[int]]]]] = {}
+        plans += sorted(
+            mixtures.others(node, min(ways * _RANDOM_WAYS, most // len(found) - 1), random)
+        )
+    by_steps: dict[int, list[tuple[int, _Plans]]] = {}
     for node, listed in found.items():
         by_steps.setdefault(int(space.layer[node]), []).extend((node, own) for own in listed)
     return [_table(choices, by_steps[steps]) for steps in sorted(by_steps)]
 
 
-def _table(choices: Choices, found: Sequence[tuple[int, list[list[int]]]]) -> Counterexamples:
+def _table(choices: Choices, found: Sequence[tuple[int, _Plans]]) -> Counterexamples:
     """Tuples as a table: the node of each, and the edges of its plans."""
     space = choices.space
     start = np.array([node for node, _ in found], np.int64)
@@ -239,28 +242,47 @@ class _Mixtures:
 
     # ---- plans of a mixture
 
-    def plans(self, node: int, failing: _Failing) -> list[list[int]]:
-        """Plans, as edges, of which a failing mixture is made, near to each other.
+    def near_plans(self, node: int, failing: _Failing, random: Random) -> _Plans:
+        """Plans of which a failing mixture is made, near to each other.
 
-        Each is made to follow the one before where it can, and then the first one the last.
+        Each is made to go where the one before goes as far as it can, and then the first one where
+        the last goes.
         """
         codes, sentence = failing
-        near: list[int] = []
-        plans: list[list[int]] = []
-        for own in codes:
-            near = self._plan(node, (len(plans), own), sentence, near)
-            plans.append(near)
-        plans[0] = self._plan(node, (0, codes[0]), sentence, near)
-        return plans
+        plans: list[tuple[int, ...]] = [()]
+        for robot in (*range(len(codes)), 0):
+            plans.append(self._plan(node, robot, codes[robot], sentence, plans[-1], random))
+        return (plans[-1], *plans[2:-1])
+
+    def others(self, node: int, most: int, random: Random) -> set[_Plans]:
+        """More plans of mixtures from a node of which one fails, drawn at random."""
+        found: set[_Plans] = set()
+        familiar = 0
+        while len(found) < most and familiar < _FAMILIAR:
+            failing = self.failing(node, random)
+            assert failing is not None, "some mixture fails"
+            codes, said = failing
+            plans = tuple(
+                self._plan(node, robot, own, said, (), random) for robot, own in enumerate(codes)
+            )
+            familiar = familiar + 1 if plans in found else 0
+            found.add(plans)
+        return found
 
     def _plan(
-        self, node: int, part: tuple[int, list[int]], sentence: Words, near: Sequence[int]
-    ) -> list[int]:
-        """A plan with a robot's first steps and a sentence, that goes to where another one does."""
-        robot, codes = part
-        spoken, path = self._spoken, []
+        self,
+        node: int,
+        robot: int,
+        codes: list[int],
+        sentence: Words,
+        near: Sequence[int],
+        random: Random,
+    ) -> tuple[int, ...]:
+        """A plan with a robot's first steps and a sentence, drawn, or ``near`` another plan."""
+        spoken = self._spoken
+        path: list[int] = []
         for step in range(int(self._space.layer[node])):
-            options = []
+            options: list[int] = []
             for edge in self._space.out_edges(node):
                 if step < len(codes) and spoken.code(robot, edge, node) != codes[step]:
                     continue
@@ -269,13 +291,12 @@ class _Mixtures:
                     target, robot, codes[step + 1 :], sentence[len(entered) :]
                 ):
                     options.append(edge)
-                    if near and target == spoken.targets[near[step]]:
-                        break
-            edge = options[-1] if near else options[0]
+            same = [e for e in options if near and spoken.targets[e] == spoken.targets[near[step]]]
+            edge = random.choice(same or options)
             sentence = sentence[len(spoken.entered(edge, node)) :]
             path.append(edge)
             node = spoken.targets[edge]
-        return path
+        return tuple(path)
 
     def _can_say(self, node: int, robot: int, codes: list[int], sentence: Words) -> bool:
         """Whether some plan from a node has a robot's first steps and a sentence."""
