@@ -20,11 +20,13 @@ import numpy as np
 
 from coordlang.required.choices import Choices
 from coordlang.vocabulary.sentence_sets import NOTHING, Words
-from coordlang.vocabulary.spoken_choices import SpokenChoices
+from coordlang.vocabulary.spoken_choices import SpokenChoices, Step
 from planners.joint.tables import Ints
 
 #: Ways to a failing step that are taken from one node at most, beside the first.
 _RANDOM_WAYS = 40
+#: Steps of mixtures that may be looked at for more tuples, beside as many as for the first ones.
+_EFFORT = 500
 #: What each robot can still do and say: words that others have not said yet, and a set.
 _Ahead = tuple[tuple[Words, int], ...]
 #: Plans of which a mixture is made, as edges.
@@ -122,7 +124,7 @@ def many_counterexamples(
     random = Random(0)  # always the same ones
     found: dict[int, list[_Plans]] = {}
     for node in nodes:
-        failing = mixtures.failing(node, random)
+        failing = mixtures.failing(node)
         if failing is not None:
             found[node] = [mixtures.near_plans(node, failing, random)]
             if len(found) >= most:
@@ -156,33 +158,64 @@ class _Mixtures:
         self._spoken = SpokenChoices(choices, word)
         self._prefixes: dict[int, dict[int, Any]] = {}
         self._safe: set[tuple[int, _Ahead]] = set()
+        self._shared: dict[_Ahead, tuple[Words, int]] = {}
+        #: How often the next steps of a mixture were looked at.
+        self.visited = 0
 
-    def failing(self, node: int, random: Random) -> _Failing | None:
-        """A mixture of plans from a node that fails while all of them have one sentence."""
+    def failing(self, node: int, random: Random | None = None) -> _Failing | None:
+        """A mixture of plans from a node that fails while all of them have one sentence.
+
+        The first one, found soon as many nodes lead to the same mixtures, or one that is drawn.
+        """
         return self._failing(node, tuple(((), own) for own in self._spoken.of_node[node]), random)
 
-    def _failing(self, node: int, ahead: _Ahead, random: Random) -> _Failing | None:
+    def _failing(self, node: int, ahead: _Ahead, random: Random | None) -> _Failing | None:
         """The same where the robots are ahead of each other in what they say."""
         key = (node, ahead)
         if key in self._safe:
             return None
+        found = None
+        if self._can_fail(node, ahead):
+            able = self._able(ahead)
+            if able == ahead:
+                found = self._after_step(node, ahead, random)
+            elif self._can_fail(node, able):
+                found = self._failing(node, able, random)
+        if found is None:
+            self._safe.add(key)
+        return found
+
+    def _can_fail(self, node: int, ahead: _Ahead) -> bool:
+        """Whether some choice of label sequences fails, whatever is said."""
         chosen = tuple(self._spoken.label_set(own) for _, own in ahead)
-        if self._choices.fails(chosen, node):
-            for codes, following, target in self._moves(node, ahead, random):
-                if target is None:
-                    return [[*own] for own in codes], self._one_sentence(following, random)
-                said = len(_begin([words for words, _ in following]))
-                below = tuple((words[said:], own) for words, own in following)
-                found = self._failing(target, below, random)
-                if found is not None:
-                    steps, sentence = found
-                    steps = [[*first, *rest] for first, rest in zip(codes, steps, strict=True)]
-                    return steps, following[0][0][:said] + sentence
-        self._safe.add(key)
+        return self._choices.fails(chosen, node)
+
+    def _able(self, ahead: _Ahead) -> _Ahead:
+        """What robots can do while they say what all of them can say."""
+        spoken = self._spoken
+        said, common = self._common(ahead)
+        return tuple(
+            (words, spoken.saying(own, spoken.words.before(said[len(words) :], common)))
+            for words, own in ahead
+        )
+
+    def _after_step(self, node: int, ahead: _Ahead, random: Random | None) -> _Failing | None:
+        """The mixture that fails after one of the next steps, or by it."""
+        self.visited += 1
+        for codes, following, target in self._moves(node, ahead, random):
+            if target is None:
+                return [[*own] for own in codes], self._one_sentence(following, random)
+            said = len(_begin([words for words, _ in following]))
+            below = tuple((words[said:], own) for words, own in following)
+            found = self._failing(target, below, random)
+            if found is not None:
+                steps, sentence = found
+                steps = [[*first, *rest] for first, rest in zip(codes, steps, strict=True)]
+                return steps, following[0][0][:said] + sentence
         return None
 
     def _moves(
-        self, node: int, ahead: _Ahead, random: Random
+        self, node: int, ahead: _Ahead, random: Random | None
     ) -> Iterator[tuple[list[Words], _Ahead, int | None]]:
         """Steps of the mixture after which the robots have a sentence in common.
 
@@ -190,42 +223,50 @@ class _Mixtures:
         fails, whatever robots do that have no code yet.
         """
         spoken, robots = self._spoken, len(ahead)
-        none: list[Words] = [()] * robots
-        waiting: list[tuple[int, list[Words], _Ahead, Any]] = [
-            (0, none, ahead, self._prefixes_of(node))
-        ]
-        while waiting:
-            robot, codes, reached, prefixes = waiting.pop()
-            if robot == robots:
-                yield codes, reached, prefixes
-                continue
-            words, own = reached[robot]
+
+        def drawn(own: int) -> Iterator[Step]:
             steps = spoken.steps(own)
-            for step in random.sample(steps, len(steps)):
-                label, entered, after = step
-                moved = (*reached[:robot], (words + entered, after), *reached[robot + 1 :])
-                if self._common(moved)[1] == NOTHING:
-                    continue
-                chosen = [*codes[:robot], (spoken.code_of(step),), *codes[robot + 1 :]]
-                if label in prefixes:
-                    waiting.append((robot + 1, chosen, moved, prefixes[label]))
-                else:
-                    yield chosen, moved, None
+            return iter(steps if random is None else random.sample(steps, len(steps)))
+
+        none: list[Words] = [()] * robots
+        open_steps = [(drawn(ahead[0][1]), none, ahead, self._prefixes_of(node))]
+        while open_steps:
+            steps, codes, reached, prefixes = open_steps[-1]
+            step = next(steps, None)
+            if step is None:
+                open_steps.pop()
+                continue
+            robot = len(open_steps) - 1
+            label, entered, after = step
+            words = reached[robot][0] + entered
+            moved = (*reached[:robot], (words, after), *reached[robot + 1 :])
+            if self._common(moved)[1] == NOTHING:
+                continue
+            chosen = [*codes[:robot], (spoken.code_of(step),), *codes[robot + 1 :]]
+            below = prefixes.get(label)
+            if below is None or len(open_steps) == robots:
+                yield chosen, moved, below
+            else:
+                open_steps.append((drawn(moved[robot + 1][1]), chosen, moved, below))
 
     def _common(self, ahead: _Ahead) -> tuple[Words, int]:
         """What the robot that is ahead of all has said, and what all can say after it."""
-        said = max((words for words, _ in ahead), key=len)
-        sets, common = self._spoken.words, -1
-        for words, own in ahead:
-            if said[: len(words)] != words:
-                return said, NOTHING
-            rest = sets.after(said[len(words) :], self._spoken.sentences(own))
-            common = rest if common < 0 else sets.common(common, rest)
-        return said, common
+        known = self._shared.get(ahead)
+        if known is None:
+            said = max((words for words, _ in ahead), key=len)
+            sets, common = self._spoken.words, -1
+            for words, own in ahead:
+                if said[: len(words)] != words:
+                    common = NOTHING
+                    break
+                rest = sets.after(said[len(words) :], self._spoken.sentences(own))
+                common = rest if common < 0 else sets.common(common, rest)
+            known = self._shared[ahead] = said, common
+        return known
 
-    def _one_sentence(self, ahead: _Ahead, random: Random) -> Words:
+    def _one_sentence(self, ahead: _Ahead, random: Random | None) -> Words:
         said, common = self._common(ahead)
-        return said + self._spoken.words.drawn(common, random)
+        return said + self._spoken.words.drawn(common, random or Random(0))
 
     def _prefixes_of(self, node: int) -> dict[int, Any]:
         """The edges of a node by the robots' labels, one after another, with their targets."""

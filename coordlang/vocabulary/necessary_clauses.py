@@ -24,8 +24,6 @@ from planners.search.plan_space import PlanSpace
 
 #: Counterexamples taken at a time.
 _AT_A_TIME = 200
-#: Counterexamples taken at a time where they are kept as tables.
-_MANY = 20_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +49,7 @@ class TaskPart:
         """The plan space of the tasks."""
         return self.choices.space
 
-    def failing(self, word: Ints, most: int = _MANY, ways: int = 1) -> list[Counterexamples]:
+    def failing(self, word: Ints, most: int, ways: int = 1) -> list[Counterexamples]:
         """Failing tuples of plans with one sentence, as tables.
 
         None only if the partition is a language for these tasks.

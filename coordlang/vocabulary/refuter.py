@@ -31,6 +31,8 @@ from planners.search.plan_space import PlanSpace
 _LEAST_PARTS = 8
 #: .. of about so many tasks at most.
 _TASKS_OF_A_PART = 1_500
+#: Failing tuples of a part that are collected at the beginning, and later at a time.
+_AT_FIRST, _LATER = 4_000, 100
 #: Longer tuples are left out of what is looked at once there are so many.
 _ENOUGH = 2_000
 _COLUMNS = ("start", "edges", "states")
@@ -47,9 +49,9 @@ class _Walked:
     part: TaskPart
     images: tuple[int, ...]
 
-    def failing(self, word: Ints) -> list[Counterexamples]:
+    def failing(self, word: Ints, most: int) -> list[Counterexamples]:
         """See `TaskPart.failing`."""
-        return self.part.failing(word, ways=len(self.images))
+        return self.part.failing(word, most, ways=len(self.images))
 
     @property
     def effort(self) -> float:
@@ -154,7 +156,7 @@ class Refuter:
 
     def _walk(self, walked: _Walked, word: Ints) -> bool:
         """Add failing plans with one sentence to the pool; whether there are any."""
-        return self._add(walked, walked.failing(word))
+        return self._add(walked, walked.failing(word, _LATER))
 
     def _add(self, walked: _Walked, found: Sequence[Counterexamples]) -> bool:
         """Add what a walk has found; whether that is anything."""
@@ -167,7 +169,7 @@ class Refuter:
 def _walk_alone(shared: tuple[Sequence[_Walked], Ints], number: int) -> Table:
     """One job: the failing plans of one part under a partition."""
     parts, word = shared
-    found = enumerate(parts[number].failing(word))
+    found = enumerate(parts[number].failing(word, _AT_FIRST))
     return {f"{name} {n}": getattr(table, name) for n, table in found for name in _COLUMNS}
 
 

@@ -49,6 +49,7 @@ class SpokenChoices:
         self._sentences = {END: SILENCE}
         self._projection = {END: END}
         self._steps: dict[int, list[Step]] = {}
+        self._saying: dict[tuple[int, int], int] = {}
         self._fill()
 
     def __len__(self) -> int:
@@ -132,4 +133,22 @@ class SpokenChoices:
                 said = self.words.before(entered, self.sentences(after))
                 known = self.words.union(known, said)
             self._sentences[number] = known
+        return known
+
+    def saying(self, number: int, sentences: int) -> int:
+        """The part of a set along which some sentence of a set of them is said; there is one."""
+        if number == END or sentences == self.sentences(number):
+            return number
+        key = number, sentences
+        known = self._saying.get(key)
+        if known is None:
+            moves = {}
+            for step in self.steps(number):
+                _, entered, after = step
+                said = self.words.common(
+                    self.words.after(entered, sentences), self.sentences(after)
+                )
+                if said != NOTHING:
+                    moves[self.code_of(step)] = self.saying(after, said)
+            known = self._saying[key] = self._sets.of_moves(moves)
         return known
