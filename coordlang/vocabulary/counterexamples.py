@@ -11,7 +11,8 @@ of what was found only then.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import sys
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from random import Random
 from typing import Any
@@ -25,8 +26,10 @@ from planners.joint.tables import Ints
 
 #: Ways to a failing step that are taken from one node at most, beside the first.
 _RANDOM_WAYS = 40
-#: Steps of mixtures that may be looked at for more tuples, beside as many as for the first ones.
-_EFFORT = 500
+#: Sets and mixtures that are kept for the next partition: some hundred megabytes.
+_KEPT = 1_000_000
+#: Steps of mixtures that are looked at for each tuple that is wanted, once there is one.
+_EFFORT = 5
 #: What each robot can still do and say: words that others have not said yet, and a set.
 _Ahead = tuple[tuple[Words, int], ...]
 #: Plans of which a mixture is made, as edges.
@@ -91,14 +94,14 @@ class Counterexamples:
         return Counterexamples(self.start[rows], self.edges[rows], self.states[rows])
 
 
-def counterexamples(choices: Choices, word: Ints, most: int) -> Iterator[Counterexample]:
+def counterexamples(mixtures: Mixtures, word: Ints, most: int) -> Iterator[Counterexample]:
     """`many_counterexamples` one by one."""
-    for found in many_counterexamples(choices, word, most):
+    for found in many_counterexamples(mixtures, word, most):
         yield from map(found.one, range(len(found)))
 
 
 def many_counterexamples(
-    choices: Choices, word: Ints, most: int, ways: int = 1
+    mixtures: Mixtures, word: Ints, most: int, ways: int = 1
 ) -> list[Counterexamples]:
     """Failing tuples of plans with one sentence, one table for each number of steps.
 
@@ -107,8 +110,8 @@ def many_counterexamples(
 
     Parameters
     ----------
-    choices
-        The robots' choices in the plan space.
+    mixtures
+        Those of the plan space.
     word
         (nodes) the word of each node of the plan space.
     most
@@ -116,23 +119,28 @@ def many_counterexamples(
     ways
         So many times as many are wanted from each node: it stands for so many images.
     """
-    space = choices.space
+    choices, space = mixtures.choices, mixtures.choices.space
     if not choices.requires[space.starts].any():
         return []
-    mixtures = _Mixtures(choices, word)
+    mixtures.say(word)
     nodes = np.flatnonzero(choices.requires & space.descendants(space.starts)).tolist()
     random = Random(0)  # always the same ones
     found: dict[int, list[_Plans]] = {}
-    for node in nodes:
+    effort = sys.maxsize
+    for node in mixtures.suspects_first(nodes):
         failing = mixtures.failing(node)
         if failing is not None:
             found[node] = [mixtures.near_plans(node, failing, random)]
-            if len(found) >= most:
-                break
+            effort = min(effort, mixtures.visited + _EFFORT * most)
+        if len(found) >= most or mixtures.visited > effort:
+            break
+    mixtures.suspect(found)
+    effort = mixtures.visited + _EFFORT * most
     for node, plans in found.items():
-        plans += sorted(
-            mixtures.others(node, min(ways * _RANDOM_WAYS, most // len(found) - 1), random)
-        )
+        if mixtures.visited > effort:
+            break
+        wanted = min(ways * _RANDOM_WAYS, most // len(found) - 1)
+        plans += sorted(mixtures.others(node, wanted, random))
     by_steps: dict[int, list[tuple[int, _Plans]]] = {}
     for node, listed in found.items():
         by_steps.setdefault(int(space.layer[node]), []).extend((node, own) for own in listed)
@@ -150,16 +158,46 @@ def _table(choices: Choices, found: Sequence[tuple[int, _Plans]]) -> Counterexam
     return Counterexamples(start, edges.transpose(0, 2, 1), states)
 
 
-class _Mixtures:
-    """Mixtures of plans that fail and have one sentence, by node of a plan space."""
+class Mixtures:
+    """Mixtures of plans that fail and have one sentence, by node of a plan space.
 
-    def __init__(self, choices: Choices, word: Ints) -> None:
+    What is known of sets of robots' steps is kept from one partition to the next: whether a mixture
+    of them can fail does not depend on the words of other steps.
+    """
+
+    def __init__(self, choices: Choices) -> None:
         self._choices, self._space = choices, choices.space
-        self._spoken = SpokenChoices(choices, word)
         self._prefixes: dict[int, dict[int, Any]] = {}
+        self._suspects: dict[int, int] = {}
+        self._turn = 0
+        self._forget()
+
+    def _forget(self) -> None:
+        self._spoken = SpokenChoices(self._choices)
         self._safe: set[tuple[int, _Ahead]] = set()
         self._shared: dict[_Ahead, tuple[Words, int]] = {}
         #: How often the next steps of a mixture were looked at.
+        self.visited = 0
+
+    def suspects_first(self, nodes: Sequence[int]) -> list[int]:
+        """Some nodes, those first from which mixtures failed last."""
+        return sorted(nodes, key=lambda node: -self._suspects.get(node, -1))
+
+    def suspect(self, nodes: Iterable[int]) -> None:
+        """Remember that mixtures from these nodes have failed."""
+        self._turn += 1
+        self._suspects.update(dict.fromkeys(nodes, self._turn))
+
+    @property
+    def choices(self) -> Choices:
+        """The robots' choices without words."""
+        return self._choices
+
+    def say(self, word: Ints) -> None:
+        """Set the word of each node (nodes)."""
+        if len(self._shared) + len(self._safe) + len(self._spoken) > _KEPT:
+            self._forget()
+        self._spoken.say(word)
         self.visited = 0
 
     def failing(self, node: int, random: Random | None = None) -> _Failing | None:

@@ -15,6 +15,7 @@ from coordlang.vocabulary.clauses import without_implied
 from coordlang.vocabulary.counterexamples import (
     Counterexample,
     Counterexamples,
+    Mixtures,
     counterexamples,
     many_counterexamples,
 )
@@ -34,15 +35,19 @@ class TaskPart:
     ----------
     choices
         The robots' choices in the plan space of just these tasks.
+    mixtures
+        Finds those of its plans that fail.
     """
 
     choices: Choices
+    mixtures: Mixtures
 
     @classmethod
     def of(cls, space: PlanSpace, tasks: Bools) -> TaskPart:
         """These tasks of a plan space."""
         part = space.with_tasks(space.starts[tasks], space.second[tasks])
-        return cls(Choices(part))
+        choices = Choices(part)
+        return cls(choices, Mixtures(choices))
 
     @property
     def space(self) -> PlanSpace:
@@ -63,7 +68,7 @@ class TaskPart:
         ways
             For how many images each task stands.
         """
-        return many_counterexamples(self.choices, word[self.space.state], most, ways)
+        return many_counterexamples(self.mixtures, word[self.space.state], most, ways)
 
     def violated(self, word: Ints) -> dict[Clause, Counterexample]:
         """Clauses that a partition violates, each with the plans that it comes from.
@@ -81,7 +86,7 @@ class TaskPart:
         words = word.tolist()
         found: dict[Clause, Counterexample] = {}
         nodes = word[self.space.state]
-        for example in counterexamples(self.choices, nodes, _AT_A_TIME):
+        for example in counterexamples(self.mixtures, nodes, _AT_A_TIME):
             clause = separation_clause(example.states, words)
             assert clause, "the plans have one sentence, and none of them is the other"
             found.setdefault(clause, example)

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from functools import reduce
 
+import numpy as np
+
 from coordlang.required.choices import END, Choices, LabelSets
 from coordlang.vocabulary.sentence_sets import NOTHING, SILENCE, SentenceSets, Words
 from planners.joint.tables import Ints
@@ -27,37 +29,43 @@ class SpokenChoices:
     ----------
     choices
         The robots' choices without words.
-    word
-        (nodes) the word of each node.
 
     Attributes
     ----------
     of_node
-        For each node the number of each robot's set.
+        For each node the number of each robot's set, under the words of `say`.
     words
         The sets of sentences.
     """
 
-    def __init__(self, choices: Choices, word: Ints) -> None:
+    def __init__(self, choices: Choices) -> None:
         self.space, self.words = choices.space, SentenceSets()
         self.of_node: list[tuple[int, ...]] = []
-        self.word: list[int] = word.tolist()
+        self.word: list[int] = []
         self.labels: list[list[int]] = self.space.labels.tolist()
         self.targets: list[int] = self.space.targets().tolist()
         self._choices, self._sets = choices, LabelSets()
-        self._spoken = max(self.word, default=0) + 2
+        self._spoken = len(self.space.rows) + 1
         self._sentences = {END: SILENCE}
         self._projection = {END: END}
         self._steps: dict[int, list[Step]] = {}
         self._saying: dict[tuple[int, int], int] = {}
-        self._fill()
 
     def __len__(self) -> int:
         """Count the different sets."""
         return len(self._sets)
 
-    def _fill(self) -> None:
-        """From the goals up."""
+    def say(self, word: Ints) -> None:
+        """Set the words (nodes), and find the sets of all nodes from the goals up.
+
+        A word is called by the least of its states: sets without a word that has changed are the
+        same as before.
+        """
+        words, number = np.unique(word, return_inverse=True)
+        least = np.full(len(words), len(self.space.rows))
+        np.minimum.at(least, number, self.space.state)
+        self.word = least[number].tolist()
+        self.of_node = []
         robots = range(self.space.robots)
         for node in range(len(self.space)):
             moves: list[dict[int, set[int]]] = [{} for _ in robots]

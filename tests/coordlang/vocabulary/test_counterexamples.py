@@ -13,7 +13,7 @@ import pytest
 
 from coordlang.language.candidates import from_problems
 from coordlang.required.choices import Choices
-from coordlang.vocabulary.counterexamples import Counterexample, counterexamples
+from coordlang.vocabulary.counterexamples import Counterexample, Mixtures, counterexamples
 from coordlang.vocabulary.sentence_sets import NOTHING, SILENCE, SentenceSets
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import BadInput, ProvedImpossible, UsageError
@@ -41,14 +41,14 @@ def compared(spaces: Iterator[PlanSpace], random: Random) -> Counter[bool]:
     """What is found under random words is there, and nothing is missed; how often was there any."""
     answers: Counter[bool] = Counter()
     for space in spaces:
-        choices = Choices(space)
+        mixtures = Mixtures(Choices(space))
         for words in (1, 2, 3, 5):
             word = [random.randrange(words) for _ in space.rows]
             try:
                 holds = naive.is_language(space, dict(enumerate(word)), MOST[space.robots])
             except naive.TooLarge:
                 break
-            found = list(counterexamples(choices, np.array(word)[space.state], 20))
+            found = list(counterexamples(mixtures, np.array(word)[space.state], 20))
             assert bool(found) != holds
             for example in found:
                 check(space, example, word)

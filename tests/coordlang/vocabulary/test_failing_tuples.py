@@ -16,7 +16,7 @@ from coordlang.language.warping import separation_clause
 from coordlang.required.choices import Choices
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.vocabulary import failing_tuples
-from coordlang.vocabulary.counterexamples import many_counterexamples
+from coordlang.vocabulary.counterexamples import Mixtures, many_counterexamples
 from coordlang.vocabulary.distinct_rows import DistinctRows
 from coordlang.vocabulary.failing_tuples import FailingTuples, agreeing_rows
 from planners.search.plan_space import PlanSpace
@@ -27,7 +27,7 @@ from tests.support.random_spaces import runs, separable_spaces
 def filled(space: PlanSpace, group: SymmetryGroup) -> tuple[FailingTuples, list[list[list[int]]]]:
     """A pool with the failing plans of a plan space, and the sequences of states of all of them."""
     silence = np.zeros(len(space), np.int64)
-    found = many_counterexamples(Choices(space), silence, 300)
+    found = many_counterexamples(Mixtures(Choices(space)), silence, 300)
     pool = FailingTuples(group, len(space.rows))
     new = sum([pool.add(table, space) for table in found])
     assert new == len(pool)
