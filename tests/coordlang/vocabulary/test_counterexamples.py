@@ -22,7 +22,7 @@ from tests.support.random_models import random_model
 from tests.support.random_spaces import random_spaces, runs
 
 #: Plans of a task up to which every mixture is made, by the number of robots.
-MOST = {2: 40, 3: 14, 4: 7}
+MOST = {1: 40, 2: 40, 3: 14, 4: 7}
 
 
 def with_slack(seeds: range) -> Iterator[PlanSpace]:
