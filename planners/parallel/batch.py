@@ -7,9 +7,12 @@ into jobs depends on the work alone, never on who does it, so that results are e
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +20,8 @@ from numpy.typing import NDArray
 
 #: What a job finds: arrays by name, no Python objects in them.
 Table = dict[str, NDArray[Any]]
+#: A table, or the error that a job has raised.
+Outcome = Table | BaseException
 #: What does a job: a function of a module (it is sent to other processes by name) that gets what
 #: all jobs share, and the job.
 Function = Callable[[Any, Any], Table]
@@ -50,19 +55,23 @@ class Batch:
     identity: str
     efforts: Sequence[float]
 
-    def key(self, number: int, version: str) -> str:
-        """The content of a job as a hash: equal keys, equal results."""
+    def keys(self) -> list[str]:
+        """What each job depends on as a hash, the code among it: equal keys, equal results."""
         function = f"{self.function.__module__}.{self.function.__qualname__}"
-        return digest(version, function, self.identity, self.jobs[number])
+        packages = {"planners", self.function.__module__.partition(".")[0]}
+        code = (*map(code_hash, sorted(packages)), np.version.version)
+        return [digest(code, function, self.identity, job) for job in self.jobs]
 
 
-@dataclass(frozen=True, slots=True)
-class Done:
-    """A job that has ended: its number, and its table or the error that it has raised."""
-
-    number: int
-    table: Table | None
-    error: BaseException | None = None
+@cache
+def code_hash(package: str) -> str:
+    """The SHA-256 of all source files of a package that is loaded, by its name."""
+    found = sha256()
+    for folder in sorted(sys.modules[package].__path__):
+        for path in sorted(Path(folder).rglob("*.py")):
+            name = path.relative_to(folder).as_posix()
+            found.update(f"{name} {sha256(path.read_bytes()).hexdigest()}\n".encode())
+    return found.hexdigest()
 
 
 def digest(*parts: object) -> str:

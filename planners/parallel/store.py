@@ -1,36 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A folder of tables found by their keys: safe for several processes at once.
 
-What is read is never executed: a file holds names, types and shapes of arrays, and their bytes.
+What is read is never executed: a file holds arrays without Python objects.
 """
 
 from __future__ import annotations
 
-import math
 import os
-import stat
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
+from io import BytesIO
 from pathlib import Path
-from typing import Annotated
 
-import msgspec
 import numpy as np
 
 from planners.parallel.batch import Table
 from planners.system.errors import note
 from planners.system.writing import write_atomically
 
-_HEAD = b"coordlang table 1\n"
-_ENDING = ".table"
-_Size = Annotated[int, msgspec.Meta(ge=0)]
 #: A table may take one part in so many of what a bounded store may take.
 _LARGEST = 4
-#: Seconds after which a temporary file is one that a killed process left.
-_WRITING = 3600.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,112 +51,58 @@ class Store:
         """The table of a key; None if there is none, or none that is whole."""
         path = self._path(key)
         try:
-            data = _content(path, self.most_bytes)
+            data = path.read_bytes()
+            if self.most_bytes is not None:
+                with suppress(OSError):  # a folder that is only read
+                    os.utime(path)  # it was used now
         except (FileNotFoundError, NotADirectoryError):
             return None
         except OSError as error:
-            self.ignore(key, f"{path} cannot be read ({error.strerror})")
+            self._ignore(path, f"cannot be read ({error.strerror})")
             return None
-        table = None if data is None else from_bytes(key, data)
-        if table is None:
-            self.ignore(key, f"{path} is {'no file' if data is None else 'damaged'}")
-        elif self.most_bytes is not None:
-            with suppress(OSError):  # a folder that is only read
-                os.utime(path)  # it was used now
-        return table
+        begin, content = data[:32], data[32:]
+        if begin != _hash(key, content):
+            self._ignore(path, "is damaged")
+            return None
+        with np.load(BytesIO(content), allow_pickle=False) as arrays:
+            return dict(arrays)
 
     def write(self, key: str, table: Table) -> None:
         """Keep a table.  Raises `OSError` or `UsageError` where it cannot be written."""
-        data = as_bytes(key, table)
+        content = BytesIO()
+        np.savez(content, **table)  # type: ignore[arg-type]
+        data = _hash(key, content.getvalue()) + content.getvalue()
         if self.most_bytes is not None and len(data) * _LARGEST > self.most_bytes:
             return
         self.path.mkdir(mode=0o700, parents=True, exist_ok=True)
-        path = self._path(key)
-        if os.path.lexists(path) and not path.is_file():
-            return  # a pipe or a folder in its place: `read` has said it
-        write_atomically(path, data)
+        write_atomically(self._path(key), data)
         if self.most_bytes is not None:
             self._let_go(self.most_bytes)
 
-    def ignore(self, key: str, why: str) -> None:
+    def _ignore(self, path: Path, why: str) -> None:
         """Say that a file is not used, and remove it."""
-        self.say(f"{why}: it is ignored, and its result is worked out again")
-        with suppress(OSError):  # it is gone already, or a folder, or the folder is only read
-            os.unlink(self._path(key))
+        self.say(f"{path} {why}: it is ignored, and its result is worked out again")
+        with suppress(OSError):  # it is gone already, or the folder is only read
+            path.unlink()
 
     def _path(self, key: str) -> Path:
-        return self.path / f"{key}{_ENDING}"
+        return self.path / f"{key}.table"
 
     def _let_go(self, most: int) -> None:
         """Remove files until the others take no more than ``most`` bytes."""
-        entries = sorted(self._entries())
+        entries = []
+        for folder in self.path.parent.glob(f"{self.path.name.rpartition('-')[0]}-*"):
+            for path in folder.iterdir():
+                with suppress(FileNotFoundError):  # another process was faster
+                    found = path.stat()
+                    entries.append((found.st_mtime, found.st_size, path))
         left = sum(size for _, size, _ in entries)
-        for _, size, path in entries:
+        for _, size, path in sorted(entries):
             if left <= most:
                 break
-            with suppress(FileNotFoundError):  # another process was faster
-                os.unlink(path)
+            path.unlink(missing_ok=True)
             left -= size
 
-    def _entries(self) -> Iterator[tuple[float, int, str]]:
-        """When each file was used last, its size and path; what killed processes left, too."""
-        family = f"{self.path.name.rpartition('-')[0]}-*"
-        for folder in sorted(self.path.parent.glob(family)):
-            for entry in os.scandir(folder):
-                try:
-                    found = entry.stat(follow_symlinks=False)
-                except FileNotFoundError:
-                    continue
-                left = not entry.name.startswith(".") or found.st_mtime < time.time() - _WRITING
-                if entry.is_file(follow_symlinks=False) and left:
-                    yield found.st_mtime, found.st_size, entry.path
 
-
-def as_bytes(key: str, table: Table) -> bytes:
-    """A table as the content of a file.
-
-    Raises
-    ------
-    ValueError
-        For an array of Python objects.
-    """
-    if any(array.dtype.hasobject for array in table.values()):
-        raise ValueError("an array of Python objects is not kept")
-    arrays = [(name, array.dtype.str, array.shape) for name, array in table.items()]
-    data = b"\n".join((msgspec.json.encode(arrays), b"".join(a.tobytes() for a in table.values())))
-    return _HEAD + _hash(key, data) + data
-
-
-def from_bytes(key: str, content: bytes) -> Table | None:
-    """The table that `as_bytes` has written for this key, None for anything else."""
-    begin = len(_HEAD) + 65
-    data = content[begin:]
-    if content[:begin] != _HEAD + _hash(key, data):
-        return None
-    offset = data.find(b"\n") + 1
-    table: Table = {}
-    try:
-        arrays = msgspec.json.decode(data[:offset], type=list[tuple[str, str, tuple[_Size, ...]]])
-        for name, kind, shape in arrays:
-            array = np.empty(0, kind)
-            count = math.prod(shape)
-            if count:
-                array = np.frombuffer(data, kind, count, offset)
-            table[name] = array.reshape(shape).copy()
-            offset += array.nbytes
-    except (ValueError, TypeError, OverflowError):
-        return None
-    return table if offset == len(data) else None
-
-
-def _hash(key: str, data: bytes) -> bytes:
-    return sha256(key.encode() + b"\n" + data).hexdigest().encode() + b"\n"
-
-
-def _content(path: Path, most: int | None) -> bytes | None:
-    """The content of a file; None if it is none or too large: a pipe could be waited for."""
-    with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
-        found = os.fstat(file.fileno())
-        if not stat.S_ISREG(found.st_mode) or (most is not None and found.st_size > most):
-            return None
-        return file.read()
+def _hash(key: str, content: bytes) -> bytes:
+    return sha256(key.encode() + b"\n" + content).digest()

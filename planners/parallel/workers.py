@@ -4,21 +4,16 @@
 from __future__ import annotations
 
 import os
-import pickle
-from collections import Counter, deque
-from collections.abc import Callable, Generator, Iterator
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
-from contextlib import ExitStack, closing, contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Protocol
+from typing import Any
 
-import numpy as np
-
-from planners.parallel.batch import Batch, Done, Table
+from planners.parallel.batch import Batch, Outcome, Table
 from planners.parallel.store import Store
-from planners.parallel.versions import code_hash
 from planners.system.errors import OutOfMemory, UsageError
 from planners.system.limits import has_memory_limit, memory_left
 
@@ -27,36 +22,12 @@ from planners.system.limits import has_memory_limit, memory_left
 WORTH_PROCESSES = 500_000.0
 #: Bytes without which a worker process is of no use.
 _LEAST_MEMORY = 256 << 20
-#: Seconds between two looks at whether the workers are there.
-_TICK = 1.0
-#: How often a job is begun at most that loses its worker each time, when it is the only one.
+#: How often workers are lost, and no job ends in between, before that is an error.
 _TRIES = 2
 
-
-class Pool(Protocol):
-    """An executor (`concurrent.futures.Executor`) with the jobs of a batch."""
-
-    @property
-    def capacity(self) -> int:
-        """How many jobs are given to it at a time."""
-        ...
-
-    def submit(self, number: int) -> Future[bytes]:
-        """Begin a job: its result is that of `planners.parallel.worker.attempt`."""
-        ...
-
-    def lost(self, error: BaseException) -> bool:
-        """Whether an error says that a worker is gone; raises what is the end of all jobs."""
-        ...
-
-    @property
-    def is_broken(self) -> bool:
-        """Whether a worker is gone, should the executor not have noticed it."""
-        ...
-
-    def close(self) -> None:
-        """End what is under way."""
-        ...
+#: Has some jobs of a batch done elsewhere: gives a future for each, and ends what is under way
+#: with its block.
+Begin = Callable[[Batch, Sequence[Any]], AbstractContextManager[list[Future[Outcome]]]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +43,7 @@ class Workers:
     processes
         The greatest number of worker processes.
     cluster
-        Gives a pool of other machines in place of them.
+        Other machines in place of them.
     kept
         Results that are known, and where others are kept.
     worth
@@ -80,12 +51,15 @@ class Workers:
     """
 
     processes: int = 1
-    cluster: Callable[[Batch], Pool] | None = None
+    cluster: Begin | None = None
     kept: Store | None = None
     worth: float = WORTH_PROCESSES
 
-    def run(self, batch: Batch) -> Generator[Done]:
-        """Yield jobs as they end; what is under way is ended when this is closed.
+    def tables(self, batch: Batch) -> Generator[Table]:
+        """The tables of jobs in their order, each as soon as its turn has come.
+
+        Errors of jobs are raised in the same order, so they do not depend on the number of
+        workers.  What is under way is ended when this is closed.
 
         Raises
         ------
@@ -94,140 +68,72 @@ class Workers:
         UsageError
             If no worker can be started.
         """
-        if self.kept is None:
-            yield from self._run(batch)
-            return
-        keys = _keys(batch)
-        left = []
+        ready: dict[int, Outcome] = {}
+        with closing(self._ended(batch)) as ended:
+            for number in range(len(batch.jobs)):
+                while number not in ready:
+                    ready.update([next(ended)])
+                outcome = ready.pop(number)
+                if isinstance(outcome, BaseException):
+                    raise outcome
+                yield outcome
+
+    def _ended(self, batch: Batch) -> Generator[tuple[int, Outcome]]:
+        """Yield jobs with their outcomes as they end; first those whose results are kept."""
+        left = list(range(len(batch.jobs)))
+        keys = [] if self.kept is None else batch.keys()
         for number, key in enumerate(keys):
-            table = self.kept.read(key)
-            if table is None:
-                left.append(number)
-            else:
-                yield Done(number, table)
-        rest = replace(
-            batch,
-            jobs=[batch.jobs[number] for number in left],
-            efforts=[batch.efforts[number] for number in left],
-        )
-        with closing(self._run(rest)) as following:
-            for done in following:
-                number = left[done.number]
-                if done.table is not None:
-                    self.kept.write(keys[number], done.table)
-                yield replace(done, number=number)
+            table = self.kept.read(key) if self.kept else None
+            if table is not None:
+                left.remove(number)
+                yield number, table
+        with closing(self._done(batch, left)) as done:
+            for number, outcome in done:
+                if self.kept is not None and isinstance(outcome, dict):
+                    self.kept.write(keys[number], outcome)
+                yield number, outcome
 
-    def tables(self, batch: Batch) -> Generator[Table]:
-        """The tables of jobs in the order of their numbers, each as soon as its turn has come.
+    def _done(self, batch: Batch, left: list[int]) -> Generator[tuple[int, Outcome]]:
+        """Do the jobs that are left, and those again whose worker was lost.
 
-        Errors are raised in the same order, so they do not depend on the number of workers.
+        All processes are lost with one of them.  Mostly there was no memory for all, so there are
+        half as many from then on.
         """
-        waiting: dict[int, Done] = {}
-        following = 0
-        with closing(self.run(batch)) as ended:
-            for done in ended:
-                waiting[done.number] = done
-                while (first := waiting.pop(following, None)) is not None:
-                    if first.table is None:
-                        assert first.error is not None
-                        raise first.error
-                    yield first.table
-                    following += 1
+        count, lost = min(self.processes, len(left)), 0
+        effort = sum(batch.efforts[number] for number in left)
+        if not self.cluster and (count < 2 or effort < self.worth):
+            for number in left:
+                yield number, batch.function(batch.shared, batch.jobs[number])
+            return
+        while left:
+            try:
+                with self._begin(batch, [batch.jobs[n] for n in left], count) as futures:
+                    running = dict(zip(futures, left, strict=True))
+                    while running:
+                        for future in wait(running, return_when=FIRST_COMPLETED).done:
+                            outcome, number = future.result(), running.pop(future)
+                            left.remove(number)
+                            lost = 0
+                            yield number, outcome
+            except BrokenExecutor:
+                count, lost = max(1, count // 2), lost + 1
+                if lost == _TRIES:
+                    raise OutOfMemory(
+                        f"{batch.name}: a job lost its worker {_TRIES} times: probably there is no "
+                        "memory for it",
+                        remedy="Use --jobs 1, or smaller or fewer tasks.",
+                    ) from None
 
-    def _run(self, batch: Batch) -> Generator[Done]:
+    def _begin(
+        self, batch: Batch, jobs: Sequence[Any], count: int
+    ) -> AbstractContextManager[list[Future[Outcome]]]:
         if self.cluster is not None:
-            if batch.jobs:
-                cluster = self.cluster
-                yield from _in_pool(batch, lambda: cluster(batch))
-            return
-        count, left = min(self.processes, len(batch.jobs)), memory_left()
-        if count < 2 or sum(batch.efforts) < self.worth:
-            for number, job in enumerate(batch.jobs):
-                yield Done(number, batch.function(batch.shared, job))
-            return
-        from planners.parallel.processes import ProcessPool
+            return self.cluster(batch, jobs)
+        from planners.parallel.processes import in_processes
 
+        left = memory_left()
         count = min(count, max(1, left // _LEAST_MEMORY))
-        memory = left // count if has_memory_limit() else None
-        yield from _in_pool(batch, lambda: ProcessPool(batch, count, memory))
-
-
-def _in_pool(batch: Batch, begin: Callable[[], Pool]) -> Generator[Done]:
-    """Map jobs to the workers of a pool, and do those again whose worker was lost.
-
-    A pool of processes is lost as a whole with one of them.  So the jobs that were under way are
-    then done one at a time in a new one, which tells whose fault it was.
-    """
-    waiting, alone = deque(range(len(batch.jobs))), deque[int]()
-    tries: Counter[int] = Counter()
-    running: dict[Future[bytes], int] = {}
-    pool = begin()
-    try:
-        while waiting or alone or running:
-            lost: list[int] = []
-            while (
-                not lost and (waiting or alone) and len(running) < (1 if alone else pool.capacity)
-            ):
-                number = (alone or waiting).popleft()
-                try:
-                    running[pool.submit(number)] = number
-                except RuntimeError as error:  # BrokenExecutor is one
-                    if not pool.lost(error):
-                        raise
-                    lost.append(number)
-            done = set() if lost else wait(running, _TICK, FIRST_COMPLETED).done
-            if not done and pool.is_broken:
-                lost.extend(n for n in running.values() if n not in lost)
-                running.clear()
-            for future in done:
-                number = running.pop(future)
-                failed = CancelledError() if future.cancelled() else future.exception()
-                if failed is None:
-                    yield Done(number, *pickle.loads(future.result()))
-                elif pool.lost(failed):
-                    lost.append(number)
-                else:
-                    raise failed
-            if lost:
-                lost += running.values()
-                running.clear()
-                pool.close()
-                _require_more_tries(batch, lost, tries)
-                alone.extend(sorted(lost))
-                pool = begin()
-    finally:
-        pool.close()
-
-
-def _require_more_tries(batch: Batch, lost: list[int], tries: Counter[int]) -> None:
-    """Raise `OutOfMemory` for a job that lost its workers: the system ends those that take most."""
-    if len(lost) > 1:
-        return
-    tries.update(lost)
-    if tries[lost[0]] >= _TRIES:
-        raise OutOfMemory(
-            f"{batch.name}: a job lost its worker {_TRIES} times: probably there is no memory for "
-            "it",
-            remedy="Use fewer --jobs, or smaller or fewer tasks.",
-        )
-
-
-def _keys(batch: Batch) -> list[str]:
-    """The key of each job: of the function, what it works on, and the code."""
-    package = batch.function.__module__.partition(".")[0]
-    code = code_hash(package), code_hash("planners"), f"numpy {np.version.version}"
-    return [batch.key(number, " ".join(code)) for number in range(len(batch.jobs))]
-
-
-def _made(folder: Path) -> Path:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(
-            f"{folder} cannot be made: {error.strerror}",
-            remedy="Say --resume DIR, with a folder that you may write to.",
-        ) from None
-    return folder
+        return in_processes(batch, jobs, count, left // count if has_memory_limit() else None)
 
 
 def cores() -> int:
@@ -269,7 +175,23 @@ def workers(
         kept = None if resume is None else Store(_made(Path(resume)), say=note)
         cluster = None
         if scheduler is not None:
-            from planners.parallel.dask_cluster import connected
-
+            try:
+                from planners.parallel.dask_cluster import connected
+            except ImportError:
+                raise UsageError(
+                    "--scheduler needs the package distributed, which is not installed",
+                    remedy="Install it: pip install 'coordlang[cluster]'.",
+                ) from None
             cluster = stack.enter_context(connected(scheduler, packages, note))
         yield Workers(jobs or cores(), cluster, kept)
+
+
+def _made(folder: Path) -> Path:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(
+            f"{folder} cannot be made: {error.strerror}",
+            remedy="Say --resume DIR, with a folder that you may write to.",
+        ) from None
+    return folder

@@ -11,8 +11,7 @@ import numpy as np
 from planners.grounding import GroundAction
 from planners.joint.model import FullState, JointModel, PlanningTask
 from planners.joint.tables import Ints, unique_rows
-from planners.parallel.batch import Table, digest
-from planners.parallel.versions import code_hash
+from planners.parallel.batch import Table, code_hash, digest
 from planners.pddl.formula_tree import formula_text, label
 from planners.pddl.lifted import And, Formula, Or
 from planners.search.plan_space import PlanSpace

@@ -261,9 +261,7 @@ def require_memory(size: int) -> None:
     To be asked before `limit_memory`: numpy aborts the process when it is loaded under a limit that
     is too small.
     """
-    import numpy as np
-
-    np.zeros((8, 8)) @ np.zeros((8, 8))
+    load_libraries()
     if size < address_space():
         raise OutOfMemory(
             f"the program alone needs {address_space() / 2**20:.0f} MiB of address space",
@@ -291,6 +289,13 @@ def require_libraries() -> None:
         )
 
 
+def load_libraries() -> None:
+    """Load numpy with all that it takes memory for."""
+    import numpy as np
+
+    np.zeros((8, 8)) @ np.zeros((8, 8))
+
+
 def limit_processor_time(seconds: int) -> None:
     """Let this process end after so many more seconds of its own, whatever it does."""
     _, hard = resource.getrlimit(resource.RLIMIT_CPU)
@@ -306,9 +311,7 @@ def _load_quietly() -> int:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, 1)
         os.dup2(nowhere, 2)
-        import numpy as np
-
-        np.zeros((8, 8)) @ np.zeros((8, 8))
+        load_libraries()
     except (ImportError, MemoryError, OSError, RuntimeError, SystemError):
         return 1
     return 0

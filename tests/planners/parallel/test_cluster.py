@@ -58,14 +58,14 @@ def left_on(found: Workers) -> tuple[int, list[str]]:
 
 
 def client_of(found: Workers) -> Any:
-    return found.cluster.args[0]  # type: ignore[union-attr]
+    return found.cluster.client  # type: ignore[union-attr]
 
 
 def test_results_and_errors(connected: Workers) -> None:
     squares = batch(jobs.squares, 3, [range(low, low + 3) for low in range(0, 12, 3)])
     found = [table["values"].tolist() for table in connected.tables(squares)]
     assert found == [[3 * n * n for n in part] for part in squares.jobs]
-    assert list(connected.run(batch(jobs.squares, 3, []))) == []
+    assert list(connected.tables(batch(jobs.squares, 3, []))) == []
     with pytest.raises(BadInput) as caught:
         list(connected.tables(batch(jobs.fails, None, [1, 0, 1])))
     assert str(caught.value) == "here:3:4: no good\n  Try 2."
@@ -100,10 +100,12 @@ def test_work_that_is_stopped_leaves_nothing(how: str, connected: Workers, tmp_p
 
 
 def test_other_versions_are_refused(connected: Workers) -> None:
-    expected = connected.cluster.args[2]  # type: ignore[union-attr]
-    expected["numpy"] = "1.0"
-    with pytest.raises(UsageError, match=r"numpy is .* there and 1.0 here") as caught:
-        list(connected.run(batch(jobs.squares, 1, [range(2)])))
+    expected = connected.cluster.expected  # type: ignore[union-attr]
+    expected["planners"] = ("Python 2.7", *expected["planners"][1:])
+    with pytest.raises(
+        UsageError, match=r"planners has Python 3.* there, Python 2.7 here"
+    ) as caught:
+        list(connected.tables(batch(jobs.squares, 1, [range(2)])))
     assert "coordlang[cluster]" in str(caught.value)
 
 
@@ -139,7 +141,6 @@ def test_there_is_no_cluster(
     (tmp_path / "not.json").write_text("nothing")
     (tmp_path / "nested.json").write_text("[" * 100_000)
     (tmp_path / "other.json").write_text('{"address": "ucx://127.0.0.1:9"}')
-    os.mkfifo(tmp_path / "pipe")
     for where in (
         noise,
         silence,
@@ -151,7 +152,6 @@ def test_there_is_no_cluster(
         "",
         str(tmp_path),
         *(str(tmp_path / name) for name in ("none.json", "not.json", "nested.json", "other.json")),
-        str(tmp_path / "pipe"),
     ):
         with pytest.raises(UsageError, match="scheduler"), opened(scheduler=where):
             pytest.fail("there is none")
@@ -167,7 +167,7 @@ def test_the_command_says_it_within_its_limit(answer: str, request: pytest.Fixtu
         world / "domain.pddl",
         world / "corners-3x3.pddl",
     ]
-    limits = ["--scheduler", request.getfixturevalue(answer), "--time-limit", "4"]
+    limits = ["--scheduler", request.getfixturevalue(answer), "--time-limit", "8"]
     done = subprocess.run(
         [sys.executable, "-m", "coordlang", *arguments, *limits],
         capture_output=True,
@@ -187,7 +187,7 @@ def test_a_worker_is_waited_for_and_said(tmp_path: Path) -> None:
         opened(scheduler=str(cluster.file), packages=PACKAGES, note=notes.append) as found,
     ):
         threading.Timer(0.5, cluster.add_worker).start()
-        assert len(list(found.run(batch(jobs.squares, 1, [range(2)])))) == 1
+        assert len(list(found.tables(batch(jobs.squares, 1, [range(2)])))) == 1
     (note,) = notes
     assert "no worker has connected" in note
 
@@ -228,4 +228,4 @@ def test_a_scheduler_that_goes_is_an_error(begun: bool, tmp_path: Path) -> None:
         else:
             kill()
         with pytest.raises(CoordlangError, match="has gone"):
-            list(found.run(batch(jobs.waits, str(tmp_path), [0, 1])))
+            list(found.tables(batch(jobs.waits, str(tmp_path), [0, 1])))

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
 import sys
 from multiprocessing import spawn
+from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
 import pytest
@@ -83,7 +85,7 @@ def script(folder: Path, lines: str) -> subprocess.Popen[bytes]:
 def test_no_worker_is_left(number: signal.Signals, tmp_path: Path) -> None:
     """And one that is asked to end removes what it writes."""
     process = script(
-        tmp_path, "list(Workers(2).run(jobs.batch(jobs.removes, sys.argv[1], [0, 1])))"
+        tmp_path, "list(Workers(2).tables(jobs.batch(jobs.removes, sys.argv[1], [0, 1])))"
     )
     until(lambda: len(workers(tmp_path)) == 2)
     process.send_signal(number)
@@ -94,7 +96,7 @@ def test_no_worker_is_left(number: signal.Signals, tmp_path: Path) -> None:
 
 def test_no_worker_is_left_when_time_is_over(tmp_path: Path) -> None:
     with pytest.raises(OutOfTime), time_limit(3):
-        list(TWO.run(batch(jobs.waits, str(tmp_path), [0, 1])))
+        list(TWO.tables(batch(jobs.waits, str(tmp_path), [0, 1])))
     assert not any(map(runs, workers(tmp_path)))
 
 
@@ -116,11 +118,18 @@ def test_one_worker_is_ended_and_its_job_done_by_another(
 
 def test_workers_that_cannot_start(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     given = batch(jobs.squares, 3, [range(2), range(3)])
-    for program in (tmp_path / "none", "/bin/false"):
-        monkeypatch.setattr(spawn, "_python_exe", os.fsencode(program))
-        with pytest.raises(UsageError, match="cannot be started: they end at once") as caught:
-            list(TWO.run(given))
-        assert "--jobs 1" in str(caught.value)
+    monkeypatch.setattr(spawn, "_python_exe", b"/bin/false")
+    with pytest.raises(OutOfMemory, match="lost its worker 2 times") as caught:
+        list(TWO.tables(given))
+    assert "--jobs 1" in str(caught.value)
+
+    def refused(*_: object) -> None:
+        raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+
+    monkeypatch.setattr(SpawnProcess, "start", refused)
+    with pytest.raises(UsageError, match="cannot be started: Resource temporarily") as error:
+        list(TWO.tables(given))
+    assert "--jobs 1" in str(error.value)
 
 
 def test_the_iterator_may_be_left_early(tmp_path: Path) -> None:
@@ -133,9 +142,9 @@ def test_the_iterator_may_be_left_early(tmp_path: Path) -> None:
 
 def test_a_script_without_main_guard_is_not_run_again(tmp_path: Path) -> None:
     (tmp_path / "script.py").write_text(
-        SCRIPT + "print(len(list(Workers(2).run(jobs.batch(jobs.squares, 1, [range(2)] * 2)))))\n"
+        SCRIPT
+        + "print(len(list(Workers(2).tables(jobs.batch(jobs.squares, 1, [range(2)] * 2)))))\n"
     )
-    (tmp_path / "struct.py").write_text("raise SystemExit")  # not in the way of workers
     program = [sys.executable, "-P", "script.py"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
