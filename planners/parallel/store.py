@@ -92,7 +92,7 @@ class Store:
         """Remove files until the others take no more than ``most`` bytes."""
         entries = []
         for folder in self.path.parent.glob(f"{self.path.name.rpartition('-')[0]}-*"):
-            for path in folder.iterdir():
+            for path in folder.glob("[!.]*"):  # others are being written
                 with suppress(FileNotFoundError):  # another process was faster
                     found = path.stat()
                     entries.append((found.st_mtime, found.st_size, path))

@@ -8,21 +8,27 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from planners.joint.model import JointModel, PlanningTask
+import numpy as np
+
+from planners.grounding import GroundAction
+from planners.joint.model import FullState, JointModel, PlanningTask
+from planners.parallel.batch import Table, code_hash, digest
+from planners.parallel.store import Store
+from planners.pddl.formula_tree import formula_text, label
+from planners.pddl.lifted import And, Formula, Or
 from planners.search import optimal_plans
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import CoordlangError, note
 
-if TYPE_CHECKING:  # what reads and writes files is loaded where plans are kept
-    from planners.parallel.store import Store
-
 #: The version of the tables: those of another one are never looked at, and go in time.
-_FORM = 3
+_FORM = 4
 #: Bytes that all tables together may take.
 _MOST_BYTES = 2**30
+#: The arrays of a plan space that are kept; goals are those of the task.
+_KEPT = ("rows", "state", "layer", "first", "target", "labels", "cost", "starts", "second")
 
 
 @dataclass(slots=True)
@@ -33,8 +39,6 @@ class _Cache:
     digests: dict[int, tuple[JointModel, str]] = field(default_factory=dict)
 
     def key(self, model: JointModel, task: PlanningTask) -> str:
-        from planners.search.plan_tables import key_of, model_digest
-
         found = self.digests.get(id(model))
         if found is None:
             found = self.digests[id(model)] = model, model_digest(model)
@@ -48,8 +52,6 @@ _USED: ContextVar[_Cache | None] = ContextVar("plans that are kept", default=Non
 
 def plan_store(folder: Path) -> Store:
     """The store of plans in a folder, bounded."""
-    from planners.parallel.store import Store
-
     return Store(folder / f"plans-{_FORM}", _MOST_BYTES)
 
 
@@ -99,18 +101,13 @@ def search(model: JointModel, task: PlanningTask) -> PlanSpace:
     used = _USED.get()
     if used is None:
         return optimal_plans.search(model, task)
-    from planners.search.plan_tables import as_table, plan_space
-
     key, store = used.key(model, task), used.store
     table = store.read(key)
     if table is not None:
-        space = plan_space(table, model, task)
-        if space is not None:
-            return space
-        store.ignore(key, f"a table of {store.path} is not of this task")
+        return _plan_space(table, model, task)
     found = optimal_plans.search(model, task)
     try:
-        store.write(key, as_table(found))
+        store.write(key, {name: getattr(found, name) for name in _KEPT})
     except (OSError, CoordlangError) as error:
         said = error.strerror if isinstance(error, OSError) else str(error).partition("\n")[0]
         note(
@@ -123,3 +120,64 @@ def search(model: JointModel, task: PlanningTask) -> PlanSpace:
 def search_each(model: JointModel, tasks: Sequence[PlanningTask]) -> PlanSpace:
     """`search` for each task, as one plan space in which every task has a goal of its own."""
     return optimal_plans.joined([search(model, task) for task in tasks])
+
+
+def _plan_space(table: Table, model: JointModel, task: PlanningTask) -> PlanSpace:
+    """The plan space of a table: that of the task, as the hash of its entry says."""
+    goal = np.zeros(len(table["state"]), np.int64)
+    return PlanSpace(model=model, goal=goal, goals=(task.goal,), **table)
+
+
+def model_digest(model: JointModel) -> str:
+    """A hash of all that a search reads of a joint model, whatever files it was made from."""
+    texts = _Texts()
+    found = sha256()
+    for action in model.actions:
+        found.update(texts.of_action(action).encode())
+        found.update(b"\n")
+    return digest(
+        found.hexdigest(),
+        model.robots,
+        model.labels,
+        model.idling_costs,
+        model.codec.facts.texts,
+        model.codec.memory,
+        model.cost,
+        int(model.is_joint_action),
+    )
+
+
+def key_of(model: str, task: PlanningTask) -> str:
+    """The key of a task's plan space, of all that it depends on.
+
+    That is the model (its `model_digest`), the task, the code of this package and numpy.
+    """
+    goal = task.goal
+    wanted = goal.facts if isinstance(goal, FullState) else formula_text(goal)
+    return digest(code_hash("planners"), np.version.version, model, task.init, wanted)
+
+
+class _Texts:
+    """Ground actions as text; formulas that many of them share are written once."""
+
+    def __init__(self) -> None:
+        # By identity; the actions keep their formulas alive.
+        self._known: dict[int, str] = {}
+
+    def of_action(self, action: GroundAction) -> str:
+        """All that a search reads of an action."""
+        effects = [(e.adds, self._part(e.atom), self._of(e.condition)) for e in action.effects]
+        links = sorted(label(link.action, link.args) for link in action.links)
+        rest = (action.owners, action.parts, action.cost, links, effects)
+        return f"{action.label} {self._of(action.precondition)} {rest}"
+
+    def _of(self, formula: Formula) -> str:
+        if isinstance(formula, And | Or):
+            return f"({type(formula).__name__} {' '.join(map(self._part, formula.parts))})"
+        return self._part(formula)
+
+    def _part(self, formula: Formula) -> str:
+        found = self._known.get(id(formula))
+        if found is None:
+            found = self._known[id(formula)] = formula_text(formula)
+        return found

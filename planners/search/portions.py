@@ -7,10 +7,12 @@ themselves: they are sent where the plans come from, not the plans.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
-from typing import Protocol, overload
+from typing import overload
 
 import numpy as np
 
@@ -37,78 +39,44 @@ _NODE_BYTES, _MAKING_BYTES = 200, 600
 _GOALS = 512
 
 
-class Source(Protocol):
-    """Where plan spaces come from; it is sent to other processes."""
-
-    def portion(self, goals: range) -> PlanSpace:
-        """The plan space of the tasks of some goals; states have the same numbers in all."""
-        ...
-
-    @property
-    def rows(self) -> Rows:
-        """The table of all states."""
-        ...
-
-    @property
-    def robots(self) -> int:
-        """How many robots there are."""
-        ...
-
-    @property
-    def efforts(self) -> Ints:
-        """For each goal the estimated nodes of its plan space, times robots."""
-        ...
-
-    @property
-    def tasks(self) -> int:
-        """How many tasks there are."""
-        ...
-
-    @property
-    def identity(self) -> str:
-        """A hash of all that portions say, the same in every process."""
-        ...
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Explored:
     """Tasks over one explored space, by goal, with their initial states; None: all others."""
 
     space: Space
     goals: Sequence[tuple[Goal, Rows | None]]
-    #: The states as plan spaces number them: with slack, where states say it.
-    _rows: Rows = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_rows", seen_rows(self.space.model, self.space.rows))
 
     def portion(self, goals: range) -> PlanSpace:
-        """See `Source.portion`; O(goals x joint steps)."""
+        """The plan space of the tasks of some goals; states have the same numbers in all.
+
+        O(goals x joint steps).
+        """
         tasks = self.goals[goals.start : goals.stop]
-        pairs = len(tasks) * len(self.space) * (1 + self.space.model.slack)
-        pieces = PieceSizes(pairs=max(1, pairs))
-        (space,) = plan_spaces(self.space, tasks, pieces)
+        (space,) = plan_spaces(self.space, tasks, PieceSizes(pairs=sys.maxsize))
         return space
 
     def only(self, goals: Ints) -> Explored:
         """The tasks of some of the goals, given by number."""
         return Explored(self.space, [self.goals[number] for number in goals.tolist()])
 
-    @property
+    @cached_property
     def rows(self) -> Rows:
-        """See `Source.rows`."""
-        return self._rows
+        """The table of all states, as plan spaces number them: with slack, where states say it."""
+        return seen_rows(self.space.model, self.space.rows)
 
     @property
     def robots(self) -> int:
-        """See `Source.robots`."""
+        """How many robots there are."""
         return len(self.space.model.robots)
 
     @property
     def efforts(self) -> Ints:
-        """As many nodes as there are states, for each slack: a goal's plan space has no more."""
+        """For each goal the estimated nodes of its plan space, times robots.
+
+        As many as there are states, for each slack: a plan space has no more.
+        """
         nodes = len(self.space) * (1 + self.space.model.slack)
-        return np.full(len(self.goals), nodes * len(self.space.model.robots))
+        return np.full(len(self.goals), nodes * self.robots)
 
     @property
     def is_every_pair(self) -> bool:
@@ -124,7 +92,7 @@ class Explored:
 
     @property
     def identity(self) -> str:
-        """See `Source.identity`."""
+        """A hash of all that portions say, the same in every process."""
         space = self.space
         goals = tuple(
             (
@@ -133,21 +101,18 @@ class Explored:
             )
             for goal, inits in self.goals
         )
-        return digest(
-            *_of_model(space.model),
-            *(space.rows, space.first, space.target, space.labels, space.cost),
-            goals,
-        )
+        steps = (space.rows, space.first, space.target, space.labels, space.cost)
+        return digest(*_of_model(space.model), *steps, goals)
 
 
 @dataclass(frozen=True, slots=True)
 class Searched:
-    """Tasks of a plan space that is there already, cut by its goals."""
+    """Tasks of a plan space that is there already, cut by its goals; as `Explored`."""
 
     plans: PlanSpace
 
     def portion(self, goals: range) -> PlanSpace:
-        """See `Source.portion`; O(edges)."""
+        """The plan space of the tasks of some goals; O(edges)."""
         plans = self.plans
         goal = plans.goal[plans.starts]
         mine = (goal >= goals.start) & (goal < goals.stop)
@@ -155,17 +120,17 @@ class Searched:
 
     @property
     def rows(self) -> Rows:
-        """See `Source.rows`."""
+        """The table of all states."""
         return self.plans.rows
 
     @property
     def robots(self) -> int:
-        """See `Source.robots`."""
+        """How many robots there are."""
         return self.plans.robots
 
     @property
     def efforts(self) -> Ints:
-        """Nodes times robots, as they are."""
+        """For each goal the nodes of its plan space, times robots."""
         plans = self.plans
         found: Ints = np.bincount(plans.goal, minlength=len(plans.goals)) * plans.robots
         return found
@@ -177,13 +142,15 @@ class Searched:
 
     @property
     def identity(self) -> str:
-        """See `Source.identity`."""
+        """A hash of all that portions say, the same in every process."""
         plans = self.plans
-        return digest(
-            *_of_model(plans.model),
-            *(plans.rows, plans.state, plans.goal, plans.layer, plans.first, plans.target),
-            *(plans.labels, plans.cost, plans.starts, plans.second),
-        )
+        nodes = (plans.rows, plans.state, plans.goal, plans.layer, plans.first, plans.target)
+        edges = (plans.labels, plans.cost, plans.starts, plans.second)
+        return digest(*_of_model(plans.model), *nodes, *edges)
+
+
+#: Where plan spaces come from; it is sent to other processes.
+Source = Explored | Searched
 
 
 class PlanSpaces(Sequence[PlanSpace]):

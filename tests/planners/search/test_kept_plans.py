@@ -5,13 +5,9 @@ from __future__ import annotations
 
 import errno
 import os
-import shutil
-import time
 import warnings
-from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
-from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import get_args
@@ -21,8 +17,7 @@ import pytest
 
 from planners.joint.model import PlanningTask
 from planners.loading import PlanningInstance, build
-from planners.parallel.batch import Table
-from planners.parallel.store import Store, as_bytes
+from planners.parallel.store import Store
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.model_options import Cost, ModelOptions
 from planners.pddl.sexpr import Source
@@ -30,12 +25,13 @@ from planners.search import kept_plans, optimal_plans
 from planners.search.kept_plans import (
     default_folder,
     keeping_plans,
+    key_of,
+    model_digest,
     plan_store,
     search,
     store_in_use,
 )
 from planners.search.plan_space import PlanSpace
-from planners.search.plan_tables import as_table, key_of, model_digest, plan_space
 from planners.system.errors import BadInput, Note, ProvedImpossible
 from tests.support.domains import DOMAINS
 from tests.support.random_pddl import KINDS, random_model
@@ -147,135 +143,48 @@ def test_what_changes_plans_changes_the_key() -> None:
     assert key_of(model_digest(again.model), state) not in keys
 
 
-def damages(data: bytes) -> Iterator[bytes]:
-    yield from (data[:length] for length in np.linspace(0, len(data) - 1, 20).astype(int).tolist())
-    for position in np.linspace(0, len(data) - 1, 20).astype(int).tolist():
-        yield data[:position] + bytes([data[position] ^ 1]) + data[position + 1 :]
-
-
 def test_a_damaged_entry_is_ignored_said_and_replaced(folder: Store, searches: list[str]) -> None:
+    """Cut off, with another byte, or that of another task."""
     world = loaded()
+    other = loaded(problem=PROBLEM.replace("(at r1 c0-0)", "(at r1 c0-1)", 1))
     with keeping_plans(folder):
         found = search(world.model, world.tasks[0])
         (path,) = entries(folder)
         whole = path.read_bytes()
-        for number, data in enumerate(damages(whole), 1):
+        search(other.model, other.tasks[0])
+        (foreign,) = set(entries(folder)) - {path}
+        half = len(whole) // 2
+        changed = whole[:half] + bytes([whole[half] ^ 1]) + whole[half + 1 :]
+        for number, data in enumerate((b"", whole[:half], changed, foreign.read_bytes()), 1):
             path.write_bytes(data)
-            with pytest.warns(
-                Note, match="damaged: it is ignored, and its result is worked out again"
-            ):
+            with pytest.warns(Note, match="damaged: it is ignored, and its result is worked out"):
                 assert same(found, search(world.model, world.tasks[0]))
-            assert len(searches) == 1 + number
+            assert len(searches) == 2 + number
             assert path.read_bytes() == whole
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             search(world.model, world.tasks[0])
 
 
-def test_an_entry_of_another_task_is_ignored(folder: Store, searches: list[str]) -> None:
-    world = loaded()
-    other = loaded(problem=PROBLEM.replace("(at r1 c0-0)", "(at r1 c0-1)", 1))
-    with keeping_plans(folder):
-        found = search(world.model, world.tasks[0])
-        (path,) = entries(folder)
-        search(other.model, other.tasks[0])
-        (foreign,) = set(entries(folder)) - {path}
-        shutil.copy(foreign, path)
-        with pytest.warns(Note, match="is damaged"):
-            assert same(found, search(world.model, world.tasks[0]))
-    assert len(searches) == 3
-
-
-def changed(name: str, change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Table], Table]:
-    return lambda table: {**table, name: change(table[name].copy())}
-
-
-def at(position: int, value: int) -> Callable[[np.ndarray], np.ndarray]:
-    def change(array: np.ndarray) -> np.ndarray:
-        array[position] = value
-        return array
-
-    return change
-
-
-def one_edge_less(table: Table) -> Table:
-    """Without the last edge of all: its source, the start, keeps others."""
-    first = table["first"].copy()
-    first[-1] -= 1
-    return {
-        **table,
-        "first": first,
-        **{name: table[name][:-1] for name in ("target", "labels", "cost")},
-    }
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        changed("state", at(0, -1)),
-        changed("state", at(1, 10**6)),
-        changed("state", lambda array: array[:-1]),
-        changed("state", lambda array: array.astype(np.int32)),
-        changed("rows", lambda array: array[::-1]),
-        changed("rows", lambda array: array[:, :0]),
-        changed("layer", at(0, 1)),
-        changed("first", at(-1, 0)),
-        changed("target", at(-1, 0)),
-        changed("target", at(0, 10**9)),
-        changed("labels", at(-1, 10**6)),
-        changed("labels", lambda array: array[::-1]),
-        changed("cost", at(-1, 7)),
-        changed("second", at(0, 3)),
-        changed("starts", at(0, 0)),
-        one_edge_less,
-        lambda table: {k: v for k, v in table.items() if k != "cost"},
-        lambda table: {**table, "more": table["cost"]},
-    ],
-)
-def test_what_cannot_be_of_the_task_is_not_believed(change: Callable[[Table], Table]) -> None:
-    world = loaded(options=ModelOptions(cost="makespan+actions"))
-    task = world.tasks[0]
-    table = as_table(optimal_plans.search(world.model, task))
-    assert plan_space(table, world.model, task) is not None
-    assert plan_space(change(table), world.model, task) is None
-
-
-def test_plans_that_are_none_in_the_model_are_not_believed() -> None:
-    """A right graph, with two robots that swap labels: only the model can tell."""
-    world = loaded()
-    task = world.tasks[0]
-    table = as_table(optimal_plans.search(world.model, task))
-    labels = table["labels"][:, ::-1]
-    first = table["first"]
-    order = np.concatenate(
-        [low + np.lexsort(labels[low:high].T[::-1]) for low, high in pairwise(first)]
-    ).astype(np.int64)
-    swapped = {**table, "labels": labels[order], "target": table["target"][order]}
-    assert plan_space(swapped, world.model, task) is None
-
-
 def test_the_oldest_entries_go(tmp_path: Path) -> None:
     table = {"numbers": np.arange(1000)}
-    size = len(as_bytes("k0", table))
-    folder = Store(tmp_path / "cache" / "plans-2", 5 * size)
+    folder = Store(tmp_path / "cache" / "plans-2")
+    folder.write("k0", table)
+    size = entries(folder)[0].stat().st_size
+    folder = Store(folder.path, 5 * size)
     for number in range(5):
         folder.write(f"k{number}", table)
-        os.utime(folder._path(f"k{number}"), (number, number))
+        os.utime(folder.path / f"k{number}.table", (number, number))
     other = tmp_path / "cache" / "plans-0" / "old"
     other.parent.mkdir()
     other.write_bytes(b"x" * size)
     os.utime(other, (-1, -1))
-    for name, seconds in ((".k9.killed", 0.0), (".k9.writing", time.time())):
-        (tmp_path / "cache" / "plans-2" / name).write_bytes(b"x")
-        os.utime(tmp_path / "cache" / "plans-2" / name, (seconds, seconds))
     assert folder.read("k0") is not None  # and is the newest now
     folder.write("k5", table)
-    assert sorted(path.name for path in entries(folder)) == [
-        ".k9.writing",
-        *(f"{key}.table" for key in ("k0", "k2", "k3", "k4", "k5")),
-    ]
+    names = [path.stem for path in entries(folder)]
+    assert names == ["k0", "k2", "k3", "k4", "k5"]
     folder.write("large", {"numbers": np.arange(10_000)})
-    assert len(entries(folder)) == 6
+    assert len(entries(folder)) == 5
 
 
 @pytest.mark.parametrize("call", ["fsync", "replace"])
@@ -315,7 +224,7 @@ def test_a_folder_that_is_only_read(
         search(world.model, world.tasks[0])
         opened = os.open
         for name in ("utime", "unlink", "replace"):
-            monkeypatch.setattr(f"planners.parallel.store.os.{name}", refused)
+            monkeypatch.setattr(os, name, refused)
         monkeypatch.setattr(
             os, "open", lambda p, f, *m, **k: refused() if f & os.O_CREAT else opened(p, f, *m, **k)
         )
@@ -332,25 +241,10 @@ def test_a_folder_that_is_only_read(
     assert len(searches) == 3
 
 
-@pytest.mark.parametrize("make", [os.mkfifo, Path.mkdir])
-def test_what_is_no_file_is_not_waited_for(
-    make: Callable[[Path], None], folder: Store, searches: list[str]
-) -> None:
-    world = loaded()
-    with keeping_plans(folder):
-        search(world.model, world.tasks[0])
-        (entry,) = entries(folder)
-        entry.unlink()
-        make(entry)
-        with pytest.warns(Note, match="is ignored, and its result is worked out again"):
-            search(world.model, world.tasks[0])
-    assert len(searches) == 2
-
-
 def test_many_at_once(tmp_path: Path) -> None:
     """Each reader gets a whole entry of its key, or none, while others write it and let it go."""
     tables = {f"k{number}": {"n": np.full(500 + number, number)} for number in range(10)}
-    folder = Store(tmp_path / "plans-2", 6 * len(as_bytes("k0", tables["k0"])))
+    folder = Store(tmp_path / "plans-2", 6 * 5_000)
 
     def work(worker: int) -> int:
         read = 0
