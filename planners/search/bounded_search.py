@@ -11,26 +11,21 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planners.joint.model import JointModel, Options, PlanningTask, Steps
 from planners.joint.tables import Ints, Rows
 from planners.search.cost_limit import CostLimit
-from planners.search.exact_bound import exact_bound
+from planners.search.exact_bound import ExactBound, exact_bound
 from planners.search.goals import FAR
 from planners.search.heuristics import Heuristic
-from planners.search.layers import Edges, Layers, joined_edges
-from planners.search.optimal_states import OptimalStates, mostly_lead
-from planners.search.packed_steps import PackedSteps
+from planners.search.layers import Edges, StateTable, grown, joined_edges
 from planners.search.reachable import PieceSizes
-from planners.search.state_table import Packing, StateTable
 from planners.search.state_variables import StateVariable
 from planners.search.unreachable import searched
 from planners.system.errors import ProvedImpossible
 
+#: The layer of a state that was not met in this round.
 _NEVER = np.iinfo(np.int32).max
-#: In place of the layer of a state: no optimal plan passes through it.
-_LEFT_OUT = -1
 #: States expanded first; from the joint steps that they have the next numbers of states follow.
 _FIRST, _FIRST_PROBED = 500, 8
 #: Labels in all steps for which the solver's formula takes as long as the steps that are tried
@@ -39,8 +34,6 @@ _FORMULA, _STEPS = 50_000, 20
 #: Combinations of labels, for each joint step that is tried without exact bounds, that are not even
 #: composed.
 _TOO_MANY = 10
-#: As many times more joint steps may be composed to see that no solver needs to be asked.
-_TRIED = 4
 #: How a round ended: the goal was met, or more joint steps were composed than are tried without
 #: exact bounds.
 _MET, _GROWN = -1, -2
@@ -67,7 +60,19 @@ class _GrownError(Exception):
 
 
 class BoundedSearch:
-    """Layers of states within a bound that grows until the goal is met."""
+    """Layers of states within a bound that grows until the goal is met.
+
+    Attributes
+    ----------
+    table
+        The states that were met in all rounds.
+    states
+        Those of each layer of the last round, the start first; goal states are in the last layer.
+    edges
+        ``edges[k]`` lead from layer k to the next one; None where they were too many to keep.
+    composed
+        Joint steps that were composed, in all rounds.
+    """
 
     def __init__(
         self,
@@ -79,40 +84,40 @@ class BoundedSearch:
     ) -> None:
         self._model, self._task, self._heuristic, self._pieces = model, task, heuristic, pieces
         self._variables = variables
-        packing = Packing(model.codec, variables)
-        self.table = StateTable(packing)
-        self._packed = PackedSteps.of(model, packing, variables)
+        self.table = StateTable(model.codec.width)
+        self.states: list[Ints] = []
+        self.edges: list[Edges | None] = []
+        self.composed = self.rounds = self.bound = 0
         #: Per state the lower bound, and the layer that it was met in, in this round.
-        self._h: NDArray[np.int32] = np.zeros(0, np.int32)
-        self._depth: NDArray[np.int32] = np.zeros(0, np.int32)
-        #: What a solver says of the states, once it was asked.
-        self._optimal: OptimalStates | None = None
+        self._h: Ints = np.zeros(0, np.int64)
+        self._depth: Ints = np.zeros(0, np.int64)
+        #: What a solver says of optimal plans, once it was asked.
+        self.exact: ExactBound | None = None
         #: How many times the probe may be composed, after what was composed before; 0: no limit.
         self._share = int(heuristic.exact)
         self._before = 0
         self._costs = (
             CostLimit(heuristic.cost_left) if heuristic.cost_left and heuristic.value else None
         )
-        self.layers = Layers(model, self.table)
-        self.bound = 0
-        self.rounds = 0
 
-    def run(self) -> Layers:
-        """Search, in as many rounds as it takes."""
+    def run(self) -> None:
+        """Search, in as many rounds as it takes.
+
+        Raises `ProvedImpossible` if the goal cannot be reached.
+        """
         start = self._numbers(self._task.init[None, :])
         following = int(self._h[start[0]]) if self._heuristic.value else FAR - 1
         if self._costs is not None and following < FAR and self._cheap(self._costs, start):
-            return self.layers
+            return
         work = 0
         slow = 1
         while following < FAR:
             self.bound, before = following, work
-            self.rounds += 1
-            done = self.layers.composed
+            done = self.composed
             following = self._round(start)
-            work = self.layers.composed - done
+            work = self.composed - done
             if following == _MET:
-                return self.layers
+                return
             if following == _GROWN:
                 following = self._bounded_exactly()
                 continue
@@ -141,58 +146,43 @@ class BoundedSearch:
             costs.begin(start, most)
             if not costs.most:
                 break  # nothing is known of costs
-            self.rounds += 1
             found = self._round(start)
             if found in (_MET, _GROWN) or costs.beyond >= FAR:
                 break
             most = costs.beyond
-        self._share, self._before = int(self._heuristic.exact), self.layers.composed
+        self._share, self._before = int(self._heuristic.exact), self.composed
         if found != _MET:
             self._costs = None
         return found == _MET
 
     def _bounded_exactly(self) -> int:
-        """Ask the solver for the optimal cost, if it may pay; what the next round is bounded by."""
-        most = _TRIED * self._probe
+        """Ask the solver for the optimal cost; what the next round is bounded by."""
         self._share = 0
         at_least = self.bound if self.bound < FAR - 1 else 0
-        if self._model.cost == "makespan" and at_least:
-            left = at_least - (len(self.layers.states) - 1)
-            if mostly_lead(self._model, self._task.goal, self._heuristic, self._last(), left, most):
-                return at_least
-        exact = exact_bound(self._model, self._task, self._variables, at_least, self._pieces)
-        if exact is None:
-            return self.bound
-        self._optimal = OptimalStates(exact, len(self._model.robots))
-        return exact.makespan
+        self.exact = exact_bound(self._model, self._task, self._variables, at_least, self._pieces)
+        return self.bound if self.exact is None else self.exact.makespan
 
     def _round(self, start: Ints) -> int:
         """Search within the bound; the least bound that was too large, `_MET` or `_GROWN`."""
-        self._depth[: len(self.table)] = _NEVER
+        self.rounds += 1
+        self._depth[:] = _NEVER
         self._depth[start] = 0
-        layers = self.layers
-        layers.states, layers.edges = [start], []
+        self.states, self.edges = [start], []
         kept = 0
         beyond = FAR
-        while not self._model.holds(self._task.goal, self._last()).any():
-            depth = len(layers.states)
+        while not self._model.holds(self._task.goal, self.table.rows(self.states[-1])).any():
+            depth = len(self.states)
             try:
-                edges, low = self._expand(layers.states[-1], depth)
+                edges, low = self._expand(self.states[-1], depth)
             except _GrownError:
                 return _GROWN
             beyond = min(beyond, low)
-            if self._optimal is not None:
-                left_out = self._optimal.left_out(edges, depth, len(self.table))
-                if len(left_out):
-                    self._depth[left_out] = _LEFT_OUT
-                    edges = edges.only(self._depth[edges.target] == depth)
             new = np.flatnonzero(self._depth[: len(self.table)] == depth)
             if not len(new):
                 return beyond
             kept += len(edges.source)
-            layers.edges.append(edges if kept <= self._pieces.kept else None)
-            layers.states.append(new)
-        layers.makespan = len(layers.states) - 1
+            self.edges.append(edges if kept <= self._pieces.kept else None)
+            self.states.append(new)
         return _MET
 
     @property
@@ -200,24 +190,14 @@ class BoundedSearch:
         """Joint steps that may be composed, where they are limited."""
         return self._share * probe_size(self._model, self.bound, self._pieces)
 
-    @property
-    def asked_solver(self) -> bool:
-        """Whether exact bounds were found."""
-        return self._optimal is not None
-
-    def close(self) -> None:
-        """Give the solver back."""
-        if self._optimal is not None:
-            self._optimal.exact.plans.close()
-
     def edges_into(self, depth: int) -> Edges:
         """The joint steps into a layer of the last round, composed again, however many they are."""
         self._share = 0
-        return self._expand(self.layers.states[depth - 1], depth)[0]
+        return self._expand(self.states[depth - 1], depth)[0]
 
     def so_far(self) -> str:
         """How far it got, for messages."""
-        states = self.layers.states
+        states = self.states
         if not states:
             return "no state"
         within = f" with a bound of {self.bound}" if self.bound < FAR - 1 else ""
@@ -226,15 +206,12 @@ class BoundedSearch:
             f"of {self._task.name}{within}, {len(states[-1]):,} of them new in the last step"
         )
 
-    def _last(self) -> Rows:
-        return self.table.rows(self.layers.states[-1])
-
     def _expand(self, states: Ints, depth: int) -> tuple[Edges, int]:
         """The joint steps from a layer into the next, and the least bound that was too large."""
         parts: list[Edges] = []
         beyond = FAR
         for numbers, steps, low in self._steps(states, depth):
-            target = self._reached(steps)
+            target = self._numbers(steps.result)
             h = self._h[target]
             late = h > self.bound - depth
             beyond = min(beyond, low + depth, int(h[late].min(initial=FAR)) + depth)
@@ -248,7 +225,7 @@ class BoundedSearch:
             parts.append(edges.compact())
             if self._costs is not None:
                 self._costs.pay(edges.source, edges.target, edges.cost)
-        return joined_edges(parts, self._model), beyond
+        return joined_edges(parts, len(self._model.robots)), beyond
 
     def _steps(self, states: Ints, depth: int) -> Iterator[tuple[Ints, Steps, int]]:
         """Joint steps into a layer, in pieces, without choices that leave too few steps.
@@ -261,8 +238,8 @@ class BoundedSearch:
             nonlocal low
             if self._share and _combinations(options) > _TOO_MANY * self._probe:
                 raise _GrownError
-            if self._optimal is not None:
-                options = self._optimal.exact.only(depth - 1, rows, options)
+            if self.exact is not None:
+                options = self.exact.only(depth - 1, rows, options)
             if self._heuristic.in_time is not None:
                 options, low = self._heuristic.in_time(rows, options, self.bound - depth)
             return options
@@ -272,46 +249,29 @@ class BoundedSearch:
         if self._share:
             most = min(most, self._probe)
         while start < len(states):
-            if self._share and self.layers.composed - self._before > self._probe:
+            if self._share and self.composed - self._before > self._probe:
                 raise _GrownError
             numbers = states[start : start + size]
-            rows = self.table.rows(numbers)
-            if self._packed is None:
-                steps = self._model.successors(rows, only)
-            else:
-                steps = self._packed.successors(rows, self.table.packed(numbers), only)
-            self.layers.composed += len(steps)
+            steps = self._model.successors(self.table.rows(numbers), only)
+            self.composed += len(steps)
             if self._share and len(steps) > self._probe:
                 raise _GrownError  # bounds of so many states take long
             yield numbers, steps, low
             start += size
             size = max(1, min(self._pieces.states, int(most * size / max(1, len(steps)))))
 
-    def _reached(self, steps: Steps) -> Ints:
-        """The numbers of the states that joint steps lead to."""
-        if self._packed is None:
-            return self._numbers(steps.result)
-        numbers, fresh = self.table.add_packed(steps.result)
-        new = numbers[fresh]
-        self._enter(new, self.table.rows(new))
-        return numbers
-
     def _numbers(self, rows: Rows) -> Ints:
         """The numbers of states, with bounds for those that are new."""
-        numbers, fresh = self.table.add(rows)
-        self._enter(numbers[fresh], rows[fresh])
-        return numbers
-
-    def _enter(self, new: Ints, rows: Rows) -> None:
-        """Bound states that are new."""
-        grown = len(self.table) - len(self._h)
-        if grown > 0:
-            more = np.full(max(grown, len(self._h)), _NEVER, np.int32)
-            self._h = np.concatenate((self._h, more))
-            self._depth = np.concatenate((self._depth, more))
-        self._h[new] = self._heuristic.value(rows) if self._heuristic.value else 0
+        before = len(self.table)
+        numbers = self.table.add(rows)
+        size = len(self.table)
+        new = self.table.rows(np.arange(before, size))
+        self._h, self._depth = grown(self._h, size, 0), grown(self._depth, size, _NEVER)
+        if self._heuristic.value:
+            self._h[before:size] = self._heuristic.value(new)
         if self._costs is not None:
-            self._costs.enter(new, rows)
+            self._costs.enter(before, new)
+        return numbers
 
 
 def _combinations(options: Options) -> float:

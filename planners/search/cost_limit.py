@@ -11,6 +11,7 @@ import numpy as np
 
 from planners.joint.tables import Bools, Ints, Numbers, Rows
 from planners.search.goals import FAR, Values
+from planners.search.layers import grown
 
 
 class CostLimit:
@@ -27,14 +28,11 @@ class CostLimit:
         self._left: Ints = np.zeros(0, np.int64)
         self._paid: Ints = np.zeros(0, np.int64)
 
-    def enter(self, states: Ints, rows: Rows) -> None:
-        """Know new states, by their numbers."""
-        grown = int(states.max(initial=-1)) + 1 - len(self._left)
-        if grown > 0:
-            more = np.full(max(grown, len(self._left)), FAR)
-            self._left = np.concatenate((self._left, more))
-            self._paid = np.concatenate((self._paid, more))
-        self._left[states] = self._bound(rows)
+    def enter(self, first: int, rows: Rows) -> None:
+        """Know new states, whose numbers begin with ``first``."""
+        size = first + len(rows)
+        self._left, self._paid = grown(self._left, size, FAR), grown(self._paid, size, FAR)
+        self._left[first:size] = self._bound(rows)
 
     def begin(self, start: Ints, most: int | None = None) -> None:
         """A new round from a state; without ``most`` with the least cost that may suffice."""

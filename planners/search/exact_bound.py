@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exact bounds from a SAT solver: what is left after them is on optimal plans, and nothing else.
+"""Exact bounds from a SAT solver: the optimal cost, and the labels that optimal plans have.
 
 First the least makespan, then the least second component, then the labels that some optimal plan
-has in each step; then, state by state, whether an optimal plan passes through it.  The solver's
-models are only hints (states and costs come from the joint model); its refutations are trusted.
-A question that is not decided with some effort is answered with yes: more is searched then.
+has in each step.  The solver's models are only hints (states and costs come from the joint model);
+its refutations are trusted.  A question that is not decided with some effort is answered with yes:
+more is searched then.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -18,9 +17,8 @@ from itertools import product
 
 import numpy as np
 
-from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, PlanningTask
-from planners.joint.tables import Bools, Ints, Rows
+from planners.joint.tables import Bools, Rows
 from planners.search.cheapest import cheapest
 from planners.search.mutexes import mutexes
 from planners.search.plan_formula import PlanFormula, TooManyClauses
@@ -29,8 +27,6 @@ from planners.search.reachable import PieceSizes
 from planners.search.state_variables import StateVariable
 from planners.system.limits import reaching
 
-#: Ways that were asked for last, of which so many may pass that no more are asked for.
-_RECENT = 200
 #: What a makespan that is refuted at once costs for each of its steps, in conflicts; the clauses of
 #: one step more are counted, too: of a task without plan there would be ever more.
 _EASY = 20
@@ -38,41 +34,15 @@ _EASY = 20
 SMALLER = "a task with a shorter plan, fewer objects or fewer robots"
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class ExactBound:
-    """The optimal cost of one task, and what its optimal plans consist of.
+    """The least makespan of one task, and what its optimal plans consist of.
 
     ``used[k][robot]`` (labels) says which labels occur in step k of some optimal plan.
     """
 
-    plans: FixedPlans
     makespan: int
     used: list[list[Bools]]
-    #: Conflicts for one question.
-    effort: int
-
-    def may_pass(self, ways: Labels, enough: float = 1) -> Bools:
-        """Which beginnings of plans, as labels (ways, steps, robots), some optimal plan may have.
-
-        An optimal plan passes through a state iff one begins with a cheapest way to it.  Of the
-        ways that no answer refuted those that are asked for come in a random order; where more
-        than the share ``enough`` of the last ones pass, the others are taken to pass, too.
-        """
-        asked = (ways + self.plans.firsts(ways.shape[1])).reshape(len(ways), -1)
-        columns = np.ascontiguousarray(asked.T)
-        passes = np.ones(len(ways), np.bool_)
-        recent: deque[bool] = deque(maxlen=_RECENT)
-        for way in np.random.default_rng(0).permutation(len(ways)).tolist():
-            if not passes[way]:
-                continue
-            literals = asked[way].tolist()
-            recent.append(_unless_refuted(self.plans, literals, self.effort))
-            if not recent[-1]:
-                # What is refuted is part of other ways, too.
-                passes &= ~_has(columns, asked[way], self.plans.core_of(literals))
-            elif len(recent) == _RECENT and sum(recent) > enough * _RECENT:
-                break
-        return passes
 
     def only(self, depth: int, rows: Rows, options: Options) -> Options:
         """The robots' options in states after ``depth`` steps, without labels that are not used."""
@@ -107,42 +77,12 @@ def exact_bound(
             plans = formula.fixed(task.init, len(plan))
     except OutOfEffort:
         return None
-    try:
-        with reaching(plans.so_far, SMALLER):
-            return _bound(plans, model, task, plan, pieces.question)
-    except BaseException:
-        plans.close()
-        raise
-
-
-def _bound(
-    plans: FixedPlans, model: JointModel, task: PlanningTask, plan: Plan, effort: int
-) -> ExactBound:
-    if model.cost != "makespan":
-        plan, cheap = cheapest(plans, model, task, plan)
-        plans.require(cheap)
-    plans.without_limit()
-    used = _used(plans, model, plan, effort)
-    plans.simplify()
-    return ExactBound(plans, len(plan), used, effort)
-
-
-def _unless_refuted(plans: FixedPlans, literals: Literals, effort: int) -> bool:
-    try:
-        with plans.at_most(effort):
-            return plans.holds(literals)
-    except OutOfEffort:
-        return True
-
-
-def _has(columns: Ints, way: Ints, core: Literals) -> Bools:
-    """Which ways (labels, ways) have the same labels as this one, of those in a core."""
-    alike = np.arange(columns.shape[1])
-    for place in np.flatnonzero(np.isin(way, core))[::-1]:
-        alike = alike[columns[place, alike] == way[place]]
-    found = np.zeros(columns.shape[1], np.bool_)
-    found[alike] = True
-    return found
+    with closing(plans), reaching(plans.so_far, SMALLER):
+        if model.cost != "makespan":
+            plan, cheap = cheapest(plans, model, task, plan)
+            plans.require(cheap)
+        plans.without_limit()
+        return ExactBound(len(plan), _used(plans, model, plan, pieces.question))
 
 
 def _shortest(formula: PlanFormula, task: PlanningTask, at_least: int) -> Plan:

@@ -8,7 +8,6 @@ Where the model has slack, those within it (`planners.search.slack`).
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -19,7 +18,7 @@ from planners.joint.tables import Bools, Ints, Numbers, Rows, ranges, unique_row
 from planners.search.bounded_search import BoundedSearch
 from planners.search.exact_bound import SMALLER
 from planners.search.heuristics import search_heuristic
-from planners.search.layers import Edges, Layers
+from planners.search.layers import Edges
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, PieceSizes, Space
 from planners.search.slack import explore_within, require_rest, seeing, seen_rows
@@ -45,7 +44,7 @@ class SearchEffort:
     rounds
         How many bounds were tried.
     states
-        The different states that were met; ``state_bytes`` is what the table of them takes.
+        The different states that were met.
     steps
         The joint steps that were composed, in all rounds.
     """
@@ -53,7 +52,6 @@ class SearchEffort:
     heuristic: str
     rounds: int
     states: int
-    state_bytes: int
     steps: int
 
 
@@ -97,33 +95,27 @@ def search_with_effort(
         variables = state_variables(model, task.init)
         chosen = search_heuristic(heuristic, model, task, variables)
     forward = BoundedSearch(model, task, chosen, variables, pieces)
-    with (
-        closing(forward),
-        reaching(forward.so_far, SMALLER, lambda: forward.layers.composed, "joint steps"),
-    ):
-        layers = forward.run()
-        found = _backward(model, task, layers, forward)
-    table = layers.table
-    name = f"{chosen.name} + SAT" if forward.asked_solver else chosen.name
-    return found, SearchEffort(name, forward.rounds, len(table), table.bytes, layers.composed)
+    with reaching(forward.so_far, SMALLER, lambda: forward.composed, "joint steps"):
+        forward.run()
+        found = _backward(model, task, forward)
+    name = f"{chosen.name} + SAT" if forward.exact else chosen.name
+    return found, SearchEffort(name, forward.rounds, len(forward.table), forward.composed)
 
 
-def _backward(
-    model: JointModel, task: PlanningTask, layers: Layers, forward: BoundedSearch
-) -> PlanSpace:
+def _backward(model: JointModel, task: PlanningTask, forward: BoundedSearch) -> PlanSpace:
     """Keep the edges that lead to the goal in time and at least cost, from the last layer back."""
-    last = layers.table.rows(layers.states[-1])
-    goals = layers.states[-1][model.holds(task.goal, last)]
-    value = np.full(len(layers.table), _FAR)
+    table, last = forward.table, forward.states[-1]
+    goals = last[model.holds(task.goal, table.rows(last))]
+    value = np.full(len(table), _FAR)
     value[goals] = 0
-    node = np.full(len(layers.table), -1)
-    tables = [_numbered(layers.table.rows(goals), goals, node)]
+    node = np.full(len(table), -1)
+    tables = [_numbered(table.rows(goals), goals, node)]
     best = [np.zeros(len(goals), np.int64)]
     counts = [np.zeros(len(goals), np.int64)]
     edges: list[Edges] = []
-    for depth in range(layers.makespan, 0, -1):
-        below = layers.edges[depth - 1] or forward.edges_into(depth)
-        layers.edges[depth - 1] = None  # they are many, and not needed again
+    for depth in range(len(forward.states) - 1, 0, -1):
+        below = forward.edges[depth - 1] or forward.edges_into(depth)
+        forward.edges[depth - 1] = None  # they are many, and not needed again
         below = below.only(node[below.target] >= 0)
         first = _runs(below.source)
         here = below.source[first].astype(np.int64)
@@ -131,8 +123,8 @@ def _backward(
         value[here] = np.minimum.reduceat(through, first)
         below = below.only(through == value[below.source])
         into = node[below.target]
-        node[layers.states[depth]] = -1
-        tables.append(_numbered(layers.table.rows(here), here, node))
+        node[forward.states[depth]] = -1
+        tables.append(_numbered(table.rows(here), here, node))
         first = _runs(below.source)
         number = np.empty(len(here), np.int64)
         number[node[here]] = np.arange(len(here))  # the source at each place of the table

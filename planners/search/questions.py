@@ -59,12 +59,6 @@ class Questions:
 
     # ---- the formula
 
-    def clear(self, variables: int) -> None:
-        """Begin a new formula, of so many variables."""
-        self.close()
-        self.variables, self.clauses = variables, array("i")
-        self._solver = sat_solver(SOLVER)
-
     def add(self, clause: Sequence[int]) -> None:
         """Let one of these literals be true."""
         self.clauses.extend(clause)
@@ -155,13 +149,10 @@ class Questions:
             for step in first.tolist()
         ]
 
-    def core_of(self, literals: Iterable[int]) -> Literals:
-        """Of literals that were assumed in the last question: those that were refuted together."""
-        return sorted(set(self._solver.get_core() or ()) & set(literals))
-
     def core(self, literals: Iterable[int]) -> Literals:
         """Of literals whose negations were assumed in the last question: those that refuted it."""
-        return sorted(-literal for literal in self.core_of(-literal for literal in literals))
+        refuted = {-literal for literal in self._solver.get_core() or ()}
+        return sorted(refuted & set(literals))
 
     # ---- the effort
 
@@ -207,29 +198,20 @@ class FixedPlans(Questions):
         self.steps, self._sizes = len(first), sizes
         runs = np.tile(sizes, self.steps)
         super().__init__(effort, int(runs.sum()))
-        kept = ranges(first.reshape(-1), runs)
+        labels = ranges(first.reshape(-1), runs)
         #: Per step and robot the variable of its first label.
         self._first: Ints = 1 + (np.cumsum(runs) - runs).reshape(first.shape)
-        self._take(simplified(clauses, kept.tolist()), kept)
-
-    def simplify(self) -> None:
-        """Eliminate what can be, now that more is required; other variables are forgotten."""
-        labels = np.arange(1, int(self._first[-1, -1]) + self._sizes[-1])
-        found = simplified(self.clauses, labels.tolist())
-        self.clear(len(labels))
-        self._take(found, labels)
-
-    def _take(self, clauses: Sequence[Sequence[int]], labels: Ints) -> None:
-        """Clauses with the labels' variables first, and others that occur after them."""
-        sizes = np.fromiter(map(len, clauses), np.int64, len(clauses))
-        literals = np.fromiter(chain.from_iterable(clauses), np.int64, int(sizes.sum()))
+        found = simplified(clauses, labels.tolist())
+        # The labels' variables come first, and others that occur after them.
+        lengths = np.fromiter(map(len, found), np.int64, len(found))
+        literals = np.fromiter(chain.from_iterable(found), np.int64, int(lengths.sum()))
         variables = np.abs(literals)
         number = np.zeros(int(max(variables.max(initial=0), labels.max(initial=0))) + 1, np.int64)
         number[labels] = np.arange(1, len(labels) + 1)
-        others, first = np.unique(variables[number[variables] == 0], return_index=True)
+        others, at = np.unique(variables[number[variables] == 0], return_index=True)
         self.variables = len(labels) + len(others)
-        number[others[np.argsort(first)]] = np.arange(len(labels) + 1, self.variables + 1)
-        self.add_all(np.insert(np.sign(literals) * number[variables], np.cumsum(sizes), 0))
+        number[others[np.argsort(at)]] = np.arange(len(labels) + 1, self.variables + 1)
+        self.add_all(np.insert(np.sign(literals) * number[variables], np.cumsum(lengths), 0))
 
     def so_far(self) -> str:
         """What is asked just now, for messages."""
@@ -237,10 +219,6 @@ class FixedPlans(Questions):
             f"question {self.calls:,} to the SAT solver, about plans of {self.steps} joint steps "
             f"from the start; {self.variables:,} variables"
         )
-
-    def firsts(self, depth: int) -> Ints:
-        """The variables of the robots' first labels, in so many first steps: (depth, robots)."""
-        return self._first[:depth]
 
     def label(self, step: int, robot: int, label: int) -> int:
         """The variable of a robot's label in a step, from 0."""

@@ -18,7 +18,6 @@ from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Atom
 from planners.pddl.model_options import Cost, ModelOptions
 from planners.pddl.sexpr import Source
-from planners.search import exact_bound, optimal_states
 from planners.search.heuristics import CHOICES
 from planners.search.optimal_plans import search, search_with_effort
 from planners.search.plan_space import PlanSpace
@@ -115,24 +114,6 @@ def test_bounds_lose_no_optimal_plan_where_a_third_robot_decides() -> None:
         read(text.domain, text.problem, COSTS[seed % 2]) for seed, text in enumerate(texts)
     )
     assert min(met["solved"], met["unsolvable"]) >= 10
-
-
-def test_states_that_are_not_asked_for_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As if most states passed wherever one does: the others are searched, and lead nowhere."""
-    monkeypatch.setattr(exact_bound, "_RECENT", 1)
-    monkeypatch.setattr(optimal_states, "_NEARLY_ALL", 0)
-    monkeypatch.setattr(optimal_states, "_SAMPLE", 1)
-    monkeypatch.setattr(optimal_states, "_MOSTLY", 1)
-    asked = 0
-    for loaded in instances(range(30), 2):
-        task = loaded.tasks[0]
-        twin = expected(loaded.model, task)
-        if twin is not None:
-            pieces = replace(PIECES, probe=0)
-            found, effort = search_with_effort(loaded.model, task, pieces)
-            asked += "SAT" in effort.heuristic
-            equal(found, twin)
-    assert asked >= 5
 
 
 @pytest.mark.slow

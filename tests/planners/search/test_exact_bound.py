@@ -15,7 +15,6 @@ from planners.joint.model import JointModel, PlanningTask
 from planners.joint.tables import Rows
 from planners.loading import PlanningInstance
 from planners.pddl.model_options import Cost
-from planners.search import exact_bound as exact_bounds
 from planners.search.cheapest import label_costs, least_cost
 from planners.search.dominated_labels import dominated_pairs
 from planners.search.exact_bound import ExactBound, exact_bound
@@ -62,22 +61,6 @@ def bound_of(model: JointModel, task: PlanningTask) -> ExactBound | None:
     return exact_bound(model, task, variables, 0, PIECES)
 
 
-def beginnings(model: JointModel, task: PlanningTask, depth: int) -> np.ndarray:
-    """All ways of so many joint steps from the start."""
-    found: list[Labels] = [()]
-    rows = task.init[None, :]
-    for _ in range(depth):
-        steps = model.successors(rows)
-        found = [
-            (*found[k], tuple(labels))
-            for k, labels in zip(steps.source.tolist(), steps.labels.tolist(), strict=True)
-        ]
-        rows = steps.result
-        if len(found) > _MANY:
-            found, rows = found[:_MANY], rows[:_MANY]
-    return np.array(found, np.int32).reshape(len(found), depth, len(model.robots))
-
-
 def compared(seeds: range) -> Counter[str]:
     met: Counter[str] = Counter()
     for seed in seeds:
@@ -89,57 +72,23 @@ def compared(seeds: range) -> Counter[str]:
         bound = bound_of(model, task)
         if bound is None:  # a condition with too many clauses
             continue
-        with closing(bound.plans):
-            assert bound.makespan == len(expected[0])
-            for step, robot in product(range(bound.makespan), range(len(model.robots))):
-                labels = np.flatnonzero(bound.used[step][robot]).tolist()
-                assert labels == sorted({plan[step][robot] for plan in expected})
-            for depth in range(1, min(2, bound.makespan) + 1):
-                ways = beginnings(model, task, depth)
-                known = {plan[:depth] for plan in expected}
-                right = [tuple(map(tuple, way)) in known for way in ways.tolist()]
-                assert bound.may_pass(ways, enough=1).tolist() == right
-                met["beginnings"] += sum(right)
-                met["others"] += len(right) - sum(right)
+        assert bound.makespan == len(expected[0])
+        for step, robot in product(range(bound.makespan), range(len(model.robots))):
+            labels = np.flatnonzero(bound.used[step][robot]).tolist()
+            assert labels == sorted({plan[step][robot] for plan in expected})
+            met["labels"] += len(labels)
+            met["others"] += len(model.labels[robot]) - len(labels)
         met["tasks"] += 1
     return met
 
 
-def test_labels_and_beginnings_are_those_of_optimal_plans() -> None:
+def test_labels_are_those_of_optimal_plans() -> None:
     met = compared(range(80))
     assert min(met.values()) >= 10
 
 
-def test_where_most_ways_pass_others_are_not_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What some optimal plan begins with always passes; fewer questions are asked."""
-    monkeypatch.setattr(exact_bounds, "_RECENT", 2)
-    questions = {0.4: 0, 1: 0}
-    wrong = 0
-    for seed in range(80):
-        loaded = small(seed)
-        expected = loaded and plans(loaded.model, loaded.tasks[0])
-        if loaded is None or not expected or not expected[0]:
-            continue
-        ways = beginnings(loaded.model, loaded.tasks[0], 1)
-        known = {plan[0] for plan in expected}
-        right = np.array([tuple(way[0]) in known for way in ways.tolist()])
-        for enough in questions:
-            bound = bound_of(loaded.model, loaded.tasks[0])
-            if bound is None:  # a condition with too many clauses
-                continue
-            with closing(bound.plans):
-                before = bound.plans.calls
-                passes = bound.may_pass(ways, enough)
-                questions[enough] += bound.plans.calls - before
-            assert passes[right].all()
-            wrong += int((passes & ~right).sum())
-            assert enough < 1 or (passes == right).all()
-    assert questions[0.4] < questions[1]
-    assert wrong
-
-
 @pytest.mark.slow
-def test_labels_and_beginnings_are_those_of_optimal_plans_of_many_models() -> None:
+def test_labels_are_those_of_optimal_plans_of_many_models() -> None:
     met = compared(range(5_000, 6_500))
     print(dict(met))
     assert met["tasks"] >= 200

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""State variables have exactly one value in every reachable state, and states packed by them come
-back; the table of states numbers each state once.
-"""
+"""State variables have exactly one value in every reachable state, and their bounds are right."""
 
 from __future__ import annotations
 
@@ -12,13 +10,11 @@ import pytest
 
 from planners.joint.states import TrueFacts
 from planners.loading import PlanningInstance, load
-from planners.search import state_table
 from planners.search.goals import FAR, goal_facts
 from planners.search.optimal_plans import distances
 from planners.search.projections import Projections
 from planners.search.reachable import Space, explore
 from planners.search.relaxed import relaxed
-from planners.search.state_table import Packing, StateTable
 from planners.search.state_variables import StateVariable, state_variables
 from tests.support.domains import DOMAINS
 from tests.support.random_instances import explored, random_instance
@@ -30,10 +26,6 @@ def checked(loaded: PlanningInstance, space: Space) -> list[StateVariable]:
     truth = loaded.model.codec.truth(space.rows)
     for variable in variables:
         assert (truth[:, list(variable.facts)].sum(axis=1) == 1).all()
-    packing = Packing(loaded.model.codec, variables)
-    packed = packing.packed(space.rows)
-    assert (packing.rows(packed) == space.rows).all()
-    assert len(np.unique(packed, axis=0)) == len(space.rows)
     return variables
 
 
@@ -100,52 +92,6 @@ def test_labels_too_late_for_a_robots_own_variable_lead_nowhere_in_time() -> Non
         late = projections.value(every.result) > left
         assert len(kept) == int((~late).sum())
         assert (kept.result == every.result[~late]).all()
-
-
-@pytest.mark.parametrize("hashes", [2**62, 7, 1])
-def test_a_state_table_numbers_each_state_once(
-    hashes: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Also where few or all states have one hash."""
-    hashed = state_table._hashed
-    monkeypatch.setattr(state_table, "_hashed", lambda rows: hashed(rows) % hashes)
-    loaded = load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "gw4-3x3.pddl"])
-    space = explore(loaded.model, loaded.tasks[0].init[None, :])
-    variables = state_variables(loaded.model, loaded.tasks[0].init)
-    table = StateTable(Packing(loaded.model.codec, variables))
-    random = np.random.default_rng(3)
-    known: dict[bytes, int] = {}
-    for _ in range(40):
-        rows = space.rows[random.integers(0, len(space), 50)]
-        numbers, fresh = table.add(rows)
-        before = len(known)
-        for row, number in zip(rows, numbers.tolist(), strict=True):
-            assert known.setdefault(row.tobytes(), number) == number
-        assert fresh.sum() == len(known) - before
-        assert (table.rows(numbers) == rows).all()
-        assert len(table) == len(known)
-    assert sorted(known.values()) == list(range(len(table)))
-
-
-def test_many_states_collide_and_are_told_apart() -> None:
-    """More states than slots at the start: the table grows, and every state is found again."""
-    loaded = load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "corners-10x10.pddl"])
-    space = explore(loaded.model, loaded.tasks[0].init[None, :])
-    table = StateTable(Packing(loaded.model.codec, []))
-    first, fresh = table.add(space.rows)
-    assert fresh.all()
-    again, fresh = table.add(space.rows[::-1])
-    assert not fresh.any()
-    assert (again[::-1] == first).all()
-
-
-def test_a_state_without_a_value_is_refused() -> None:
-    loaded = load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "gw4-3x3.pddl"])
-    variables = state_variables(loaded.model, loaded.tasks[0].init)
-    packing = Packing(loaded.model.codec, variables)
-    nowhere = np.zeros((1, loaded.model.codec.width), np.uint64)
-    with pytest.raises(AssertionError, match="exactly one value"):
-        packing.packed(nowhere)
 
 
 def test_true_facts_of_rows() -> None:
