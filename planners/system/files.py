@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import errno
 import gzip
-import re
 import sys
 import zlib
 from collections.abc import Iterator
@@ -31,13 +30,7 @@ MAX_TEXT = 2**30
 _READING = 4
 #: Reading less text than this asks nothing of the memory that is left, in bytes.
 _SMALL = 2**16
-#: Deeper nesting of arrays and objects in a JSON text is refused: no format needs it.
-MAX_DEPTH = 200
 _CHUNK = 2**20
-_ESCAPED = re.compile(rb"\\.", re.DOTALL)
-_TEXT = re.compile(rb'"[^"]*"?')
-_ALIKE = bytes.maketrans(b"{}", b"[]")
-_NOT_NESTING = bytes(set(range(256)) - set(b'[]{}"'))
 
 
 class _Head(msgspec.Struct):
@@ -80,7 +73,6 @@ class FileFormat(Generic[T]):
         """
         check_utf8(data, position)
         data = data.removeprefix(_BYTE_ORDER_MARK)
-        _require_shallow(data, position)
         try:
             if self.format is not None:
                 self.check_head(data, position)
@@ -208,7 +200,6 @@ def names_format(data: bytes, name: str) -> bool:
         return False
     try:
         check_utf8(data, Position("a file"))
-        _require_shallow(data, Position("a file"))
         found = msgspec.json.decode(data.removeprefix(_BYTE_ORDER_MARK), type=_Head)
     except (BadInput, msgspec.DecodeError, RecursionError):
         return False
@@ -287,30 +278,4 @@ def _require_size(size: int, most: int, position: Position) -> None:
             f"or more, {left / 2**20:,.0f} MiB are left",
             position=position,
             remedy=f"Use {more_memory()}, or a smaller file.",
-        )
-
-
-def _require_shallow(data: bytes, position: Position) -> None:
-    """Raise `BadInput` for JSON that is nested more than `MAX_DEPTH` deep.
-
-    Readers recurse, and they would end wherever the stack is full.
-    """
-    if data.count(b"[") + data.count(b"{") <= MAX_DEPTH:
-        return
-    # Two quotation marks in a row end a text and begin the next, or are an empty one: with both
-    # gone, the same brackets stand outside of texts.
-    if b"\\" in data:
-        data = _ESCAPED.sub(b"", data)
-    marks = data.translate(_ALIKE, _NOT_NESTING).replace(b'""', b"")
-    marks = _TEXT.sub(b"", marks)
-    for _ in range(MAX_DEPTH):  # level by level, from inside
-        outer = marks.replace(b"[]", b"")
-        if len(outer) == len(marks):
-            break
-        marks = outer
-    if len(marks) > MAX_DEPTH or b"[]" in marks:
-        raise BadInput(
-            f"this JSON is nested more than {MAX_DEPTH} deep",
-            position=position,
-            remedy="No file of coordlang is nested as deep: is it the right one?",
         )

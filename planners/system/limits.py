@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import errno
 import math
-import os
 import re
 import resource
 import signal
@@ -48,8 +47,6 @@ _NO_MEMORY = (
 )
 #: How Python says that C code has failed without a word.
 _NO_REASON = ("without exception set", "without setting an exception")
-#: Seconds of processor time in which numpy is loaded, on a slow machine, too.
-_LOADING = 20
 _LONGER = "Use a larger --time-limit."
 #: Of the memory that is free, what a process takes that is given no limit.
 _SHARE = 0.8
@@ -58,9 +55,8 @@ _SHARE = 0.8
 _MEMORY_OF_MACHINE = Path("/proc/meminfo")
 _MEMORY_OF_PROCESS = Path("/proc/self/statm")
 _AVAILABLE = re.compile(r"^MemAvailable:\s*(\d+) kB$", re.MULTILINE)
-#: Where control groups are, and which of their memory is files that can be read again.
+#: Where control groups (version 2) are.
 _GROUPS = Path("/sys/fs/cgroup")
-_GIVEN_UP = ("inactive_file", "total_inactive_file")
 
 
 @contextmanager
@@ -269,52 +265,11 @@ def require_memory(size: int) -> None:
         )
 
 
-def require_libraries() -> None:
-    """Raise `OutOfMemory` if numpy does not load under the limit that the process started with.
-
-    BLAS ends the process then (``ulimit -v``), or asks for memory without end, so that a child
-    process tries it, for some seconds.
-    """
-    soft, _ = resource.getrlimit(resource.RLIMIT_AS)
-    if soft == resource.RLIM_INFINITY or "numpy" in sys.modules:
-        return
-    child = os.fork()
-    if child == 0:
-        os._exit(_load_quietly())
-    _, status = os.waitpid(child, 0)
-    if status != 0:
-        raise OutOfMemory(
-            f"the libraries do not load in {soft / 2**20:.0f} MiB of address space",
-            remedy="Use a larger limit (ulimit -v).",
-        )
-
-
 def load_libraries() -> None:
     """Load numpy with all that it takes memory for."""
     import numpy as np
 
     np.zeros((8, 8)) @ np.zeros((8, 8))
-
-
-def limit_processor_time(seconds: int) -> None:
-    """Let this process end after so many more seconds of its own, whatever it does."""
-    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
-    end = math.ceil(time.process_time()) + seconds
-    soft = end if hard == resource.RLIM_INFINITY else min(end, hard)
-    resource.setrlimit(resource.RLIMIT_CPU, (soft, hard))
-
-
-def _load_quietly() -> int:
-    """Load numpy, silently: the exit code of the process that tries it."""
-    try:
-        limit_processor_time(_LOADING)
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, 1)
-        os.dup2(nowhere, 2)
-        load_libraries()
-    except (ImportError, MemoryError, OSError, RuntimeError, SystemError):
-        return 1
-    return 0
 
 
 def lacks_memory(error: BaseException) -> bool:
@@ -360,46 +315,21 @@ def _group_memory_left() -> int:
     """Bytes that the control groups of this process leave it (jobs of a scheduler, containers)."""
     left = sys.maxsize
     for folder in _memory_groups():
-        most = _number(folder / "memory.max", folder / "memory.limit_in_bytes")
-        used = _number(folder / "memory.current", folder / "memory.usage_in_bytes")
-        if most is not None and used is not None:
-            left = min(left, max(0, most - used + _cached(folder)))
+        with suppress(OSError, ValueError):  # no group of its own, or one without a limit
+            most = int((folder / "memory.max").read_text())
+            used = int((folder / "memory.current").read_text())
+            # Files in memory are given up where it is short.
+            files = re.search(r"^inactive_file (\d+)", (folder / "memory.stat").read_text(), re.M)
+            left = min(left, max(0, most - used + (int(files[1]) if files else 0)))
     return left
 
 
 def _memory_groups() -> Iterator[Path]:
-    """The folders of the control groups that count this process's memory, versions 1 and 2."""
-    try:
-        lines = Path("/proc/self/cgroup").read_text().splitlines()
-    except OSError:
-        return
-    for line in lines:
-        _, controllers, path = line.split(":", 2)
-        if controllers not in ("", "memory"):
-            continue
-        root = _GROUPS / controllers
-        own = root / path.lstrip("/")
+    """The folders of the control groups that this process is in."""
+    with suppress(OSError):
+        own = _GROUPS / Path("/proc/self/cgroup").read_text().strip().rpartition("0::/")[2]
         # In a container the path may be that of the machine, and the root is the own group.
-        for folder in (own, *own.parents):
-            if folder.is_relative_to(root):
-                yield folder
-
-
-def _cached(folder: Path) -> int:
-    """Bytes of a group that are files in memory, which are given up where memory is short."""
-    try:
-        lines = (folder / "memory.stat").read_text().splitlines()
-    except OSError:
-        return 0
-    return sum(int(line.split()[1]) for line in lines if line.split()[0] in _GIVEN_UP)
-
-
-def _number(*paths: Path) -> int | None:
-    """The number that the first of these files holds, None where there is none."""
-    for path in paths:
-        with suppress(OSError, ValueError):
-            return int(path.read_text())
-    return None
+        yield from (folder for folder in (own, *own.parents) if folder.is_relative_to(_GROUPS))
 
 
 def address_space() -> int:

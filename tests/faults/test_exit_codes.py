@@ -59,17 +59,6 @@ def test_the_working_directory_is_removed(tmp_path: Path) -> None:
     assert "cannot be written: the working directory has been removed" in refused.stderr
 
 
-@pytest.mark.parametrize("mebibytes", [60, 90, 120, 150, 180])
-def test_too_little_memory_for_the_libraries(mebibytes: int, tmp_path: Path) -> None:
-    arguments = ("build", *CELLS, "-o", str(tmp_path / "l.json"))
-    done = shell("", arguments, f"ulimit -v {mebibytes * 1024};")
-    assert done.returncode in (0, 22), done.stderr
-    if done.returncode == 22:
-        assert done.stderr.startswith("coordlang: ")
-        assert "Traceback" not in done.stderr
-        assert not list(tmp_path.iterdir())
-
-
 @pytest.mark.parametrize("robots", [["r1", "r3"], ["r1"], ["a", "b"]])
 @pytest.mark.parametrize("place", ["t-map", "three-cells"])
 def test_robots_of_a_language_file_that_contradict_the_domain(

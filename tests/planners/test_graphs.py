@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
 
@@ -14,10 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planners.search.graphs import parts_of_graph
-from planners.system.limits import limit_processor_time
 from tests.support.command import own_process
 from tests.support.domains import DOMAINS
-from tests.support.forks import fork
 
 EDGES = st.lists(st.tuples(st.integers(0, 6), st.integers(0, 6)), max_size=12)
 
@@ -70,12 +67,3 @@ def test_a_command_under_a_limit_that_is_too_small_for_scipy_ends(mebibytes: int
     command = own_process("build", *files, "--tasks", "all", "-o", os.devnull, *limit)
     done = subprocess.run(command, capture_output=True, text=True, timeout=100)
     assert done.returncode in (0, 22), done.stderr
-
-
-def test_a_process_ends_after_its_time() -> None:
-    def spin() -> None:
-        limit_processor_time(0)
-        while True:
-            pass
-
-    assert fork(spin).join().code == -signal.SIGXCPU
