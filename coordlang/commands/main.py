@@ -21,7 +21,6 @@ import coordlang
 from coordlang.commands.failure import BROKEN_PIPE, failure_of, wants_json
 from coordlang.commands.terminal import Output, echo
 from planners.system.errors import Note, UsageError
-from planners.system.limits import require_libraries
 from planners.system.messages import visible
 from planners.system.signals import Interruptions
 
@@ -59,7 +58,6 @@ class _LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        require_libraries()  # before what imports them
         module = importlib.import_module(f"coordlang.commands.{cmd_name}")
         command: click.Command = module.command
         return command

@@ -47,7 +47,7 @@ def cheapest(
     elif dearest > _COST:
         return plan, []
     most = _cost_of(costs, plan)
-    sums = _counter(plans, costs, most)
+    sums = _counter(plans, costs)
     with suppress(OutOfEffort):
         while most and plans.holds(_at_most(sums, most - 1)):
             plan = plans.labels_chosen()
@@ -65,27 +65,15 @@ def _cost_of(costs: Sequence[Ints], plan: Plan) -> int:
     return sum(int(costs[robot][label]) for step in plan for robot, label in enumerate(step))
 
 
-def _counter(plans: FixedPlans, costs: Sequence[Ints], most: int) -> Literals:
-    """A unary counter: its k-th literal is implied where plans cost more than k, up to ``most``."""
-    sums: Literals = []
-    for step in range(plans.steps):
-        for robot, own in enumerate(costs):
-            for least in range(1, int(own.max(initial=0)) + 1):
-                labels = np.flatnonzero(own >= least).tolist()
-                paid = plans.any_of([plans.label(step, robot, label) for label in labels])
-                sums = _one_more(plans, sums, paid, most)
-    return sums
-
-
-def _one_more(plans: FixedPlans, before: Literals, paid: int, most: int) -> Literals:
-    after = [plans.fresh() for _ in range(min(len(before) + 1, most + 1))]
-    for place, literal in enumerate(before):
-        if place < len(after):
-            plans.add([-literal, after[place]])
-        if place + 1 < len(after):
-            plans.add([-literal, -paid, after[place + 1]])
-    plans.add([-paid, after[0]])
-    return after
+def _counter(plans: FixedPlans, costs: Sequence[Ints]) -> Literals:
+    """Literals, the k-th of which is implied where plans cost more than k."""
+    paid = [
+        plans.any_of([plans.label(step, robot, n) for n in np.flatnonzero(own >= least).tolist()])
+        for step in range(plans.steps)
+        for robot, own in enumerate(costs)
+        for least in range(1, int(own.max(initial=0)) + 1)
+    ]
+    return plans.counter(paid) if paid else []
 
 
 def _at_most(sums: Literals, cost: int) -> Literals:

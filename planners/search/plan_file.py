@@ -170,46 +170,24 @@ def only_one_plan(text: str, position: Position) -> None:
     """Raise `BadInput`, with the line, where a second plan begins in IPC text.
 
     It begins with its comment, after the closing comment of the plan before it, or with step
-    numbers that start again.
+    numbers that start again: they may repeat.
     """
     begun = ended = False
-    steps = _StepNumbers()
-    for number, raw in enumerate(text.splitlines(), 1):
-        line, _, _ = raw.partition(";")
-        title, action = bool(_BEGIN.match(raw)), bool(line.strip())
-        again = action and (ended or steps.start_again(line))
-        if again or (title and (begun or steps.any)):
+    numbers: list[int] = []  # of the actions so far; one without a number is in the step before
+    for line, raw in enumerate(text.splitlines(), 1):
+        title, action = bool(_BEGIN.match(raw)), raw.partition(";")[0].strip()
+        found = re.match(r"(\d{1,8})(?:\.\d+)?\s*:", action)
+        number = int(found[1]) if found else numbers[-1] if numbers else -1
+        again = bool(numbers) and number == numbers[0] < numbers[-1]
+        if (action and (ended or again)) or (title and (begun or numbers)):
             raise BadInput(
                 "this file holds several plans: a second one begins here",
-                position=Position(position.file, number, 1),
+                position=Position(position.file, line, 1),
                 remedy="Write one plan a file (`coordlang plans --max 1`), or use the JSON form.",
             )
-        begun, ended = begun or title, ended or (steps.any and bool(_END.match(raw)))
+        begun, ended = begun or title, ended or (bool(numbers) and bool(_END.match(raw)))
         if action:
-            steps.enter(line)
-
-
-class _StepNumbers:
-    """The step numbers of a plan, read line by line: they may repeat, but never start again."""
-
-    def __init__(self) -> None:
-        self._first = self._last = -1
-        #: Whether there was any action.
-        self.any = False
-
-    def start_again(self, line: str) -> bool:
-        """Whether the line's number is the first one again, after a later one."""
-        return self._number(line) == self._first < self._last
-
-    def enter(self, line: str) -> None:
-        """Take in the number of the next action."""
-        self.any, self._last = True, self._number(line)
-        if self._first < 0:
-            self._first = self._last
-
-    def _number(self, line: str) -> int:
-        step = re.match(r"\s*(\d{1,8})(?:\.\d+)?\s*:", line)
-        return int(step[1]) if step else self._last
+            numbers.append(number)
 
 
 def _from_json(text: str, model: JointModel, position: Position) -> list[tuple[Texts, ...]]:

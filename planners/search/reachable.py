@@ -108,36 +108,89 @@ def blocks(
         size = max(1, min(pieces.states, int(pieces.steps * size / max(1, len(steps)))))
 
 
+class Exploration:
+    """A breadth-first search from some initial states (a table of rows), layer by layer.
+
+    Attributes
+    ----------
+    layer
+        The states that were new in the last step; ``seen`` are all so far, sorted.
+    depth
+        How many joint steps they are from the initial states.
+    composed
+        How many joint steps were composed.
+    """
+
+    def __init__(self, model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> None:
+        self._model, self._pieces = model, pieces
+        self.layer, _ = unique_rows(inits)
+        self.seen = self.layer
+        self.depth = self.composed = 0
+        self._sources: list[Rows] = []
+        self._steps: list[Steps] = []
+
+    def expand(
+        self, only: Callable[[Rows, Options], Options] | None = None, *, keep: bool = True
+    ) -> Rows:
+        """The states after the layer's joint steps that were not seen before, sorted.
+
+        With ``keep`` the steps are kept for `space`.
+        """
+        fresh = self.seen[:0]
+        for start, steps in blocks(self._model, self.layer, self._pieces, only):
+            self.composed += len(steps)
+            if keep:
+                self._sources.append(self.layer[start:])
+                self._steps.append(steps)
+            new, _ = unique_rows(steps.result)
+            fresh, _ = unique_rows(np.concatenate((fresh, new[find_rows(self.seen, new) < 0])))
+        return fresh
+
+    def enter(self, new: Rows) -> None:
+        """Let these states be the next layer."""
+        self.layer = new
+        self.seen, _ = unique_rows(np.concatenate((self.seen, new)))
+        self.depth += 1
+
+    def so_far(self) -> str:
+        """How far it got, for messages."""
+        return (
+            f"{len(self.seen):,} states within {self.depth} steps of the initial states, "
+            f"{self.composed:,} joint steps; {len(self.layer):,} states are new in the last step"
+        )
+
+    def space(self) -> Space:
+        """The states seen with the steps that were kept; those to other states are left out."""
+        seen = self.seen
+        source = np.concatenate(
+            [
+                find_rows(seen, rows)[steps.source]
+                for rows, steps in zip(self._sources, self._steps, strict=True)
+            ]
+        )
+        target = np.concatenate([find_rows(seen, s.result) for s in self._steps])
+        order = np.argsort(source, kind="stable")
+        order = order[target[order] >= 0]
+        return Space(
+            model=self._model,
+            rows=seen,
+            first=np.searchsorted(source[order], np.arange(len(seen) + 1)),
+            target=target[order],
+            labels=np.concatenate([s.labels for s in self._steps])[order],
+            cost=np.concatenate([s.cost for s in self._steps])[order],
+        )
+
+
 def explore(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> Space:
     """Breadth-first search from all ``inits`` (a table of rows) to the end.
 
     Time and memory are linear in the number of joint steps.
     """
-    layer, _ = unique_rows(inits)
-    seen = layer
-    sources: list[Rows] = []
-    found: list[Steps] = []
-    depth = 0
-
-    def so_far() -> str:
-        return (
-            f"{len(seen):,} states within {depth} steps of the initial "
-            f"states, {sum(map(len, found)):,} joint steps; "
-            f"{len(layer):,} states are new in the last step"
-        )
-
-    with reaching(so_far, FEWER, lambda: sum(map(len, found)), "joint steps"):
-        while len(layer):
-            fresh: list[Rows] = []
-            for start, steps in blocks(model, layer, pieces):
-                sources.append(layer[start:])
-                found.append(steps)
-                fresh.append(unique_rows(steps.result)[0])
-            new, _ = unique_rows(np.concatenate(fresh))
-            layer = new[find_rows(seen, new) < 0]
-            seen, _ = unique_rows(np.concatenate((seen, layer)))
-            depth += 1
-        return joined_steps(model, seen, sources, found)
+    found = Exploration(model, inits, pieces)
+    with reaching(found.so_far, FEWER, lambda: found.composed, "joint steps"):
+        while len(found.layer):
+            found.enter(found.expand())
+        return found.space()
 
 
 def count(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> tuple[int, int]:
@@ -145,45 +198,8 @@ def count(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> tuple[
 
     Needs only the memory that the states take.
     """
-    layer, _ = unique_rows(inits)
-    seen = layer
-    steps_counted = depth = 0
-
-    def so_far() -> str:
-        return (
-            f"{len(seen):,} states within {depth} steps of the initial "
-            f"states, {steps_counted:,} joint steps"
-        )
-
-    with reaching(so_far, FEWER, lambda: steps_counted, "joint steps"):
-        while len(layer):
-            fresh = seen[:0]
-            for _, steps in blocks(model, layer, pieces):
-                steps_counted += len(steps)
-                new, _ = unique_rows(steps.result)
-                fresh, _ = unique_rows(np.concatenate((fresh, new[find_rows(seen, new) < 0])))
-            layer = fresh
-            seen, _ = unique_rows(np.concatenate((seen, layer)))
-            depth += 1
-    return len(seen), steps_counted
-
-
-def joined_steps(model: JointModel, seen: Rows, sources: list[Rows], found: list[Steps]) -> Space:
-    """The steps out of tables of states, as a space of the states ``seen``, which are sorted.
-
-    Steps to other states are left out.
-    """
-    source = np.concatenate(
-        [find_rows(seen, rows)[steps.source] for rows, steps in zip(sources, found, strict=True)]
-    )
-    target = np.concatenate([find_rows(seen, s.result) for s in found])
-    order = np.argsort(source, kind="stable")
-    order = order[target[order] >= 0]
-    return Space(
-        model=model,
-        rows=seen,
-        first=np.searchsorted(source[order], np.arange(len(seen) + 1)),
-        target=target[order],
-        labels=np.concatenate([s.labels for s in found])[order],
-        cost=np.concatenate([s.cost for s in found])[order],
-    )
+    found = Exploration(model, inits, pieces)
+    with reaching(found.so_far, FEWER, lambda: found.composed, "joint steps"):
+        while len(found.layer):
+            found.enter(found.expand(keep=False))
+    return len(found.seen), found.composed

@@ -6,14 +6,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from planners.joint.model import JointModel, PlanningTask
-from planners.joint.tables import Rows, find_rows, unique_rows
+from planners.joint.tables import Rows
 from planners.search.bounded_search import probe_size
 from planners.search.goals import FAR, Values
 from planners.search.heuristics import search_heuristic
-from planners.search.reachable import PIECES
+from planners.search.reachable import PIECES, Exploration
 from planners.search.relaxed import relaxed
 from planners.search.state_variables import state_variables
 
@@ -142,17 +140,15 @@ def estimate(
 
 def _layers(model: JointModel, start: Rows, steps: int, states: int) -> list[Rows]:
     """The states of each layer; the last one is empty if no others can be reached."""
-    layer = seen = start
-    layers = [layer]
-    while len(layer):
-        most = _most_steps(model, layer)
-        if most > steps or len(seen) > states:
+    found = Exploration(model, start)
+    layers = [found.layer]
+    while len(found.layer):
+        most = _most_steps(model, found.layer)
+        if most > steps or len(found.seen) > states:
             break
         steps -= most
-        new, _ = unique_rows(model.successors(layer).result)
-        layer = new[find_rows(seen, new) < 0]
-        seen, _ = unique_rows(np.concatenate((seen, layer)))
-        layers.append(layer)
+        found.enter(found.expand(keep=False))
+        layers.append(found.layer)
     return layers
 
 

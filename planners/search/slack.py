@@ -17,12 +17,12 @@ from dataclasses import replace
 import numpy as np
 
 from planners.joint.conditions import Labels
-from planners.joint.model import JointModel, Options, PlanningTask, Steps
+from planners.joint.model import JointModel, Options, PlanningTask
 from planners.joint.tables import Bools, Ints, Rows, find_rows, unique_rows
 from planners.search.goals import FAR
 from planners.search.heuristics import search_heuristic
 from planners.search.plan_space import PlanSpace
-from planners.search.reachable import PIECES, PieceSizes, Space, blocks, joined_steps
+from planners.search.reachable import PIECES, Exploration, PieceSizes, Space
 from planners.search.state_variables import state_variables
 from planners.system.errors import UsageError
 from planners.system.limits import reaching
@@ -38,38 +38,25 @@ def explore_within(
     joint steps are those between states that are kept.
     """
     heuristic = search_heuristic("auto", model, task, state_variables(model, task.init))
-    layer = seen = task.init[None, :]
-    sources: list[Rows] = []
-    found: list[Steps] = []
-    depth = 0
+    found = Exploration(model, task.init[None, :], pieces)
 
     def so_far() -> str:
-        return f"{len(seen):,} states within {depth} of {steps} steps of {task.name}"
+        return f"{len(found.seen):,} states within {found.depth} of {steps} steps of {task.name}"
 
     def only(rows: Rows, options: Options) -> Options:
         if heuristic.in_time is None:
             return options
-        return heuristic.in_time(rows, options, steps - depth)[0]
+        return heuristic.in_time(rows, options, steps - found.depth - 1)[0]
 
-    with reaching(so_far, "less slack", lambda: sum(map(len, found)), "joint steps"):
-        while len(layer) and depth < steps:
-            depth += 1
-            fresh: list[Rows] = [layer[:0]]
-            for start, piece in blocks(model, layer, pieces, only):
-                sources.append(layer[start:])
-                found.append(piece)
-                fresh.append(unique_rows(piece.result)[0])
-            new, _ = unique_rows(np.concatenate(fresh))
-            layer = new[find_rows(seen, new) < 0]
+    with reaching(so_far, "less slack", lambda: found.composed, "joint steps"):
+        while len(found.layer) and found.depth < steps:
+            new = found.expand(only)
             if heuristic.value is not None:
-                bound = heuristic.value(layer)
-                layer = layer[(bound < FAR) & (depth + bound <= steps)]
-            seen, _ = unique_rows(np.concatenate((seen, layer)))
-        # Goal states that are met in the last layer rest there, as do others.
-        for start, piece in blocks(model, layer, pieces):
-            sources.append(layer[start:])
-            found.append(piece)
-        return joined_steps(model, seen, sources, found)
+                bound = heuristic.value(new)
+                new = new[(bound < FAR) & (found.depth + 1 + bound <= steps)]
+            found.enter(new)
+        found.expand()  # goal states that are met in the last layer rest there, as do others
+        return found.space()
 
 
 def rests(labels: Labels) -> Bools:
