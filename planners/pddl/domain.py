@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 from planners.pddl.lifted import Domain, Signatures
@@ -41,9 +42,7 @@ def parse_domain(source: Source) -> Domain:
     constants: dict[str, tuple[str, ...]] = {}
     for section in sections.get(":constants", ()):
         read_objects(names, section.items[1:], constants)
-    actions = {action_name(document, item).text: item for item in sections.get(":action", ())}
-    if len(actions) < len(sections.get(":action", ())):
-        _complain_about_double_action(document, sections)
+    actions = _read_actions(document, sections)
     if not actions:
         raise document.fail(
             "this domain has no action",
@@ -95,35 +94,16 @@ def _read_types(document: Document, sections: Sections) -> dict[str, tuple[str, 
             for parent in parents:
                 types.setdefault(parent, ())
     types.pop("object", None)
-    cycle = _cycle(types)
-    if cycle:
+    try:
+        TopologicalSorter(types).prepare()
+    except CycleError as error:
+        cycle = error.args[1][::-1]
         raise document.fail(
             "the types form a cycle: " + " - ".join(cycle),
             offsets.get(cycle[0], document.root),
-            remedy="Remove one of these supertypes.",
-        )
+            "Remove one of these supertypes.",
+        ) from None
     return types
-
-
-def _cycle(types: dict[str, tuple[str, ...]]) -> list[str] | None:
-    """A chain of supertypes that leads from a type back to it, or None; each type is met once."""
-    done: set[str] = set()
-    for start in types:
-        if start in done:
-            continue
-        chain = {start: iter(types[start])}  # the way to the type that is looked at, in its order
-        while chain:
-            name = next(reversed(chain))
-            parent = next(chain[name], None)
-            if parent is None:
-                done.add(name)
-                del chain[name]
-            elif parent in chain:
-                names = list(chain)
-                return [*names[names.index(parent) :], parent]
-            elif parent not in done:
-                chain[parent] = iter(types[parent])
-    return None
 
 
 def _read_predicates(
@@ -179,14 +159,12 @@ def _arities(found: Iterable[tuple[str, int]]) -> dict[str, frozenset[int]]:
     return arities
 
 
-def _complain_about_double_action(document: Document, sections: Sections) -> None:
-    seen: set[str] = set()
+def _read_actions(document: Document, sections: Sections) -> dict[str, Group]:
+    """The sections of the actions by their names."""
+    actions: dict[str, Group] = {}
     for item in sections.get(":action", ()):
         name = action_name(document, item)
-        if name.text in seen:
-            raise document.fail(
-                f"action {echoed(name.text)} is declared twice",
-                name,
-                remedy="Rename or remove one of them.",
-            )
-        seen.add(name.text)
+        if actions.setdefault(name.text, item) is not item:
+            what = f"action {echoed(name.text)} is declared twice"
+            raise document.fail(what, name, "Rename or remove one of them.")
+    return actions

@@ -8,32 +8,21 @@ the action's ``:agent``.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields, is_dataclass, replace
+from operator import or_
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from planners.pddl.domain import read_domain
-from planners.pddl.formula_tree import Leaf, fold, with_parts
-from planners.pddl.lifted import (
-    And,
-    Atom,
-    Domain,
-    Equal,
-    Formula,
-    Problem,
-    Schema,
-    Signatures,
-    StepAtom,
-    Term,
-    Variable,
-)
+from planners.pddl.lifted import And, Atom, Domain, Formula, Problem, Schema, Variable
 from planners.pddl.problem import read_problem
 from planners.pddl.sexpr import JoinedSource
 from planners.system.errors import BadInput, Position
 from planners.system.messages import echoed
 
-_AtomKind = TypeVar("_AtomKind", Atom, StepAtom)
+K = TypeVar("K")
+V = TypeVar("V")
 
 
 def read_factored(directory: str | Path) -> tuple[Domain, Problem]:
@@ -141,10 +130,10 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
     return replace(
         first,
         source=source,
-        types=_all_types([domain.types for domain in domains]),
-        constants=_all_types([domain.constants for domain in domains]),
-        predicates=_union([domain.predicates for domain in domains]),
-        functions=_union([domain.functions for domain in domains]),
+        types=_merged((domain.types for domain in domains), _both),
+        constants=_merged((domain.constants for domain in domains), _both),
+        predicates=_merged((domain.predicates for domain in domains), or_),
+        functions=_merged((domain.functions for domain in domains), or_),
         schemas=tuple(schemas.values()),
         constraints=tuple(
             dict.fromkeys(
@@ -154,61 +143,32 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
             )
         ),
         dependences=tuple(dict.fromkeys(d for domain in domains for d in domain.dependences)),
-        signatures=_joined_signatures([domain.signatures for domain in domains]),
+        signatures=_merged(
+            (domain.signatures for domain in domains),
+            lambda one, other: tuple(map(or_, one, other)),
+        ),
     )
-
-
-#: What an agent is called while actions are compared: no variable of a file has this name.
-_AGENT = "?"
 
 
 def _without_agent(schema: Schema) -> Schema:
     """The action with neither the name nor the type of its agent, nor its position."""
     assert schema.agent is not None
-    own = schema.parameters[schema.agent].name
-
-    def term(name: Term) -> Term:
-        return _AGENT if name == own else name
-
-    def in_formula(formula: Formula) -> Formula:
-        return fold(formula, _renamed_leaf(term), with_parts)
-
     parameters = list(schema.parameters)
-    parameters[schema.agent] = Variable(_AGENT)
-    cost = schema.cost
-    return replace(
-        schema,
-        offset=0,
-        parameters=tuple(parameters),
-        precondition=in_formula(schema.precondition),
-        effects=tuple(
-            replace(
-                effect,
-                atom=_renamed(effect.atom, term),
-                condition=in_formula(effect.condition),
-            )
-            for effect in schema.effects
-        ),
-        cost=_renamed(cost, term) if isinstance(cost, Atom) else cost,
-    )
+    own = parameters[schema.agent].name
+    parameters[schema.agent] = Variable(own)
+    changed = replace(schema, offset=0, parameters=tuple(parameters))
+    found: Schema = _renamed(changed, own, "?")  # no variable of a file has this name
+    return found
 
 
-def _renamed_leaf(term: Callable[[Term], Term]) -> Callable[[Leaf], Formula]:
-    def leaf(found: Leaf) -> Formula:
-        match found:
-            case Equal(left, right):
-                return Equal(term(left), term(right))
-            case Atom():
-                return _renamed(found, term)
-            case StepAtom():
-                return _renamed(found, term)
-        return found
-
-    return leaf
-
-
-def _renamed(atom: _AtomKind, term: Callable[[Term], Term]) -> _AtomKind:
-    return replace(atom, args=tuple(map(term, atom.args)))
+def _renamed(part: Any, old: str, new: str) -> Any:
+    """A part of an action in which a name is replaced wherever it stands."""
+    if isinstance(part, tuple):
+        return tuple(_renamed(inner, old, new) for inner in part)
+    if is_dataclass(part) and not isinstance(part, type):
+        own = {field.name: getattr(part, field.name) for field in fields(part)}
+        return replace(part, **{name: _renamed(inner, old, new) for name, inner in own.items()})
+    return new if part == old else part
 
 
 def _with_agent_of(known: Schema, other: Schema) -> Schema:
@@ -217,7 +177,7 @@ def _with_agent_of(known: Schema, other: Schema) -> Schema:
     assert other.agent is not None
     parameters = list(known.parameters)
     agent = parameters[known.agent]
-    types = tuple(dict.fromkeys((*agent.types, *other.parameters[other.agent].types)))
+    types = _both(agent.types, other.parameters[other.agent].types)
     parameters[known.agent] = replace(agent, types=types)
     return replace(known, parameters=tuple(parameters))
 
@@ -243,31 +203,17 @@ def _require_owners(views: list[tuple[Domain, Problem]], robots: list[str]) -> N
                     )
 
 
-def _all_types(tables: list[dict[str, tuple[str, ...]]]) -> dict[str, tuple[str, ...]]:
-    """Types (or objects) with all the supertypes (types) that they have in some file."""
-    joined: dict[str, tuple[str, ...]] = {}
+def _merged(tables: Iterable[Mapping[K, V]], join: Callable[[V, V], V]) -> dict[K, V]:
+    """One table of several, in which values of one key are joined."""
+    merged: dict[K, V] = {}
     for table in tables:
-        for name, types in table.items():
-            joined[name] = tuple(dict.fromkeys((*joined.get(name, ()), *types)))
-    return joined
+        for key, value in table.items():
+            merged[key] = join(merged[key], value) if key in merged else value
+    return merged
 
 
-def _union(tables: list[dict[str, frozenset[int]]]) -> dict[str, frozenset[int]]:
-    """Names with all the numbers of arguments that they have in some file."""
-    joined: dict[str, frozenset[int]] = {}
-    for table in tables:
-        for name, arities in table.items():
-            joined[name] = joined.get(name, frozenset()) | arities
-    return joined
-
-
-def _joined_signatures(tables: list[Signatures]) -> Signatures:
-    """The types that arguments may have in some file."""
-    joined: Signatures = {}
-    for table in tables:
-        for key, own in table.items():
-            joined[key] = tuple(a | b for a, b in zip(joined.get(key, own), own, strict=True))
-    return joined
+def _both(one: tuple[str, ...], other: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys((*one, *other)))
 
 
 def _join_problems(problems: list[Problem], domain: Domain, name: str) -> Problem:

@@ -55,18 +55,6 @@ def fold(
     return leaf(formula)
 
 
-def with_parts(compound: Compound, parts: Iterator[Formula]) -> Formula:
-    """The compound formula of the same kind with other parts: what `fold` keeps structure with."""
-    match compound:
-        case Not():
-            return Not(next(parts))
-        case Forall(variables, _):
-            return Forall(variables, next(parts))
-        case Exists(variables, _):
-            return Exists(variables, next(parts))
-    return type(compound)(tuple(parts))
-
-
 def literals(formula: Formula) -> tuple[tuple[Atom | StepAtom | Equal, bool], ...]:
     """List the literals of the formula's negation normal form, from left to right.
 

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
+from itertools import count
 
 from planners.pddl.lifted import (
     TRUE,
@@ -48,21 +49,17 @@ def read_formula(names: Names, item: Expression) -> Formula:
         return TRUE
     head = token(names.document, item.items[0], "a predicate, 'and', 'or', 'not', ..").text
     if head in names.predicates:
-        return _atom(names, item, head)
+        return _atom(names, item)
     if head in _CONNECTIVES:
         return _CONNECTIVES[head](names, item)
     if head in names.actions:
-        _require_arity(names, item, [names.actions[head]], "action")
-        return StepAtom(head, tuple(names.term(term) for term in item.items[1:]))
+        return StepAtom(head, names.arguments(item, [names.actions[head]], "action"))
     raise _no_formula(names, item, head)
 
 
-def _and(names: Names, item: Group) -> Formula:
-    return And(tuple(read_formula(names, part) for part in item.items[1:]))
-
-
-def _or(names: Names, item: Group) -> Formula:
-    return Or(tuple(read_formula(names, part) for part in item.items[1:]))
+def _connected(names: Names, item: Group) -> Formula:
+    parts = tuple(read_formula(names, part) for part in item.items[1:])
+    return And(parts) if item.head == "and" else Or(parts)
 
 
 def _not(names: Names, item: Group) -> Formula:
@@ -89,13 +86,13 @@ def _equal(names: Names, item: Group) -> Formula:
     left, right = item.items[1:]
     for side in (left, right):
         if isinstance(side, Group) or (NUMBER.match(side.text) and side.text not in names.objects):
-            raise _unsupported(names, "numeric condition '(= ..)'", item)
+            raise names.document.unsupported("numeric condition '(= ..)' is", item)
     return Equal(names.term(left), names.term(right))
 
 
 _CONNECTIVES: dict[str, Callable[[Names, Group], Formula]] = {
-    "and": _and,
-    "or": _or,
+    "and": _connected,
+    "or": _connected,
     "not": _not,
     "imply": _imply,
     "forall": _quantified,
@@ -106,27 +103,26 @@ _CONNECTIVES: dict[str, Callable[[Names, Group], Formula]] = {
 
 def _no_formula(names: Names, item: Group, head: str) -> BadInput | Unsupported:
     """The error for something else than a formula: what PDDL has and coordlang not, or nothing."""
+    unsupported = names.document.unsupported
     if head in _NUMERIC_TESTS:
-        return _unsupported(names, f"numeric condition '({head} ..)'", item)
+        return unsupported(f"numeric condition '({head} ..)' is", item)
     if head == "preference":
-        return _unsupported(names, "a preference", item)
+        return unsupported("a preference is", item)
     timed = head == "at" and len(item) > 1 and is_token(item.items[1], "end", "start")
     if head in _TEMPORAL or timed:
-        return _unsupported(names, f"trajectory constraint '({head} ..)'", item)
-    return _unknown(names, f"unknown predicate {echoed(head)}", item, head)
+        return unsupported(f"trajectory constraint '({head} ..)' is", item)
+    return names.unknown("predicate", item, names.predicates)
 
 
 def read_effects(names: Names, item: Expression) -> tuple[tuple[Effect, ...], int | Atom | None]:
     """The literal effects, flattened, and the term of ``(increase (total-cost) ..)``, if any."""
-    reader = _EffectReader([], [])
-    reader.read(_Scope(names), item)
-    if len(reader.costs) > 1:
-        raise names.document.fail(
-            "total-cost is increased twice in one action",
-            item,
-            remedy="Keep one '(increase (total-cost) N)'.",
-        )
-    return tuple(reader.effects), reader.costs[0] if reader.costs else None
+    found = [*_effects(_Scope(names), item)]
+    costs = [part for part in found if not isinstance(part, Effect)]
+    if len(costs) > 1:
+        remedy = "Keep one '(increase (total-cost) N)'."
+        raise names.document.fail("total-cost is increased twice in one action", item, remedy)
+    effects = tuple(part for part in found if isinstance(part, Effect))
+    return effects, costs[0] if costs else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,98 +133,94 @@ class _Scope:
     variables: tuple[Variable, ...] = ()
     condition: Formula = TRUE
 
-
-@dataclass(frozen=True, slots=True)
-class _EffectReader:
-    """Collects the effects of one action."""
-
-    effects: list[Effect]
-    costs: list[int | Atom]
-
-    def read(self, scope: _Scope, item: Expression) -> None:
-        names = scope.names
-        item = group(names.document, item, "an effect in parentheses")
-        if len(item) == 0:
-            return
-        head = token(names.document, item.items[0], "a predicate, 'and', 'not', 'when', ..").text
-        if head in names.predicates:
-            self._add(scope, _atom(names, item, head), True)
-        elif head in _EFFECTS:
-            _EFFECTS[head](self, scope, item)
-        elif head in _NUMERIC_EFFECTS:
-            conditional = bool(scope.variables) or scope.condition != TRUE
-            self.costs.append(_cost(names, item, conditional=conditional))
-        elif head in ("oneof", "probabilistic", "unknown"):
-            raise _unsupported(names, f"non-deterministic effect '({head} ..)'", item)
-        else:
-            raise _unknown(names, f"unknown predicate {echoed(head)} in an effect", item, head)
-
-    def _add(self, scope: _Scope, atom: Atom, adds: bool) -> None:
-        self.effects.append(Effect(atom, adds, scope.condition, scope.variables))
-
-    def _all(self, scope: _Scope, item: Group) -> None:
-        for part in item.items[1:]:
-            self.read(scope, part)
-
-    def _delete(self, scope: _Scope, item: Group) -> None:
-        names = scope.names
-        _expect(names, item, 1)
-        part = group(names.document, item.items[1], "an atom in parentheses")
-        if part.head not in names.predicates:
-            what = f"only atoms can be deleted, found '({part.head} ..)'"
-            raise _unknown(names, what, part, part.head)
-        self._add(scope, _atom(names, part, part.head), False)
-
-    def _when(self, scope: _Scope, item: Group) -> None:
-        _expect(scope.names, item, 2)
-        condition = read_formula(scope.names, item.items[1])
-        if scope.condition != TRUE:
-            condition = And((scope.condition, condition))
-        self.read(replace(scope, condition=condition), item.items[2])
-
-    def _forall(self, scope: _Scope, item: Group) -> None:
-        names = scope.names
-        _expect(names, item, 2)
-        listed = group(names.document, item.items[1], "a list of variables")
-        variables = names.read_variables(listed.items)
-        # An inner variable may shadow an outer one: give it a name of its own.
-        taken = {v.name for v in scope.variables} | set(names.variables)
-        clash = next((v.name for v in variables if v.name in taken), None)
-        if clash:
-            self.read(scope, _rename(item, clash, _fresh(clash, taken)))
-            return
-        inner = names.with_variables(variables)
-        self.read(replace(scope, names=inner, variables=scope.variables + variables), item.items[2])
+    def effect(self, item: Group, adds: bool) -> Effect:
+        return Effect(_atom(self.names, item), adds, self.condition, self.variables)
 
 
-_EFFECTS: dict[str, Callable[[_EffectReader, _Scope, Group], None]] = {
-    "and": _EffectReader._all,
-    "not": _EffectReader._delete,
-    "when": _EffectReader._when,
-    "forall": _EffectReader._forall,
+def _effects(scope: _Scope, item: Expression) -> Iterator[Effect | int | Atom]:
+    """The literals of an effect, and the terms that it adds to the cost."""
+    names = scope.names
+    item = group(names.document, item, "an effect in parentheses")
+    if len(item) == 0:
+        return
+    head = token(names.document, item.items[0], "a predicate, 'and', 'not', 'when', ..").text
+    if head in names.predicates:
+        yield scope.effect(item, True)
+    elif head in _EFFECTS:
+        yield from _EFFECTS[head](scope, item)
+    elif head in _NUMERIC_EFFECTS:
+        conditional = bool(scope.variables) or scope.condition != TRUE
+        yield _cost(names, item, conditional=conditional)
+    elif head in ("oneof", "probabilistic", "unknown"):
+        what = f"non-deterministic effect '({head} ..)' is"
+        raise names.document.unsupported(what, item)
+    else:
+        what = f"unknown predicate {echoed(head)} in an effect"
+        raise names.document.fail(what, item, known(names.predicates, head, "predicate"))
+
+
+def _all(scope: _Scope, item: Group) -> Iterator[Effect | int | Atom]:
+    for part in item.items[1:]:
+        yield from _effects(scope, part)
+
+
+def _deleted(scope: _Scope, item: Group) -> Iterator[Effect]:
+    names = scope.names
+    _expect(names, item, 1)
+    part = group(names.document, item.items[1], "an atom in parentheses")
+    if part.head not in names.predicates:
+        what = f"only atoms can be deleted, found '({part.head} ..)'"
+        raise names.document.fail(what, part, known(names.predicates, part.head, "predicate"))
+    yield scope.effect(part, False)
+
+
+def _when(scope: _Scope, item: Group) -> Iterator[Effect | int | Atom]:
+    _expect(scope.names, item, 2)
+    condition = read_formula(scope.names, item.items[1])
+    if scope.condition != TRUE:
+        condition = And((scope.condition, condition))
+    return _effects(replace(scope, condition=condition), item.items[2])
+
+
+def _forall(scope: _Scope, item: Group) -> Iterator[Effect | int | Atom]:
+    names = scope.names
+    _expect(names, item, 2)
+    listed = group(names.document, item.items[1], "a list of variables")
+    variables = names.read_variables(listed.items)
+    # An inner variable may shadow an outer one: give it a name of its own.
+    taken = {v.name for v in scope.variables} | set(names.variables)
+    clash = next((v.name for v in variables if v.name in taken), None)
+    if clash:
+        return _effects(scope, _rename(item, clash, _fresh(clash, taken)))
+    inner = replace(
+        scope, names=names.with_variables(variables), variables=scope.variables + variables
+    )
+    return _effects(inner, item.items[2])
+
+
+_EFFECTS: dict[str, Callable[[_Scope, Group], Iterator[Effect | int | Atom]]] = {
+    "and": _all,
+    "not": _deleted,
+    "when": _when,
+    "forall": _forall,
 }
 
 
 def _cost(names: Names, item: Group, *, conditional: bool) -> int | Atom:
-    document = names.document
+    unsupported = names.document.unsupported
     target = item.items[1] if len(item) == 3 else None
     if item.head != "increase" or not isinstance(target, Group) or target.head != "total-cost":
-        raise _unsupported(names, f"numeric effect '({item.head} ..)'", item)
+        raise unsupported(f"numeric effect '({item.head} ..)' is", item)
     if conditional:
-        raise _unsupported(names, "a cost that depends on a condition", item)
+        raise unsupported("a cost that depends on a condition is", item)
     amount = item.items[2]
     if isinstance(amount, Token):
         return _constant_cost(names, item, amount)
     if amount.head not in names.functions:
         if amount.head in ("+", "-", "*", "/"):
-            raise _unsupported(names, "arithmetic in an action cost", amount)
-        raise document.fail(
-            f"unknown function {echoed(amount.head)}",
-            amount,
-            known(names.functions, amount.head, "function"),
-        )
-    _require_arity(names, amount, names.functions[amount.head], "function")
-    return Atom(amount.head, tuple(names.term(term) for term in amount.items[1:]))
+            raise unsupported("arithmetic in an action cost is", amount)
+        raise names.unknown("function", amount, names.functions)
+    return Atom(amount.head, names.arguments(amount, names.functions[amount.head], "function"))
 
 
 def _constant_cost(names: Names, item: Group, amount: Token) -> int:
@@ -236,31 +228,20 @@ def _constant_cost(names: Names, item: Group, amount: Token) -> int:
         raise names.document.fail(
             f"expected a number, found {echoed(amount.text)}",
             amount,
-            remedy="As in (increase (total-cost) 3), or with a function declared in "
-            "(:functions ..).",
+            "As in (increase (total-cost) 3), or with a function declared in (:functions ..).",
         )
     # Costs that are too large are refused where costs are used.
     value = min(float(amount.text), 2.0 * MAX_COST)
     if value < 0 or value % 1 != 0:
-        raise _unsupported(names, f"action cost {amount.text} (whole numbers from 0 only)", item)
+        what = f"action cost {amount.text} (whole numbers from 0 only) is"
+        raise names.document.unsupported(what, item)
     return int(value)
 
 
-def _atom(names: Names, item: Group, head: str) -> Atom:
-    _require_arity(names, item, names.predicates[head], "predicate")
-    atom = Atom(head, tuple(names.term(term) for term in item.items[1:]))
+def _atom(names: Names, item: Group) -> Atom:
+    args = names.arguments(item, names.predicates[item.head], "predicate")
     names.check_arguments(item)
-    return atom
-
-
-def _require_arity(names: Names, item: Group, arities: Iterable[int], what: str) -> None:
-    error = names.arity(item, item.head, arities, what)
-    if error:
-        raise error
-
-
-def _unknown(names: Names, what: str, item: Group, head: str) -> BadInput:
-    return names.document.fail(what, item, known(names.predicates, head, "predicate"))
+    return Atom(item.head, args)
 
 
 def _expect(names: Names, item: Group, count: int) -> None:
@@ -268,23 +249,12 @@ def _expect(names: Names, item: Group, count: int) -> None:
         raise names.document.fail(
             f"'{item.head}' takes {count} argument{'s' * (count > 1)}, found {len(item) - 1}",
             item,
-            remedy="As in (not (p a)), (= ?x ?y), (when (p a) (q a)), (forall (?x - t) (p ?x)).",
+            "As in (not (p a)), (= ?x ?y), (when (p a) (q a)), (forall (?x - t) (p ?x)).",
         )
 
 
-def _unsupported(names: Names, feature: str, item: Group) -> Unsupported:
-    return Unsupported(
-        f"{feature} is not supported",
-        position=names.document.source.position(item.offset),
-        remedy="coordlang reads classical PDDL: states of true and false facts.",
-    )
-
-
-def _fresh(name: str, taken: frozenset[str] | set[str]) -> str:
-    number = 1
-    while f"{name}.{number}" in taken:
-        number += 1
-    return f"{name}.{number}"
+def _fresh(name: str, taken: Collection[str]) -> str:
+    return next(new for n in count(1) if (new := f"{name}.{n}") not in taken)
 
 
 def _rename(item: Group, old: str, new: str) -> Group:

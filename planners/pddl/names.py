@@ -9,7 +9,7 @@ from difflib import get_close_matches
 
 from planners.pddl.lifted import Domain, Signatures, Variable, have_common
 from planners.pddl.sexpr import Document, Expression, Group, Token
-from planners.system.errors import BadInput, Unsupported, note
+from planners.system.errors import BadInput, note
 from planners.system.messages import echoed, visible
 
 #: Characters of a wrong name that are compared with the declared names.
@@ -174,11 +174,9 @@ class Names:
         """A variable in scope or a declared object."""
         if isinstance(item, Group):
             if item.head in self.functions:
-                raise Unsupported(
-                    f"numeric or object fluent ({item.head} ..) inside a formula",
-                    position=self.document.source.position(item.offset),
-                    remedy="coordlang reads functions only in '(increase (total-cost) ..)'.",
-                )
+                what = f"a numeric or object fluent ({item.head} ..) inside a formula is"
+                remedy = "coordlang reads functions only in '(increase (total-cost) ..)'."
+                raise self.document.unsupported(what, item, remedy)
             raise self.document.fail(
                 "expected a variable or an object, found a list",
                 item,
@@ -221,18 +219,27 @@ class Names:
                     "swapped, or is a type missing there?",
                 )
 
-    def arity(self, item: Group, name: str, arities: Iterable[int], what: str) -> BadInput | None:
-        """The error for a wrong number of arguments, or None."""
-        found = len(item) - 1
+    def unknown(self, what: str, item: Group, declared: Iterable[str]) -> BadInput:
+        """The error for a list whose head is no ``what`` that is declared."""
+        remedy = known(declared, item.head, what)
+        return self.document.fail(f"unknown {what} {echoed(item.head)}", item, remedy)
+
+    def arguments(self, item: Group, arities: Iterable[int], what: str) -> tuple[str, ...]:
+        """The arguments of an atom, action or function; `BadInput` where their number is wrong."""
+        self._require_arity(item, arities, what)
+        return tuple(self.term(term) for term in item.items[1:])
+
+    def _require_arity(self, item: Group, arities: Iterable[int], what: str) -> None:
+        name, found = item.head, len(item) - 1
         if found in arities:
-            return None
+            return
         numbers = sorted(arities)
         wanted = " or ".join(str(n) for n in numbers)
         plural = "" if numbers == [1] else "s"
         forms = " or ".join(
             f"({' '.join((visible(name[:_SHOWN]), *_LETTERS[:n]))})" for n in numbers
         )
-        return self.document.fail(
+        raise self.document.fail(
             f"{what} {echoed(name)} takes {wanted} argument{plural}, found {found}",
             item,
             f"Write {forms}, or declare it with {found}.",

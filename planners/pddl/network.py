@@ -49,11 +49,8 @@ def read_network(
             )
         for item in pair:
             if item.text not in by_name:
-                raise names.document.fail(
-                    f"unknown constraint {echoed(item.text)}",
-                    item,
-                    known(by_name, item.text, "constraint"),
-                )
+                remedy = known(by_name, item.text, "constraint")
+                raise names.document.fail(f"unknown constraint {echoed(item.text)}", item, remedy)
         first, second = (by_name[item.text] for item in pair)
         if len(first.parameters) != len(second.parameters):
             raise names.document.fail(
@@ -90,9 +87,7 @@ def _constraint(names: Names, arities: dict[str, int], section: Group) -> Constr
     for item in group(document, fields[":actions"], "a list of actions").items:
         entry = group(document, item, "'(action POSITION ..)'")
         if entry.head not in arities:
-            raise document.fail(
-                f"unknown action {echoed(entry.head)}", entry, known(arities, entry.head, "action")
-            )
+            raise names.unknown("action", entry, arities)
         positions = tuple(_number(names, part) for part in entry.items[1:])
         if len(positions) != len(parameters) or any(p >= arities[entry.head] for p in positions):
             raise document.fail(

@@ -8,10 +8,9 @@ from pathlib import Path
 
 from planners.pddl.formulas import NUMBER, read_formula
 from planners.pddl.lifted import Atom, Domain, Formula, Problem
-from planners.pddl.names import Names, group, known, read_objects, token
+from planners.pddl.names import Names, group, read_objects, token
 from planners.pddl.sections import Sections, read_header
 from planners.pddl.sexpr import Document, Group, Source, Token, parse, read_source
-from planners.system.errors import Unsupported
 from planners.system.limits import reaching
 from planners.system.messages import echoed
 
@@ -31,11 +30,8 @@ def parse_problem(source: Source, domain: Domain) -> Problem:
     document = parse(source)
     name, sections = read_header(document, "problem")
     for section in sections.get(":domain", ()):
-        other = (
-            token(document, section.items[1], "the name of the domain").text
-            if len(section) > 1
-            else ""
-        )
+        given = section.items[1:2]
+        other = token(document, given[0], "the name of the domain").text if given else ""
         if other != domain.name:
             raise document.fail(
                 f"this is a problem for domain {echoed(other)}, not for {echoed(domain.name)}",
@@ -96,18 +92,13 @@ def _read_init(names: Names, item: Group, init: set[Atom], values: dict[Atom, fl
 def _refuse_other_states(document: Document, item: Group) -> None:
     """Raise `Unsupported` for what is said of a later state or of one of several states."""
     if item.head == "at" and len(item) == 3 and isinstance(item.items[2], Group):
-        raise Unsupported(
-            "timed initial literals are not supported",
-            position=document.source.position(item.offset),
-            remedy="coordlang reads classical PDDL: list what is true at the start.",
-        )
+        remedy = "coordlang reads classical PDDL: list what is true at the start."
+        raise document.unsupported("timed initial literals are", item, remedy)
     second = item.items[1] if len(item) > 1 else None
     if item.head in ("oneof", "unknown", "or") and isinstance(second, Group):
-        raise Unsupported(
-            f"an uncertain initial state '({item.head} ..)' is not supported",
-            position=document.source.position(item.offset),
-            remedy="coordlang reads problems with one initial state, known to all robots.",
-        )
+        remedy = "coordlang reads problems with one initial state, known to all robots."
+        what = f"an uncertain initial state '({item.head} ..)' is"
+        raise document.unsupported(what, item, remedy)
 
 
 def _read_value(names: Names, item: Group, values: dict[Atom, float]) -> None:
@@ -115,20 +106,10 @@ def _read_value(names: Names, item: Group, values: dict[Atom, float]) -> None:
     function = group(document, item.items[1], "a function in parentheses")
     number = item.items[2]
     if function.head not in names.functions and function.head != "total-cost":
-        raise document.fail(
-            f"unknown function {echoed(function.head)}",
-            function,
-            remedy=known(names.functions, function.head, "function"),
-        )
+        raise names.unknown("function", function, names.functions)
     if not isinstance(number, Token) or not NUMBER.match(number.text):
-        raise Unsupported(
-            "a function value that is no number is not supported",
-            position=document.source.position(item.offset),
-            remedy="As in (= (distance a b) 3).",
-        )
-    if function.head in names.functions:
-        error = names.arity(function, function.head, names.functions[function.head], "function")
-        if error:
-            raise error
-    args = tuple(names.term(term) for term in function.items[1:])
+        what, remedy = "a function value that is no number is", "As in (= (distance a b) 3)."
+        raise document.unsupported(what, item, remedy)
+    arities = names.functions.get(function.head, {len(function) - 1})
+    args = names.arguments(function, arities, "function")
     values[Atom(function.head, args)] = float(number.text)

@@ -8,7 +8,7 @@ import re
 from planners.pddl.formulas import read_effects, read_formula
 from planners.pddl.lifted import TRUE, Formula, Part, Schema
 from planners.pddl.names import Names, group, is_token, token, typed_list
-from planners.pddl.sexpr import SUBACTION, Comment, Document, Expression, Group, Token
+from planners.pddl.sexpr import SUBACTION, Document, Expression, Group, Token
 from planners.system.files import require_seen
 from planners.system.messages import echoed
 
@@ -163,7 +163,7 @@ def _read_parts(names: Names, item: Group) -> tuple[Part, ...]:
     return tuple(parts.values())
 
 
-def _read_part(names: Names, comment: Comment) -> Part:
+def _read_part(names: Names, comment: Token) -> Part:
     require_seen(comment.text, names.document.source.position(comment.offset), "comment")
     found = _PART.match(comment.text)
     if not found:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from planners.pddl.names import group, token
 from planners.pddl.sexpr import Document, Group
-from planners.system.errors import Unsupported
 from planners.system.messages import echoed
 
 #: Keyword -> the sections that it begins, in the order of the file.
@@ -55,11 +54,8 @@ def read_header(document: Document, kind: str) -> tuple[str, Sections]:
 def _require_known(document: Document, section: Group, kind: str) -> None:
     head = section.head
     if head in _UNSUPPORTED:
-        raise Unsupported(
-            f"{_UNSUPPORTED[head]} ({head}) are not supported",
-            position=document.source.position(section.offset),
-            remedy="coordlang reads classical PDDL with instantaneous actions.",
-        )
+        remedy = "coordlang reads classical PDDL with instantaneous actions."
+        raise document.unsupported(f"{_UNSUPPORTED[head]} ({head}) are", section, remedy)
     if head not in _SECTIONS[kind]:
         raise document.fail(
             f"unknown section {echoed(head)} in a {kind}",
@@ -70,22 +66,10 @@ def _require_known(document: Document, section: Group, kind: str) -> None:
 
 _SECTIONS = {
     "domain": {
-        ":requirements",
-        ":types",
-        ":constants",
-        ":predicates",
-        ":functions",
-        ":action",
-        ":concurrency-constraint",
-        ":positive-dependence",
+        *(":requirements", ":types", ":constants", ":predicates", ":functions", ":action"),
+        *(":concurrency-constraint", ":positive-dependence"),
     },
     "problem": {
-        ":domain",
-        ":requirements",
-        ":objects",
-        ":init",
-        ":goal",
-        ":metric",
-        ":length",
+        *(":domain", ":requirements", ":objects", ":init", ":goal", ":metric", ":length"),
     },
 }

@@ -15,7 +15,7 @@ from itertools import accumulate
 from pathlib import Path
 from unicodedata import normalize
 
-from planners.system.errors import BadInput, Position
+from planners.system.errors import BadInput, Position, Unsupported
 from planners.system.files import not_utf8, read_stored_bytes, require_seen
 from planners.system.messages import UNSEEN, echoed
 
@@ -53,6 +53,10 @@ def _read_tokens(text: str) -> Iterator[str]:
 
 #: What helps against an error of syntax that has no remedy of its own.
 _COMPARE = "`coordlang domains` lists domains that are read, to compare with."
+#: What helps against features that are not supported.
+_CLASSICAL = "coordlang reads classical PDDL: states of true and false facts."
+#: What helps against a file that is none of PDDL.
+_NO_PDDL = "Give a PDDL file: DOMAIN first, then PROBLEM."
 
 
 class Source:
@@ -72,11 +76,15 @@ class Source:
         line = bisect_right(self._line_starts, offset)
         return Position(self.name, line, offset - self._line_starts[line - 1] + 1)
 
+    def fail(self, what: str, offset: int, remedy: str) -> BadInput:
+        """An error that points at a character (the caller raises it)."""
+        return BadInput(what, position=self.position(offset), remedy=remedy)
+
     def section(self, name: str) -> Position:
         """Where a section such as ``:objects`` begins; the first parenthesis if there is none."""
-        positions = [m.start() for m in _TOKEN.finditer(self.text) if m.group().lower() == name]
-        positions += [m.start() for m in _TOKEN.finditer(self.text) if m.group() == "("][:1]
-        return self.position(positions[0] if positions else 0)
+        tokens = [(match[0].lower(), match.start()) for match in _TOKEN.finditer(self.text)]
+        found = (at for wanted in (name, "(") for text, at in tokens if text == wanted)
+        return self.position(next(found, 0))
 
     @property
     def sha256(self) -> str:
@@ -114,7 +122,7 @@ class JoinedSource(Source):
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    """A name, number, keyword or variable, in lower case (PDDL does not distinguish case)."""
+    """A name, number, keyword or variable in lower case, or a comment without its semicolons."""
 
     text: str
     offset: int
@@ -131,8 +139,7 @@ class Group:
     @property
     def head(self) -> str:
         """The first token, or the empty string."""
-        first = self.items[0] if self.items else None
-        return first.text if isinstance(first, Token) else ""
+        return _first(self.items)
 
     def __iter__(self) -> Iterator[Token | Group]:
         return iter(self.items)
@@ -145,25 +152,21 @@ Expression = Token | Group
 
 
 @dataclass(frozen=True, slots=True)
-class Comment:
-    """A comment without its semicolons."""
-
-    text: str
-    offset: int
-
-
-@dataclass(frozen=True, slots=True)
 class Document:
     """The one top-level expression of a PDDL file, with its comments."""
 
     source: Source
     root: Group
-    comments: tuple[Comment, ...]
+    comments: tuple[Token, ...]
 
-    def fail(self, what: str, at: Expression | Comment, remedy: str | None = None) -> BadInput:
+    def fail(self, what: str, at: Expression, remedy: str | None = None) -> BadInput:
         """An error that points at an expression (the caller raises it)."""
+        return self.source.fail(what, at.offset, remedy or _COMPARE)
+
+    def unsupported(self, feature: str, at: Expression, remedy: str = _CLASSICAL) -> Unsupported:
+        """The error for what PDDL has and coordlang has not (the caller raises it)."""
         position = self.source.position(at.offset)
-        return BadInput(what, position=position, remedy=remedy or _COMPARE)
+        return Unsupported(f"{feature} not supported", position=position, remedy=remedy)
 
 
 def read_source(path: str | Path) -> Source:
@@ -188,7 +191,7 @@ def _with_old_comments(data: bytes, name: str) -> str:
         raise BadInput(
             "this is a binary file, not PDDL text",
             position=Position(name),
-            remedy="Give a PDDL file: DOMAIN first, then PROBLEM.",
+            remedy=_NO_PDDL,
         )
     # Such a byte b is chr(0xdc00 + b) here, so that it comes back as it was.
     text = data.decode("utf-8-sig", "surrogateescape")
@@ -208,42 +211,29 @@ def parse(source: Source) -> Document:
     `planners.system.messages.UNSEEN`, or two names that Unicode makes one.
     """
     reader = _Reader(source)
-    _require_seen(source)
-    _require_told_apart(source)
+    _require_plain_names(source)
     for match in _TOKEN.finditer(source.text):
         reader.take(match.group(), match.start())
     return reader.document()
 
 
-def _require_seen(source: Source) -> None:
-    """Raise `BadInput` for a control character or another unseen one outside of comments."""
-    if not _UNSEEN_IN_NAME.search(source.text):
-        return
-    for match in _TOKEN.finditer(source.text):
-        if match[0][0] != ";":
-            require_seen(match[0], source.position(match.start()))
-
-
-def _require_told_apart(source: Source) -> None:
-    """Raise `BadInput` for two names that are one under Unicode's folding, and not just in case.
+def _require_plain_names(source: Source) -> None:
+    """Raise `BadInput` for names with unseen characters, and for two names that Unicode makes one.
 
     Such as ``ß`` and ``ss``, the sign for Kelvin and ``k``, or an accent in one or two characters:
     people would take them for one name, and programs now for one, now for two.
     """
-    if source.text.isascii():
+    if source.text.isascii() and not _UNSEEN_IN_NAME.search(source.text):
         return
+    names = [(m[0], m.start()) for m in _TOKEN.finditer(source.text) if m[0][0] != ";"]
+    for name, offset in names:
+        require_seen(name, source.position(offset))
     seen: dict[str, str] = {}
-    for match in _TOKEN.finditer(source.text):
-        name = match[0]
-        if name[0] == ";":
-            continue
+    for name, offset in names:
         other = seen.setdefault(normalize("NFKC", name).casefold(), name)
         if (name.lower(), name.upper()) != (other.lower(), other.upper()):
-            raise BadInput(
-                f"the names {other!a} and {name!a} are one name to Unicode",
-                position=source.position(match.start()),
-                remedy="Give one of them another name.",
-            )
+            what = f"the names {other!a} and {name!a} are one name to Unicode"
+            raise source.fail(what, offset, "Give one of them another name.")
 
 
 class _Reader:
@@ -251,59 +241,47 @@ class _Reader:
 
     def __init__(self, source: Source) -> None:
         self._source = source
-        self._comments: list[Comment] = []
+        self._comments: list[Token] = []
         self._open: list[tuple[int, list[Expression]]] = []
         self._root: Group | None = None
 
     def take(self, text: str, offset: int) -> None:
+        fail = self._source.fail
         if text[0] == ";":
-            self._comments.append(Comment(text.lstrip(";").strip().lower(), offset))
+            self._comments.append(Token(text.lstrip(";").strip().lower(), offset))
         elif self._root is not None:
-            raise self._error(
-                f"unexpected {echoed(text[:40])} after the end of the definition",
-                offset,
-                "Expected the end of the file: a parenthesis too many before this position?",
+            remedy = "Expected the end of the file: a parenthesis too many before this position?"
+            raise fail(
+                f"unexpected {echoed(text[:40])} after the end of the definition", offset, remedy
             )
         elif text == "(":
             if len(self._open) >= MAX_DEPTH:
-                raise self._error(
-                    f"nested more than {MAX_DEPTH} deep",
-                    offset,
-                    remedy="Is a ')' missing? No domain needs such nesting.",
-                )
+                remedy = "Is a ')' missing? No domain needs such nesting."
+                raise fail(f"nested more than {MAX_DEPTH} deep", offset, remedy)
             self._open.append((offset, []))
         elif text == ")":
             self._close(offset)
         elif not self._open:
-            raise self._error(
-                f"expected '(define ...', found {echoed(text[:40])}",
-                offset,
-                remedy="Give a PDDL file: DOMAIN first, then PROBLEM.",
-            )
+            raise fail(f"expected '(define ...', found {echoed(text[:40])}", offset, _NO_PDDL)
         else:
             self._require_place(text.lower())
             self._open[-1][1].append(Token(text.lower(), offset))
 
     def _require_place(self, text: str) -> None:
         """Raise `BadInput` if a section begins within another one."""
-        if text not in _SECTIONS or len(self._open) < 3 or self._open[-1][1]:
-            return
-        outer, items = self._open[1]
-        name = items[0].text if items and isinstance(items[0], Token) else ""
-        raise self._error(
-            f"{text!r} begins inside of another list: a ')' is missing before it",
-            self._open[-1][0],
-            f"'({name}' opens at {self._source.position(outer)} and is not closed: add "
-            f"{len(self._open) - 2} ')' before this position.",
-        )
+        if text in _SECTIONS and len(self._open) > 2 and not self._open[-1][1]:
+            outer, items = self._open[1]
+            raise self._source.fail(
+                f"{text!r} begins inside of another list: a ')' is missing before it",
+                self._open[-1][0],
+                f"'({_first(items)}' opens at {self._source.position(outer)} and is not closed: "
+                f"add {len(self._open) - 2} ')' before this position.",
+            )
 
     def _close(self, offset: int) -> None:
         if not self._open:
-            raise self._error(
-                "')' without a '('",
-                offset,
-                remedy="Remove it, or add the '(' that is missing before it.",
-            )
+            remedy = "Remove it, or add the '(' that is missing before it."
+            raise self._source.fail("')' without a '('", offset, remedy)
         start, items = self._open.pop()
         group = Group(tuple(items), start, offset)
         if self._open:
@@ -315,21 +293,19 @@ class _Reader:
         """The whole, when there is no more text."""
         if self._open:
             start, items = self._open[-1]
-            first = items[0].text if items and isinstance(items[0], Token) else ""
             inner = items[-1] if items and isinstance(items[-1], Group) else None
             last = f", after {self._source.position(inner.offset)}" if inner else ""
-            raise self._error(
-                f"the '({first}' that opens here is never closed",
+            raise self._source.fail(
+                f"the '({_first(items)}' that opens here is never closed",
                 start,
                 f"Expected {len(self._open)} more ')' before the end of the file{last}.",
             )
         if self._root is None:
-            raise BadInput(
-                "expected '(define ...', found an empty file",
-                position=Position(self._source.name),
-                remedy="Give a PDDL file: DOMAIN first, then PROBLEM.",
-            )
+            what = "expected '(define ...', found an empty file"
+            raise BadInput(what, position=Position(self._source.name), remedy=_NO_PDDL)
         return Document(self._source, self._root, tuple(self._comments))
 
-    def _error(self, what: str, offset: int, remedy: str | None = None) -> BadInput:
-        return BadInput(what, position=self._source.position(offset), remedy=remedy)
+
+def _first(items: Sequence[Expression]) -> str:
+    """The first token of a list, or the empty string."""
+    return items[0].text if items and isinstance(items[0], Token) else ""
