@@ -14,6 +14,8 @@ from planners.pddl.robots import objects_of
 
 #: Variable -> the object that it stands for.
 Binding = dict[str, str]
+#: What stands behind a predicate or an action.
+Arguments = tuple[str, ...]
 #: An atom without which an instance of a quantified part is no matter.
 Guard = Atom | StepAtom
 #: From this many values for the variables on, only subactions that are ever possible are tried.
@@ -50,19 +52,22 @@ class Bindings:
         problem: Problem,
         fluents: Set[str],
         statics: Iterable[Atom],
-        instances: Mapping[str, Sequence[tuple[str, ...]]],
+        instances: Mapping[str, Sequence[Arguments]],
     ) -> None:
         self._domain = domain
         self._problem = problem
         self._fluents = fluents
         self._members: dict[tuple[str, ...], dict[str, int]] = {}
-        self._facts: dict[tuple[str, int, str], list[tuple[str, ...]]] = {}
+        #: The arguments with which a guard's predicate is true, or its action possible.
+        self._true: dict[tuple[type[Guard], str], list[Arguments]] = {}
         for fact in statics:
-            for position, arg in enumerate(fact.args):
-                self._facts.setdefault((fact.predicate, position, arg), []).append(fact.args)
-        self._instances = instances
-        #: The possible subactions of an action by an argument; made for the actions it is asked of.
-        self._possible: dict[str, dict[tuple[int, str], list[tuple[str, ...]]]] = {}
+            self._true.setdefault((Atom, fact.predicate), []).append(fact.args)
+        for action, own in instances.items():
+            self._true[StepAtom, action] = [*own]
+        #: The same by each argument; made for the predicates and actions that are asked for.
+        self._by_argument: dict[
+            tuple[type[Guard], str], dict[tuple[int, str], list[Arguments]]
+        ] = {}
         # By identity; the formula stays alive here.
         self._quantified: dict[int, Quantified] = {}
 
@@ -100,10 +105,10 @@ class Bindings:
         names = [v.name for v in variables]
         members = [self.objects(v.types) for v in variables]
         outer = {name: value for name, value in binding.items() if name not in names}
-        known = self._known(statics, outer, names)
-        if steps and self._count(known, names, members) > _MANY:
+        known = [*self._known(statics, outer, names)]
+        if steps and _count(known, names, members) > _MANY:
             known += self._known(steps, outer, names)
-        rows: Iterable[tuple[str, ...]] = product(*members)
+        rows: Iterable[Arguments] = product(*members)
         if known:
             rows = self._unified(*min(known, key=lambda one: len(one[1])), outer, names, members)
         for values in rows:
@@ -111,61 +116,41 @@ class Bindings:
 
     def _known(
         self, guards: Sequence[Guard], outer: Binding, names: Sequence[str]
-    ) -> list[tuple[Guard, Sequence[tuple[str, ...]]]]:
-        """The guards of which some argument is known, with the facts that may match them."""
-        return [
-            (guard, found)
-            for guard in guards
-            if (found := self._facts_of(guard, outer, names)) is not None
-        ]
+    ) -> Iterator[tuple[Guard, Sequence[Arguments]]]:
+        """The guards with the facts that may match them, looked up by an argument that is known.
 
-    @staticmethod
-    def _count(
-        known: Sequence[tuple[Guard, Sequence[object]]],
-        names: Sequence[str],
-        members: Sequence[Mapping[str, int]],
-    ) -> int:
-        """How many values there are at most, by the guard that leaves the fewest facts."""
-        guard, facts = min(known, key=lambda one: len(one[1]), default=(None, (None,)))
-        given = guard.args if guard else ()
-        own = zip(names, members, strict=True)
-        return len(facts) * prod(len(objects) for name, objects in own if name not in given)
-
-    def _facts_of(
-        self, guard: Guard, outer: Binding, names: Sequence[str]
-    ) -> Sequence[tuple[str, ...]] | None:
-        """The facts that may match a guard, looked up by an argument that is known.
-
-        All possible subactions if none is; None for a static atom of which none is.
+        Of a static atom some argument is known; of a subaction of which none is, all are taken.
         """
-        known = [(n, outer.get(arg, arg)) for n, arg in enumerate(guard.args) if arg not in names]
-        if isinstance(guard, Atom):
-            lists = [self._facts.get((guard.predicate, n, value), []) for n, value in known]
-            return min(lists, key=len) if lists else None
-        if not known:
-            return self._instances.get(guard.action, ())
-        by_argument = self._possible_by_argument(guard.action)
-        return min((by_argument.get(one, []) for one in known), key=len)
+        for guard in guards:
+            given = [
+                (n, outer.get(arg, arg)) for n, arg in enumerate(guard.args) if arg not in names
+            ]
+            key = type(guard), guard.predicate if isinstance(guard, Atom) else guard.action
+            if given:
+                table = self._table(key)
+                yield guard, min((table.get(one, []) for one in given), key=len)
+            elif isinstance(guard, StepAtom):
+                yield guard, self._true.get(key, [])
 
-    def _possible_by_argument(self, action: str) -> dict[tuple[int, str], list[tuple[str, ...]]]:
-        found = self._possible.get(action)
-        if found is None:
-            found = self._possible[action] = {}
-            for args in self._instances.get(action, ()):
-                for key in enumerate(args):
-                    found.setdefault(key, []).append(args)
-        return found
+    def _table(self, key: tuple[type[Guard], str]) -> dict[tuple[int, str], list[Arguments]]:
+        table = self._by_argument.get(key)
+        if table is None:
+            table = self._by_argument[key] = {}
+            for args in self._true.get(key, ()):
+                for one in enumerate(args):
+                    table.setdefault(one, []).append(args)
+        return table
 
     @staticmethod
     def _unified(
         guard: Guard,
-        facts: Iterable[tuple[str, ...]],
+        facts: Iterable[Arguments],
         outer: Binding,
         names: Sequence[str],
         members: Sequence[dict[str, int]],
-    ) -> list[tuple[str, ...]]:
+    ) -> list[Arguments]:
         """All values under which the guard is one of the facts, in the order of the objects."""
-        rows: set[tuple[str, ...]] = set()
+        rows: set[Arguments] = set()
         for fact in facts:
             if len(fact) != len(guard.args):
                 continue
@@ -195,3 +180,15 @@ class Bindings:
             found = objects_of(self._domain, self._problem, types)
             self._members[types] = {name: number for number, name in enumerate(found)}
         return self._members[types]
+
+
+def _count(
+    known: Sequence[tuple[Guard, Sequence[object]]],
+    names: Sequence[str],
+    members: Sequence[Mapping[str, int]],
+) -> int:
+    """How many values there are at most, by the guard that leaves the fewest facts."""
+    guard, facts = min(known, key=lambda one: len(one[1]), default=(None, (None,)))
+    given = guard.args if guard else ()
+    own = zip(names, members, strict=True)
+    return len(facts) * prod(len(objects) for name, objects in own if name not in given)

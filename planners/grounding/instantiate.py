@@ -12,9 +12,8 @@ from itertools import product
 
 from planners.grounding.actions import GroundAction, GroundEffect
 from planners.grounding.bindings import Binding, Bindings
-from planners.grounding.interned import Interned
 from planners.grounding.reachability import reachable_arguments
-from planners.pddl.formula_tree import label, literals
+from planners.pddl.formula_tree import GroundLeaf, joined, label, literals
 from planners.pddl.formulas import MAX_COST
 from planners.pddl.lifted import (
     FALSE,
@@ -136,7 +135,8 @@ class _Grounder:
         self._statics = static_atoms(domain, problem)
         self._schemas = {schema.name: schema for schema in domain.schemas}
         self._bindings = Bindings(domain, problem, self._fluents, self._statics, reachable)
-        self._interned = Interned()
+        #: Every literal once: thousands of actions share what their preconditions have in common.
+        self._literals: dict[tuple[type[GroundLeaf], str, tuple[str, ...], bool], Formula] = {}
         #: The owners of a subaction that a formula names; None for arguments of other types.
         self._acting: dict[tuple[str, tuple[str, ...]], frozenset[int] | None] = {}
         #: Ground quantified formulas by the values of their free variables: actions share most.
@@ -185,7 +185,7 @@ class _Grounder:
         if isinstance(f, And | Or):
             kind = And if isinstance(f, And) == positive else Or
             ground = (self.formula(part, binding, positive, acting) for part in f.parts)
-            return self._interned.joined(kind, ground)
+            return joined(kind, ground)
         if isinstance(f, StepAtom):
             values = tuple([binding.get(a, a) for a in f.args])
             return self._step_atom(f.action, values, positive, acting)
@@ -203,7 +203,7 @@ class _Grounder:
             kind = And if isinstance(f, Forall) == positive else Or
             instances = self._bindings.values(f.variables, binding, known.statics, known.steps)
             ground = (self.formula(f.part, inner, positive, acting) for inner in instances)
-            found = self._quantified[key] = self._interned.joined(kind, ground)
+            found = self._quantified[key] = joined(kind, ground)
         return found
 
     def _state_literal(self, f: Truth | Equal | Atom, binding: Binding, positive: bool) -> Formula:
@@ -212,11 +212,10 @@ class _Grounder:
         if isinstance(f, Equal):
             same = binding.get(f.left, f.left) == binding.get(f.right, f.right)
             return TRUE if same == positive else FALSE
-        if f.predicate not in self._fluents:
-            atom = self._atom(f.predicate, f.args, binding)
-            return TRUE if (atom in self._statics) == positive else FALSE
         args = tuple([binding.get(a, a) for a in f.args])
-        return self._interned.literal(Atom, f.predicate, args, positive)
+        if f.predicate not in self._fluents:
+            return TRUE if (Atom(f.predicate, args) in self._statics) == positive else FALSE
+        return self._literal(Atom, f.predicate, args, positive)
 
     def _step_atom(
         self, action: str, args: tuple[str, ...], positive: bool, acting: tuple[int, ...]
@@ -229,7 +228,7 @@ class _Grounder:
             return FALSE if positive else TRUE
         if not positive and not owners.isdisjoint(acting):
             return TRUE
-        return self._interned.literal(StepAtom, action, args, positive)
+        return self._literal(StepAtom, action, args, positive)
 
     def _owners_named(self, action: str, args: tuple[str, ...]) -> frozenset[int] | None:
         schema = self._schemas[action]
@@ -249,11 +248,24 @@ class _Grounder:
         for inner in self._bindings.values(effect.variables, binding, guards):
             condition = self.formula(effect.condition, inner, True)
             if condition != FALSE:
-                atom = self._atom(effect.atom.predicate, effect.atom.args, inner)
+                atom = self._atom(effect.atom, inner)
                 yield GroundEffect(atom, effect.adds, condition)
 
-    def _atom(self, predicate: str, args: tuple[str, ...], binding: Binding) -> Atom:
-        return self._interned.atom(predicate, tuple([binding.get(a, a) for a in args]))
+    def _literal(
+        self, kind: type[GroundLeaf], name: str, args: tuple[str, ...], positive: bool
+    ) -> Formula:
+        key = kind, name, args, positive
+        found = self._literals.get(key)
+        if found is None:
+            found = kind(name, args) if positive else Not(self._literal(kind, name, args, True))
+            self._literals[key] = found
+        return found
+
+    def _atom(self, atom: Atom, binding: Binding) -> Atom:
+        args = tuple([binding.get(a, a) for a in atom.args])
+        found = self._literal(Atom, atom.predicate, args, True)
+        assert isinstance(found, Atom)
+        return found
 
     def _parts(self, schema: Schema, binding: Binding) -> tuple[str | None, ...]:
         if not schema.parts:
@@ -280,11 +292,9 @@ class _Grounder:
             owners = self._team.owners(schema, args)
             if len(owners) != 1:
                 continue
-            if isinstance(schema.cost, Atom):
-                atom = self._atom(schema.cost.predicate, schema.cost.args, binding)
-                if atom not in self._problem.values:
-                    continue
-            yield owners[0], self._cost(schema, binding)
+            cost = schema.cost
+            if not isinstance(cost, Atom) or self._atom(cost, binding) in self._problem.values:
+                yield owners[0], self._cost(schema, binding)
 
     def _cost(self, schema: Schema, binding: Binding) -> int:
         if schema.cost is None or isinstance(schema.cost, int):
@@ -295,7 +305,7 @@ class _Grounder:
                     remedy="Write costs in a larger unit, or leave out --cost makespan+cost.",
                 )
             return schema.cost or 0
-        atom = self._atom(schema.cost.predicate, schema.cost.args, binding)
+        atom = self._atom(schema.cost, binding)
         value = self._problem.values.get(atom)
         if value is None or not 0 <= value <= MAX_COST or value != int(value):
             raise BadInput(

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import TypeVar
 
 from planners.pddl.lifted import (
+    FALSE,
     TRUE,
     And,
     Atom,
@@ -144,20 +145,20 @@ def negated(formula: Formula) -> Formula:
 
 
 def joined(kind: type[And] | type[Or], parts: Iterable[Formula]) -> Formula:
-    """A flat conjunction or disjunction, with truth values simplified away."""
+    """A flat conjunction or disjunction with each part once and without truth values."""
     neutral = kind is And
-    kept: list[Formula] = []
+    kept: dict[Formula, None] = {}
     for part in parts:
         if isinstance(part, Truth):
             if part.value != neutral:
-                return part
+                return FALSE if neutral else TRUE
         elif isinstance(part, And | Or) and isinstance(part, kind):
-            kept += part.parts
+            kept.update(dict.fromkeys(part.parts))
         else:
-            kept.append(part)
-    if not kept:
-        return Truth(neutral)
-    return kept[0] if len(kept) == 1 else kind(tuple(kept))
+            kept[part] = None
+    if len(kept) == 1:
+        return next(iter(kept))
+    return kind(tuple(kept)) if kept else Truth(neutral)
 
 
 def substituted(formula: Formula, value: Callable[[GroundLeaf], Formula]) -> Formula:

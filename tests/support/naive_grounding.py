@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from itertools import product
 
 from planners.grounding.actions import GroundEffect
@@ -29,12 +28,6 @@ from planners.pddl.lifted import (
 from planners.pddl.robots import Team, fluent_predicates, objects_of, static_atoms
 
 Binding = dict[str, str]
-
-
-def joined_once(kind: type[And] | type[Or], parts: Iterable[Formula]) -> Formula:
-    """A flat conjunction or disjunction in which no part stands twice."""
-    whole = joined(kind, parts)
-    return joined(kind, dict.fromkeys(whole.parts)) if isinstance(whole, kind) else whole
 
 
 class NaiveGrounding:
@@ -72,15 +65,13 @@ class NaiveGrounding:
                 return self.formula(part, binding, not positive, acting)
             case And(parts) | Or(parts):
                 kind = And if isinstance(f, And) == positive else Or
-                return joined_once(
+                return joined(
                     kind, [self.formula(part, binding, positive, acting) for part in parts]
                 )
             case Forall(variables, part) | Exists(variables, part):
                 kind = And if isinstance(f, Forall) == positive else Or
                 inner = self._bindings(variables, binding)
-                return joined_once(
-                    kind, [self.formula(part, own, positive, acting) for own in inner]
-                )
+                return joined(kind, [self.formula(part, own, positive, acting) for own in inner])
             case Truth(value):
                 return Truth(value == positive)
             case Equal(left, right):
@@ -119,8 +110,7 @@ def without_impossible(formula: Formula, possible: frozenset[StepAtom]) -> Formu
     def value(leaf: Atom | StepAtom) -> Formula:
         return FALSE if isinstance(leaf, StepAtom) and leaf not in possible else leaf
 
-    once = substituted(formula, value)
-    return joined_once(type(once), once.parts) if isinstance(once, And | Or) else once
+    return substituted(formula, value)
 
 
 def _put(args: tuple[str, ...], binding: Binding) -> tuple[str, ...]:

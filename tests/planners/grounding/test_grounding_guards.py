@@ -15,10 +15,10 @@ from planners.grounding import ground_actions
 from planners.grounding.actions import GroundAction
 from planners.grounding.bindings import Bindings
 from planners.grounding.instantiate import _Grounder
-from planners.grounding.interned import Interned
 from planners.loading import build
 from planners.pddl import parse_domain, parse_problem
-from planners.pddl.lifted import FALSE, And, Formula, StepAtom
+from planners.pddl.formula_tree import literals
+from planners.pddl.lifted import FALSE, Formula, StepAtom
 from planners.pddl.model_options import ModelOptions, Unowned
 from planners.pddl.robots import find_team
 from planners.pddl.sexpr import Source
@@ -104,12 +104,10 @@ def test_random_models() -> None:
         assert fast == slow
 
 
-def test_actions_share_their_formulas() -> None:
+def test_actions_share_their_atoms() -> None:
     text = DOMAIN.format(condition="(not (lit ?p)) (or (lit home) (exists (?x) (lit ?x)))")
-    preconditions = [a.precondition for a in grounded(text.replace("(at ?r ?p)", ""), PROBLEM)]
-    parts = [{id(p) for p in f.parts} for f in preconditions if isinstance(f, And)]
-    assert len(parts) > 2
-    assert len(set.intersection(*parts)) == 1
+    leaves = [leaf for a in grounded(text, PROBLEM) for leaf, _ in literals(a.precondition)]
+    assert len({*map(id, leaves)}) == len({*leaves}) < len(leaves)
 
 
 STEP_CONDITIONS = [
@@ -148,13 +146,13 @@ def test_only_possible_subactions_are_tried_where_there_are_many(
 def test_what_is_possible_is_looked_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of 9,000 subactions that a precondition forbids, the few that can be done are looked at."""
     asked: list[str] = []
-    original = Interned.literal
+    original = _Grounder._step_atom
 
-    def counting(self: Interned, kind: type, name: str, *rest: object) -> object:
+    def counting(self: _Grounder, name: str, *rest: object) -> object:
         asked.append(name)
-        return original(self, kind, name, *rest)  # type: ignore[arg-type]
+        return original(self, name, *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(Interned, "literal", counting)
+    monkeypatch.setattr(_Grounder, "_step_atom", counting)
     places = " ".join(f"q{n}" for n in range(3000))
     problem = PROBLEM.replace("p1 - place", f"p1 {places} - place")
     domain = DOMAIN.format(
@@ -180,7 +178,7 @@ def test_the_facts_are_looked_up(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = PROBLEM.replace("p1 - place", f"p1 {places} - place")
     grounded(DOMAIN.format(condition=CONDITIONS[0]), problem)
     few, tried = tried, 0
-    monkeypatch.setattr(Bindings, "_facts_of", lambda *_: None)
+    monkeypatch.setattr(Bindings, "_known", lambda *_: ())
     grounded(DOMAIN.format(condition=CONDITIONS[0]), problem)
     assert 20 * few < tried
 
