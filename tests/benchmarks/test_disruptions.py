@@ -29,12 +29,7 @@ from tests.support.task_languages import task_languages, three_cells
 def groups(one: TaskLanguage) -> dict[tuple[int, ...], list[Plan]]:
     """The plans of each sentence."""
     of_state = dict(zip(one.space.state.tolist(), one.word.tolist(), strict=True))
-    found: dict[tuple[int, ...], list[Plan]] = {}
-    for plan in naive.listed(one.space, one.task, 10_000):
-        found.setdefault(
-            naive.sentence([of_state[s] for s in naive.states(one.space, one.task, plan)]), []
-        ).append(plan)
-    return found
+    return naive.by_sentence(one.space, one.task, of_state.__getitem__, 10_000)
 
 
 def succeed(plans: list[Plan], disruption: Disruption) -> bool:

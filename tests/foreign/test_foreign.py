@@ -15,6 +15,8 @@ import pytest
 from coordlang.commands.main import run
 from coordlang.language.patterns import varied_tasks
 from coordlang.required.miscoordination import Inseparable
+from planners.classical.fast_downward import optimal_cost
+from planners.search.optimal_plans import search
 from tests.support import foreign_tasks as foreign
 from tests.support.domains import SHARED
 from tests.support.foreign_tasks import (
@@ -58,11 +60,14 @@ def test_numbers(row: Row, capfd: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("limit", "cost"), [(2000, "makespan"), (0, "makespan+actions")])
 @pytest.mark.parametrize("row", SMALL, ids=lambda row: row.name)
-def test_fast_downward_agrees(row: Row, capfd: pytest.CaptureFixture[str]) -> None:
-    checked = output(capfd, "check", *row.arguments, "--json", "--cost", "makespan+actions")
-    assert checked["agree"]
-    assert checked["fast_downward"][0] == row.known[1]  # type: ignore[index]
+def test_fast_downward_agrees(row: Row, limit: int, cost: str) -> None:
+    loaded = load(row, cost)
+    answer = optimal_cost(loaded.model, loaded.tasks[0], limit=limit).cost
+    assert answer == search(loaded.model, loaded.tasks[0]).cost_of(0)
+    assert answer is not None
+    assert answer[0] == row.known[1]
 
 
 def test_both_forms_of_workshop_have_the_same_plans_of_fewest_actions(

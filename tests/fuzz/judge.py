@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tests.fuzz.mutants import Mutant, arguments_of, mutant
-from tests.fuzz.runner import Outcome, Runner
+from tests.fuzz.runner import Outcome, run
 from tests.fuzz.sources import Pair
 
 #: docs/cli.md.  32 is left out: no external program should fail here.
@@ -115,27 +115,24 @@ def fuzz(
         tempfile.TemporaryDirectory(prefix="fuzz-") as name,
         contextlib.suppress(KeyboardInterrupt),
     ):
-        folder = Path(name)
-        runner = Runner(folder)
-        try:
-            for done, number in enumerate(numbers):
-                m = mutant(number, seed, sources)
-                if only_light and not m.light:
-                    continue
-                _judge(m, runner, folder / "work", report, keep)
-                if done % 20 == 0:
-                    progress(f"{done} of {len(numbers)}")
-        finally:
-            runner.close()
+        for done, number in enumerate(numbers):
+            m = mutant(number, seed, sources)
+            if only_light and not m.light:
+                continue
+            _judge(m, Path(name), report, keep)
+            if done % 20 == 0:
+                progress(f"{done} of {len(numbers)}")
     return report
 
 
-def _judge(m: Mutant, runner: Runner, work: Path, report: Report, keep: Path | None) -> None:
+def _judge(m: Mutant, folder: Path, report: Report, keep: Path | None) -> None:
+    work = folder / "work"
+    work.mkdir(exist_ok=True)
     (work / "domain.pddl").write_bytes(m.domain)
     (work / "problem.pddl").write_bytes(m.problem)
     language = work / "language.json"
     language.unlink(missing_ok=True)
-    outcome = runner.run(arguments_of(m), fresh=m.number % _FRESH == 0)
+    outcome = run(folder, arguments_of(m), fresh=m.number % _FRESH == 0)
     report.codes[m.command, "killed" if outcome.code is None else str(outcome.code)] += 1
     report.slowest = sorted(
         [*report.slowest, (outcome.seconds, f"#{m.number} {m.pair.name}, {m.what}")]

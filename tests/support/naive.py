@@ -5,11 +5,14 @@ only.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Hashable, Iterator
 from itertools import product
+from typing import TypeVar
 
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, counts
+
+Word = TypeVar("Word", bound=Hashable)
 
 
 class TooLarge(Exception):
@@ -23,7 +26,7 @@ class _Listing:
         self.space = space
         self.counted = counts(space)
         self.plans: dict[int, list[Plan]] = {}
-        self.states: dict[int, list[tuple[int, ...]]] = {}
+        self.states: dict[tuple[int, Plan], tuple[int, ...]] = {}
 
 
 #: The listings of the plan spaces looked at last, by the space's identity (they keep it alive).
@@ -93,24 +96,30 @@ def minimal(found: set[tuple[int, frozenset[int]]]) -> set[tuple[int, frozenset[
     }
 
 
-def sentence(words: list[int]) -> tuple[int, ...]:
+def sentence(words: list[Word]) -> tuple[Word, ...]:
     return tuple(word for n, word in enumerate(words) if n == 0 or word != words[n - 1])
+
+
+def by_sentence(
+    space: PlanSpace, task: int, word: Callable[[int], Word], most: int
+) -> dict[tuple[Word, ...], list[Plan]]:
+    """All optimal plans of a task by their sentences, for the word of each state."""
+    groups: dict[tuple[Word, ...], list[Plan]] = {}
+    for plan in listed(space, task, most):
+        passed = _listing(space).states
+        if (task, plan) not in passed:
+            passed[task, plan] = states(space, task, plan)
+        said = sentence([word(state) for state in passed[task, plan]])
+        groups.setdefault(said, []).append(plan)
+    return groups
 
 
 def is_language(space: PlanSpace, word_of_state: dict[int, int], most: int) -> bool:
     """By definition: for every task and sentence, the optimal plans with that sentence are RC-free."""
-    robots = len(space.model.robots)
     for task in range(len(space.starts)):
-        plans = listed(space, task, most)
-        passed = _listing(space).states
-        if task not in passed:
-            passed[task] = [states(space, task, plan) for plan in plans]
-        good = set(plans)
-        groups: dict[tuple[int, ...], list[Plan]] = {}
-        for plan, through in zip(plans, passed[task], strict=True):
-            key = sentence([word_of_state[s] for s in through])
-            groups.setdefault(key, []).append(plan)
+        groups = by_sentence(space, task, word_of_state.__getitem__, most)
+        good = {plan for group in groups.values() for plan in group}
         for group in groups.values():
-            if any(mixture(chosen) not in good for chosen in product(group, repeat=robots)):
+            if any(mixture(chosen) not in good for chosen in product(group, repeat=space.robots)):
                 return False
     return True

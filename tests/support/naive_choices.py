@@ -25,14 +25,9 @@ Known = tuple[frozenset[str], frozenset[str]]
 
 def sentences(task_language: TaskLanguage, most: int) -> dict[tuple[int, ...], list[Plan]]:
     """All optimal plans of the task by their sentence; raises `naive.TooLarge`."""
-    groups: dict[tuple[int, ...], list[Plan]] = {}
-    word = task_language.partition.word_of(task_language.space.rows)
-    for plan in naive.listed(task_language.space, task_language.task, most):
-        said = naive.sentence(
-            [int(word[s]) for s in naive.states(task_language.space, task_language.task, plan)]
-        )
-        groups.setdefault(said, []).append(plan)
-    return groups
+    space = task_language.space
+    word = task_language.partition.word_of(space.rows).tolist()
+    return naive.by_sentence(space, task_language.task, word.__getitem__, most)
 
 
 @dataclass

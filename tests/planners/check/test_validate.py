@@ -5,14 +5,8 @@ it.
 
 from __future__ import annotations
 
-import ast
-import inspect
-
 import pytest
 
-import planners.check.meaning
-import planners.check.rules
-import planners.check.validate
 from planners.check.rules import Rules
 from planners.check.validate import Labels, Verdict, validate
 from planners.pddl import parse_domain, parse_problem
@@ -620,30 +614,3 @@ def test_the_parts_determine_the_result() -> None:
     assert validate(
         *world(AMBIGUOUS.format(when="(q)", effect="(q)"), problem), [["(do)", None]]
     ).valid
-
-
-# -- independence
-# -------------------------------------------------------------------------------------------------
-
-
-def test_the_checker_shares_only_the_nouns() -> None:
-    imported: set[str | None] = set()
-    for module in (planners.check.validate, planners.check.rules, planners.check.meaning):
-        tree = ast.parse(inspect.getsource(module))
-        imported |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
-        imported |= {
-            alias.name
-            for node in ast.walk(tree)
-            if isinstance(node, ast.Import)
-            for alias in node.names
-        }
-    imported -= {"planners.check.rules", "planners.check.meaning"}
-    ours = {name for name in imported if name and name.startswith("planners")}
-    # Besides the nouns: the errors, and how their messages quote what a file holds.
-    assert ours == {
-        "planners.system.errors",
-        "planners.system.messages",
-        "planners.pddl.lifted",
-        "planners.pddl.robots",
-    }
-    assert "numpy" not in imported
