@@ -66,18 +66,15 @@ def build(
     depends on where tasks start.
     """
     options = options or ModelOptions()
-    if options.remember_actions and "last" in domain.predicates:
-        raise UsageError(
-            "--remember-actions writes facts (last ROBOT ACTION), but this domain has a predicate "
-            "'last'",
-            remedy="Rename the predicate.",
-        )
-    if options.words_see_slack and SLACK_LEFT in domain.predicates:
-        raise UsageError(
-            f"--words-see-slack writes facts ({SLACK_LEFT} N), but this domain has a predicate "
-            f"{SLACK_LEFT!r}",
-            remedy="Rename the predicate.",
-        )
+    for is_used, option, name, args in (
+        (options.remember_actions, "--remember-actions", "last", "ROBOT ACTION"),
+        (options.words_see_slack, "--words-see-slack", SLACK_LEFT, "N"),
+    ):
+        if is_used and name in domain.predicates:
+            raise UsageError(
+                f"{option} writes facts ({name} {args}), but this domain has a predicate {name!r}",
+                remedy="Rename the predicate.",
+            )
     first = problems[0]
     for other in problems[1:]:
         _check_same_world(domain, first, other)

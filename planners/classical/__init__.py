@@ -26,7 +26,7 @@ from planners.classical.positive import with_positive_conditions, with_positive_
 from planners.classical.selection import select_then_apply
 from planners.classical.selectors import Selectors, selectors_of
 from planners.classical.task import LONGEST, ClassicalAction, ClassicalTask, Condition, Form
-from planners.classical.writer import Writer, state_literals
+from planners.classical.writer import Writer
 from planners.joint.model import Goal, JointModel, PlanningTask, show
 
 __all__ = [
@@ -61,13 +61,11 @@ def compile_classical(
     team = selectors_of(model)
     step_cost = team.highest_cost * longest + 1
     out, form = _written(team, model, task.goal, step_cost, limit)
-    true_at_first = set(model.codec.true_facts(task.init))
-    true = {out.fact(atom) for atom, holds in state_literals(model, true_at_first).items() if holds}
     return ClassicalTask(
         name=task.name,
         form=form,
         facts=tuple(show(atom) for atom in out.facts),
-        init=frozenset(true | out.init),
+        init=frozenset({*model.codec.true_facts(task.init), *out.init}),
         actions=tuple(out.actions),
         goal=out.goal,
         step_cost=step_cost,

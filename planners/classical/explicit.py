@@ -9,7 +9,6 @@ from planners.classical.selectors import Selectors
 from planners.classical.task import Known
 from planners.classical.writer import (
     Writer,
-    fact_atoms,
     goal_formula,
     known_literals,
     own_fact,
@@ -29,7 +28,7 @@ def explicit(team: Selectors, model: JointModel, goal: Goal, step_cost: int, lim
 
     One per case where it has disjunctions or conditional effects.
     """
-    out = Writer(fact_atoms(model))
+    out = Writer(model.codec.facts)
     for step in _joint_steps(team, limit):
         for known, adds, deletes in _cases_of(team, model, step):
             cost = step_cost + team.second_cost(step)

@@ -18,7 +18,6 @@ from planners.classical.staged import STAGES, StagedAction, selected, staged_act
 from planners.classical.task import Known
 from planners.classical.writer import (
     Writer,
-    fact_atoms,
     goal_formula,
     known_literals,
     own_fact,
@@ -44,7 +43,7 @@ def select_then_apply(team: Selectors, model: JointModel, goal: Goal, step_cost:
     """
     value = _of_selections(team, model)
     actions = staged_actions(team, value)
-    form = _SelectThenApply(Writer(fact_atoms(model)), team, actions, step_cost)
+    form = _SelectThenApply(Writer(model.codec.facts), team, actions, step_cost)
     for robot in range(len(team.names)):
         form.write_robot(robot)
     form.write_goal(goal_formula(model, goal))

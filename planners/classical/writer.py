@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Iterable
 
 from planners.classical.task import ClassicalAction, Condition, Known
 from planners.joint.model import FullState, Goal, JointModel
@@ -12,7 +12,10 @@ from planners.pddl.lifted import FALSE, And, Atom, Formula, Not, Or
 
 
 class Writer:
-    """Collects facts and actions; equal actions are written once."""
+    """Collects facts and actions; equal actions are written once.
+
+    The facts of a model come first, with the numbers that they have there.
+    """
 
     def __init__(self, facts: Iterable[Atom]) -> None:
         self.facts: dict[Atom, int] = {atom: n for n, atom in enumerate(facts)}
@@ -153,22 +156,11 @@ def own_fact(kind: str, *args: str) -> Atom:
     return Atom(kind, args)
 
 
-def fact_atoms(model: JointModel) -> list[Atom]:
-    """The fluent atoms of a model in the order of their numbers."""
-    numbers = model.codec.facts.index
-    return sorted(numbers, key=numbers.__getitem__)
-
-
-def state_literals(model: JointModel, true: Collection[int]) -> dict[Atom, bool]:
-    """The value of each fact in the state in which just these facts are true."""
-    return {atom: number in true for number, atom in enumerate(model.codec.facts)}
-
-
 def goal_formula(model: JointModel, goal: Goal) -> Formula:
     """A goal over facts of the model; a fact that can never be true is replaced by its value."""
     if isinstance(goal, FullState):
-        values = state_literals(model, set(goal.facts))
-        return And(tuple(atom if value else Not(atom) for atom, value in values.items()))
+        facts = enumerate(model.codec.facts)
+        return And(tuple(atom if n in goal.facts else Not(atom) for n, atom in facts))
     return substituted(goal, state_reader(model))
 
 

@@ -24,6 +24,7 @@ from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
 from planners.search.reachable import Space, explore
 from tests.support.domains import DOMAINS, Worlds
+from tests.support.readme_tables import Row, tables
 
 #: Table 1 of the paper: problem, tasks, states.
 ALL_TASKS = [
@@ -43,6 +44,7 @@ FILTERED = [
     ("gwb8-4x4", 956, 132, 6),
 ]
 STYLES = ("grid", "grid-joint")
+MAPS = (*STYLES, "three-cells", "t-map", "corridor")
 
 
 def to_every_state(space: Space) -> PlanSpace:
@@ -228,49 +230,36 @@ def test_who_uses_the_passing_place_of_the_corridor(world: Worlds) -> None:
     assert aside == {(True, False): 16, (False, True): 16}
 
 
-def readme_rows() -> list[tuple[str, str, dict[str, int]]]:
-    """(folder, problem, numbers by column) for every row of a README table about problems."""
-    found = []
-    for readme in sorted(DOMAINS.glob("*/README.md")):
-        for table in re.findall(r"^\| problem \|.*\n(?:\|.*\n)+", readme.read_text(), re.MULTILINE):
-            columns, _, *rows = (
-                [entry.strip() for entry in line.split("|")[1:-1]] for line in table.splitlines()
-            )
-            for row in rows:
-                values = dict(zip(columns, row, strict=True))
-                numbers = {key: int(values[key]) for key in ("states", "makespan", "optimal plans")}
-                found.append((readme.parent.name, row[0], numbers))
-    return found
+README = [
+    (readme.parent.name, row)
+    for readme in sorted(DOMAINS.glob("*/README.md"))
+    for row in tables(readme.parent.name, "problem")
+]
 
 
 def test_every_problem_is_in_a_readme() -> None:
-    told = {(folder, problem) for folder, problem, _ in readme_rows()}
+    told = {(folder, row["problem"]) for folder, row in README}
     there = {(p.parent.name, p.stem) for p in DOMAINS.glob("*/*.pddl") if p.stem != "domain"}
     assert told == there
 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(
-    ("folder", "problem", "told"),
+    ("folder", "row"),
     [
         pytest.param(
-            *row,
-            id=f"{row[0]}-{row[1]}",
-            marks=[pytest.mark.slow] if row[2]["states"] > 4000 else [],
+            *(folder, row),
+            id=f"{folder}-{row['problem']}",
+            marks=[pytest.mark.slow] if int(row["states"]) > 4000 else [],
         )
-        for row in readme_rows()
+        for folder, row in README
+        if folder in MAPS  # the other worlds: test_robot_worlds
     ],
 )
-def test_the_numbers_in_the_readme_files(
-    world: Worlds, folder: str, problem: str, told: dict[str, int]
-) -> None:
-    here = world(folder, problem)
-    seen = {
-        "states": len(here.space),
-        "makespan": here.plans.cost_of(0)[0],
-        "optimal plans": Plans.of(here.plans).count,
-    }
-    assert seen == told
+def test_the_numbers_in_the_readme_files(world: Worlds, folder: str, row: Row) -> None:
+    here = world(folder, row["problem"])
+    seen = (len(here.space), here.plans.cost_of(0)[0], Plans.of(here.plans).count)
+    assert seen == tuple(int(row[key]) for key in ("states", "makespan", "optimal plans"))
 
 
 @pytest.mark.parametrize(
