@@ -3,7 +3,7 @@
 
 Divergences at a node depend on its goal only, so the goals are cut into portions, and each is a
 job (`planners.parallel`).  Of goals that are images of each other under a symmetry one is
-looked at (`coordlang.symmetry.goals`).  Few or small ones are one portion, and done here.
+looked at (`coordlang.symmetry.goals`).
 """
 
 from __future__ import annotations
@@ -19,15 +19,10 @@ from coordlang.required.divergences import (
     Divergences,
     FirstDifferences,
     first_differences,
+    minimal,
     states_on_plans,
 )
-from coordlang.required.miscoordination import (
-    Inseparable,
-    inseparable,
-    require_separable,
-    separable,
-)
-from coordlang.required.partings import minimal
+from coordlang.required.miscoordination import Inseparable, inseparable, separable
 from coordlang.symmetry.goals import SymmetricGoals, symmetric_goals
 from planners.joint.tables import Ints
 from planners.parallel.batch import Batch, Table, digest
@@ -65,11 +60,6 @@ def differences(
         tables_of_some = _tables(some, workers, progress, portion)
         if not _inseparable(tables_of_some):
             return _spread(_together(tables_of_some), goals)
-    if len(cut(source.efforts, portion)) == 1:
-        progress("looking for inseparable plans")
-        require_separable(candidates.spaces)
-        progress("looking where coordination is required")
-        return Differences(first_differences(candidates.spaces), states_on_plans(candidates.spaces))
     found = _tables(_Goals(source, None), workers, progress, portion)
     if _inseparable(found):
         witness = inseparable(source.portion(cut(source.efforts, portion)[len(found) - 1]))
@@ -133,25 +123,16 @@ def _spread(found: Differences, goals: SymmetricGoals) -> Differences:
 def _differences(shared: _Goals, goals: range) -> Table:
     """One job: the tasks of some goals."""
     space = shared.source.portion(goals)
-    if not len(space):  # nothing leads to these goals
-        return _table(None, np.zeros((0, 1 + space.robots), np.int64), space.state)
     if not separable(space):
         return {"inseparable": np.array(True)}
     times = None if shared.spoken_for is None else [shared.spoken_for[goals.start : goals.stop]]
     found = first_differences([space], times)
-    rows = np.column_stack((found.divergences.last, found.divergences.following))
-    return _table(found, rows, states_on_plans([space]))
-
-
-def _table(found: FirstDifferences | None, rows: Ints, states: Ints) -> Table:
-    figures = np.zeros(5, np.int64)
-    if found is not None:
-        figures[:] = found.requiring, found.nodes, found.edges, found.sets, found.evaluations
+    figures = [found.requiring, found.nodes, found.edges, found.sets, found.evaluations]
     return {
         "inseparable": np.array(False),
-        "divergences": rows,
-        "figures": figures,
-        "states": states,
+        "divergences": np.column_stack((found.divergences.last, found.divergences.following)),
+        "figures": np.array(figures, np.int64),
+        "states": states_on_plans([space]),
     }
 
 

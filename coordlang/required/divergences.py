@@ -2,18 +2,27 @@
 """First differences: where plans that introduce RC part, over all candidate tasks.
 
 The sets ``alpha*`` of the paper's Theorem 3: Proposition 3 of docs/concepts.md.
+
+At a node ``p`` a set of two or more different next nodes is a divergence iff for some way to give
+each robot one of them, all of them used, some choice of labels into these nodes, and of sequences
+from there on, is no optimal plan.  Minimal sets say all.  A set of states that is known to be a
+divergence, from another goal, is not looked at again.
+
+Whole tables are handled at a time: that there is no mixed step, or that a robot's choices are none
+where the mixed step leads, decides nearly all sets, and only the others are looked at one by one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations, product
 
 import numpy as np
 
 from coordlang.required.choices import Choices, LabelSets
-from coordlang.required.partings import Partings
-from planners.joint.tables import Bools, Ints
+from planners.joint.tables import Bools, Ints, find_rows, ranges, spans, unique_rows, unique_tuples
+from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 
 
@@ -67,7 +76,7 @@ def first_differences(
         tasks, nodes and edges are counted so often.
     """
     sets = LabelSets()
-    partings = Partings(spaces[0].robots)
+    search = DivergenceSearch(spaces[0].robots)
     requiring = nodes = edges = evaluations = 0
     for number, space in enumerate(spaces):
         choices = Choices(space, sets)
@@ -76,9 +85,9 @@ def first_differences(
         requiring += int(counts[space.starts][choices.requires[space.starts]].sum())
         nodes += int(counts.sum())
         edges += int((counts * space.out_degrees).sum())
-        partings.add(choices)
+        search.add(choices)
         evaluations += choices.evaluations
-    table = partings.table()
+    table = search.table()
     return FirstDifferences(
         Divergences(table[:, 0], table[:, 1:]),
         requiring,
@@ -97,3 +106,262 @@ def required_nodes(space: PlanSpace) -> Bools:
 def states_on_plans(spaces: Sequence[PlanSpace]) -> Ints:
     """The numbers of the states that lie on some optimal plan of some candidate task, sorted."""
     return np.unique(np.concatenate([space.state for space in spaces]))
+
+
+#: Rows of a table handled together.
+_CHUNK = 1_000_000
+#: Values a coded tuple may have.
+_MOST = 2**63 - 1
+
+
+class DivergenceSearch:
+    """The divergences found so far, over as many plan spaces of one table of states as are added.
+
+    They are sets of up to as many next states as there are robots.
+    """
+
+    def __init__(self, robots: int, chunk: int = _CHUNK) -> None:
+        self._robots, self._chunk = robots, chunk
+        #: For each number of next states.
+        self._known: dict[int, _KnownSets] = {}
+
+    def add(self, choices: Choices) -> None:
+        """Look for divergences at the nodes of a plan space that require coordination."""
+        space = choices.space
+        for size in range(2, self._robots + 1):
+            self._known.setdefault(size, _KnownSets(size, len(space.rows)))
+        nodes = np.flatnonzero(choices.requires)
+        index = EdgeIndex.of(space)
+        for span in spans(space.out_degrees[nodes].astype(np.float64) ** 2, self._chunk):
+            here = _Mixing(choices, index, nodes[span])
+            self._look(here, here.pairs())
+
+    def _look(self, here: _Mixing, sets: Ints) -> None:
+        """Look at sets of next nodes of one size, then at larger ones without a divergence."""
+        known = self._known[sets.shape[1]]
+        rows = here.states_of(sets)
+        open_rows = ~known.has(rows)
+        sets, rows = sets[open_rows], rows[open_rows]
+        different, number = unique_tuples(rows, [known.states] * rows.shape[1])
+        fails = here.failing(sets, number, len(different))
+        known.enter(different[fails])
+        if sets.shape[1] == self._robots:
+            return
+        good = sets[~fails[number]]
+        for span in spans(here.nodes_after(good).astype(np.float64), self._chunk):
+            larger = here.extended(good[span])
+            self._look(here, larger[self._minimal(here, larger)])
+
+    def _minimal(self, here: _Mixing, sets: Ints) -> Bools:
+        """Which sets hold no smaller known divergence that has their last next node."""
+        keep = np.ones(len(sets), np.bool_)
+        last = sets.shape[1] - 1
+        for size in range(2, sets.shape[1]):
+            for others in combinations(range(last), size - 1):
+                left = np.flatnonzero(keep)
+                some = sets[left][:, [*others, last]]
+                keep[left] = ~self._known[size].has(here.states_of(some))
+        return keep
+
+    def table(self) -> Ints:
+        """The divergences, (k, 1 + robots): the last shared state, then next states, sorted.
+
+        Filled up with -1; only those that no other one implies.
+        """
+        filled = [np.zeros((0, 1 + self._robots), np.int64)]
+        for size, known in self._known.items():
+            filled.append(np.full((len(known.rows), 1 + self._robots), -1))
+            filled[-1][:, : 1 + size] = known.rows
+        return minimal(np.concatenate(filled))
+
+
+def minimal(rows: Ints) -> Ints:
+    """The divergences (as in `DivergenceSearch.table`) that no other one implies, sorted."""
+    states = int(rows.max(initial=0)) + 1
+    sizes = (rows[:, 1:] >= 0).sum(axis=1)
+    known: dict[int, _KnownSets] = {}
+    kept = [rows[:0]]
+    for size in np.unique(sizes).tolist():
+        known[size] = _KnownSets(size, states)
+        known[size].enter(rows[sizes == size][:, : 1 + size])
+        own = known[size].rows
+        implied = np.zeros(len(own), np.bool_)
+        for smaller in sorted(known)[:-1]:
+            for some in combinations(range(1, 1 + size), smaller):
+                implied |= known[smaller].has(own[:, [0, *some]])
+        filled = np.full((int((~implied).sum()), rows.shape[1]), -1)
+        filled[:, : 1 + size] = own[~implied]
+        kept.append(filled)
+    found = np.concatenate(kept)
+    return found[np.lexsort(found.T[::-1])]
+
+
+class _KnownSets:
+    """A table of rows (state, next states), all of one size, in which rows are looked up.
+
+    ``states`` is one more than the largest number of a state.  Rows are packed into one number each
+    where that fits.
+    """
+
+    def __init__(self, size: int, states: int) -> None:
+        self.states = states
+        self.rows: Ints = np.zeros((0, 1 + size), np.int64)
+        self._packs = float(states) ** (1 + size) < _MOST
+        self._codes: Ints = np.zeros(0, np.int64)
+
+    def has(self, rows: Ints) -> Bools:
+        """Which rows are in the table."""
+        if not len(self.rows):
+            return np.zeros(len(rows), np.bool_)
+        if not self._packs:
+            return find_rows(self.rows.astype(np.uint64), rows.astype(np.uint64)) >= 0
+        codes = self._packed(rows)
+        found = np.minimum(np.searchsorted(self._codes, codes), len(self._codes) - 1)
+        same: Bools = self._codes[found] == codes
+        return same
+
+    def enter(self, rows: Ints) -> None:
+        """Add rows to the table."""
+        table, _ = unique_rows(np.concatenate((self.rows, rows)).astype(np.uint64))
+        self.rows = table.astype(np.int64)
+        if self._packs:
+            self._codes = self._packed(self.rows)
+
+    def _packed(self, rows: Ints) -> Ints:
+        code = rows[:, 0].copy()
+        for column in rows.T[1:]:
+            code *= self.states
+            code += column
+        return code
+
+
+@dataclass(frozen=True, slots=True)
+class _Mixed:
+    """Mixed steps that are edges: for each the set that it is for, its edge's target, who follows.
+
+    ``row`` numbers the sets, ``next`` (mixed steps, robots) is the node that each robot was given.
+    """
+
+    row: Ints
+    target: Ints
+    next: Ints
+
+
+class _Mixing:
+    """Mixtures of edges out of some nodes of a plan space.
+
+    A *way* is a pair of a node and the target of some of its edges: ways are numbered by node, then
+    by the target's state.  ``_labels[i]`` delimits, for each way, the labels of robot i on its
+    edges.
+    """
+
+    def __init__(self, choices: Choices, index: EdgeIndex, nodes: Ints) -> None:
+        self._choices, self._index = choices, index
+        space = self._space = choices.space
+        position, edges = space.edges_from(nodes)
+        target = space.targets(edges)
+        order = np.lexsort((space.state[target], position))
+        position, edges, target = position[order], edges[order], target[order]
+        fresh = np.ones(len(edges), np.bool_)
+        fresh[1:] = (position[1:] != position[:-1]) | (target[1:] != target[:-1])
+        way = np.cumsum(fresh) - 1
+        self._node = nodes[position[fresh]]
+        self._target = target[fresh]
+        #: One more than the last way out of the same node.
+        self._end = np.searchsorted(position[fresh], position[fresh], side="right")
+        self._labels = [
+            _labels_of_ways(way, space.robot_labels(robot, edges)) for robot in range(space.robots)
+        ]
+
+    def pairs(self) -> Ints:
+        """All pairs of ways out of one node, the first before the second."""
+        return self.extended(np.arange(len(self._node))[:, None])
+
+    def nodes_after(self, sets: Ints) -> Ints:
+        """How many ways out of the same node come after the last one of each set."""
+        after: Ints = self._end[sets[:, -1]] - sets[:, -1] - 1
+        return after
+
+    def extended(self, sets: Ints) -> Ints:
+        """The sets with one more way out of the same node, after all that they have."""
+        counts = self.nodes_after(sets)
+        more = ranges(sets[:, -1] + 1, counts)
+        return np.column_stack((np.repeat(sets, counts, axis=0), more))
+
+    def states_of(self, sets: Ints) -> Ints:
+        """(state of the node, states of the ways' targets) of each set."""
+        state = self._space.state
+        return np.column_stack((state[self._node[sets[:, 0]]], state[self._target[sets]]))
+
+    def failing(self, sets: Ints, number: Ints, count: int) -> Bools:
+        """Which of ``count`` sets of states fail in some way; ``number`` says which each set is.
+
+        Those that nothing is known of are looked at one by one at the end.
+        """
+        fails, asked = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+        choices, size, robots = self._choices, sets.shape[1], self._space.robots
+        given = [way for way in product(range(size), repeat=robots) if len(set(way)) == size]
+        for assigned in given:
+            rows = np.flatnonzero(~fails[number])
+            mixed, none = self._mixed(sets[rows][:, assigned])
+            fails[number[rows[none]]] = True
+            for robot in range(robots):
+                left = np.flatnonzero(~fails[number[rows[mixed.row]]])
+                mine = choices.of_node[robot, mixed.next[left, robot]]
+                theirs = choices.of_node[robot, mixed.target[left]]
+                lost = ~choices.sets.within_each(mine, theirs)
+                fails[number[rows[mixed.row[left[lost]]]]] = True
+            asked[number[rows[mixed.row[choices.requires[mixed.target]]]]] = True
+        for assigned in given:
+            rows = np.flatnonzero(asked[number] & ~fails[number])
+            mixed, _ = self._mixed(sets[rows][:, assigned])
+            self._search(mixed, number[rows], fails)
+        return fails
+
+    def _mixed(self, ways: Ints) -> tuple[_Mixed, Ints]:
+        """The edges that mix the ways given to the robots, and the rows where one is missing."""
+        row = np.arange(len(ways))
+        prefix = self._node[ways[:, 0]]
+        missing = [row[:0]]
+        for robot, (first, labels) in enumerate(self._labels):
+            own = ways[row, robot]
+            if len(labels) > len(self._node):  # more than one label on some way
+                counts = first[own + 1] - first[own]
+                own = ranges(first[own], counts)
+                row, prefix = np.repeat(row, counts), np.repeat(prefix, counts)
+            label = labels[own]
+            prefix = self._index.follow(robot, prefix, label)
+            missing.append(row[prefix < 0])
+            row, prefix = row[prefix >= 0], prefix[prefix >= 0]
+        target = self._space.targets(prefix)
+        return _Mixed(row, target, self._target[ways[row]]), np.concatenate(missing)
+
+    def _search(self, mixed: _Mixed, number: Ints, fails: Bools) -> None:
+        """Sets whose mixed steps are edges, one after another, each until it is known."""
+        choices = self._choices
+        asked = np.flatnonzero(choices.requires[mixed.target])
+        chosen = np.column_stack(
+            [
+                choices.of_node[robot, mixed.next[asked, robot]]
+                for robot in range(self._space.robots)
+            ]
+        )
+        columns = zip(
+            number[mixed.row[asked]].tolist(),
+            map(tuple, chosen.tolist()),
+            mixed.target[asked].tolist(),
+            strict=True,
+        )
+        for which, sets, target in columns:
+            if not fails[which] and choices.fails(sets, target):
+                fails[which] = True
+
+
+def _labels_of_ways(way: Ints, labels: Ints) -> tuple[Ints, Ints]:
+    """For each way the different labels on its edges: (first of each way, labels)."""
+    pairs, _ = unique_tuples(
+        np.column_stack((way, labels)),
+        [int(way.max(initial=0)) + 1, int(labels.max(initial=0)) + 1],
+    )
+    first = np.searchsorted(pairs[:, 0], np.arange(int(way.max(initial=-1)) + 2))
+    return first, pairs[:, 1]

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from coordlang.language.candidates import describe
-from coordlang.required.breaks import Trail as Trail
-from coordlang.required.breaks import break_in_same_states, earliest_break
 from coordlang.required.choices import Choices
+from coordlang.required.witnesses import Trail as Trail
+from coordlang.required.witnesses import earliest_witness, witness_in_same_states
 from planners.joint.model import PlanningTask
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
@@ -52,7 +52,7 @@ def miscoordination(space: PlanSpace, task: int) -> Miscoordination | None:
     start = int(space.starts[task])
     if not choices.requires[start]:
         return None
-    return describe_failure(space, earliest_break(choices, start))
+    return describe_failure(space, earliest_witness(choices, start))
 
 
 class Inseparable(ProvedImpossible):
@@ -93,21 +93,13 @@ def _short(task: str) -> str:
 
 def inseparable(space: PlanSpace) -> Miscoordination | None:
     """Plans of some task that pass through the same states and yet introduce RC, or None."""
-    trail = break_in_same_states(space)
+    trail = witness_in_same_states(space)
     return describe_failure(space, trail) if trail is not None else None
-
-
-def require_separable(spaces: Sequence[PlanSpace]) -> None:
-    """Raise `Inseparable` if plans of some task introduce RC but pass through the same states."""
-    for space in spaces:
-        witness = inseparable(space)
-        if witness is not None:
-            raise Inseparable(witness)
 
 
 def separable(space: PlanSpace) -> bool:
     """Whether plans that introduce RC always pass through different states."""
-    return break_in_same_states(space) is None
+    return witness_in_same_states(space) is None
 
 
 def describe_failure(

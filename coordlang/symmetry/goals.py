@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coordlang.language.candidates import Candidates
-from coordlang.symmetry.check import SymmetryCheck
-from coordlang.symmetry.graph import automorphism_generators
+from coordlang.symmetry.group import checked_generators
 from planners.joint.tables import Ints, unique_rows
 from planners.search.graphs import parts_of_graph
 
@@ -113,12 +112,6 @@ def symmetric_goals(
         return None
     if states**2 < for_action * (len(model.actions) + len(model.codec.facts)):
         return None
-    proposed = automorphism_generators(candidates, with_tasks=False)
-    check = SymmetryCheck(candidates) if proposed else None
-    found = [check.states_under(renaming) for renaming in proposed] if check else []
-    generators = [to for to in found if to is not None and _moves(to)]
+    found, _ = checked_generators(candidates, with_tasks=False)
+    generators = [s.states for s in found if (s.states != np.arange(states)).any()]
     return SymmetricGoals.of(generators, states) if generators else None
-
-
-def _moves(to: Ints) -> bool:
-    return bool((to != np.arange(len(to))).any())

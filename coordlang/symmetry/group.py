@@ -118,19 +118,26 @@ def symmetry_group(
     """
     if candidates.model.remembers or candidates.model.slack_facts:
         return SymmetryGroup(())
-    check = SymmetryCheck(candidates)
-    proposed = automorphism_generators(candidates, largest_graph)
-    generators = []
-    for renaming in proposed:
-        states = check.states_under(renaming)
-        if states is not None:
-            generators.append(Symmetry(renaming, states))
+    generators, dropped = checked_generators(candidates, largest_graph)
     names = joined_order(candidates)
     group = sorted(
         generated(generators, largest),
         key=lambda symmetry: [natural(symmetry.renaming[name]) for name in names],
     )
-    return SymmetryGroup(tuple(group), dropped=len(proposed) - len(generators))
+    return SymmetryGroup(tuple(group), dropped)
+
+
+def checked_generators(
+    candidates: Candidates, largest_graph: int = LARGEST_GRAPH, *, with_tasks: bool = True
+) -> tuple[list[Symmetry], int]:
+    """Symmetries that generate the group, and how many automorphisms of the graph were none."""
+    proposed = automorphism_generators(candidates, largest_graph, with_tasks=with_tasks)
+    if not proposed:
+        return [], 0
+    check = SymmetryCheck(candidates)
+    found = [(renaming, check.states_under(renaming)) for renaming in proposed]
+    kept = [Symmetry(renaming, states) for renaming, states in found if states is not None]
+    return kept, len(found) - len(kept)
 
 
 def generated(generators: Iterable[Symmetry], largest: int) -> list[Symmetry]:

@@ -43,6 +43,8 @@ def verify(partition: Partition, spaces: Sequence[PlanSpace], growth: float = GR
     """
     nodes = tasks = 0
     for space in spaces:
+        if not len(space):  # nothing leads to these goals
+            continue
         word = partition.word_of(space.rows)[space.state]
         walk = Walk(space, word, growth)
         goal, walked = walk.run()

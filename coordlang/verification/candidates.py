@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,23 +16,8 @@ from coordlang.language.partition import Partition
 from coordlang.verification.by_definition import Verdict, verify
 from planners.parallel.batch import Batch, Table, digest
 from planners.parallel.workers import Workers
-from planners.search.plan_space import PlanSpace
 from planners.search.portions import PORTION, Source, cut
 from planners.system.limits import reaching
-
-
-@dataclass(frozen=True, slots=True)
-class _Check:
-    """What all jobs share: words, and where the plans come from."""
-
-    source: Source
-    partition: Partition
-
-    def verdict(self, space: PlanSpace) -> Verdict:
-        """By definition."""
-        if not len(space):  # nothing leads to these goals
-            return Verdict(True, 0, 0, None)
-        return verify(self.partition, [space])
 
 
 def verify_candidates(
@@ -52,10 +36,9 @@ def verify_candidates(
     if len(portions) == 1:
         return verify(partition, candidates.spaces)
     efforts = [float(source.efforts[goals.start : goals.stop].sum()) for goals in portions]
-    check = _Check(source, partition)
     words = (partition.words, partition.rows, partition.word, partition.default)
     identity = digest(source.identity, *words)
-    batch = Batch("verification", _verdict, check, portions, identity, efforts)
+    batch = Batch("verification", _job, (source, partition), portions, identity, efforts)
     done = nodes = 0
 
     def so_far() -> str:
@@ -68,14 +51,15 @@ def verify_candidates(
         for table in tables:
             nodes += int(table["nodes"])
             if not table["holds"]:
-                witness = check.verdict(source.portion(portions[done])).witness
-                return Verdict(False, candidates.count, nodes, witness)
+                shown = verify(partition, [source.portion(portions[done])])
+                return Verdict(False, candidates.count, nodes, shown.witness)
             done += 1
             progress(f"verifying by definition: {so_far()}")
     return Verdict(True, candidates.count, nodes, None)
 
 
-def _verdict(check: _Check, goals: range) -> Table:
-    """One job: the tasks of some goals."""
-    verdict = check.verdict(check.source.portion(goals))
+def _job(shared: tuple[Source, Partition], goals: range) -> Table:
+    """The tasks of some goals."""
+    source, partition = shared
+    verdict = verify(partition, [source.portion(goals)])
     return {"holds": np.array(verdict.holds), "nodes": np.array(verdict.nodes)}

@@ -284,20 +284,6 @@ def test_a_single_term_limits_as_few_variables_as_possible() -> None:
     assert shorter > 10  # expanding alone does not do it
 
 
-@pytest.mark.parametrize("ordered", [True, False])
-def test_expanded_boxes_are_prime(ordered: bool) -> None:
-    for seed in range(60):
-        random = Random(seed)
-        points = random_points(random)
-        order = random.sample(range(len(points.sizes)), len(points.sizes)) if ordered else None
-        box = expand(points, points.supercube([0]), points.on, order)
-        assert not points.inside(box[None, :], points.off).any()
-        for column in np.flatnonzero(~box):
-            larger = box.copy()
-            larger[column] = True
-            assert points.inside(larger[None, :], points.off).any()
-
-
 @pytest.mark.parametrize(
     ("folder", "stem", "names"),
     [

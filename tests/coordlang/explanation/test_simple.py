@@ -10,8 +10,6 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from coordlang.commands.building import build_language
 from coordlang.explanation.formula_problem import FormulaProblem
@@ -93,8 +91,9 @@ def by_trying_all(number: int) -> tuple[Lengths, list[int], dict[int, Lengths]]:
     return min(length(word, states, shortest) for word in languages), states, shortest
 
 
-@settings(max_examples=16, deadline=None)
-@given(st.integers(0, 9))
+@pytest.mark.parametrize(
+    "number", [0, 3, *(pytest.param(n, marks=pytest.mark.thorough) for n in range(10))]
+)
 def test_shortest_by_trying_all(number: int) -> None:
     candidates = small_worlds(6)[number]
     best, states, shortest = by_trying_all(number)

@@ -10,15 +10,8 @@ from pathlib import Path
 import pytest
 
 from coordlang.commands.building import build_language
-from coordlang.language.candidates import Candidates, all_pairs, from_problems
-from coordlang.language.file import read_language, to_bytes
 from coordlang.language.partition import Partition
-from coordlang.symmetry.group import symmetry_group
 from coordlang.verification.by_definition import verify
-from planners.pddl import parse_domain, parse_problem, read_domain
-from planners.pddl.sexpr import Source
-from planners.search.plans import Plans, counts
-from planners.system.errors import BadInput
 from planners.system.writing import write_atomically
 from tests.support import naive
 from tests.support.command import Command
@@ -119,15 +112,6 @@ def test_contradictions(
     assert message in outcome.err
 
 
-def test_written_and_read_is_the_same(tmp_path: Path) -> None:
-    language = build_language(all_tasks("three-cells"), "minimal").language
-    path = tmp_path / "l.json"
-    path.write_bytes(to_bytes(language))
-    again = read_language(path)
-    assert to_bytes(again) == to_bytes(language)
-    assert again.guarantee == language.guarantee
-
-
 def test_writing_goes_through_links_and_devices(tmp_path: Path) -> None:
     real, link = tmp_path / "real.json", tmp_path / "link.json"
     real.write_text("old")
@@ -139,72 +123,10 @@ def test_writing_goes_through_links_and_devices(tmp_path: Path) -> None:
     assert not Path("/dev/null").is_file()
 
 
-def test_a_file_that_is_no_gzip(tmp_path: Path) -> None:
-    path = tmp_path / "l.json.gz"
-    path.write_bytes(b"\x1f\x8b" + b"\x08" + bytes(range(50)))
-    with pytest.raises(BadInput):
-        read_language(path)
-
-
-def problem_of(folder_init: str, goal: str) -> Candidates:
-    domain = parse_domain(Source("parking", PARKING))
-    return from_problems(
-        domain, [parse_problem(Source("p", parking("p", folder_init, goal)), domain)]
-    )
-
-
 @pytest.mark.parametrize(
-    "candidates",
-    [
-        all_tasks("t-map"),
-        all_tasks("grid", "gw1-2x2"),
-        all_pairs(
-            *(lambda d: (d, [parse_problem(Source("p", ROADS), d)]))(
-                parse_domain(Source("parking", PARKING))
-            )
-        ),
-        problem_of("(at r1 a) (at r2 c)", "(or (at r1 b) (at r2 b))"),
-    ],
-    ids=["t-map", "gw1", "roads", "one task"],
+    ("folder", "stem", "method"),
+    [("three-cells", "problem", "greedy"), ("grid", "gw1-2x2", "minimal")],
 )
-def test_symmetries_map_plans_to_plans(candidates: Candidates) -> None:
-    found = symmetry_group(candidates).permutations
-    assert found
-    lists = set()
-    for space in candidates.spaces:
-        counted = counts(space)
-        for start in space.starts.tolist():
-            plans = Plans(space, start, counted)
-            lists.add(frozenset(tuple(plans.states(plan)) for plan in plans))
-    for permutation in found:
-        assert sorted(permutation) == list(range(len(candidates.rows)))
-        image = {
-            frozenset(tuple(permutation[s] for s in states) for states in plans) for plans in lists
-        }
-        assert image == lists
-
-
-def test_objects_that_nothing_reaches_cost_no_symmetries() -> None:
-    """A hundred cells without a door: the same symmetries, and not a hundred factorial of them to
-    try.
-    """
-    text = (DOMAINS / "grid" / "gw1-2x2.pddl").read_text()
-    extra = " ".join(f"far{n}" for n in range(100))
-    domain = read_domain(DOMAINS / "grid" / "domain.pddl")
-    plain = all_pairs(domain, [parse_problem(Source("p", text), domain)])
-    more = all_pairs(
-        domain, [parse_problem(Source("p", text.replace(" - cell", f" {extra} - cell")), domain)]
-    )
-    assert more.count == plain.count
-    found = symmetry_group(plain).permutations
-    assert len(found) == 15
-    assert symmetry_group(more).permutations == found
-
-
-@pytest.mark.parametrize(
-    ("folder", "stem"), [("three-cells", "problem"), ("t-map", "problem"), ("grid", "gw1-2x2")]
-)
-@pytest.mark.parametrize("method", ["greedy", "minimal"])
 def test_every_single_corruption_that_matters_is_caught(
     folder: str, stem: str, method: str
 ) -> None:

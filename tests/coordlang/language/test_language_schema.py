@@ -15,7 +15,6 @@ from typing import Any
 import jsonschema
 import pytest
 
-import coordlang
 from coordlang.commands.building import build_language
 from coordlang.language.file import language_from_bytes, read_language, to_bytes, write_language
 from coordlang.language.record import json_schema
@@ -46,18 +45,6 @@ def readable(data: object) -> bool:
     except BadInput:
         return False
     return True
-
-
-def test_packaged_schema_is_the_printed_one(coordlang: Command) -> None:
-    packaged = Path(coordlang_folder() / "language" / "language.schema.json").read_text()
-    assert packaged == coordlang("schema").out, (
-        "coordlang schema > coordlang/language/language.schema.json"
-    )
-    jsonschema.Draft202012Validator.check_schema(json.loads(packaged))
-
-
-def coordlang_folder() -> Path:
-    return Path(str(coordlang.__file__)).parent
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,8 @@ from coordlang.execution.choices import choices
 from coordlang.execution.choices_file import to_bytes
 from coordlang.execution.monitor import Monitor, MonitorError
 from coordlang.execution.task_language import languages_in_tasks
+from coordlang.language.file import read_language
+from coordlang.language.file import to_bytes as language_bytes
 from coordlang.language.listed import ListedTask
 from coordlang.language.sentences import task_sentences
 from coordlang.language.task_file import read_task_file, tasks_text
@@ -70,6 +72,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any
     task = next(languages_in_tasks(built.language, candidates))
     (words, *_) = (task.words_of(s.words) for s in task_sentences(task.space, 0, task.partition))
     texts = {
+        "language": language_bytes(built.language).decode(),
         "tasks": tasks_text([ListedTask(("(at r1 a)", "(at r2 b)"), ("(at r1 b)",))]),
         "certificate": certificate.read_text(),
         "lifted": lifted_bytes(
@@ -92,6 +95,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any
 
 
 READ: dict[str, Callable[[Path], object]] = {
+    "language": read_language,
     "tasks": read_task_file,
     "certificate": read_certificate,
     "lifted": read_lifted,

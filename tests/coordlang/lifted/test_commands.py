@@ -37,14 +37,6 @@ def test_what_was_learned_as_json(coordlang: Command, tmp_path: Path) -> None:
     assert len(json.loads(path.read_text())["words"]) == 3
 
 
-def test_ground_and_verify(coordlang: Command, lifted: Path, tmp_path: Path) -> None:
-    language = tmp_path / "language.json"
-    outcome = coordlang("ground", lifted, GRID, LARGER, "-o", language, "--jobs", "1")
-    assert (outcome.code, outcome.err) == (0, "4 words (lifted; verified here) for 8,010 tasks\n")
-    assert coordlang("verify", language, GRID, LARGER, "--jobs", "1").code == 0
-    assert coordlang("verify", lifted, GRID, LARGER, "--tasks", "all", "--jobs", "1").code == 0
-
-
 def test_files_on_stdout(
     coordlang: Command, lifted: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -57,15 +49,6 @@ def test_files_on_stdout(
     out = coordlang("ground", lifted, GRID, LARGER, "-o", "-", "--jobs", "1")
     assert (out.code, out.out) == (0, Path("l.json").read_text())
     assert sorted(path.name for path in tmp_path.iterdir()) == ["l.json"]
-
-
-def test_what_is_refuted_is_not_written(coordlang: Command, lifted: Path, tmp_path: Path) -> None:
-    language = tmp_path / "language.json"
-    outcome = coordlang("ground", lifted, GRID, OPEN, "-o", language, "--jobs", "1")
-    assert outcome.code == 1
-    assert "--check PROBLEM" in outcome.err
-    assert not language.exists()
-    assert coordlang("verify", lifted, GRID, OPEN, "--tasks", "all", "--jobs", "1").code == 1
 
 
 def test_what_is_not_verified_says_so(coordlang: Command, lifted: Path, tmp_path: Path) -> None:

@@ -15,12 +15,12 @@ from coordlang.symmetry.check import SymmetryCheck
 from coordlang.symmetry.graph import automorphism_generators
 from coordlang.symmetry.group import Symmetry, SymmetryGroup, generated, symmetry_group
 from planners.joint.states import split_atoms
-from planners.pddl import parse_domain, parse_problem
+from planners.pddl import parse_domain, parse_problem, read_domain
 from planners.pddl.sexpr import Source
 from planners.search.plans import Plans, counts
 from planners.system.errors import ProvedImpossible
 from tests.support import slow_symmetry
-from tests.support.domains import all_tasks
+from tests.support.domains import DOMAINS, all_tasks
 from tests.support.random_models import random_model
 from tests.support.symmetric_worlds import GRID, world
 
@@ -220,3 +220,20 @@ def test_without_room_for_tasks_the_check_decides() -> None:
     proposed = [r for n in range(20, 60) for r in automorphism_generators(candidates, largest=n)]
     assert any(check.states_under(renaming) is None for renaming in proposed)
     assert automorphism_generators(candidates, largest=5) == []
+
+
+def test_objects_that_nothing_reaches_cost_no_symmetries() -> None:
+    """A hundred cells without a door: the same symmetries, and not a hundred factorial of them to
+    try.
+    """
+    text = (DOMAINS / "grid" / "gw1-2x2.pddl").read_text()
+    extra = " ".join(f"far{n}" for n in range(100))
+    domain = read_domain(DOMAINS / "grid" / "domain.pddl")
+    plain = all_pairs(domain, [parse_problem(Source("p", text), domain)])
+    more = all_pairs(
+        domain, [parse_problem(Source("p", text.replace(" - cell", f" {extra} - cell")), domain)]
+    )
+    assert more.count == plain.count
+    found = symmetry_group(plain).permutations
+    assert len(found) == 15
+    assert symmetry_group(more).permutations == found

@@ -17,9 +17,6 @@ from coordlang.language.partition import Partition
 from coordlang.required.divergences import first_differences
 from coordlang.required.miscoordination import inseparable, miscoordination
 from coordlang.verification.by_definition import verify
-from coordlang.vocabulary.greedy import greedy_partition
-from coordlang.vocabulary.separations import separations
-from planners.joint.model import FullState
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import ProvedImpossible
 from tests.support import naive
@@ -166,48 +163,3 @@ def check_witness(candidates: Candidates, table: Partition, witness: Any) -> Non
             if len(sentences) == 1:
                 return
     raise AssertionError("no task has these plans with one sentence and a failing mixture")
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(("robots", "most", "number"), SIZES)
-def test_greedy_is_a_language_and_merging_is_judged_right(
-    robots: int, most: int, number: int
-) -> None:
-    """Merging two words that alpha separates is refuted by `verify` exactly when the naive twin
-    says so.
-    """
-    seen = {True: 0, False: 0}
-
-    @models(number // 2)
-    @given(st.integers(0, 10**9))
-    def compare(seed: int) -> None:
-        candidates = candidates_of(seed, robots)
-        listable(candidates, most)
-        assume(all(inseparable(space) is None for space in candidates.spaces))
-        found = first_differences(candidates.spaces)
-        partition = greedy_partition(range(len(candidates.rows)), separations(found.divergences))
-        word = np.array([partition[s] for s in range(len(candidates.rows))])
-        names = tuple(f"w{n}" for n in range(int(word.max()) + 1))
-        assert verify(Partition(names, candidates.rows, word, 0), candidates.spaces).holds
-        for a in range(len(names)):
-            for b in range(a):
-                merged = np.where(word == a, b, word)
-                expected = all(
-                    naive.is_language(space, dict(enumerate(merged.tolist())), most)
-                    for space in candidates.spaces
-                )
-                assert (
-                    verify(Partition(names, candidates.rows, merged, 0), candidates.spaces).holds
-                    == expected
-                )
-                seen[expected] += 1
-
-    compare()
-    assert seen[False] >= number // (20 if robots == 2 else 60)
-    assert seen[True] >= 1
-
-
-def test_full_state_goals_are_all_pairs() -> None:
-    domain, problem, options = random_model(1, 2)
-    candidates = all_pairs(domain, [problem], options)
-    assert all(isinstance(goal, FullState) for space in candidates.spaces for goal in space.goals)

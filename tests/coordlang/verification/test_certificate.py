@@ -35,7 +35,6 @@ from coordlang.vocabulary.minimal import _Search as Search
 from coordlang.vocabulary.minimal import refuting_clauses
 from coordlang.vocabulary.problems_by_size import SolverBudget
 from planners.pddl import read_domain, read_problem
-from planners.pddl.model_options import ModelOptions
 from planners.system.errors import BadInput, OutOfTime, ProvedImpossible, Refuted
 from planners.system.limits import time_left
 from tests.support.candidates import states_of
@@ -223,29 +222,6 @@ def test_nothing_to_refute() -> None:
         core([], 1)
     assert encode([frozenset({(0, 1)})], 1).refuted()
     assert not encode([frozenset({(0, 1)})], 2).refuted()
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    ("folder", "remember"),
-    [
-        ("tray", False),
-        ("lock", True),
-        ("charger", False),
-        # Minutes, nearly all of them in the search for the language; lock remembers actions, too.
-        pytest.param("push-box", True, marks=pytest.mark.slow),
-    ],
-)
-def test_three_robots(folder: str, remember: bool) -> None:
-    domain = read_domain(DOMAINS / folder / "domain.pddl")
-    problem = read_problem(DOMAINS / folder / "three-robots.pddl", domain)
-    built = build_language(
-        from_problems(domain, [problem], ModelOptions(remember_actions=remember)), "minimal"
-    )
-    assert (
-        check(built.certificate(), built.job.candidates).lower_bound
-        == built.language.guarantee.size
-    )
 
 
 def test_task_file_with_symmetries() -> None:

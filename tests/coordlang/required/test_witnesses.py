@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from coordlang.language.candidates import Candidates
-from coordlang.required.breaks import break_in_same_states
 from coordlang.required.choices import Choices
 from coordlang.required.miscoordination import (
     Miscoordination,
@@ -18,11 +17,12 @@ from coordlang.required.miscoordination import (
     inseparable,
     miscoordination,
 )
+from coordlang.required.witnesses import witness_in_same_states
 from planners.check.validate import Verdict, validate
 from planners.joint.model import JointModel
 from planners.search.plan_space import PlanSpace
-from tests.support.break_walk import walk_to_a_break
 from tests.support.random_spaces import random_spaces, runs
+from tests.support.witness_walk import walk_to_a_witness
 
 
 def breaks(candidates: Candidates, space: PlanSpace, found: Miscoordination) -> None:
@@ -75,9 +75,9 @@ def test_breaks_equal_the_walk(robots: int | None, seeds: range) -> None:
     answers: Counter[tuple[str, bool]] = Counter()
     for candidates, space in random_spaces(seeds, robots):
         starts = np.unique(space.starts)
-        together = walk_to_a_break(space, starts, together=True)
+        together = walk_to_a_witness(space, starts, together=True)
         shown = inseparable(space)
-        assert (shown is None) == (together is None) == (break_in_same_states(space) is None)
+        assert (shown is None) == (together is None) == (witness_in_same_states(space) is None)
         answers["inseparable", shown is not None] += 1
         if shown is not None:
             breaks(candidates, space, shown)
@@ -85,7 +85,7 @@ def test_breaks_equal_the_walk(robots: int | None, seeds: range) -> None:
         requires = Choices(space).requires[space.starts]
         some = [*np.flatnonzero(requires)[:4].tolist(), *np.flatnonzero(~requires)[:2].tolist()]
         for task in some:
-            twin = walk_to_a_break(space, space.starts[[task]], together=False)
+            twin = walk_to_a_witness(space, space.starts[[task]], together=False)
             found = miscoordination(space, task)
             assert (found is None) == (twin is None)
             answers["break", found is not None] += 1

@@ -21,10 +21,10 @@ def divergences(choices: Choices) -> list[tuple[int, ...]]:
         state = int(choices.space.state[node])
         found.setdefault(state, set()).update(_sets_at(choices, node))
     return sorted(
-        (state, *sorted(parting))
+        (state, *sorted(divergence))
         for state, sets in found.items()
-        for parting in sets
-        if not any(other < parting for other in sets)
+        for divergence in sets
+        if not any(other < divergence for other in sets)
     )
 
 

@@ -10,16 +10,15 @@ import pytest
 
 from coordlang.language.candidates import all_pairs
 from coordlang.required.choices import Choices, LabelSets
-from coordlang.required.divergences import first_differences
+from coordlang.required.divergences import DivergenceSearch, first_differences, minimal
 from coordlang.required.miscoordination import inseparable
-from coordlang.required.partings import Partings, _KnownSets, minimal
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
 from planners.search.plan_space import PlanSpace
-from tests.support import naive_partings
+from tests.support import naive_divergences
 from tests.support.composition_walk import walk
 from tests.support.random_models import random_model
-from tests.support.random_spaces import separable_spaces
+from tests.support.random_spaces import runs, separable_spaces
 
 
 def agree(space: PlanSpace, chunk: int) -> bool:
@@ -27,9 +26,9 @@ def agree(space: PlanSpace, chunk: int) -> bool:
     twin = walk(space)
     choices = Choices(space)
     assert (choices.requires == twin.requires).all()
-    partings = Partings(space.robots, chunk)
-    partings.add(choices)
-    table = partings.table()
+    search = DivergenceSearch(space.robots, chunk)
+    search.add(choices)
+    table = search.table()
     assert table[:, 0].tolist() == twin.divergences.last.tolist()
     assert table[:, 1:].tolist() == twin.divergences.following.tolist()
     return bool(twin.requires.any())
@@ -42,25 +41,11 @@ def compared(seeds: range, robots: int | None) -> Counter[bool]:
     return answers
 
 
-@pytest.mark.parametrize(("robots", "number"), [(2, 40), (3, 20), (None, 25)])
-def test_choices_equal_the_walk(robots: int | None, number: int) -> None:
-    answers = compared(range(number), robots)
+@pytest.mark.parametrize(("robots", "seeds"), runs(30, 15, 20))
+def test_choices_equal_the_walk(robots: int | None, seeds: range) -> None:
+    answers = compared(seeds, robots)
     assert answers[True] >= 3
     assert answers[False] >= 3
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("robots", "first", "last"),
-    [(2, 1_000, 1_700), (3, 2_000, 2_800), (4, 3_000, 3_300), (None, 4_000, 4_400)],
-)
-def test_choices_equal_the_walk_on_many_models(robots: int | None, first: int, last: int) -> None:
-    answers = compared(range(first, last), robots)
-    print(
-        f"{robots or 'any'} robots: {answers[True]} spaces require coordination, {answers[False]} not"
-    )
-    assert answers[True] >= 10
-    assert answers[False] >= 10
 
 
 def tables_agree(seeds: range, robots: int | None, most: int) -> Counter[int]:
@@ -68,45 +53,18 @@ def tables_agree(seeds: range, robots: int | None, most: int) -> Counter[int]:
     sizes: Counter[int] = Counter()
     for number, space in enumerate(separable_spaces(seeds, robots, most)):
         choices = Choices(space)
-        partings = Partings(space.robots, chunk=(5, 70, 1_000_000)[number % 3])
-        partings.add(choices)
-        rows = [tuple(s for s in row if s >= 0) for row in partings.table().tolist()]
-        assert rows == naive_partings.divergences(choices)
+        search = DivergenceSearch(space.robots, chunk=(5, 70, 1_000_000)[number % 3])
+        search.add(choices)
+        rows = [tuple(s for s in row if s >= 0) for row in search.table().tolist()]
+        assert rows == naive_divergences.divergences(choices)
         sizes.update(len(row) - 1 for row in rows)
     return sizes
 
 
-@pytest.mark.parametrize(("robots", "number"), [(2, 40), (3, 15), (4, 12), (None, 15)])
-def test_whole_tables_equal_node_by_node(robots: int | None, number: int) -> None:
-    sizes = tables_agree(range(500, 500 + number), robots, 1_000)
+@pytest.mark.parametrize(("robots", "seeds"), [*runs(40, 15, 15), (4, range(500, 512))])
+def test_whole_tables_equal_node_by_node(robots: int | None, seeds: range) -> None:
+    sizes = tables_agree(seeds, robots, 1_000)
     assert sizes[2] >= 20
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("robots", "first", "last"), [(3, 6_000, 6_500), (4, 7_000, 7_400), (None, 8_000, 8_300)]
-)
-def test_whole_tables_equal_node_by_node_on_many_models(
-    robots: int | None, first: int, last: int
-) -> None:
-    sizes = tables_agree(range(first, last), robots, 5_000)
-    print(f"{robots or 'any'} robots: divergences by number of next states {dict(sizes)}")
-    assert sizes[2] >= 20
-
-
-@pytest.mark.parametrize("packs", [True, False])
-def test_known_sets_are_found_packed_or_not(packs: bool) -> None:
-    """Where the number of states is too large to pack a row into one number, too."""
-    states = 50 if packs else 2**22
-    known = _KnownSets(2, states)
-    random = np.random.default_rng(0)
-    rows = random.integers(0, 50, (200, 3))
-    known.enter(rows[:60])
-    known.enter(rows[60:100])
-    listed = {tuple(row) for row in rows[:100].tolist()}
-    assert known.rows.tolist() == sorted(map(list, listed))
-    assert known.has(rows).tolist() == [tuple(row) in listed for row in rows.tolist()]
-    assert 0 < known.has(rows[100:]).sum() + len(listed) < 200
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -166,10 +124,10 @@ def test_several_labels_lead_to_one_state() -> None:
     assert len(np.unique(ends, axis=0)) < len(ends)
     assert inseparable(space) is None
     choices = Choices(space)
-    partings = Partings(2)
-    partings.add(choices)
-    rows = [tuple(row) for row in partings.table().tolist()]
-    assert rows == naive_partings.divergences(choices)
+    search = DivergenceSearch(2)
+    search.add(choices)
+    rows = [tuple(row) for row in search.table().tolist()]
+    assert rows == naive_divergences.divergences(choices)
     assert rows
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from coordlang.required.breaks import Trail
 from coordlang.required.composition_walk import FAILED, Moves, moves
+from coordlang.required.witnesses import Trail
 from planners.joint.tables import Ints, unique_tuples
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 
 
-def walk_to_a_break(space: PlanSpace, starts: Ints, *, together: bool) -> Trail | None:
+def walk_to_a_witness(space: PlanSpace, starts: Ints, *, together: bool) -> Trail | None:
     """Breadth first through the layers, until a mixture breaks; with ``together`` along plans in
     the same states only.
     """

@@ -38,7 +38,7 @@ class Trail:
 # ---- any plans
 
 
-def earliest_break(choices: Choices, start: int) -> Trail:
+def earliest_witness(choices: Choices, start: int) -> Trail:
     """Plans from a node that requires coordination whose mixture breaks in the fewest steps.
 
     As many robots as is easily possible follow the same plan.
@@ -181,7 +181,7 @@ class _Step:
     edge: Ints
 
 
-def break_in_same_states(space: PlanSpace) -> Trail | None:
+def witness_in_same_states(space: PlanSpace) -> Trail | None:
     """Plans of some task that pass through the same states and yet introduce RC, or None.
 
     While all mixtures of the edges between two states are edges between them, the mixture is where
