@@ -118,15 +118,14 @@ def build(grid: Grid) -> Figures:
     figures: Figures = {"tasks": candidates.count, "plans": clock.look()}
     found = differences(candidates, here)
     figures["coordination"] = clock.look()
-    outcome = greedy(Job(candidates, tuple(found.states.tolist()), found.first))
+    outcome = greedy(Job(candidates, tuple(found.states.tolist()), found))
     figures["greedy"] = clock.look()
     partition = Partition.of_states(candidates.rows, outcome.partition)
     verdict = verify_candidates(partition, candidates, here)
     assert verdict.holds
     figures["verify"] = clock.look()
     figures["words"] = len(partition.words)
-    first = found.first
-    counted = (first.nodes, first.edges, first.sets, first.evaluations)
+    counted = (found.nodes, found.edges, found.sets, found.evaluations)
     return {**figures, **dict(zip(COUNTED, counted, strict=False))}
 
 

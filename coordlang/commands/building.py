@@ -129,7 +129,7 @@ def build_language(
     job = Job(
         candidates,
         states,
-        found.first,
+        found,
         seed=options.seed,
         alpha_only=options.alpha_only,
         progress=progress,

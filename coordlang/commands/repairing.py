@@ -175,7 +175,7 @@ def repair_language(
     progress("verifying the old language")
     verdict = verify_candidates(old.partition, candidates, workers, progress)
     clock.note("verify")
-    job = Job(candidates, states, found.first, seed=seed)
+    job = Job(candidates, states, found, seed=seed)
     if verdict.holds:
         kept = Repaired(None, new_states=new_states, gone=old.gone)
         return _built(old.partition, job, verdict, clock, kept)

@@ -5,14 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-
 from coordlang.commands.built import Built, Clock, language_of
 from coordlang.language.candidates import Candidates, require_solvable
 from coordlang.language.partition import Partition
 from coordlang.required.all_differences import differences
-from coordlang.required.choices import Choices
-from coordlang.required.divergences import Divergences, FirstDifferences, states_on_plans
+from coordlang.required.divergences import FirstDifferences, states_on_plans, without_divergences
 from coordlang.required.failures import Failures
 from coordlang.required.miscoordination import Inseparable
 from coordlang.symmetry.group import symmetry_group
@@ -133,16 +130,8 @@ def _first_differences(
     try:
         found = (hidden_differences if hidden else differences)(candidates, workers, progress)
     except Inseparable:
-        return _without_divergences(candidates), None
+        return without_divergences(candidates.spaces), None
     if hidden:
-        return found.first, {state: word for word, state in enumerate(found.states.tolist())}
-    job = Job(candidates, tuple(found.states.tolist()), found.first)
-    return found.first, greedy(job).partition
-
-
-def _without_divergences(candidates: Candidates) -> FirstDifferences:
-    spaces = candidates.spaces
-    none = Divergences(np.zeros(0, np.int64), np.zeros((0, len(candidates.model.robots)), np.int64))
-    requiring = sum(int(Choices(space).requires[space.starts].sum()) for space in spaces)
-    nodes, edges = (sum(map(len, spaces)), sum(len(space.targets()) for space in spaces))
-    return FirstDifferences(none, requiring, nodes, edges, 0, 0)
+        return found, {state: word for word, state in enumerate(found.states.tolist())}
+    job = Job(candidates, tuple(found.states.tolist()), found)
+    return found, greedy(job).partition

@@ -20,7 +20,6 @@ from coordlang.required.divergences import (
     FirstDifferences,
     first_differences,
     minimal,
-    states_on_plans,
 )
 from coordlang.required.miscoordination import Inseparable, inseparable, separable
 from coordlang.symmetry.goals import SymmetricGoals, symmetric_goals
@@ -31,21 +30,13 @@ from planners.search.portions import PORTION, Explored, Source, cut
 from planners.system.limits import reaching
 
 
-@dataclass(frozen=True, slots=True)
-class Differences:
-    """The first differences of candidate tasks, and the numbers of the states on their plans."""
-
-    first: FirstDifferences
-    states: Ints
-
-
 def differences(
     candidates: Candidates,
     workers: Workers,
     progress: Callable[[str], None] = lambda _: None,
     portion: float = PORTION,
-) -> Differences:
-    """Find both, for tasks without inseparable plans, in jobs of about ``portion`` effort.
+) -> FirstDifferences:
+    """Find them for tasks without inseparable plans, in jobs of about ``portion`` effort.
 
     Raises
     ------
@@ -108,16 +99,15 @@ def _inseparable(found: Sequence[Table]) -> bool:
     return bool(found[-1]["inseparable"])
 
 
-def _spread(found: Differences, goals: SymmetricGoals) -> Differences:
+def _spread(found: FirstDifferences, goals: SymmetricGoals) -> FirstDifferences:
     """What the chosen goals say, for all goals (Proposition 15 of docs/concepts.md).
 
     The numbers of tasks, nodes and edges are those of all goals already.
     """
-    divergences = found.first.divergences
-    rows = np.column_stack((divergences.last, divergences.following))
+    rows = np.column_stack((found.divergences.last, found.divergences.following))
     rows = minimal(goals.images_of_rows(rows))
-    first = replace(found.first, divergences=Divergences(rows[:, 0], rows[:, 1:]))
-    return Differences(first, goals.images_of_states(found.states))
+    states = goals.images_of_states(found.states)
+    return replace(found, divergences=Divergences(rows[:, 0], rows[:, 1:]), states=states)
 
 
 def _differences(shared: _Goals, goals: range) -> Table:
@@ -132,18 +122,13 @@ def _differences(shared: _Goals, goals: range) -> Table:
         "inseparable": np.array(False),
         "divergences": np.column_stack((found.divergences.last, found.divergences.following)),
         "figures": np.array(figures, np.int64),
-        "states": states_on_plans([space]),
+        "states": found.states,
     }
 
 
-def _together(found: Sequence[Table]) -> Differences:
+def _together(found: Sequence[Table]) -> FirstDifferences:
     """What jobs found as one: sets and mixtures are counted anew in each."""
     rows = minimal(np.concatenate([table["divergences"] for table in found]))
+    states = np.unique(np.concatenate([table["states"] for table in found]))
     figures = np.stack([table["figures"] for table in found]).sum(axis=0)
-    requiring, nodes, edges, sets, evaluations = figures.tolist()
-    return Differences(
-        FirstDifferences(
-            Divergences(rows[:, 0], rows[:, 1:]), requiring, nodes, edges, sets, evaluations
-        ),
-        np.unique(np.concatenate([table["states"] for table in found])),
-    )
+    return FirstDifferences(Divergences(rows[:, 0], rows[:, 1:]), states, *figures.tolist())

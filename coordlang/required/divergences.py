@@ -46,12 +46,14 @@ class Divergences:
 class FirstDifferences:
     """The first differences of all candidate tasks (the paper's ``alpha*``, each once).
 
-    ``requiring`` counts the tasks that require coordination.  ``nodes`` and ``edges`` are those of
-    the plan spaces; ``sets`` counts the different sets of a robot's label sequences and
-    ``evaluations`` the mixtures of such sets that were looked at: the work.
+    ``states`` are the numbers of the states on their plans, sorted.  ``requiring`` counts the tasks
+    that require coordination.  ``nodes`` and ``edges`` are those of the plan spaces; ``sets``
+    counts the different sets of a robot's label sequences and ``evaluations`` the mixtures of such
+    sets that were looked at: the work.
     """
 
     divergences: Divergences
+    states: Ints
     requiring: int
     nodes: int
     edges: int
@@ -90,11 +92,25 @@ def first_differences(
     table = search.table()
     return FirstDifferences(
         Divergences(table[:, 0], table[:, 1:]),
+        states_on_plans(spaces),
         requiring,
         nodes,
         edges,
         len(sets),
         evaluations,
+    )
+
+
+def without_divergences(spaces: Sequence[PlanSpace]) -> FirstDifferences:
+    """Where coordination is required, of plans whose divergences are not defined."""
+    return FirstDifferences(
+        Divergences(np.zeros(0, np.int64), np.zeros((0, spaces[0].robots), np.int64)),
+        states_on_plans(spaces),
+        sum(int(required_nodes(space)[space.starts].sum()) for space in spaces),
+        sum(map(len, spaces)),
+        sum(len(space.targets()) for space in spaces),
+        sets=0,
+        evaluations=0,
     )
 
 

@@ -12,16 +12,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-
 from coordlang.language.candidates import Candidates
 from coordlang.language.partition import Partition
-from coordlang.required.all_differences import Differences
 from coordlang.required.divergences import (
-    Divergences,
     FirstDifferences,
-    required_nodes,
     states_on_plans,
+    without_divergences,
 )
 from coordlang.required.miscoordination import Inseparable
 from coordlang.verification.candidates import verify_candidates
@@ -30,7 +26,7 @@ from planners.parallel.workers import Workers
 
 def hidden_differences(
     candidates: Candidates, workers: Workers, progress: Callable[[str], None] = lambda _: None
-) -> Differences:
+) -> FirstDifferences:
     """Count the tasks that require coordination, and the states on plans, of separable plans.
 
     There are no first differences of states to speak of: a plan may part from another one by
@@ -50,11 +46,4 @@ def hidden_differences(
     if verdict.witness is not None:
         raise Inseparable(replace(verdict.witness, sentence=None), hides_slack=True)
     progress("looking where coordination is required")
-    requiring = nodes = edges = 0
-    for space in candidates.spaces:
-        requiring += int(required_nodes(space)[space.starts].sum())
-        nodes += len(space)
-        edges += len(space.sources)
-    robots = len(candidates.model.robots)
-    none = Divergences(np.zeros(0, np.int64), np.zeros((0, robots), np.int64))
-    return Differences(FirstDifferences(none, requiring, nodes, edges, 0, verdict.nodes), states)
+    return replace(without_divergences(candidates.spaces), evaluations=verdict.nodes)

@@ -15,7 +15,8 @@ import pytest
 import coordlang
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.language.partition import Partition
-from coordlang.required.all_differences import Differences, differences
+from coordlang.required.all_differences import differences
+from coordlang.required.divergences import FirstDifferences
 from coordlang.required.miscoordination import Inseparable
 from coordlang.required.task_answers import answers
 from coordlang.verification.by_definition import verify
@@ -47,14 +48,14 @@ def random_candidates(seeds: range, robots: int) -> Iterator[Candidates]:
             yield found
 
 
-def found(candidates: Candidates, portion: float) -> Differences | str:
+def found(candidates: Candidates, portion: float) -> FirstDifferences | str:
     try:
         return differences(candidates, HERE, portion=portion)
     except Inseparable:
         return "inseparable"
 
 
-def words(differences: Differences, seed: int) -> dict[int, int]:
+def words(differences: FirstDifferences, seed: int) -> dict[int, int]:
     random = Random(seed)
     return {state: random.randrange(4) for state in differences.states.tolist()}
 
@@ -69,7 +70,7 @@ def test_jobs_give_what_the_whole_gives(robots: int, number: int) -> None:
             answers[whole] += 1
             continue
         assert (whole.states == parts.states).all()
-        a, b = whole.first, parts.first
+        a, b = whole, parts
         assert a.divergences.last.tolist() == b.divergences.last.tolist()
         assert a.divergences.following.tolist() == b.divergences.following.tolist()
         assert (a.requiring, a.nodes, a.edges) == (b.requiring, b.nodes, b.edges)

@@ -12,7 +12,8 @@ import pytest
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.required import all_differences
-from coordlang.required.all_differences import Differences, differences
+from coordlang.required.all_differences import differences
+from coordlang.required.divergences import FirstDifferences
 from coordlang.required.miscoordination import Inseparable, separable
 from coordlang.symmetry.goals import SymmetricGoals, symmetric_goals
 from planners.parallel.workers import Workers
@@ -35,14 +36,14 @@ def agree(candidates: Candidates, portion: float = PORTION) -> bool:
         assert found is every
         return False
     assert found.states.tolist() == every.states.tolist()
-    one, other = found.first, every.first
+    one, other = found, every
     assert one.divergences.last.tolist() == other.divergences.last.tolist()
     assert one.divergences.following.tolist() == other.divergences.following.tolist()
     assert (one.requiring, one.nodes, one.edges) == (other.requiring, other.nodes, other.edges)
     return bool(one.requiring)
 
 
-def answer(candidates: Candidates, portion: float, by_symmetry: bool) -> Differences | None:
+def answer(candidates: Candidates, portion: float, by_symmetry: bool) -> FirstDifferences | None:
     """First differences with or without symmetries; None if some plans are inseparable."""
     with pytest.MonkeyPatch.context() as patch:
         for_action = 0 if by_symmetry else 10**9
