@@ -13,6 +13,7 @@ from coordlang.explanation.demands import RobotPart, SentenceDemands, WordChange
 from coordlang.explanation.descriptions import WordDescriptions
 from coordlang.explanation.words import MappedStates
 from planners.joint.model import show
+from planners.system.notebook import counted
 
 #: Terms of one formula, and alternatives of one choice, that are written out.
 _TERMS = 12
@@ -219,11 +220,6 @@ def _cause(change: WordChange) -> str:
     first = "; or ".join(together[:_ALTERNATIVES] if rest > 1 else together)
     *others, last = change.robots
     return f"{', '.join(others)} and {last} decide it together: {first}{more}"
-
-
-def counted(number: int, noun: str) -> str:
-    """``1 state``, ``1,200 states``."""
-    return f"{number:,} {noun}{'s' * (number != 1)}"
 
 
 def demands_data(demands: SentenceDemands) -> dict[str, Any]:

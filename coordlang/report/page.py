@@ -12,7 +12,6 @@ from typing import Any
 
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.lifted_words import lifted_words
-from coordlang.explanation.text import counted
 from coordlang.language.provenance import domain_sha256
 from coordlang.language.tolerance import percent
 from coordlang.language.words import Language
@@ -25,6 +24,7 @@ from coordlang.sites.coordinates import Point
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import OutOfMemory, Position
+from planners.system.notebook import counted
 
 #: What a page has at most, in bytes.
 LARGEST = 5_000_000

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from coordlang.commands.main import run
 from coordlang.language.candidates import from_listed
 from coordlang.language.listed import ListedTask
 from coordlang.language.patterns import varied_tasks
 from coordlang.language.task_file import read_task_file
 from planners.loading import PlanningInstance, load
 from planners.system.errors import ProvedImpossible, UsageError
+from tests.support.command import Command
 from tests.support.domains import DOMAINS
 from tests.support.naive_joint_steps import Twin
 
@@ -113,41 +113,16 @@ def test_goals_that_cannot_be_together() -> None:
         varied_tasks(loaded, [], ["(at r1 a)", "(at r2 a)"])
 
 
-def test_the_command_writes_what_build_reads(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    files = (
-        str(DOMAINS / "three-cells" / "domain.pddl"),
-        str(DOMAINS / "three-cells" / "problem.pddl"),
-    )
+def test_the_command_writes_what_build_reads(coordlang: Command, tmp_path: Path) -> None:
+    files = [DOMAINS / "three-cells" / name for name in ("domain.pddl", "problem.pddl")]
     output = tmp_path / "tasks.json"
-    assert (
-        run(
-            [
-                "tasks",
-                *files,
-                "--start",
-                "(AT  r1 ?)",
-                "--goal",
-                "( at r2 ? )",
-                "-o",
-                str(output),
-                "--json",
-            ]
-        )
-        == 0
-    )
-    assert json.loads(capfd.readouterr().out) == {"tasks": 4, "starts": 2, "goals": 2}
+    two = "--start", "(AT  r1 ?)", "--goal", "( at r2 ? )"
+    written = coordlang("tasks", *files, *two, "-o", output, "--json")
+    assert json.loads(written.out) == {"tasks": 4, "starts": 2, "goals": 2}
     assert len(read_task_file(output)) == 4
-    assert run(["tasks", *files, "--start", "(at r1 ?)", "--goal", "(at r2 ?)", "-o", "-"]) == 0
-    shown = capfd.readouterr()
-    assert shown.out == output.read_text()
-    assert shown.err == "4 tasks: 2 starts, 2 goals\n"
-    assert (
-        run(["build", *files, "--tasks", str(output), "-o", str(tmp_path / "language.json")]) == 0
-    )
-    assert run(["tasks", *files, "--goal", "(on r2 ?)", "-o", str(output)]) == 2
-    assert (
-        run(["tasks", *files, "--goal", "(at r1 a)", "--goal", "(at r2 a)", "-o", str(output)])
-        == 11
-    )
+    shown = coordlang("tasks", *files, *two, "-o", "-")
+    assert (shown.out, shown.err) == (output.read_text(), "4 tasks: 2 starts, 2 goals\n")
+    assert coordlang("build", *files, "--tasks", output, "-o", tmp_path / "l.json").code == 0
+    for goals, code in ((("(on r2 ?)",), 2), (("(at r1 a)", "(at r2 a)"), 11)):
+        more = [text for goal in goals for text in ("--goal", goal)]
+        assert coordlang("tasks", *files, *more, "-o", output).code == code
