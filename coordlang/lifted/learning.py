@@ -112,54 +112,15 @@ def learn(
         If no features up to this ``complexity`` suffice; the error has the states that must be told
         apart.
     """
-    workers = workers or Workers()
-    learner = _Learner(complexity, seed, progress)
-    every = [*known, *held_back]
+    learner = _Learner([*known, *held_back], complexity, seed, workers or Workers(), progress)
     for own in known:
         learner.take(own)
     learner.begin()
-    found = [_verified(learner, None, every, workers, progress)]
+    found = [learner.verified(None)]
     if prefer is None:
         return found[0]
-    stopped = run_until_stopped(
-        lambda: found.append(_verified(learner, prefer, every, workers, progress))
-    )
+    stopped = run_until_stopped(lambda: found.append(learner.verified(prefer)))
     return replace(found[-1], stopped=stopped)
-
-
-def _verified(
-    learner: _Learner,
-    prefer: Preference | None,
-    every: Sequence[Instance],
-    workers: Workers,
-    progress: Progress,
-) -> Learned:
-    """Words that are verified on every problem; those that refute some are learned from."""
-    while True:
-        try:
-            words = learner.best(prefer, every)
-        except ProvedImpossible:
-            if learner.landmarks:
-                raise
-            learner.begin(landmarks=True)
-            continue
-        refuted = _refuted(words, every, workers, progress)
-        if refuted is None:
-            return learner.learned(words, every)
-        own, of_states = refuted
-        assert own not in learner.taken, "what was learned from is a language there"
-        learner.take(own, of_states)
-        learner.begin(learner.landmarks)
-
-
-def _refuted(
-    words: _Words, every: Sequence[Instance], workers: Workers, progress: Progress
-) -> tuple[Instance, Ints] | None:
-    """The first problem that refutes words, and the words of its states; None if there is none."""
-    for own, of_states in zip(every, words.of_states, strict=True):
-        if not own.holds(of_states, workers, progress):
-            return own, of_states
-    return None
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,12 +142,20 @@ class _Words:
 
 
 class _Learner:
-    """What was learned from, and the clauses that it gave."""
+    """What was learned from, and the clauses that it gave; ``every`` are all problems."""
 
-    def __init__(self, complexity: int, seed: int, progress: Progress) -> None:
+    def __init__(
+        self,
+        every: Sequence[Instance],
+        complexity: int,
+        seed: int,
+        workers: Workers,
+        progress: Progress,
+    ) -> None:
         self.taken: list[Instance] = []
         self.rounds = 0
         self.landmarks = False
+        self._every, self._workers = every, workers
         self._complexity, self._seed, self._progress = complexity, seed, progress
         self._refuters: list[Refuter] = []
         self._clauses: list[dict[Clause, None]] = []
@@ -216,7 +185,26 @@ class _Learner:
         ends = np.cumsum([len(own) for own in states])
         self._tables = np.split(self._pool.values, ends[:-1], axis=1)
 
-    def best(self, prefer: Preference | None, every: Sequence[Instance]) -> _Words:
+    def verified(self, prefer: Preference | None) -> Learned:
+        """Words that are verified on every problem; those that refute some are learned from."""
+        while True:
+            try:
+                words = self._best(prefer)
+            except ProvedImpossible:
+                if self.landmarks:
+                    raise
+                self.begin(landmarks=True)
+                continue
+            for own, of_states in zip(self._every, words.of_states, strict=True):
+                if not own.holds(of_states, self._workers, self._progress):
+                    assert own not in self.taken, "what was learned from is a language there"
+                    self.take(own, of_states)
+                    self.begin(self.landmarks)
+                    break
+            else:
+                return self._learned(words)
+
+    def _best(self, prefer: Preference | None) -> _Words:
         """Words over the simplest features; if words come first, over those with fewest words."""
         found: list[_Words] = []
         excluded: list[int] = []
@@ -227,17 +215,17 @@ class _Learner:
                 if not found:
                     raise
                 break
-            found.append(self._words(chosen, prefer, every))
+            found.append(self._words(chosen, prefer))
             if found[-1].size == 1 or not chosen:
                 break
             excluded.append(max(chosen, key=lambda k: self._pool.features[k].complexity))
         return min(found, key=lambda words: words.size)
 
-    def learned(self, words: _Words, every: Sequence[Instance]) -> Learned:
+    def _learned(self, words: _Words) -> Learned:
         """What was learned, with words numbered as they come."""
         sizes = tuple(
             (len(own.states), own.candidates.count, len(np.unique(of_states)))
-            for own, of_states in zip(every, words.of_states, strict=True)
+            for own, of_states in zip(self._every, words.of_states, strict=True)
         )
         number = {word: k for k, word in enumerate(dict.fromkeys(words.merged.words))}
         word = {
@@ -255,9 +243,8 @@ class _Learner:
             len(self.taken),
         )
 
-    def _words(
-        self, chosen: Sequence[int], prefer: Preference | None, every: Sequence[Instance]
-    ) -> _Words:
+    def _words(self, chosen: Sequence[int], prefer: Preference | None) -> _Words:
+        every = self._every
         features = tuple(self._pool.features[k] for k in chosen)
         vectors = np.concatenate([own.vectors(features) for own in every])
         table, number = np.unique(vectors, axis=0, return_inverse=True)
