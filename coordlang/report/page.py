@@ -143,7 +143,8 @@ def _render(
         may_fail=language.may_fail,
         warning=language.tolerance.warning if language.tolerance else None,
         slack=language.tolerance.slack if language.tolerance else None,
-        simulated=simulated and summary(simulated, len(data["simulated"]["runs"])),
+        simulated=simulated
+        and summary(simulated, len(data["simulated"]["runs"]), data["kept"]["one"]),
         about=_about(language, domain, problems, data, seed),
         formula=_formula,
         counted=counted,

@@ -18,7 +18,7 @@ MOST_POSES = 20_000
 _AGREED = {
     "sentence": "All robots know the sentence {sentence}, and each draws its own choices under it.",
     "plan": "All robots follow one whole plan.",
-    "nothing": "Nothing is agreed: each robot follows an optimal plan of its own.",
+    "nothing": "Nothing is agreed: each robot follows {one} of its own.",
 }
 _STEPS = {
     "clock": "A common clock begins the joint steps",
@@ -43,9 +43,12 @@ def require_of(record: SimulationRecord, domain: Domain, position: Position) -> 
         )
 
 
-def summary(record: SimulationRecord, shown: int) -> str:
-    """Return what stands above the player of runs, of which so many are in the page."""
-    agreed = _AGREED[record.agreement].format(sentence=record.sentence)
+def summary(record: SimulationRecord, shown: int, one: str = "an optimal plan") -> str:
+    """Return what stands above the player of runs, of which so many are in the page.
+
+    ``one`` is what a plan is called: an optimal one, or one within the slack.
+    """
+    agreed = _AGREED[record.agreement].format(sentence=record.sentence, one=one)
     some = "" if shown == len(record.runs) else f" The first {shown} of {len(record.runs)} runs."
     return (
         f"{agreed} {_STEPS[record.step]}; noise {100 * record.noise:g} %, discs of "

@@ -58,11 +58,7 @@ def runs_of(
 
 
 def run(
-    mission: Mission,
-    floor: Floor,
-    settings: Settings,
-    seed: int,
-    wishes: Sequence[WishRecord] = (),
+    mission: Mission, floor: Floor, settings: Settings, seed: int, wishes: Sequence[WishRecord] = ()
 ) -> RunRecord:
     """Let the robots do a task once.
 

@@ -78,8 +78,7 @@ class Settings:
 
         if self.human is not None and not self.lidar:
             raise UsageError(
-                "--human: without a lidar no robot sees a human",
-                remedy="Leave out --no-lidar.",
+                "--human: without a lidar no robot sees a human", remedy="Leave out --no-lidar."
             )
 
     @property

@@ -21,11 +21,7 @@ from planners.system.errors import BadInput, CoordlangError, UsageError
 from planners.system.options import record_from
 
 #: The kinds of plans that the engine returns and validates.
-PLAN_KINDS = (
-    PlanKind.PARTIAL_ORDER_PLAN,
-    PlanKind.SEQUENTIAL_PLAN,
-    PlanKind.TIME_TRIGGERED_PLAN,
-)
+PLAN_KINDS = (PlanKind.PARTIAL_ORDER_PLAN, PlanKind.SEQUENTIAL_PLAN, PlanKind.TIME_TRIGGERED_PLAN)
 _OPTION = re.compile(r"(?<![\w-])--([a-z]+(?:-[a-z]+)*)")
 
 

@@ -86,9 +86,7 @@ class Translated:
 
 
 def translate(
-    problem: Any,
-    subactions: Subactions | None = None,
-    concurrency: Concurrency | None = None,
+    problem: Any, subactions: Subactions | None = None, concurrency: Concurrency | None = None
 ) -> Translated:
     """PDDL for a `unified_planning.model.Problem` or a `MultiAgentProblem`.
 

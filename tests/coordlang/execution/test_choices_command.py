@@ -42,23 +42,15 @@ def test_json_is_a_choices_file(coordlang: Command, cells: Path, tmp_path: Path)
     assert Monitor.read(str(path), "r2").allowed() == (None, "(move r2 b a)")
     data = json.loads(path.read_text())
     assert [entry["robot"] for entry in data["choices"]] == ["r1", "r2"]
-    assert (data["plans"], data["covered"], data["guaranteed"], data["combinations_walked"]) == (
-        2,
-        True,
-        True,
-        4,
-    )
+    keys = ("plans", "covered", "guaranteed", "combinations_walked")
+    assert [data[key] for key in keys] == [2, True, True, 4]
     one = json.loads(
         coordlang("choices", cells, *CELLS, "w1 w0", "--json", "--robot", "r2", "--robot", "r2").out
     )
     assert one == data | {"choices": data["choices"][1:]}
-
-
-def test_dot(coordlang: Command, cells: Path) -> None:
-    out = coordlang("choices", cells, *CELLS, "w1 w0", "--format", "dot").out
-    assert out.count("subgraph") == 2
-    assert 'r1s0 -> r1s2 [label="(move r2 b a)"];' in out
-    assert out.count("{") == out.count("}")
+    drawn = coordlang("choices", cells, *CELLS, "w1 w0", "--format", "dot").out
+    assert drawn.count("subgraph") == 2
+    assert 'r1s0 -> r1s2 [label="(move r2 b a)"];' in drawn
 
 
 def test_detours(coordlang: Command, cells: Path) -> None:
@@ -162,17 +154,6 @@ def test_a_task_that_is_not_covered_and_refuted(
     data = json.loads(coordlang("choices", cells, *CELLS, "w0", "--json", *check).out)
     assert (data["guaranteed"], data["covered"]) == (False, False)
     assert {entry["atoms"] for entry in data["choices"]} == {"own"}
-
-
-def test_a_broken_language_file(coordlang: Command, cells: Path) -> None:
-    data = json.loads(cells.read_text())
-    data["states"] = dict.fromkeys(data["states"], "w0")
-    cells.write_text(json.dumps(data))
-    outcome = coordlang("choices", cells, *CELLS, "w0")
-    assert outcome.code == 1
-    assert (
-        "refuted: choices of this task miscoordinate; the language does not cover it" in outcome.err
-    )
 
 
 def test_large_tables_are_cut(

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from itertools import chain, pairwise, product
 from pathlib import Path
 
@@ -37,21 +38,18 @@ def check(candidates: Candidates, task_language: TaskLanguage, names: tuple[str,
         assert without.cost == task_language.space.cost_of(0)
         assert any(without.plan in plans for plans in groups.values())
         for words, plans in list(groups.items())[:25]:
-            for count_words in (True, False):
+            said = task_language.words_of(words)
+            for by_words in (True, False):
                 found = plan_under_sentence(
-                    task_language,
-                    task_language.words_of(words),
-                    name,
-                    terrain,
-                    count_words=count_words,
+                    task_language, said, name, terrain, count_words=by_words
                 )
                 assert found.plan in plans
-                assert found.words == task_language.words_of(words)
+                assert found.words == said
                 assert found.cost == without.cost
                 assert found.states <= found.expanded < found.generated + 1
                 searches += 1
-            said = texts(task_language.model, found.plan)
-            verdict = validate(loaded.domain, problem, loaded.team, said, init=init, goal=goal)
+            steps = texts(task_language.model, found.plan)
+            verdict = validate(loaded.domain, problem, loaded.team, steps, init=init, goal=goal)
             assert verdict.valid, verdict.reason
     return searches
 
@@ -62,22 +60,21 @@ def test_shipped_domains(name: str) -> None:
     candidates, task_language = shipped(name)
     space = task_language.space
     init = space.rows[space.state[task_language.start]]
-    try:
+    names = ["blind", "relaxed"]
+    with suppress(UsageError):
         heuristic("manhattan", task_language.model, space.goals[0], init)
-        names = ["blind", "relaxed", "manhattan"]
-    except UsageError:
-        names = ["blind", "relaxed"]
+        names.append("manhattan")
     assert check(candidates, task_language, tuple(names)) > 1
 
 
 @pytest.mark.parametrize("robots", [2, 3])
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 10**6))
 def test_random_models(robots: int, seed: int) -> None:
     check(*random_task_language(seed, robots), ("blind", "relaxed"))
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 10**6), robots=st.sampled_from([2, 3]))
 def test_a_state_is_looked_at_once(seed: int, robots: int) -> None:
     """By breadth every state is expanded once, whatever the sentence, and none that is farther than
@@ -125,10 +122,6 @@ def test_a_sentence_of_longer_plans_only_is_no_sentence() -> None:
         assert result.words == words
         with pytest.raises(NoPlanFits):
             plan_under_sentence(task_language, words)
-
-
-# -- the command
-# ---------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture

@@ -53,23 +53,17 @@ def test_coordinates(coordlang: Command, language: Path, tmp_path: Path) -> None
         '{"coordinates": {"c0-1": [9, 0], "c1-0": [0, 5], "c1-1": [9, 5], "c1-2": [20, 5]}}'
     )
     page = tmp_path / "report.html"
-    assert (
-        coordlang(
-            "report", language, *FILES, "-o", page, "--tasks-shown", "1", "--coordinates", sidecar
-        ).code
-        == 0
-    )
+    one = ("-o", page, "--tasks-shown", "1")
+    assert coordlang("report", language, *FILES, *one, "--coordinates", sidecar).code == 0
     assert data_of(page.read_bytes())["places"][0] == {"name": "c0-1", "x": 9, "y": 0}
     # Beside the problem it needs no option.
     copy = tmp_path / "problem.pddl"
     copy.write_text(FILES[1].read_text())
     sidecar.rename(tmp_path / "coordinates.json")
-    assert coordlang("report", language, FILES[0], copy, "-o", page, "--tasks-shown", "1").code == 0
+    assert coordlang("report", language, FILES[0], copy, *one).code == 0
     assert data_of(page.read_bytes())["places"][0]["x"] == 9
     (tmp_path / "coordinates.json").write_text("[]")
-    assert (
-        coordlang("report", language, FILES[0], copy, "-o", page, "--tasks-shown", "1").code == 31
-    )
+    assert coordlang("report", language, FILES[0], copy, *one).code == 31
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from math import prod
 from pathlib import Path
 from random import Random
@@ -11,6 +10,7 @@ from typing import Any
 
 import pytest
 
+import coordlang as door
 from coordlang.commands.building import build_language
 from coordlang.execution.task_language import language_in_task
 from coordlang.language.candidates import all_pairs, from_problems
@@ -24,6 +24,7 @@ from coordlang.required.miscoordination import Inseparable
 from planners.search.plans import Plans
 from planners.system.errors import ProvedImpossible, UsageError
 from tests.coordlang.report.conftest import data_of, make_language, make_world, refuted
+from tests.support.domains import DOMAINS
 from tests.support.random_models import random_model
 
 WORLDS = [
@@ -53,35 +54,23 @@ def listed_plans(task: dict[str, Any]) -> list[tuple[list[int], list[int]]]:
 
 @pytest.mark.parametrize(("domain", "problem", "tasks"), WORLDS)
 def test_plans_and_sentences(domain: str, problem: str, tasks: str | None) -> None:
-    world = make_world(domain, problem, tasks)
-    data = world.data
+    data = make_world(domain, problem, tasks).data
     assert sum(t["name"] is not None for t in data["tasks"]) == 1
     for task in data["tasks"]:
-        plans = listed_plans(task)
-        assert task["plans"] == str(len(plans))
+        said: dict[tuple[int, ...], list[list[int]]] = {}
+        for edges, nodes in listed_plans(task):
+            words = sentence(data["state_words"][task["nodes"]["state"][n]] for n in nodes)
+            said.setdefault(words, []).append(edges)
+        assert task["plans"] == str(sum(map(len, said.values())))
         assert task["complete"]
-        said = Counter(
-            sentence(data["state_words"][task["nodes"]["state"][n]] for n in nodes)
-            for _, nodes in plans
-        )
         assert task["all_sentences"] == len(said)
-        for entry in task["sentences"]:
-            words = tuple(entry["words"])
-            assert entry["plans"] == str(said[words])
-            mine = [
-                edges
-                for edges, nodes in plans
-                if sentence(data["state_words"][task["nodes"]["state"][n]] for n in nodes) == words
-            ]
-            own = [
-                len({tuple(labels[edge] for edge in edges) for edges in mine})
-                for labels in task["labels"]
-            ]
+        shown = [said[tuple(entry["words"])] for entry in task["sentences"]]
+        assert shown == sorted(shown, key=len, reverse=True)
+        for entry, plans in zip(task["sentences"], shown, strict=True):
+            assert entry["plans"] == str(len(plans))
+            own = [len({tuple(o[e] for e in edges) for edges in plans}) for o in task["labels"]]
             assert entry["own"] == [str(number) for number in own]
-            assert prod(own) >= len(mine)
-        assert [int(s["plans"]) for s in task["sentences"]] == sorted(
-            (said[tuple(s["words"])] for s in task["sentences"]), reverse=True
-        )
+            assert prod(own) >= len(plans)
 
 
 def test_ranks_are_those_of_the_planner() -> None:
@@ -94,21 +83,18 @@ def test_ranks_are_those_of_the_planner() -> None:
         spoken = language_in_task(world.language, world.domain, world.problem)
         plans = Plans.of(spoken.space)
 
-        def by_labels(way: tuple[list[int], list[int]], task: dict[str, Any] = task) -> list[int]:
-            # Edges of a node are in the order of labels, so that ways are ordered by their choices
-            # of edge.
-            return [edge - task["first"][node] for edge, node in zip(way[0], way[1], strict=False)]
+        def by_labels(
+            way: tuple[list[int], list[int]], first: list[int] = task["first"]
+        ) -> list[int]:
+            # Edges of a node are in the order of labels.
+            return [edge - first[node] for edge, node in zip(way[0], way[1], strict=False)]
 
         for rank, (edges, nodes) in enumerate(sorted(listed_plans(task), key=by_labels)):
             plan = plans.unrank(rank)
-            texts = [spoken.model.texts(step) for step in plan]
             assert [
-                tuple(
-                    data["labels"][robot][own[edge]]["text"]
-                    for robot, own in enumerate(task["labels"])
-                )
+                tuple(data["labels"][r][own[edge]]["text"] for r, own in enumerate(task["labels"]))
                 for edge in edges
-            ] == [tuple(text or "idle" for text in step) for step in texts]
+            ] == [tuple(t or "idle" for t in spoken.model.texts(step)) for step in plan]
             keys = [spoken.model.codec.key(spoken.space.rows[s]) for s in plans.states(plan)]
             assert [key_of(data, task["nodes"]["state"][n]) for n in nodes] == keys
 
@@ -120,7 +106,7 @@ def key_of(data: dict[str, Any], state: int) -> str:
 def test_random_models() -> None:
     """Models that nobody wrote for a page: it is made, and its numbers add up."""
     made = requiring = unmapped = 0
-    for seed in range(26):
+    for seed in range(20):
         random = Random(seed)
         domain, problem, options = random_model(seed, random.choice([2, 2, 3]))
         try:
@@ -138,18 +124,14 @@ def test_random_models() -> None:
         made += 1
         unmapped += not data["places"]
         for task, part in zip(data["tasks"], parts, strict=True):
-            plans = listed_plans(task)
-            assert (
-                task["plans"]
-                == str(len(plans))
-                == str(sum(int(s["plans"]) for s in task["sentences"]))
-            )
+            of_sentences = sum(int(s["plans"]) for s in task["sentences"])
+            assert int(task["plans"]) == len(listed_plans(task)) == of_sentences
             assert not part.shown.language.covered or task["verified"]
             if task["witness"]:
                 requiring += 1
                 assert task["witness"]["breaks"] <= task["steps"]
                 assert not task["witness"]["reaches"] or options.cost != "makespan"
-    assert made >= 8
+    assert made >= 6
     assert requiring >= 3
     assert unmapped >= 2
 
@@ -178,44 +160,33 @@ def test_selection() -> None:
     language, domain, problem = make_language("t-map", "problem")
     every = select_tasks(language, domain, [problem], 200, 0)
     assert every.complete
-    # The problem's own task is the pair of its start and the only state with its goal: 131 further
-    # pairs.
-    assert len(every.tasks) == 132 or len(every.tasks) == 133
+    # The problem's own task is the pair of its start and the only state with its goal.
+    assert len(every.tasks) in (132, 133)
     assert sum(task.witness is not None for task in every.tasks) in (12, 13)
-    some = select_tasks(language, domain, [problem], 10, 0)
-    assert len(some.tasks) == 10
-    assert not some.complete
-    assert sum(task.witness is not None for task in some.tasks[1:]) == round(9 * 0.75)
-    other = select_tasks(language, domain, [problem], 10, 1)
 
-    def texts(selection: Any) -> list[Any]:
-        return [
-            task.language.space.rows[task.language.space.state[task.language.start]].tolist()
-            for task in selection.tasks
-        ]
+    def some(seed: int) -> tuple[list[int], ...]:
+        found = select_tasks(language, domain, [problem], 10, seed)
+        assert (len(found.tasks), found.complete) == (10, False)
+        assert sum(task.witness is not None for task in found.tasks[1:]) == round(9 * 0.75)
+        used = [task.language for task in found.tasks]
+        return tuple(u.space.rows[u.space.state[u.start]].tolist() for u in used)
 
-    assert texts(some) == texts(select_tasks(language, domain, [problem], 10, 0))
-    assert texts(some) != texts(other)
+    assert some(0) == some(0) != some(1)
     with pytest.raises(UsageError):
         select_tasks(language, domain, [problem, problem], 1, 0)
 
 
-def test_a_page_is_the_same_each_time_and_opens_offline() -> None:
+def test_a_page_is_the_same_each_time_opens_offline_and_shows_fewer_tasks_if_too_large() -> None:
     language, domain, problem = make_language("t-map", "problem")
-    one = make_report(language, domain, [problem], tasks_shown=5, seed=3)
-    assert one.html == make_report(language, domain, [problem], tasks_shown=5, seed=3).html
-    assert one.html != make_report(language, domain, [problem], tasks_shown=5, seed=4).html
-    text = one.html.decode().replace("http://www.w3.org/2000/svg", "")
-    assert "http:" not in text
-    assert "https:" not in text
-    assert str(Path.cwd()) not in text
-
-
-def test_pages_that_would_be_too_large_show_fewer_tasks() -> None:
-    language, domain, problem = make_language("t-map", "problem")
-    full = make_report(language, domain, [problem], tasks_shown=12)
-    less = make_report(language, domain, [problem], tasks_shown=12, largest=len(full.html) - 1)
-    assert less.tasks == full.tasks // 2
+    one, again, other = (
+        make_report(language, domain, [problem], tasks_shown=4, seed=seed).html
+        for seed in (3, 3, 4)
+    )
+    assert one == again != other
+    text = one.decode().replace("http://www.w3.org/2000/svg", "")
+    assert [part for part in ("http:", "https:", str(Path.cwd())) if part in text] == []
+    less = make_report(language, domain, [problem], tasks_shown=4, seed=3, largest=len(one) - 1)
+    assert less.tasks == 2
     assert not data_of(less.html)["candidates"]["complete"]
 
 
@@ -229,14 +200,19 @@ def test_without_a_map() -> None:
 
 def test_a_language_that_is_none_is_said_to_be_none() -> None:
     language, domain, problem = make_language("t-map", "problem")
-    task = data_of(make_report(refuted(language), domain, [problem], tasks_shown=2).html)["tasks"][
-        0
-    ]
-    assert task["verified"] is False
-    assert task["violation"]["stops"] is not None
-    assert (
-        data_of(make_report(language, domain, [problem], tasks_shown=2).html)["tasks"][0][
-            "violation"
-        ]
-        is None
-    )
+    for shown, holds in ((language, True), (refuted(language), False)):
+        task = data_of(make_report(shown, domain, [problem], tasks_shown=1).html)["tasks"][0]
+        assert task["verified"] is holds
+        assert (task["violation"] is None) == holds
+
+
+def test_plans_within_slack_are_called_so() -> None:
+    """The page says "optimal plan" of no other plans."""
+    folder = DOMAINS / "three-cells"
+    built = door.build(folder / "domain.pddl", folder / "problem.pddl", slack=2, method="minimal")
+    _, domain, problem = make_language("three-cells", "problem", None)
+    html = make_report(built.language, domain, [problem], tasks_shown=1).html
+    kept = data_of(html)["kept"]
+    assert kept["one"] == "a plan within 2 steps of the optimum"
+    assert b"optimal plan" not in html
+    assert f"follows any {kept['plan']} with that sentence" in " ".join(html.decode().split())

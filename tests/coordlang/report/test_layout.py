@@ -5,6 +5,7 @@ crossings.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from random import Random
 
@@ -17,16 +18,10 @@ from coordlang.sites.coordinates import from_names, read_coordinates
 from planners.system.errors import BadInput
 
 
-def test_names_of_grids_tell_rows_and_columns() -> None:
-    layout = place_layout(["c0-1", "c1-0", "c1-1"], [("c0-1", "c1-1"), ("c1-0", "c1-1")])
-    assert layout.is_grid
-    assert layout.points["c0-1"] == (1, 0)
-    assert layout.points["c1-0"] == (0, 1)
-
-
 @pytest.mark.parametrize(
     ("names", "points"),
     [
+        (["c0-1", "c1-1"], {"c0-1": (1, 0), "c1-1": (1, 1)}),
         (["loc-x2-y3", "loc-x3-y3"], {"loc-x2-y3": (2, 3), "loc-x3-y3": (3, 3)}),
         (["cell_4_5", "cell_4_6"], {"cell_4_5": (5, 4), "cell_4_6": (6, 4)}),
         (["f0-0f", "f0-1f"], {"f0-0f": (0, 0), "f0-1f": (1, 0)}),
@@ -96,22 +91,13 @@ def test_layers_keep_their_nodes_and_cross_less() -> None:
         random = Random(seed)
         sizes = [random.randint(1, 6) for _ in range(4)]
         bounds = np.cumsum([0, *sizes]).tolist()
-        edges = sorted(
-            {
-                (
-                    random.randrange(bounds[k], bounds[k + 1]),
-                    random.randrange(bounds[k + 1], bounds[k + 2]),
-                )
-                for k in range(3)
-                for _ in range(6)
-            }
-        )
+        spans = [range(a, b) for a, b in pairwise(bounds)]
+        pairs = [(one, other) for one, other in pairwise(spans) for _ in range(6)]
+        edges = sorted({(random.choice(one), random.choice(other)) for one, other in pairs})
         orders = layer_orders(sizes, edges)
-        for k, size in enumerate(sizes):
-            assert sorted(orders[bounds[k] : bounds[k + 1]]) == list(range(size))
-        given = [
-            n - bounds[int(np.searchsorted(bounds, n, "right")) - 1] for n in range(bounds[-1])
-        ]
+        given = [n - span.start for span in spans for n in span]
+        for span in spans:
+            assert sorted(orders[span.start : span.stop]) == [*range(len(span))]
         better += crossings(given, sizes, edges) - crossings(orders, sizes, edges)
     assert better > 100
 
@@ -129,23 +115,22 @@ def test_coordinates_from_a_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    [
-        "",
-        "[]",
-        "{}",
-        '{"coordinates": []}',
-        '{"coordinates": {"a": [1]}}',
-        '{"coordinates": {"a": [1, "2"]}}',
-        '{"coordinates": {"a": [1, true]}}',
-        '{"coordinates": {"a": [1, 1e400]}}',
-        '{"coordinates": {"a": [0, 0], "b": [0, 0]}}',
-        '{"coordinates": {"a": [NaN, 0]}}',
+    ["", "[]", "{}", '{"coordinates": []}']
+    + [
+        f'{{"coordinates": {{{entries}}}}}'
+        for entries in (
+            '"a": [1]',
+            '"a": [1, "2"]',
+            '"a": [1, true]',
+            '"a": [1, 1e400]',
+            '"a": [0, 0], "b": [0, 0]',
+            '"a": [NaN, 0]',
+        )
     ],
 )
 def test_files_that_are_no_coordinates(text: str, tmp_path: Path) -> None:
     path = tmp_path / "coordinates.json"
     path.write_text(text)
-    with pytest.raises(BadInput):
-        read_coordinates(path)
-    with pytest.raises(BadInput):
-        read_coordinates(tmp_path / "missing.json")
+    for file in (path, tmp_path / "missing.json"):
+        with pytest.raises(BadInput):
+            read_coordinates(file)

@@ -18,11 +18,16 @@ from tests.support.simulation import floor_for, mission_of
 
 
 def runs(
-    folder: str, agreement: Agreement, settings: Settings, *wishes: WishRecord, stem: str
+    folder: str,
+    agreement: Agreement,
+    settings: Settings,
+    *wishes: WishRecord,
+    stem: str,
+    number: int = 2,
 ) -> list[RunRecord]:
     mission = mission_of(folder, stem, agreement)
     floor = floor_for(mission)
-    return [run(mission, floor, settings, seed, wishes) for seed in range(3)]
+    return [run(mission, floor, settings, seed, wishes) for seed in range(number)]
 
 
 def detours(found: RunRecord) -> list[EventRecord]:
@@ -61,17 +66,12 @@ def test_a_detour_that_own_choices_allow_is_made() -> None:
 
 def test_under_a_whole_plan_a_detour_can_be_had_only_if_it_is_on_it() -> None:
     wish = WishRecord("r2", 2, "(at r2 c0-4)")
-    found = [
-        run(mission_of("corridor", agreement="plan"), floor_for(mission_of("corridor")), Settings(),
-            seed, [wish])
-        for seed in range(4)
-    ]  # fmt: skip
-    granted = []
-    for one in found:
-        (event,) = detours(one)
-        granted.append(event.granted)
-        assert event.granted == ("(move r2 c1-4 c0-4)" in one.subplans["r2"])
-    assert set(granted) == {True, False}
+    granted = set()
+    for found in runs("corridor", "plan", Settings(), wish, stem="problem", number=4):
+        (event,) = detours(found)
+        granted.add(event.granted)
+        assert event.granted == ("(move r2 c1-4 c0-4)" in found.subplans["r2"])
+    assert granted == {True, False}
 
 
 def test_a_walker_goes_along_links_and_turns_back_before_robots() -> None:
@@ -93,17 +93,15 @@ def test_a_walker_goes_along_links_and_turns_back_before_robots() -> None:
     assert human.place != before or (x, y) == (0.0, 0.0)
 
 
-@pytest.mark.parametrize("human", ["nowhere", "c9-9"])
-def test_an_unknown_place_is_an_error(human: str) -> None:
+def test_a_human_needs_a_place_that_there_is_and_that_is_free() -> None:
     floor = floor_for(mission_of("t-map"))
-    with pytest.raises(UsageError, match="there is no such place"):
-        Human.of(human, floor, (), (), 1.0, Random(0))
-
-
-def test_a_human_needs_a_place_that_is_free() -> None:
-    floor = floor_for(mission_of("t-map"))
-    assert Human.of("random", floor, sorted(floor.points)[1:], (), 1.0, Random(0)).place == "c0-1"
-    with pytest.raises(UsageError, match="no place for a human"):
-        Human.of("random", floor, ["c1-1"], list(floor.points), 1.0, Random(0))
-    with pytest.raises(UsageError, match="a robot starts in this place"):
-        Human.of("c1-1", floor, ["c1-1"], (), 1.0, Random(0))
+    every = sorted(floor.points)
+    assert Human.of("random", floor, every[1:], (), 1.0, Random(0)).place == "c0-1"
+    for place, starts, goals, said in (
+        ("nowhere", [], [], "there is no such place"),
+        ("c9-9", [], [], "there is no such place"),
+        ("random", ["c1-1"], every, "no place for a human"),
+        ("c1-1", ["c1-1"], [], "a robot starts in this place"),
+    ):
+        with pytest.raises(UsageError, match=said):
+            Human.of(place, floor, starts, goals, 1.0, Random(0))

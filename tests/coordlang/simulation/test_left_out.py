@@ -59,7 +59,7 @@ def test_a_robot_may_be_called_human(tmp_path: Path) -> None:
     assert set(run.poses) == {"human", "wall"}
     assert len(run.human) == len(run.poses["human"])
     assert len({(x, y) for x, y, _ in run.poses["human"]}) > len(set(run.human)) == 1
-    assert recorded(found.record, run, ".gif").startswith(b"GIF89a")
+    assert recorded(found.record, run, ".png").startswith(b"\x89PNG")
 
 
 def test_nothing_is_said_where_all_is_simulated(recwarn: pytest.WarningsRecorder) -> None:

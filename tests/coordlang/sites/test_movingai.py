@@ -151,8 +151,7 @@ def test_maps_of_others_have_a_plan(name: str, tmp_path: Path) -> None:
     cells = sorted(grid.passable)
     (sy, sx), (gy, gx) = cells[0], cells[-1]
     scenario = tmp_path / "own.scen"
-    line = f"0 {path.name} {grid.width} {grid.height} {sx} {sy} {gx} {gy} 0\n"
-    scenario.write_text(f"version 1\n{line}")
+    scenario.write_text(f"0 {path.name} {grid.width} {grid.height} {sx} {sy} {gx} {gy} 0\n")
     model = loaded(tmp_path, planning_files(path, scenario, 1))
     distance, layer, seen = 0, {cells[0]}, {cells[0]}
     while cells[-1] not in layer:

@@ -151,9 +151,7 @@ def our_steps(space: Any) -> list[list[list[str]]]:
     ("folder", "name", "robots"),
     [
         ("handover", "two-doors", {}),
-        ("handover", "three-rooms", {}),
         ("elevator", "same-floor", {}),
-        ("two-arms", "pass-on", {}),
         ("two-arms", "exchange", {"robots": ("arm1", "arm2")}),
     ],
 )
@@ -413,10 +411,8 @@ def shortest(problem: Any) -> tuple[int, int] | None:
                 for action, args in simulator.get_applicable_actions(state):
                     after = simulator.apply(state, action, args)
                     if after is not None and key(after) not in seen:
-                        following[key(after)] = (
-                            after,
-                            ways + following.get(key(after), (None, 0))[1],
-                        )
+                        _, others = following.get(key(after), (None, 0))
+                        following[key(after)] = after, ways + others
             seen |= following.keys()
             layer, length = following, length + 1
     return None
@@ -473,12 +469,11 @@ def test_concurrency_constraints() -> None:
     problem = lifting()
     problem.add_goal(up.Dot(problem.agent("ann"), problem.agent("ann").fluent("up")()))
     free, partner, alone = (
-        [steps_of(translate(problem, None, given), plan) for plan in all_plans(problem, **params)]
-        for given, params in (
-            (None, {}),
-            (PARTNER, {"concurrency": PARTNER}),
-            (ALONE, {"concurrency": ALONE}),
-        )
+        [
+            steps_of(translate(problem, None, given), p)
+            for p in all_plans(problem, concurrency=given)
+        ]
+        for given in (None, PARTNER, ALONE)
     )
     both, one = [["(lift ann)", "(lift bob)"]], [["(lift ann)"]]
     assert sorted(free) == sorted([both, one])
@@ -633,15 +628,13 @@ def test_limits(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def _process(problem: Any) -> None:
     fuel = problem.add_fluent("fuel", up.RealType(), default_initial_value=3)
-    process = up.Process("leak")
-    process.add_decrease_continuous_effect(fuel, 1)
-    problem.add_process(process)
+    problem.add_process(up.Process("leak"))
+    problem.process("leak").add_decrease_continuous_effect(fuel, 1)
 
 
 def _event(problem: Any) -> None:
-    event = up.Event("gust")
-    event.add_effect(_free(problem), False)
-    problem.add_event(event)
+    problem.add_event(up.Event("gust"))
+    problem.event("gust").add_effect(_free(problem), False)
 
 
 def _numeric(problem: Any) -> None:
@@ -784,11 +777,13 @@ def test_wrong_parameters(params: dict[str, Any], message: str) -> None:
 
 def test_who_the_robots_are() -> None:
     problem = crossing()
-    assert (
-        solve(problem, robots=problem.objects(problem.user_type("Robot"))).metrics["plans"] == "2"
-    )
-    assert solve(problem, robots=("R1", "R2")).metrics["plans"] == "2"
-    assert solve(problem, robot_type=problem.user_type("Robot")).metrics["plans"] == "2"
+    kind = problem.user_type("Robot")
+    for params in (
+        {"robots": problem.objects(kind)},
+        {"robots": ("R1", "R2")},
+        {"robot_type": kind},
+    ):
+        assert solve(problem, **params).metrics["plans"] == "2"
     nobody = up.Problem("nobody")
     on = nobody.add_fluent("on", up.BoolType(), default_initial_value=False)
     press = up.InstantaneousAction("press")
@@ -816,52 +811,34 @@ def test_invalid_plans() -> None:
     problem = crossing()
     good = solve(problem, plan_kind=PlanKind.SEQUENTIAL_PLAN).plan.actions
 
-    def again(actions: list[Any]) -> SequentialPlan:
-        return SequentialPlan([ActionInstance(a.action, a.actual_parameters) for a in actions])
+    def again(actions: Any) -> list[Any]:
+        return [ActionInstance(a.action, a.actual_parameters) for a in actions]
 
-    assert verdict(problem, again(good)).status == Validity.VALID
-    late = verdict(problem, again([*good[:1], *good[:1], *good]))
-    assert (late.status, late.reason) == (
-        Validity.INVALID,
-        FailedValidationReason.INAPPLICABLE_ACTION,
-    )
+    def refused(plan: Any, reason: Any) -> Any:
+        found = verdict(problem, plan)
+        assert (found.status, found.reason) == (Validity.INVALID, reason)
+        return found
+
+    assert verdict(problem, SequentialPlan(again(good))).status == Validity.VALID
+    inapplicable = FailedValidationReason.INAPPLICABLE_ACTION
+    late = refused(SequentialPlan(again([*good[:1], *good[:1], *good])), inapplicable)
     assert str(late.inapplicable_action) == str(good[0])
     assert "step 2" in str(late.log_messages)
-    short = verdict(problem, again(good[:-1]))
-    assert (short.status, short.reason) == (
-        Validity.INVALID,
-        FailedValidationReason.UNSATISFIED_GOALS,
-    )
-    twice = verdict(
-        problem,
-        PartialOrderPlan({ActionInstance(a.action, a.actual_parameters): [] for a in good[:2]}),
-    )
-    assert (twice.status, twice.reason) == (Validity.INVALID, FailedValidationReason.MUTEX_CONFLICT)
-    one, two = again(good[:2]).actions
-    cycle = verdict(problem, PartialOrderPlan({one: [two], two: [one]}))
-    assert (cycle.status, cycle.reason) == (Validity.INVALID, FailedValidationReason.MUTEX_CONFLICT)
-    other = crossing(5)
+    refused(SequentialPlan(again(good[:-1])), FailedValidationReason.UNSATISFIED_GOALS)
+    one, two = again(good[:2])
+    at_once: dict[Any, list[Any]] = {one: [], two: []}
+    for order in (at_once, {one: [two], two: [one]}):  # the second has a cycle
+        refused(PartialOrderPlan(order), FailedValidationReason.MUTEX_CONFLICT)
     wait = up.InstantaneousAction("Wait", r=up.UserType("Robot"))
-    agent = agents().agents[0]
-    foreign: list[Any] = [
-        SequentialPlan([ActionInstance(wait, (up.ObjectExp(problem.object("R1")),))]),
-        SequentialPlan([ActionInstance(good[0].action, good[0].actual_parameters, agent)]),
-        SequentialPlan(solve(agents(), plan_kind=PlanKind.SEQUENTIAL_PLAN).plan.actions[:1]),
-        SequentialPlan(
-            [
-                ActionInstance(
-                    one.action, (*one.actual_parameters[:2], up.ObjectExp(other.object("c4")))
-                )
-            ]
-        ),
-        TimeTriggeredPlan([(Fraction(0), one, Fraction(3))]),
-    ]
-    for plan in foreign:
-        result = verdict(problem, plan)
-        assert (result.status, result.reason) == (
-            Validity.INVALID,
-            FailedValidationReason.INAPPLICABLE_ACTION,
-        )
+    elsewhere = (*one.actual_parameters[:2], up.ObjectExp(crossing(5).object("c4")))
+    for action in (
+        ActionInstance(wait, (up.ObjectExp(problem.object("R1")),)),
+        ActionInstance(good[0].action, good[0].actual_parameters, agents().agents[0]),
+        solve(agents(), plan_kind=PlanKind.SEQUENTIAL_PLAN).plan.actions[0],
+        ActionInstance(one.action, elsewhere),
+    ):
+        refused(SequentialPlan([action]), inapplicable)
+    refused(TimeTriggeredPlan([(Fraction(0), one, Fraction(3))]), inapplicable)
     with (
         pytest.warns(UserWarning, match="cannot validate"),
         pytest.raises(UPUsageError, match="a STNPlan cannot be validated"),
@@ -893,15 +870,8 @@ def test_odd_names() -> None:
     )
     assert sequential_verdicts(problem, plans[0]) == {Validity.VALID}
     names = Names()
-    assert [names.of(n, n) for n in ("x", "X", "?x", "", "-", "object", "x")] == [
-        "x",
-        "x__2",
-        "_x",
-        "x__3",
-        "x__4",
-        "object__2",
-        "x",
-    ]
+    made = [names.of(n, n) for n in ("x", "X", "?x", "", "-", "object", "x")]
+    assert made == ["x", "x__2", "_x", "x__3", "x__4", "object__2", "x"]
 
 
 def test_the_engine_by_a_file_beside_the_program(tmp_path: Path) -> None:
