@@ -33,7 +33,7 @@ from coordlang.commands.options import (
 )
 from coordlang.commands.terminal import covered_code, echo, line_width, note
 from coordlang.commands.witness import witness_text
-from coordlang.execution.choices import MOST, Choices
+from coordlang.execution.choices import MOST, SentenceChoices
 from coordlang.execution.choices import choices as choices_under
 from coordlang.execution.choices_file import monitor, to_bytes, to_data
 from coordlang.execution.drawing import choices_dot
@@ -60,7 +60,7 @@ class RobotsChoices(Presented):
     ``chosen`` are the numbers of the robots that are shown and saved.
     """
 
-    found: Choices
+    found: SentenceChoices
     chosen: tuple[int, ...]
     shown = ("sentence", "subplans", "guaranteed", "covered")
 
@@ -108,7 +108,7 @@ class RobotsChoices(Presented):
     @property
     def witness(self) -> Miscoordination | None:
         """A combination that is no optimal plan, or None."""
-        return self.found.mixtures.violation if self.found.mixtures else None
+        return self.found.mixtures.witness if self.found.mixtures else None
 
     @property
     def subplans(self) -> dict[str, int]:

@@ -70,14 +70,14 @@ def best_sentence(
         When the prefixes have more than ``most`` entries, or more than the memory holds.
     """
     graph = _Graph.of(task_language, preferences)
-    start = _Prefix((graph.word[0],), {0: 1}, None)
+    start = _Prefix((graph.word[0],), {0: 1})
     queue = [(graph.bound(start), start.words, 0, start)]
     seen: set[object] = set()
     entries, prefixes, pushed = 0, 0, 0
     while queue:
         _, words, _, prefix = heappop(queue)
-        if prefix.whole is not None:
-            return BestSentence(words, prefix.whole.plans, graph.values(prefix), prefixes)
+        if prefix.plans is not None:
+            return BestSentence(words, prefix.plans, graph.values(prefix), prefixes)
         same = graph.continuation(prefix)
         if same in seen:
             continue  # the one that was here before is as good, and shorter or smaller
@@ -97,27 +97,18 @@ def best_sentence(
 
 
 @dataclass(frozen=True, slots=True)
-class _Whole:
-    """The plans of a whole sentence.
-
-    How many, and for each `PlanPreference` the worst and the best grade.
-    """
-
-    plans: int
-    grades: tuple[tuple[int, int], ...]
-
-
-@dataclass(frozen=True, slots=True)
 class _Prefix:
-    """The prefix of a sentence.
+    """The prefix of a sentence, or a whole sentence.
 
     ``counts`` has how many beginnings of plans come to each point with the first state of the last
-    word.  ``whole`` is there for a whole sentence.
+    word.  Of a whole sentence ``plans`` is the number of its plans, and ``grades`` has the worst
+    and the best grade for each `PlanPreference`.
     """
 
     words: tuple[int, ...]
     counts: dict[int, int]
-    whole: _Whole | None
+    plans: int | None = None
+    grades: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,20 +193,18 @@ class _Graph:
                     heappush(todo, q)
                 counts = inside if self.word[q] == word else further.setdefault(self.word[q], {})
                 counts[q] = counts.get(q, 0) + inside[point] * number
-        found = [_Prefix((*prefix.words, w), counts, None) for w, counts in further.items()]
-        return [*found, self._whole(prefix, ended)] if ended else found
-
-    def _whole(self, prefix: _Prefix, ended: dict[int, int]) -> _Prefix:
-        """A prefix as a whole sentence; ``ended`` has the plans that end at each point."""
-        columns = zip(*(self.grades[p] for p in ended), strict=True)
-        whole = _Whole(sum(ended.values()), tuple((max(c), min(c)) for c in columns))
-        return _Prefix(prefix.words, {}, whole)
+        found = [_Prefix((*prefix.words, w), counts) for w, counts in further.items()]
+        if ended:
+            columns = zip(*(self.grades[p] for p in ended), strict=True)
+            grades = tuple((max(column), min(column)) for column in columns)
+            found.append(_Prefix(prefix.words, {}, sum(ended.values()), grades))
+        return found
 
     def values(self, prefix: _Prefix) -> tuple[int | tuple[int, int], ...]:
         """The value of a whole sentence in each preference."""
-        assert prefix.whole is not None
-        grades = iter(prefix.whole.grades)
-        worth = {"shortest": len(prefix.words), "most-plans": prefix.whole.plans}
+        assert prefix.plans is not None
+        grades = iter(prefix.grades)
+        worth = {"shortest": len(prefix.words), "most-plans": prefix.plans}
         return tuple(
             worth[one] if isinstance(one, str) else next(grades) for one in self.preferences
         )
@@ -225,7 +214,7 @@ class _Graph:
 
         The smaller the better; the length last.
         """
-        if prefix.whole is not None:
+        if prefix.plans is not None:
             signs = (
                 -value if one == "most-plans" and isinstance(value, int) else value
                 for one, value in zip(self.preferences, self.values(prefix), strict=True)

@@ -51,7 +51,7 @@ class RobotChoices:
 
 
 @dataclass(frozen=True, slots=True)
-class Choices:
+class SentenceChoices:
     """All robots' choices under one sentence of one task.
 
     Parameters
@@ -92,7 +92,7 @@ def choices(
     words: Sequence[int],
     index: EdgeIndex | None = None,
     most: int | None = MOST,
-) -> Choices:
+) -> SentenceChoices:
     """The choices of every robot under a sentence.
 
     What is known in a state is exact (`coordlang.execution.automaton.determinise`) where all
@@ -129,7 +129,7 @@ def choices(
         _with_knowledge(task_language, automaton, robot, mixtures, most)
         for robot, automaton in enumerate(subplans)
     )
-    return Choices(task_language, tuple(words), fits, robots, mixtures)
+    return SentenceChoices(task_language, tuple(words), fits, robots, mixtures)
 
 
 def _with_knowledge(

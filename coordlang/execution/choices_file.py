@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Choices files: robots' choices as JSON (docs/formats.md).
+"""SentenceChoices files: robots' choices as JSON (docs/formats.md).
 
 `coordlang.execution.monitor` reads them without this module, because a robot may have Python's
 standard library only.
@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import UNSET, Meta, UnsetType
 
-from coordlang.execution.choices import Choices, RobotChoices
+from coordlang.execution.choices import RobotChoices, SentenceChoices
 from coordlang.execution.monitor import FORMAT, IDLE, VERSION, Monitor
 from coordlang.language.candidates import describe
 from coordlang.language.tolerance import tolerance_data
@@ -98,7 +98,7 @@ def json_schema() -> dict[str, Any]:
     return CHOICES.json_schema()
 
 
-def to_record(choices: Choices, robots: Sequence[int] | None = None) -> ChoicesFile:
+def to_record(choices: SentenceChoices, robots: Sequence[int] | None = None) -> ChoicesFile:
     """The content of a choices file, of all robots or of those with these numbers."""
     task_language = choices.task_language
     return ChoicesFile(
@@ -117,18 +117,18 @@ def to_record(choices: Choices, robots: Sequence[int] | None = None) -> ChoicesF
     )
 
 
-def to_data(choices: Choices, robots: Sequence[int] | None = None) -> dict[str, Any]:
+def to_data(choices: SentenceChoices, robots: Sequence[int] | None = None) -> dict[str, Any]:
     """The data of a choices file, of all robots or of those with these numbers."""
     data: dict[str, Any] = msgspec.to_builtins(to_record(choices, robots))
     return data
 
 
-def to_bytes(choices: Choices, robots: Sequence[int] | None = None) -> bytes:
+def to_bytes(choices: SentenceChoices, robots: Sequence[int] | None = None) -> bytes:
     """The text of a choices file: the same choices give the same bytes."""
     return msgspec.json.encode(to_record(choices, robots)) + b"\n"
 
 
-def monitor(choices: Choices, robot: str) -> Monitor:
+def monitor(choices: SentenceChoices, robot: str) -> Monitor:
     """A run-time monitor of one robot's choices.
 
     Raises `coordlang.execution.monitor.MonitorError` for an unknown robot.
@@ -137,7 +137,7 @@ def monitor(choices: Choices, robot: str) -> Monitor:
     return Monitor(to_data(choices, [names.index(robot)] if robot in names else None), robot)
 
 
-def _robot(choices: Choices, own: RobotChoices) -> RobotRecord:
+def _robot(choices: SentenceChoices, own: RobotChoices) -> RobotRecord:
     model, automaton = choices.task_language.model, own.automaton
     texts = model.codec.facts.texts
     sometimes_known = reduce(or_, (known.true | ~known.possible for known in automaton.known))

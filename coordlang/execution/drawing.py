@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import reduce
 from operator import and_
 
-from coordlang.execution.choices import Choices, RobotChoices
+from coordlang.execution.choices import RobotChoices, SentenceChoices
 from coordlang.execution.open_plans import DagEdge, DagNode, PlanDag
 from planners.joint.model import IDLE, NO_FACT, own_text
 from planners.joint.states import split_atoms
@@ -113,7 +113,7 @@ def _edge_text(dag: PlanDag, edge: DagEdge) -> str:
     return "\nor\n".join("\n".join(lines) for lines in actions) + more
 
 
-def choices_dot(choices: Choices, robots: Sequence[int] | None = None) -> str:
+def choices_dot(choices: SentenceChoices, robots: Sequence[int] | None = None) -> str:
     """All robots' automata, or of those with these numbers: a cluster each, a rank for each step.
 
     In a state stand its number, how many own subplans are left, and the atoms known to be true that
@@ -128,7 +128,7 @@ def choices_dot(choices: Choices, robots: Sequence[int] | None = None) -> str:
     return "\n".join([*lines, "}"]) + "\n"
 
 
-def distinguishing(choices: Choices, own: RobotChoices, states: range) -> list[list[str]]:
+def distinguishing(choices: SentenceChoices, own: RobotChoices, states: range) -> list[list[str]]:
     """For each state of one step the atoms known to be true there.
 
     Without those known to be true in all of them.
@@ -142,7 +142,7 @@ def distinguishing(choices: Choices, own: RobotChoices, states: range) -> list[l
     ]
 
 
-def _cluster(choices: Choices, own: RobotChoices) -> list[str]:
+def _cluster(choices: SentenceChoices, own: RobotChoices) -> list[str]:
     model, automaton = choices.task_language.model, own.automaton
     title = f"{model.robots[own.robot]}: {automaton.count:,} subplan{'s' * (automaton.count != 1)}"
     lines = [f"  subgraph cluster_{own.robot} {{", f"    label={_quoted(title)};"]

@@ -209,8 +209,7 @@ def a_star(
     [start] = states.numbers(init[None, :])
     if words is not None and (not words or states.word[start] != words[0]):
         return None
-    search = _AStar(states, words, _Heights(states, goal, bound), count_words)
-    return search.run(start)
+    return _AStar(states, goal, bound, words, count_words).run(start)
 
 
 class _AStar:
@@ -222,16 +221,20 @@ class _AStar:
     def __init__(
         self,
         states: ExpandedStates,
+        goal: Goal,
+        bound: Values,
         words: Sequence[int] | None,
-        heights: _Heights,
         count_words: bool,
     ) -> None:
-        self.states, self.heights, self.count_words = states, heights, count_words
+        self.states, self.goal, self.bound = states, goal, bound
+        self.count_words = count_words
         self.guided = words is not None
         self.last = len(words) - 1 if words else 0
         self.indices: dict[int, int] = {}  # word -> its indices in the sentence
         for index, word in enumerate(words or ()):
             self.indices[word] = self.indices.get(word, 0) | 1 << index
+        self.height: dict[int, int] = {}  # the lower bound of every state met
+        self.is_goal: dict[int, bool] = {}
         self.best: dict[int, Cost] = {}
         self.met: dict[int, int] = {}  # state -> indices met at the best cost
         self.waiting: dict[int, int] = {}  # state -> those of them that are not expanded yet
@@ -241,7 +244,7 @@ class _AStar:
 
     def run(self, start: int) -> GuidedPlan | None:
         """Search from a state to the nearest goal state whose word is the sentence's last."""
-        self.heights.meet([start])
+        self._meet([start])
         self.best[start] = (0, 0)
         self.met[start] = 0
         self._put(start, 1, 0)
@@ -252,7 +255,7 @@ class _AStar:
             if not here:
                 continue
             self.waiting[state] = 0
-            if self.heights.is_goal[state] and here >> self.last & 1:
+            if self.is_goal[state] and here >> self.last & 1:
                 return self._found(state, len(looked_at))
             looked_at.add(state)
             self._expand(state, here)
@@ -261,9 +264,9 @@ class _AStar:
     def _expand(self, state: int, here: int) -> None:
         """Take all joint steps out of a state, for some indices of its word."""
         self.expanded += 1
-        word, height = self.states.word, self.heights.height
+        word, height = self.states.word, self.height
         steps = self.states.steps(state)
-        self.heights.meet([target for target, _, _ in steps])
+        self._meet([target for target, _, _ in steps])
         makespan, second = self.best[state]
         for order, (target, labels, cost) in enumerate(steps):
             goes_on = self.guided and word[target] != word[state]
@@ -275,6 +278,15 @@ class _AStar:
                 self.before[target, index] = ((state, index - goes_on), labels)
             self._put(target, fresh, order)
 
+    def _meet(self, states: Sequence[int]) -> None:
+        """Look at states, those among them that are new as one table."""
+        fresh = sorted({state for state in states if state not in self.height})
+        if fresh:
+            rows = np.stack([self.states.rows[state] for state in fresh])
+            self.height.update(zip(fresh, self.bound(rows).tolist(), strict=True))
+            reached = self.states.model.holds(self.goal, rows).tolist()
+            self.is_goal.update(zip(fresh, reached, strict=True))
+
     def _improved(self, state: int, cost: Cost, indices: int) -> int:
         """Those of the indices that a state was not met with yet at this cost or a lower one."""
         if state not in self.best or cost < self.best[state]:
@@ -285,7 +297,7 @@ class _AStar:
         """Add indices to a state, and queue it if one is beyond those that wait already."""
         if indices > self.waiting.get(state, 0):
             left = self.last + 1 - indices.bit_length()
-            height = self.heights.height[state]
+            height = self.height[state]
             if self.count_words:
                 height = max(height, left)
             steps, second = self.best[state]
@@ -308,23 +320,3 @@ class _AStar:
             plan.append(labels)
             states.append(node[0])
         return tuple(reversed(plan)), states[::-1]
-
-
-@dataclass(frozen=True, slots=True)
-class _Heights:
-    """The lower bound of every state met, and whether it is a goal state."""
-
-    states: ExpandedStates
-    goal: Goal
-    bound: Values
-    height: dict[int, int] = field(default_factory=dict)
-    is_goal: dict[int, bool] = field(default_factory=dict)
-
-    def meet(self, states: Sequence[int]) -> None:
-        """Look at states, those among them that are new as one table."""
-        fresh = sorted({state for state in states if state not in self.height})
-        if fresh:
-            rows = np.stack([self.states.rows[state] for state in fresh])
-            self.height.update(zip(fresh, self.bound(rows).tolist(), strict=True))
-            reached = self.states.model.holds(self.goal, rows).tolist()
-            self.is_goal.update(zip(fresh, reached, strict=True))

@@ -36,18 +36,18 @@ class Mixtures:
     """What the robots can do together when each takes its choices as it likes.
 
     ``space``: all of it, again as a plan space of one task, its nodes being ``(a_1 .. a_n, y)``;
-    None if some combination is no optimal plan, and then ``violation`` shows one.  ``nodes`` counts
+    None if some combination is no optimal plan, and then ``witness`` shows one.  ``nodes`` counts
     what was walked.
     """
 
     space: PlanSpace | None
-    violation: Miscoordination | None
+    witness: Miscoordination | None
     nodes: int
 
     @property
     def holds(self) -> bool:
         """Whether every combination is an optimal plan."""
-        return self.violation is None
+        return self.witness is None
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +110,7 @@ def walk_mixtures(
         if len(broken):
             last = int(source[broken[0]]), tuple(labels[broken[0]].tolist())
             paths = _breaking_plans(fits, steps, *last)
-            return Mixtures(None, _violation(task_language, paths, words), walked)
+            return Mixtures(None, _witness(task_language, paths, words), walked)
         reached = np.column_stack((after, space.targets(edge)))
         table, number = unique_tuples(reached, [*(len(a) for a in automata), len(space)])
         steps.append(_JointMoves(UnfoldingStep(source, edge, number), labels))
@@ -167,7 +167,7 @@ def _breaking_plans(
     ]
 
 
-def _violation(
+def _witness(
     task_language: TaskLanguage, plans: Sequence[list[tuple[int, ...]]], words: Sequence[int]
 ) -> Miscoordination:
     """Plans whose mixture breaks, described in the task's own plan space."""

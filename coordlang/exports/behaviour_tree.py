@@ -16,7 +16,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
-from coordlang.execution.choices import Choices, RobotChoices
+from coordlang.execution.choices import RobotChoices, SentenceChoices
 from planners.grounding import GroundAction
 from planners.joint.model import IDLE, JointModel
 from planners.pddl.formula_tree import required_atoms
@@ -39,7 +39,7 @@ class _Move:
     target: int
 
 
-def behaviour_trees(choices: Choices) -> str:
+def behaviour_trees(choices: SentenceChoices) -> str:
     """All robots' choices as one XML document.
 
     Each robot's tree can do exactly the robot's subplans: for every one of them there is one way to
@@ -55,7 +55,7 @@ def behaviour_trees(choices: Choices) -> str:
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
 
 
-def _comment(choices: Choices) -> str:
+def _comment(choices: SentenceChoices) -> str:
     sentence = " ".join(choices.task_language.partition.words[word] for word in choices.words)
     if choices.guaranteed:
         kind = choices.task_language.model.kept_plan
@@ -145,7 +145,7 @@ def _action(text: str) -> ET.Element:
     return ET.Element("Action", {"ID": name, "subaction": text, **ports})
 
 
-def _models(model: JointModel, choices: Choices) -> ET.Element:
+def _models(model: JointModel, choices: SentenceChoices) -> ET.Element:
     """The ports of all leaves, which editors of trees ask for."""
     found = ET.Element("TreeNodesModel")
     for name, (kind, port, _) in LEAVES.items():

@@ -24,7 +24,7 @@ from coordlang.language.words import Language
 from coordlang.report.layout import graph_layout, spread
 from coordlang.report.places import place_layout
 from coordlang.report.shown import Selection
-from coordlang.report.task import Tables, TaskPart, task_data, task_summary
+from coordlang.report.task import Tables, TaskPage, task_data, task_summary
 from coordlang.sites.coordinates import Point
 from coordlang.sites.world import World, find_world
 from planners.joint.model import JointModel, own_text
@@ -49,7 +49,7 @@ MOST_PLACES = 600
 def page_data(
     language: Language,
     selection: Selection,
-    parts: Sequence[TaskPart],
+    parts: Sequence[TaskPage],
     known: Mapping[str, Point] | None = None,
     most_places: int = MOST_PLACES,
     lifted: LiftedWords | None = None,
@@ -75,6 +75,7 @@ def page_data(
         "kept": {
             "plan": model.kept_plan,
             "plans": model.kept_plans,
+            "slack": model.slack,
             "one": f"{'a' if model.slack else 'an'} {model.kept_plan}",
         },
         **(_lifted_words(language, lifted) if lifted else _words(language, model)),

@@ -18,7 +18,7 @@ from coordlang.language.words import Language
 from coordlang.report.data import MOST_PLACES, page_data
 from coordlang.report.shown import select_tasks
 from coordlang.report.simulated import simulated_data, summary
-from coordlang.report.task import task_part
+from coordlang.report.task import task_page
 from coordlang.simulation.record import SimulationRecord
 from coordlang.sites.coordinates import Point
 from planners.pddl.lifted import Domain, Problem
@@ -86,7 +86,7 @@ def make_report(
         What `coordlang.report.shown.select_tasks` raises.
     """
     selection = select_tasks(language, domain, problems, tasks_shown, seed, options, position)
-    parts = [task_part(shown, seed) for shown in selection.tasks]
+    parts = [task_page(shown, seed) for shown in selection.tasks]
     lifted = lifted_words(
         language,
         domain,

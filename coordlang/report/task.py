@@ -13,7 +13,6 @@ from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.listed import goal_text
 from coordlang.language.partition import Partition
 from coordlang.report.graph import Graph, ShownSentences, plan_graph, shown_sentences
-from coordlang.report.played import Played, play
 from coordlang.report.shown import ShownTask
 from coordlang.required.failure import TooManyToCount, failure_probability
 from coordlang.required.miscoordination import Miscoordination
@@ -32,7 +31,27 @@ _VERIFIED = 20_000
 
 
 @dataclass(frozen=True, slots=True)
-class TaskPart:
+class Played:
+    """The execution of a mixture of plans.
+
+    Attributes
+    ----------
+    states
+        The keys of the states passed, the start first, as far as the steps are applicable.
+    stops, why
+        The number of the first step that is not applicable (None: all are), and the reason.
+    reaches
+        Whether the last state satisfies the goal.
+    """
+
+    states: tuple[str, ...]
+    stops: int | None
+    why: str | None
+    reaches: bool
+
+
+@dataclass(frozen=True, slots=True)
+class TaskPage:
     """Everything about one shown task.
 
     Attributes
@@ -56,12 +75,12 @@ class TaskPart:
     violation_played: Played | None
 
 
-def task_part(shown: ShownTask, seed: int) -> TaskPart:
+def task_page(shown: ShownTask, seed: int) -> TaskPage:
     """Compute what is shown of a task."""
     language = shown.language
     graph = plan_graph(language, seed)
     verified, violation = _verified(language)
-    return TaskPart(
+    return TaskPage(
         shown,
         graph,
         shown_sentences(language, graph, seed),
@@ -80,6 +99,24 @@ def _verified(language: TaskLanguage) -> tuple[bool | None, Miscoordination | No
     except OutOfMemory:
         return None, None
     return verdict.holds, verdict.witness
+
+
+def play(language: TaskLanguage, witness: Miscoordination) -> Played:
+    """Play a mixture from the start: robot i executes its part of ``witness.plans[i]``."""
+    space, model = language.space, language.model
+    row = space.rows[space.state[language.start]]
+    goal = space.goals[space.goal[language.start]]
+    states = [model.codec.key(row)]
+    for number, step in enumerate(zip(*witness.plans, strict=True)):
+        labels = model.numbers([own[robot] for robot, own in enumerate(step)])
+        assert labels is not None
+        steps = model.successors(row[None, :])
+        same = np.flatnonzero((steps.labels == np.array(labels)).all(axis=1))
+        if not len(same):
+            return Played(tuple(states), number, model.why_not(row, labels), False)
+        row = steps.result[same[0]]
+        states.append(model.codec.key(row))
+    return Played(tuple(states), None, None, bool(model.holds(goal, row[None, :])[0]))
 
 
 class Tables:
@@ -108,7 +145,7 @@ class Tables:
         return own.setdefault(text, len(own))
 
 
-def task_data(part: TaskPart, tables: Tables) -> dict[str, Any]:
+def task_data(part: TaskPage, tables: Tables) -> dict[str, Any]:
     """Return a task as JSON data, with states and labels as numbers into ``tables``."""
     language = part.shown.language
     space, model = language.space, language.model
@@ -210,7 +247,7 @@ def _witness_data(
     }
 
 
-def task_summary(part: TaskPart, world: World) -> dict[str, Any]:
+def task_summary(part: TaskPage, world: World) -> dict[str, Any]:
     """Return the start and goal of a task in words and, as ``goals``, on the map."""
     language = part.shown.language
     space, model = language.space, language.model

@@ -124,7 +124,7 @@ class OwnStep:
 
 
 @dataclass(frozen=True, slots=True)
-class Detour:
+class Asked:
     """What a robot asked of its choices on the way: to visit an atom, or to avoid a place.
 
     ``granted`` says whether it could be had; then the robot has committed to it.
@@ -168,7 +168,7 @@ class Robot:
     ) -> None:
         self.name = name
         self.steps: list[OwnStep] = []
-        self.detours: list[Detour] = []
+        self.detours: list[Asked] = []
         self._monitor, self._body, self._pace, self._period = monitor, body, pace, period
         self._random, self._words, self._word_state = random, words, 0
         self._progress = Progress()
@@ -230,7 +230,7 @@ class Robot:
             granted = bool(self._monitor.can(visit=atom))
             if granted:
                 self._monitor.commit(visit=atom)
-            self.detours.append(Detour(atom, None, granted))
+            self.detours.append(Asked(atom, None, granted))
         met = {self._place_of(stranger, sensed.pose) for stranger in sensed.strangers}
         for place in sorted(met):
             known = {detour.avoid for detour in self.detours}
@@ -240,7 +240,7 @@ class Robot:
             granted = bool(self._monitor.can(never=ways))
             if granted:
                 self._monitor.commit(never=ways)
-            self.detours.append(Detour(None, place, granted))
+            self.detours.append(Asked(None, place, granted))
 
     def _place_of(self, stranger: tuple[float, float], pose: Pose) -> str:
         """The place nearest to what the lidar sees, behind the surface that it sees."""

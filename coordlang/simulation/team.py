@@ -29,7 +29,7 @@ Agreement = Literal["sentence", "plan", "nothing"]
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class Equipment:
     """What one robot is given for one run: a monitor of its own, and its words."""
 
     monitor: Monitor
@@ -68,17 +68,17 @@ class Mission:
     leads: Mapping[str, Mapping[str, str]]
     steps: int
     _plans: Plans
-    _given: Mapping[str, Given]
+    _given: Mapping[str, Equipment]
 
     @property
     def robots(self) -> tuple[str, ...]:
         """The robots, in the order of joint actions."""
         return self.task_language.model.robots
 
-    def team(self, seed: int) -> dict[str, Given]:
+    def team(self, seed: int) -> dict[str, Equipment]:
         """Return what each robot is given in the run with this seed."""
         if self.agreement == "sentence":
-            return {name: Given(g.monitor.copy(), g.words) for name, g in self._given.items()}
+            return {name: Equipment(g.monitor.copy(), g.words) for name, g in self._given.items()}
         team = {}
         for robot, name in enumerate(self.robots):
             agreed = self.agreement == "plan"
@@ -123,7 +123,7 @@ class Mission:
 
     def _following(
         self, robot: str, subactions: Sequence[str | None], words: Sequence[int] | None = None
-    ) -> Given:
+    ) -> Equipment:
         """What a robot is given that has one subplan: a choices file without a choice.
 
         It knows in which place it is, and nothing else.
@@ -148,9 +148,9 @@ class Mission:
         }
         data = {"format": FORMAT, "version": VERSION, "sentence": "", "choices": [entry]}
         if words is None:
-            return Given(Monitor(data, robot), None)
+            return Equipment(Monitor(data, robot), None)
         moves = [dict(state["next"]) for state in states]
-        return Given(Monitor(data, robot), OwnWords(moves, words))
+        return Equipment(Monitor(data, robot), OwnWords(moves, words))
 
     def _drawn(self, seed: str) -> Plan:
         return self._plans.unrank(Random(seed).randrange(self._plans.count))
@@ -186,12 +186,12 @@ def mission(
     world = find_world(model, states)
     starts = _starts(world, model.robots, states[0])
     _note_what_is_left_out(world, model.robots, space)
-    given: dict[str, Given] = {}
+    given: dict[str, Equipment] = {}
     if agreement == "sentence":
         found = choices(task_language, sentence)
         for robot, name in enumerate(model.robots):
             words = own_words(found.fits, task_language, robot)
-            given[name] = Given(Monitor(to_data(found, [robot]), name), words)
+            given[name] = Equipment(Monitor(to_data(found, [robot]), name), words)
     return Mission(
         task_language,
         agreement,

@@ -10,10 +10,8 @@ from collections.abc import Hashable
 _RESERVED = ("and", "or", "not", "imply", "forall", "exists", "when", "either", "object")
 
 
-class Names:
-    """Names of one kind (types, predicates, actions or objects).
-
-    Each thing gets a PDDL name of its own.
+class PddlNames:
+    """Names of one kind (types, predicates, actions or objects): each thing gets one of its own.
 
     What is a PDDL name already, in lower case, is kept unless it is taken.
     """

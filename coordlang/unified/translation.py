@@ -17,7 +17,7 @@ from unified_planning.model import InstantaneousAction, OperatorKind, Problem, V
 from unified_planning.model.multi_agent import MultiAgentProblem
 from unified_planning.model.problem_kind import FEATURES as ALL_FEATURES
 
-from coordlang.unified.names import Names
+from coordlang.unified.names import PddlNames
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain
 from planners.pddl.lifted import Problem as PddlProblem
@@ -174,13 +174,18 @@ class _Writer:
         self.problem, self.concurrency = problem, concurrency
         self.values = 0
         self.agents: tuple[Any, ...] = tuple(getattr(problem, "agents", ()))
-        self.types, self.predicates, self.actions, self.objects = Names(), Names(), Names(), Names()
-        self.variable_names = Names()
+        self.types, self.predicates, self.actions, self.objects = (
+            PddlNames(),
+            PddlNames(),
+            PddlNames(),
+            PddlNames(),
+        )
+        self.variable_names = PddlNames()
         self.variable_names.keep(None, _AGENT[1:])
         roots = {[*t.ancestors][-1].name for t in problem.user_types}
         if len(roots) == 1 and min(roots).lower() == "object":  # as its PDDL reader makes it
             self.types.keep(min(roots), "object")
-        # Names of the problem come first, so that they are kept where possible.
+        # PddlNames of the problem come first, so that they are kept where possible.
         for t in problem.user_types:
             self.type_name(t)
         for o in problem.all_objects:

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import cache
+from itertools import count
 from random import Random
 
-from hypothesis import assume
+import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
@@ -82,6 +84,33 @@ def task_languages(
     return tuple(languages_in_tasks(build_language(candidates, method).language, candidates))
 
 
+class Unsuitable(Exception):
+    """A random model without a task that can be solved, or with too many plans to list."""
+
+
+#: (robots, random models): some always, more of them in CI.
+RANDOM = [
+    (2, 25),
+    (3, 25),
+    pytest.param(2, 120, marks=pytest.mark.thorough),
+    pytest.param(3, 120, marks=pytest.mark.thorough),
+]
+
+
+@cache
+def random_task_languages(
+    robots: int, number: int
+) -> tuple[tuple[int, Candidates, TaskLanguage], ...]:
+    """So many random models by their seeds, each made once in a process."""
+    found: list[tuple[int, Candidates, TaskLanguage]] = []
+    for seed in count():
+        with suppress(Unsuitable):
+            found.append((seed, *random_task_language(seed, robots)))
+        if len(found) == number:
+            return tuple(found)
+    raise AssertionError("seeds do not end")
+
+
 def random_task_language(seed: int, robots: int) -> tuple[Candidates, TaskLanguage]:
     """A task of a random model, one of its longer ones, under a random partition; some states are
     left to the default.
@@ -107,8 +136,9 @@ def random_task_language(seed: int, robots: int) -> tuple[Candidates, TaskLangua
                 domain, [problem], [long_task(random, domain, problem, options)], options
             )
     except ProvedImpossible:
-        assume(False)
-    assume(0 < Plans.of(candidates.spaces[0]).count <= 300)
+        raise Unsuitable from None
+    if not 0 < Plans.of(candidates.spaces[0]).count <= 300:
+        raise Unsuitable
     size = random.choice([1, 2, 2, 3, 3, 4, 5])
     used = sorted(set(candidates.spaces[0].state.tolist()))
     mapped = [n for n in used if random.random() < 0.9] or used[:1]
@@ -124,7 +154,8 @@ def long_task(
     loaded = build(domain, [problem], options)
     codec = loaded.model.codec
     space = explore(loaded.model, loaded.tasks[0].init[None, :])
-    assume(1 < len(space) <= 400)
+    if not 1 < len(space) <= 400:
+        raise Unsuitable
     farthest: list[tuple[int, int, list[int]]] = []
     for start in random.sample(range(len(space)), min(8, len(space))):
         layer, seen, depth = [start], {start}, 0

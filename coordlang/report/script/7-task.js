@@ -30,7 +30,7 @@ class TaskView {
     const { task } = this, plans = BigInt(task.plans);
     const cost = task.second === null ? '' : ` (second cost ${task.second})`;
     this.byId('task-summary').replaceChildren(
-      make('strong', {}, countedPlans(plans)), ` of `, make('strong', {}, counted(task.steps, 'step')), cost, ', ',
+      make('strong', {}, countedPlans(plans)), DATA.kept.slack ? ', of at most ' : ' of ', make('strong', {}, counted(task.steps, 'step')), cost, ', ',
       ...(task.all_sentences === null ? ['too many sentences to count. '] : [make('strong', {}, counted(task.all_sentences, 'sentence')), '. ']),
       task.requires === null ? 'Whether coordination is required was not decided: too large.' : task.requires
         ? `Coordination is required: some mixtures of these plans go wrong${task.silence === null ? '' : `, without a word ${percent(task.silence)} of all`}.` : 'No coordination is required: any mixture of these plans is one of them.');

@@ -14,7 +14,7 @@ import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.execution.automaton import Automaton, determinise
-from coordlang.execution.choices import Choices, RobotChoices, choices
+from coordlang.execution.choices import RobotChoices, SentenceChoices, choices
 from coordlang.execution.choices_file import monitor
 from coordlang.execution.own_facts import OwnFacts
 from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
@@ -44,7 +44,7 @@ def moves(automaton: Automaton) -> list[dict[int, int]]:
     return [dict(automaton.moves(state)) for state in range(len(automaton))]
 
 
-def check_automata(found: Choices, twin: Listed) -> None:
+def check_automata(found: SentenceChoices, twin: Listed) -> None:
     """Each automaton accepts exactly the robot's own parts, is deterministic, and the least that
     knows what it knows.
     """
@@ -77,7 +77,7 @@ def check_automata(found: Choices, twin: Listed) -> None:
                     state = dict(automaton.moves(state))[part[step]]
 
 
-def check_combinations(found: Choices, twin: Listed) -> None:
+def check_combinations(found: SentenceChoices, twin: Listed) -> None:
     """Every combination of choices, stepped through all robots' monitors, is an optimal plan; they
     allow no others.
     """
@@ -143,12 +143,12 @@ def test_a_broken_language_is_found_out(robots: int, models: int) -> None:
     assert min(seen[True], seen[False]) >= models / 4, seen
 
 
-def check_violation(found: Choices, twin: Listed) -> None:
+def check_violation(found: SentenceChoices, twin: Listed) -> None:
     """What is shown: plans with the sentence, whose mixture is no optimal plan, and breaks where it
     says.
     """
     assert found.mixtures is not None
-    shown = found.mixtures.violation
+    shown = found.mixtures.witness
     assert shown is not None
     model = found.task_language.model
     followed = tuple(

@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 
 from coordlang.execution import monitor as monitor_module
-from coordlang.execution.choices import Choices, choices
+from coordlang.execution.choices import SentenceChoices, choices
 from coordlang.execution.choices_file import monitor, to_bytes, to_data
 from coordlang.execution.monitor import Detour, Monitor, MonitorError, NotAllowed, NotPossible
 from coordlang.execution.task_language import TaskLanguage
@@ -28,7 +28,7 @@ from tests.support.task_languages import shipped
 
 
 @pytest.fixture(scope="module")
-def three_cells() -> Choices:
+def three_cells() -> SentenceChoices:
     task_language = shipped("three-cells/problem")[1]
     return choices(task_language, task_language.words_of("w1 w0"))
 
@@ -158,7 +158,7 @@ def check_detours(
         left = expected
 
 
-def test_monitor_by_hand(three_cells: Choices) -> None:
+def test_monitor_by_hand(three_cells: SentenceChoices) -> None:
     at = monitor(three_cells, "r2")
     assert (at.robot, at.sentence, at.atoms) == ("r2", "w1 w0", "exact")
     assert (at.step, at.remaining, at.finished) == (0, 2, False)
@@ -193,7 +193,7 @@ def test_monitor_by_hand(three_cells: Choices) -> None:
         at.did(None)
 
 
-def test_messages(three_cells: Choices) -> None:
+def test_messages(three_cells: SentenceChoices) -> None:
     at = monitor(three_cells, "r1")
     for ask, said in (
         (lambda: at.can(visit="(at r9 a)"), r"\(at r9 a\) is no atom .*: there are \(at r1 a\), "),
@@ -212,7 +212,7 @@ def test_messages(three_cells: Choices) -> None:
         at.commit(never="(move *)")
 
 
-def test_a_robot_can_carry_it(three_cells: Choices, tmp_path: Path) -> None:
+def test_a_robot_can_carry_it(three_cells: SentenceChoices, tmp_path: Path) -> None:
     """One file of Python and one of JSON, in an interpreter without any package: it does the same."""
     shutil.copy(monitor_module.__file__, tmp_path / "monitor.py")
     (tmp_path / "choices.json.gz").write_bytes(gzip.compress(to_bytes(three_cells)))

@@ -11,8 +11,6 @@ from random import Random
 from xml.etree import ElementTree
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from coordlang.execution.drawing import COLOURS, cut_note, inks, plans_dot
 from coordlang.execution.fitting_plans import NoPlanFits
@@ -23,7 +21,7 @@ from planners.search.plans import Plan
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
 from tests.support.naive_sentences import by_sentence
-from tests.support.task_languages import SHIPPED, random_task_language, shipped
+from tests.support.task_languages import RANDOM, SHIPPED, random_task_languages, shipped
 
 
 def check(task_language: TaskLanguage, seed: int) -> None:
@@ -104,11 +102,10 @@ def test_every_sentence_of_a_shipped_domain(name: str) -> None:
     check(shipped(name)[1], 0)
 
 
-@pytest.mark.parametrize("robots", [2, 3])
-@settings(max_examples=25, deadline=None, derandomize=True)
-@given(seed=st.integers(0, 10**6))
-def test_every_sentence_of_a_random_model(robots: int, seed: int) -> None:
-    check(random_task_language(seed, robots)[1], seed)
+@pytest.mark.parametrize(("robots", "number"), RANDOM)
+def test_every_sentence_of_a_random_model(robots: int, number: int) -> None:
+    for seed, _, task_language in random_task_languages(robots, number):
+        check(task_language, seed)
 
 
 def most_open(name: str) -> OpenPlans:

@@ -12,8 +12,6 @@ from random import Random
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from coordlang.execution.plan_sentence import NotAPlan, NotOptimal, sentence_of_plan
 from coordlang.execution.task_language import TaskLanguage
@@ -29,7 +27,7 @@ from planners.search.plans import Plan, Plans
 from planners.system.errors import BadInput, Position, ProvedImpossible
 from tests.support.command import Command
 from tests.support.naive_sentences import by_sentence
-from tests.support.task_languages import SHIPPED, random_task_language, shipped
+from tests.support.task_languages import RANDOM, SHIPPED, random_task_languages, shipped
 
 
 def check_said(task_language: TaskLanguage) -> None:
@@ -44,11 +42,10 @@ def test_every_plan_says_its_sentence(name: str) -> None:
     check_said(shipped(name)[1])
 
 
-@pytest.mark.parametrize("robots", [2, 3])
-@settings(max_examples=40, deadline=None, derandomize=True)
-@given(seed=st.integers(0, 10**6))
-def test_every_plan_of_a_random_model(robots: int, seed: int) -> None:
-    check_said(random_task_language(seed, robots)[1])
+@pytest.mark.parametrize(("robots", "number"), RANDOM)
+def test_every_plan_of_a_random_model(robots: int, number: int) -> None:
+    for _, _, task_language in random_task_languages(robots, number):
+        check_said(task_language)
 
 
 def changed(task_language: TaskLanguage, random: Random) -> Plan:
@@ -148,17 +145,11 @@ def judged(
 @pytest.mark.thorough
 def test_wrong_plans_of_random_models() -> None:
     seen: Counter[str] = Counter()
-
-    @settings(max_examples=40, deadline=None, derandomize=True)
-    @given(seed=st.integers(0, 10**6), robots=st.sampled_from([2, 3]))
-    def compare(seed: int, robots: int) -> None:
-        candidates, task_language = random_task_language(seed, robots)
-        optimal = {plan for plans in by_sentence(task_language).values() for plan in plans}
+    for seed, candidates, used in (*random_task_languages(2, 60), *random_task_languages(3, 60)):
+        optimal = {plan for plans in by_sentence(used).values() for plan in plans}
         random = Random(seed)
         for _ in range(6):
-            seen[judged(candidates, task_language, changed(task_language, random), optimal)] += 1
-
-    compare()
+            seen[judged(candidates, used, changed(used, random), optimal)] += 1
     assert min(seen[kind] for kind in ("goal", "no plan", "optimal", "longer", "dearer")) > 2, seen
 
 

@@ -10,21 +10,19 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
-from hypothesis.errors import UnsatisfiedAssumption
 from py_trees.common import Status
 
 from coordlang.execution.choices import choices
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.exports.behaviour_tree import behaviour_trees
 from coordlang.language.sentences import task_sentences
-from coordlang.required.miscoordination import Inseparable
 from planners.joint.model import IDLE, JointModel
 from planners.joint.tables import Rows
 from tests.support import naive
 from tests.support.behaviour_trees import Leaf, read_tree
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
-from tests.support.task_languages import random_task_language, shipped
+from tests.support.task_languages import random_task_languages, shipped
 
 #: Shipped problems: two and three robots, shared actions, conditional choices, joint-action PDDL.
 WORLDS = [
@@ -144,15 +142,10 @@ def test_every_mixture_is_an_optimal_plan(name: str) -> None:
     assert mixtures >= 1
 
 
-@pytest.mark.filterwarnings("ignore:Using `assume` outside a property-based test")
 @pytest.mark.parametrize("robots", [2, 3])
 def test_every_mixture_of_random_models(robots: int) -> None:
     several = 0
-    for seed in range(20):
-        try:
-            _, used = random_task_language(seed, robots)
-        except (UnsatisfiedAssumption, Inseparable):
-            continue
+    for _, _, used in random_task_languages(robots, 25):
         for sentence in task_sentences(used.space, used.task, used.partition)[:SENTENCES]:
             words = used.words_of(sentence.words)
             found = choices(used, words)

@@ -19,7 +19,7 @@ from coordlang.report import graph
 from coordlang.report.data import page_data
 from coordlang.report.page import make_report
 from coordlang.report.shown import select_tasks
-from coordlang.report.task import task_part
+from coordlang.report.task import task_page
 from coordlang.required.miscoordination import Inseparable
 from planners.search.plans import Plans
 from planners.system.errors import ProvedImpossible, UsageError
@@ -119,7 +119,7 @@ def test_random_models() -> None:
             selection = select_tasks(language, domain, [problem], 4, seed)
         except (Inseparable, ProvedImpossible):
             continue
-        parts = [task_part(shown, seed) for shown in selection.tasks]
+        parts = [task_page(shown, seed) for shown in selection.tasks]
         data = page_data(language, selection, parts)
         made += 1
         unmapped += not data["places"]

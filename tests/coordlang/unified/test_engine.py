@@ -47,7 +47,7 @@ from coordlang.language.sentences import task_sentences
 from coordlang.unified import engine as engine_module
 from coordlang.unified import register
 from coordlang.unified.engine import CoordlangEngine
-from coordlang.unified.names import Names
+from coordlang.unified.names import PddlNames
 from coordlang.unified.options import PLAN_KINDS
 from coordlang.unified.plans import label
 from coordlang.unified.translation import translate
@@ -869,7 +869,7 @@ def test_odd_names() -> None:
         {"Do It(R 1, not)", "Do It(r 1, Not)"},
     )
     assert sequential_verdicts(problem, plans[0]) == {Validity.VALID}
-    names = Names()
+    names = PddlNames()
     made = [names.of(n, n) for n in ("x", "X", "?x", "", "-", "object", "x")]
     assert made == ["x", "x__2", "_x", "x__3", "x__4", "object__2", "x"]
 
