@@ -96,20 +96,11 @@ class Automaton:
         edges = slice(int(self.first[state]), int(self.first[state + 1]))
         return list(zip(self.label[edges].tolist(), self.target[edges].tolist(), strict=True))
 
-    def edges_from(self, states: Ints) -> tuple[Ints, Ints]:
-        """All edges out of many states: for each its position in ``states``, and its number."""
+    def moves_of(self, states: Ints) -> tuple[Ints, Ints, Ints]:
+        """The moves of many states: their positions in ``states``, labels and next states."""
         degrees = self.out_degrees[states]
-        return np.repeat(np.arange(len(states)), degrees), ranges(self.first[states], degrees)
-
-    def labels(self, edges: Ints) -> Ints:
-        """The labels of these edges."""
-        found: Ints = self.label[edges]
-        return found
-
-    def targets(self, edges: Ints) -> Ints:
-        """The states that these edges lead to."""
-        found: Ints = self.target[edges]
-        return found
+        edges = ranges(self.first[states], degrees)
+        return np.repeat(np.arange(len(states)), degrees), self.label[edges], self.target[edges]
 
 
 def determinise(

@@ -19,7 +19,6 @@ from coordlang.execution.automaton import Automaton, determinise
 from coordlang.execution.mixtures import Mixtures, walk_mixtures
 from coordlang.execution.own_facts import OwnFacts, with_own_facts
 from coordlang.execution.task_language import TaskLanguage
-from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import OutOfMemory
 
@@ -90,7 +89,6 @@ class SentenceChoices:
 def choices(
     task_language: TaskLanguage,
     words: Sequence[int],
-    index: EdgeIndex | None = None,
     most: int | None = MOST,
 ) -> SentenceChoices:
     """The choices of every robot under a sentence.
@@ -105,8 +103,6 @@ def choices(
         The language and the task.
     words
         The word numbers of the sentence.
-    index
-        See `coordlang.execution.mixtures.walk_mixtures`.
     most
         The most joint moves of a walk; None: as many as the memory holds.
 
@@ -120,7 +116,7 @@ def choices(
     fits = task_language.plans_with(words)
     subplans = [determinise(fits, robot) for robot in range(len(task_language.model.robots))]
     try:
-        mixtures = walk_mixtures(task_language, fits, subplans, words, index, most)
+        mixtures = walk_mixtures(task_language, fits, subplans, words, most)
     except OutOfMemory:
         if most is None:
             raise

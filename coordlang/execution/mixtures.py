@@ -67,7 +67,6 @@ def walk_mixtures(
     fits: PlanSpace,
     automata: Sequence[Automaton],
     words: Sequence[int],
-    index: EdgeIndex | None = None,
     most: int | None = None,
 ) -> Mixtures:
     """Walk all combinations of the robots' subplans in the task's optimal plans, layer by layer.
@@ -84,9 +83,6 @@ def walk_mixtures(
         Each robot's subplans in them.
     words
         The word numbers of the sentence.
-    index
-        ``EdgeIndex.of(task_language.space)``, to be given when many sentences of one plan space are
-        looked at.
     most
         The most joint moves to hold; None: as many as the memory holds.
 
@@ -96,7 +92,7 @@ def walk_mixtures(
         With an estimate, before the joint moves fill the memory or beyond ``most`` of them.
     """
     space = task_language.space
-    index = index or EdgeIndex.of(space)
+    index = EdgeIndex.of(space)
     robots = len(automata)
     table = np.array([[0] * robots + [task_language.start]])
     layers = [table[:, robots]]
@@ -131,10 +127,10 @@ def _moves(automata: Sequence[Automaton], table: Ints) -> tuple[Ints, Labels, In
     labels: list[Ints] = []
     after: list[Ints] = []
     for robot, own in enumerate(automata):
-        earlier, edges = own.edges_from(table[source, robot])
+        earlier, label, target = own.moves_of(table[source, robot])
         source = source[earlier]
-        labels = [*(column[earlier] for column in labels), own.labels(edges)]
-        after = [*(column[earlier] for column in after), own.targets(edges)]
+        labels = [*(column[earlier] for column in labels), label]
+        after = [*(column[earlier] for column in after), target]
     return source, np.stack(labels, axis=1).astype(np.int32), np.stack(after, axis=1)
 
 

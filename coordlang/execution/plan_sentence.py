@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from coordlang.execution.task_language import TaskLanguage
@@ -67,19 +66,6 @@ class NotOptimal(Refuted):
         self.excess = excess
 
 
-@dataclass(frozen=True, slots=True)
-class ExecutedPlan:
-    """A plan, optimal or not, carried out from the initial state.
-
-    ``labels`` are its label numbers, ``rows`` the states that it passes through (one more than
-    steps), ``second`` is the second component of its cost.
-    """
-
-    labels: Plan
-    rows: list[Rows]
-    second: int
-
-
 def sentence_of_plan(task_language: TaskLanguage, plan: Sequence[Texts]) -> tuple[int, ...]:
     """The sentence of an optimal plan (the paper's TSC).
 
@@ -105,23 +91,25 @@ def sentence_of_plan(task_language: TaskLanguage, plan: Sequence[Texts]) -> tupl
     NotOptimal
         With the first step that leaves all optimal plans.
     """
-    executed = execute(task_language, plan)
+    numbers, rows, second = _executed(task_language, plan)
     space, node = task_language.space, task_language.start
     words = [int(task_language.word[node])]
-    with_rest = Plans(space, node, []).padded(executed.labels) if space.model.slack else None
-    for step, labels in enumerate(with_rest or executed.labels):
+    with_rest = Plans(space, node, []).padded(numbers) if space.model.slack else None
+    for step, labels in enumerate(with_rest or numbers):
         edge = space.edge_with(node, labels)
         if edge is None:
-            raise _not_optimal(task_language, plan, executed, step)
+            raise _not_optimal(task_language, plan, rows, second, step)
         node = space.target_of(edge)
         words.append(int(task_language.word[node]))
     return sentence(words)
 
 
-def execute(task_language: TaskLanguage, plan: Sequence[Texts]) -> ExecutedPlan:
+def _executed(task_language: TaskLanguage, plan: Sequence[Texts]) -> tuple[Plan, list[Rows], int]:
     """Carry out a plan of the task, optimal or not, step by step.
 
-    Raises `NotAPlan` for a step that cannot be taken, or if the goal does not hold at the end.
+    Returns its label numbers, the states that it passes through (one more than steps), and the
+    second component of its cost.  Raises `NotAPlan` for a step that cannot be taken, or if the goal
+    does not hold at the end.
     """
     model, space = task_language.model, task_language.space
     init = model.forgetting_slack(space.rows[space.state[task_language.start]])
@@ -146,7 +134,7 @@ def execute(task_language: TaskLanguage, plan: Sequence[Texts]) -> ExecutedPlan:
             f"after {_steps(len(plan))} {unmet}",
             remedy="Give the whole plan: it ends where the goal holds.",
         )
-    return ExecutedPlan(tuple(numbers), rows, second)
+    return tuple(numbers), rows, second
 
 
 def read_plan_file(path: str | Path, model: JointModel) -> list[tuple[Texts, ...]]:
@@ -214,12 +202,12 @@ def _unmet_goal(task_language: TaskLanguage, row: Rows) -> str:
 
 
 def _not_optimal(
-    task_language: TaskLanguage, plan: Sequence[Texts], executed: ExecutedPlan, step: int
+    task_language: TaskLanguage, plan: Sequence[Texts], rows: Sequence[Rows], cost: int, step: int
 ) -> NotOptimal:
     """The error that says how much too expensive a plan is, and where it leaves optimal ones."""
     model, space = task_language.model, task_language.space
     makespan, second = space.cost_of(task_language.task)
-    excess = max(0, len(plan) - makespan), executed.second - second
+    excess = max(0, len(plan) - makespan), cost - second
     if excess[0]:
         enough = f"{makespan} {'is' if makespan == 1 else 'are'} enough"
         if model.slack:
@@ -229,14 +217,11 @@ def _not_optimal(
     else:
         what = "subactions" if model.cost == "makespan+actions" else "action costs of"
         few = "are as few as can be" if not model.slack else "are within the slack"
-        wrong = (
-            f"its {_steps(len(plan))} {few}, "
-            f"but with {executed.second} {what} where {second} are enough"
-        )
+        wrong = f"its {_steps(len(plan))} {few}, but with {cost} {what} where {second} are enough"
     if step == makespan:
         reason = f"{wrong}: the goal holds before step {step + 1} already"
     else:
-        state = model.state_text(executed.rows[step])
+        state = model.state_text(rows[step])
         doing = ", ".join(
             f"{robot} {text or 'idles'}"
             for robot, text in zip(model.robots, plan[step], strict=True)

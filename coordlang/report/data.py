@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.explanation.cover import Cover
 from coordlang.explanation.descriptions import WordDescriptions, describe_words
 from coordlang.explanation.lifted_words import LiftedWords
 from coordlang.explanation.text import term_text
@@ -138,7 +137,12 @@ def _words(language: Language, model: JointModel) -> dict[str, Any]:
     sizes = language.sizes()
     found = {}
     for word, cover in descriptions.rules:
-        entry = _formula_data(cover) if explained else _example_data(language, word)
+        if explained:  # without a cover: every other state
+            terms = [term_text(term) for term in cover.terms] if cover else []
+            entry = _told(terms, rest=cover is None)
+        else:
+            states = (key for key, own in language.states.items() if own == word)
+            entry = _told(None, examples=[*islice(states, _EXAMPLES)])
         found[word] = {"name": word, "size": sizes[word], **entry}
     return {
         "words": [found[word] for word in language.words],
@@ -153,14 +157,7 @@ def _lifted_words(language: Language, lifted: LiftedWords) -> dict[str, Any]:
     """The words with their formulas over features."""
     sizes = language.sizes()
     words = [
-        {
-            "name": word,
-            "size": sizes[word],
-            "rest": False,
-            "terms": list(lifted.terms.get(word, ())[:_TERMS]),
-            "more_terms": max(0, len(lifted.terms.get(word, ())) - _TERMS),
-            "examples": [],
-        }
+        {"name": word, "size": sizes[word], **_told(lifted.terms.get(word, ()))}
         for word in language.words
     ]
     return {
@@ -170,25 +167,15 @@ def _lifted_words(language: Language, lifted: LiftedWords) -> dict[str, Any]:
     }
 
 
-def _formula_data(cover: Cover | None) -> dict[str, Any]:
-    """The formula of a word; None: every other state."""
-    terms = cover.terms if cover else ()
+def _told(
+    terms: Sequence[str] | None, *, rest: bool = False, examples: Sequence[str] = ()
+) -> dict[str, Any]:
+    """What the row of a word shows; ``terms`` None: its formula was not sought."""
     return {
-        "rest": cover is None,
-        "terms": [term_text(term) for term in terms[:_TERMS]],
-        "more_terms": max(0, len(terms) - _TERMS),
-        "examples": [],
-    }
-
-
-def _example_data(language: Language, word: str) -> dict[str, Any]:
-    """A few states of a word whose formula is not sought."""
-    states = (key for key, own in language.states.items() if own == word)
-    return {
-        "rest": False,
-        "terms": None,
-        "more_terms": 0,
-        "examples": list(islice(states, _EXAMPLES)),
+        "rest": rest,
+        "terms": None if terms is None else list(terms[:_TERMS]),
+        "more_terms": max(0, len(terms or ()) - _TERMS),
+        "examples": list(examples),
     }
 
 

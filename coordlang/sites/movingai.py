@@ -324,36 +324,16 @@ def _agent(text: str, grid: MovingMap, position: Position) -> Agent:
             remedy="Give --map the map of this scenario, not scaled.",
         )
     agent = Agent((start_y, start_x), (goal_y, goal_x))
-    for what, cell in _blocked(agent, grid):
-        raise BadInput(
-            f"the {what} is no passable cell of the map: x {cell[1]}, y {cell[0]}",
-            position=position,
-            remedy="x counts columns from the left and y rows from the top, both from 0.",
-        )
-    return agent
-
-
-def _blocked(agent: Agent, grid: MovingMap) -> Iterator[tuple[str, Cell]]:
     for what, cell in (("start", agent.start), ("goal", agent.goal)):
         if cell not in grid:
-            yield what, cell
+            raise BadInput(
+                f"the {what} is no passable cell of the map: x {cell[1]}, y {cell[0]}",
+                position=position,
+                remedy="x counts columns from the left and y rows from the top, both from 0.",
+            )
+    return agent
 
 
 def _natural(text: str) -> int | None:
     """A whole number that is not negative; None for anything else, and for endless ones."""
     return int(text) if text.isdecimal() and text.isascii() and len(text) <= 9 else None
-
-
-__all__ = [
-    "BLOCKED",
-    "PASSABLE",
-    "Agent",
-    "Cell",
-    "MovingMap",
-    "cell_name",
-    "grid_problem_text",
-    "in_rows",
-    "planning_files",
-    "read_agents",
-    "read_map",
-]
