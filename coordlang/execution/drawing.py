@@ -62,7 +62,7 @@ def plans_dot(dag: PlanDag) -> str:
 def inks(dag: PlanDag) -> dict[str, Ink]:
     """A colour for each word, in the order in which plans come to them."""
     result = {}
-    for number, word in enumerate(dict.fromkeys(dag.sentence)):
+    for number, word in enumerate(dag.words):
         fill = COLOURS[number % len(COLOURS)]
         red, green, blue = (int(fill[k : k + 2], 16) / 255 for k in (1, 3, 5))
         dark = 0.299 * red + 0.587 * green + 0.114 * blue < 0.5

@@ -126,6 +126,11 @@ class PlanDag:
     cut: int
 
     @property
+    def words(self) -> tuple[str, ...]:
+        """The different words of its nodes, in the order in which plans come to them."""
+        return tuple(dict.fromkeys(self.sentence))
+
+    @property
     def layers(self) -> list[range]:
         """The numbers of the nodes of each step."""
         steps = groupby(range(len(self.nodes)), lambda number: self.nodes[number].step)
