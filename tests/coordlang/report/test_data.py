@@ -209,7 +209,8 @@ def test_a_language_that_is_none_is_said_to_be_none() -> None:
 def test_plans_within_slack_are_called_so() -> None:
     """The page says "optimal plan" of no other plans."""
     folder = DOMAINS / "three-cells"
-    built = door.build(folder / "domain.pddl", folder / "problem.pddl", slack=2, method="minimal")
+    files = folder / "domain.pddl", folder / "problem.pddl"
+    built = door.build(*files, slack=2, words_see_slack=True)
     _, domain, problem = make_language("three-cells", "problem", None)
     html = make_report(built.language, domain, [problem], tasks_shown=1).html
     kept = data_of(html)["kept"]
