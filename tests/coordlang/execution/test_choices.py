@@ -255,11 +255,11 @@ def test_own_atoms_of_shipped_domains(name: str) -> None:
     assert seen["unknown"] >= 4, seen
 
 
-def test_all_tasks_of_the_t_map() -> None:
-    """Every sentence of all 132 tasks, with the smallest language."""
+def test_tasks_of_the_t_map() -> None:
+    """Every sentence of every third of all 132 tasks, with the smallest language."""
     every = task_languages("t-map", "problem")
     assert (len(every), len(every[0].language.words)) == (132, 3)
-    for task_language in every:
+    for task_language in every[::3]:
         for words, twin in listed(task_language, 1000, 1000):
             found = choices(task_language, words)
             check_automata(found, twin)

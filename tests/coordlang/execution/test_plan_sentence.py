@@ -31,8 +31,8 @@ from tests.support.task_languages import RANDOM, SHIPPED, random_task_languages,
 
 
 def check_said(task_language: TaskLanguage) -> None:
-    for words, plans in [*by_sentence(task_language).items()][:30]:
-        for plan in sorted(plans)[:10]:
+    for words, plans in [*by_sentence(task_language).items()][:15]:
+        for plan in sorted(plans)[:5]:
             said = sentence_of_plan(task_language, texts(task_language.model, plan))
             assert task_language.text(said) == " ".join(words)
 
@@ -167,7 +167,7 @@ def test_wrong_plans_of_shipped_domains(name: str) -> None:
     candidates, used = shipped(name)
     optimal = {plan for plans in by_sentence(used).values() for plan in plans}
     random = Random(name)
-    assert len({judged(candidates, used, changed(used, random), optimal) for _ in range(15)}) > 1
+    assert len({judged(candidates, used, changed(used, random), optimal) for _ in range(10)}) > 1
 
 
 @pytest.fixture

@@ -27,7 +27,7 @@ from tests.support.task_languages import random_task_languages, shipped
 #: Shipped problems: two and three robots, shared actions, conditional choices, joint-action PDDL.
 WORLDS = [
     *("t-map/problem", "grid/corners-4x4", "grid-joint/three-cells", "flags/parade"),
-    *("charger/three-robots", "handover/three-rooms", "lock/both-in"),
+    *("charger/three-robots", "handover/exchange", "lock/both-in"),
 ]
 #: Mixtures of one sentence that are run, and sentences of one task.
 MOST, SENTENCES = 30, 3

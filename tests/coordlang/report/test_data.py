@@ -27,12 +27,14 @@ from tests.coordlang.report.conftest import data_of, make_language, make_world, 
 from tests.support.domains import DOMAINS
 from tests.support.random_models import random_model
 
-WORLDS = [
+WORLDS: list[tuple[str, str, str | None]] = [
     ("t-map", "problem", "all"),
-    ("lock", "both-in", "all"),
     ("handover", "two-doors", "all"),
-    ("elevator", "two-calls", "all"),
     ("grid", "three-robots-3x3", None),
+]
+MORE = [
+    pytest.param("lock", "both-in", "all", marks=pytest.mark.thorough),
+    pytest.param("elevator", "two-calls", "all", marks=pytest.mark.thorough),
 ]
 
 
@@ -52,7 +54,7 @@ def listed_plans(task: dict[str, Any]) -> list[tuple[list[int], list[int]]]:
     return found
 
 
-@pytest.mark.parametrize(("domain", "problem", "tasks"), WORLDS)
+@pytest.mark.parametrize(("domain", "problem", "tasks"), [*WORLDS, *MORE])
 def test_plans_and_sentences(domain: str, problem: str, tasks: str | None) -> None:
     data = make_world(domain, problem, tasks).data
     assert sum(t["name"] is not None for t in data["tasks"]) == 1

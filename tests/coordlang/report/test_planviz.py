@@ -15,6 +15,8 @@ from tests.support.command import Command
 from tests.support.domains import DOMAINS
 from tests.support.task_languages import shipped
 
+#: So that the page is made quickly.
+ONE = ("--tasks-shown", "1")
 #: What a letter does to (row, column) in PlanViz' action model MAPF.
 LETTERS = {"W": (0, 0), "R": (0, 1), "L": (0, -1), "U": (1, 0), "D": (-1, 0)}
 
@@ -66,7 +68,7 @@ def test_a_plan_without_steps_has_one_in_which_nobody_moves(tmp_path: Path) -> N
 def test_command(coordlang: Command, language: Path, tmp_path: Path) -> None:
     files = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
     page = tmp_path / "page.html"
-    assert coordlang("report", language, *files, "-o", page, "--planviz").code == 0
+    assert coordlang("report", language, *files, "-o", page, "--planviz", *ONE).code == 0
     assert json.loads((tmp_path / "page.planviz.json").read_text())["teamSize"] == 2
     assert (tmp_path / "page.planviz.map").read_text().splitlines()[4:] == ["@.@", "..."]
     assert coordlang("report", language, *files, "-o", "-", "--planviz").code == 2

@@ -109,6 +109,8 @@ def test_within_a_word_robots_get_out_of_step() -> None:
     mission = mission_of("t-map", method="minimal")
     assert len(mission.sentence) == 1, "there is no barrier at all"
     found = [run(mission, floor_for(mission), Settings(step="word"), seed) for seed in range(6)]
+    idle = [s for run_ in found for s in run_.steps if s.subaction is None and s.end is not None]
+    assert min(step.end - step.begin for step in idle if step.end is not None) > 1, "a whole step"
     broken = [run_ for run_ in found if not run_.arrived]
     assert broken
     for run_ in broken:
