@@ -37,19 +37,6 @@ class Message:
     number: int
 
 
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """How far a robot is, by its own account.
-
-    ``steps`` are done, ``words`` of the sentence are passed at most; the last step was begun at
-    time ``begun`` (seconds; negative before the first).
-    """
-
-    steps: int = 0
-    words: int = 0
-    begun: float = -1.0
-
-
 class Pace:
     """One robot's way to keep step with the others.
 
@@ -78,18 +65,22 @@ class Pace:
             if message.sender in self._heard:
                 self._heard[message.sender] = max(self._heard[message.sender], message.number)
 
-    def told(self, before: Progress, after: Progress) -> Sequence[tuple[Kind, int]]:
-        """Return what to tell all robots after a step."""
+    def told(self, steps: int, words: int, is_further: bool) -> Sequence[tuple[Kind, int]]:
+        """Return what to tell all robots after a step, by which ``is_further`` in the sentence."""
         if self._way == "barrier":
-            return [("step", after.steps)]
-        return [("word", after.words)] if self._way == "word" and after.words > before.words else []
+            return [("step", steps)]
+        return [("word", words)] if self._way == "word" and is_further else []
 
-    def may_begin(self, progress: Progress, time: float) -> bool:
-        """Say whether the next step may begin; by the clock, who is late misses its beginning."""
+    def may_begin(self, steps: int, words: int, begun: float, time: float) -> bool:
+        """Say whether the next step may begin.
+
+        ``steps`` are done, and ``words`` of the sentence passed at most; the last step was begun at
+        ``begun`` (seconds; negative before the first).  By the clock, who is late misses a
+        beginning.
+        """
         if self._way == "clock":
-            begins = abs(math.remainder(time, self._period)) < _SAME
-            return begins and progress.begun < time
-        own = progress.steps if self._way == "barrier" else progress.words
+            return abs(math.remainder(time, self._period)) < _SAME and begun < time
+        own = steps if self._way == "barrier" else words
         return all(heard >= own for heard in self._heard.values())
 
 

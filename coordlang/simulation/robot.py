@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from random import Random
 
 from coordlang.execution.monitor import IDLE, Monitor
-from coordlang.simulation.pace import Message, OwnWords, Pace, Progress
+from coordlang.simulation.pace import Message, OwnWords, Pace
 from coordlang.simulation.tracking import (
     ALIGNED,
     ARRIVED,
@@ -170,24 +170,15 @@ class Robot:
         self.steps: list[OwnStep] = []
         self.detours: list[Asked] = []
         self._monitor, self._body, self._pace, self._period = monitor, body, pace, period
-        self._random, self._words, self._word_state = random, words, 0
-        self._progress = Progress()
+        self._random, self._own_words, self._word_state = random, words, 0
+        #: Own steps done, and words of the sentence passed at most, by its own account.
+        self.done = self.words = 0
         self._is_turning = False
 
     @property
     def finished(self) -> bool:
         """Whether all own steps are done."""
         return self._monitor.finished and not self._is_underway
-
-    @property
-    def done(self) -> int:
-        """How many own steps are done."""
-        return self._progress.steps
-
-    @property
-    def words(self) -> int:
-        """How many words of the sentence it has passed at most, by its own account."""
-        return self._progress.words
 
     @property
     def looks_around(self) -> bool:
@@ -214,7 +205,7 @@ class Robot:
         self._pace.hears(sensed.heard)
         if not self._is_underway:
             self._look_around(sensed)
-            if self._monitor.finished or not self._pace.may_begin(self._progress, sensed.time):
+            if self._monitor.finished or not self._may_begin(sensed.time):
                 return Act()
             self._begin(sensed)
         step = self.steps[-1]
@@ -258,8 +249,7 @@ class Robot:
         subaction = drawn(self._monitor, self._random)
         place = self._body.leads.get(subaction) if subaction is not None else None
         self._monitor.did(subaction)
-        self.steps.append(OwnStep(self._progress.steps, subaction, place, sensed.time))
-        self._progress = replace(self._progress, begun=sensed.time)
+        self.steps.append(OwnStep(self.done, subaction, place, sensed.time))
         self._is_turning = place is not None
 
     def _is_done(self, step: OwnStep, sensed: Sensed) -> bool:
@@ -268,16 +258,18 @@ class Robot:
             return distance(sensed.pose, self._body.points[step.place]) < near
         return self._pace.is_common or sensed.time >= step.begin + self._period
 
+    def _may_begin(self, time: float) -> bool:
+        begun = self.steps[-1].begin if self.steps else -1.0
+        return self._pace.may_begin(self.done, self.words, begun, time)
+
     def _finish(self, step: OwnStep, sensed: Sensed) -> tuple[Message, ...]:
-        before = self._progress
-        words = before.words
-        if self._words is not None:
-            self._word_state = self._words.moves[self._word_state][step.subaction or IDLE]
-            words = max(words, self._words.words[self._word_state])
-        known = None if self._words is None else words
-        self.steps[-1] = replace(step, end=sensed.time, words=known)
-        self._progress = replace(before, steps=before.steps + 1, words=words)
-        told = self._pace.told(before, self._progress)
+        before, words = self.words, None
+        if self._own_words is not None:
+            self._word_state = self._own_words.moves[self._word_state][step.subaction or IDLE]
+            words = self.words = max(before, self._own_words.words[self._word_state])
+        self.steps[-1] = replace(step, end=sensed.time, words=words)
+        self.done += 1
+        told = self._pace.told(self.done, self.words, self.words > before)
         return tuple(Message(self.name, kind, number) for kind, number in told)
 
     def _drive(self, target: tuple[float, float], step: OwnStep, sensed: Sensed) -> Act:

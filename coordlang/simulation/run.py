@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict, astuple
 from itertools import combinations
 from random import Random
 
@@ -201,7 +202,7 @@ class _Going:
         """Return the record of the run that has ended."""
         self._keep_poses()
         steps = [
-            StepRecord(name, one.number, one.subaction, one.place, one.begin, one.end, one.words)
+            StepRecord(name, *astuple(one))
             for name, robot in self.robots.items()
             for one in robot.steps
         ]
@@ -271,9 +272,7 @@ class _Going:
             if message.kind == "word":
                 self._event("word", [name])
         for detour in robot.detours[self.asked[name] :]:
-            self._event(
-                "detour", [name], visit=detour.visit, avoid=detour.avoid, granted=detour.granted
-            )
+            self._event("detour", [name], **asdict(detour))
         self.asked[name] = len(robot.detours)
         if act.is_stopped and self.stopped.get(name) != robot.done:
             self.stopped[name] = robot.done  # once in a step
