@@ -22,7 +22,6 @@ import numpy as np
 import pytest
 
 from coordlang.commands.build import build
-from coordlang.commands.building import build_language
 from coordlang.commands.inputs import read_task
 from coordlang.commands.options import Source
 from coordlang.execution.fitting_plans import NoPlanFits
