@@ -13,7 +13,7 @@ import numpy as np
 from planners.grounding import GroundAction
 from planners.joint.conditions import Evaluator, Labels, speaks_of_step
 from planners.joint.interference import Choices, compatible, conflict
-from planners.joint.model import Options, Steps
+from planners.joint.model import Options, Stepper, Steps
 from planners.joint.operators import Operators
 from planners.joint.states import StateCodec
 from planners.joint.step_clauses import Clause, StepClauses, Waiting, clauses
@@ -25,7 +25,7 @@ from planners.system.errors import OutOfMemory
 from planners.system.limits import memory_left, more_memory
 
 
-class ComposingStepper:
+class ComposingStepper(Stepper):
     """The `Stepper` of PDDL with one action per robot: every robot picks one subaction or idles.
 
     ``tables[i, j]`` (i < j) says which labels of two robots may share a step
@@ -81,27 +81,17 @@ class ComposingStepper:
         return [robot.cost for robot in self._robot]
 
     def steps(self, rows: Rows, options: Options | None = None) -> Steps:
-        """All joint steps applicable in the states of a table, sorted by source and labels.
-
-        Of ``options`` only, some of the `choices`, if they are given.
-        """
+        """See `Stepper`."""
         parts = [
-            Steps(source, labels, *self._apply(rows, source, labels))
+            (source, labels, *self._apply(rows, source, labels))
             for source, labels in self._pieces(rows, options)
         ]
-        return Steps(
-            np.concatenate([p.source for p in parts]),
-            np.concatenate([p.labels for p in parts]),
-            np.concatenate([p.result for p in parts]),
-            np.concatenate([p.cost for p in parts]),
-        )
+        return Steps(*map(np.concatenate, zip(*parts, strict=True)))
 
     def chosen(self, rows: Rows, options: Options | None = None) -> tuple[Ints, Labels]:
         """The joint steps as `steps` gives them, without what they lead to: sources and labels."""
-        parts = list(self._pieces(rows, options))
-        if len(parts) == 1:
-            return parts[0]
-        return np.concatenate([p for p, _ in parts]), np.concatenate([p for _, p in parts])
+        sources, labels = zip(*self._pieces(rows, options), strict=True)
+        return np.concatenate(sources), np.concatenate(labels)
 
     @property
     def effects(self) -> list[tuple[Rows, Rows]] | None:
@@ -124,21 +114,18 @@ class ComposingStepper:
             yield self._compose(rows, possible, span)
 
     def choices(self, rows: Rows) -> Options:
-        """For each robot the labels whose conditions on the state hold, by state.
-
-        (first index, labels), CSR.
-        """
+        """For each robot the labels whose conditions on the state hold, by state (CSR)."""
         return [self._options(robot, rows) for robot in self._robot]
 
     def most_steps(self, rows: Rows) -> int:
-        """An upper bound on the joint steps out of these states: products of the own choices."""
+        """Products of the own choices."""
         products = [1] * len(rows)
         for first, _ in self.choices(rows):
             products = [n * own for n, own in zip(products, np.diff(first).tolist(), strict=True)]
         return sum(products)
 
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
-        """Why these labels are no joint step in a state: the first rule that they break."""
+        """The first rule that these labels break in a state."""
         chosen = [self.labelled[i][label] for i, label in enumerate(labels)]
         return (
             self._unmet_in_state(row, chosen)
@@ -185,20 +172,16 @@ class ComposingStepper:
                 )
         return None
 
-    def joint_action(self, row: Rows, labels: Sequence[int]) -> str | None:
-        """None: robots' subactions are actions of their own."""
-        return None
-
     def interfering_pairs(self) -> int:
-        """Pairs of subactions of different robots that may not share a step."""
+        """See `Stepper`."""
         return sum(int(np.count_nonzero(~table[1:, 1:])) for table in self.tables.values())
 
     def conflict_in(self, rows: Rows) -> str | None:
-        """Why two subactions interfere that are both possible in one of these states, or None."""
+        """See `Stepper`."""
         return next((why for pair in self._clashing(rows) if (why := self._conflict(pair))), None)
 
     def frequent_conflict(self, rows: Rows) -> tuple[str, int] | None:
-        """The `conflict_in` that is met in most of these states, and in how many."""
+        """See `Stepper`."""
         counted = Counter(self._clashing(rows)).most_common()
         return next(((why, n) for pair, n in counted if (why := self._conflict(pair))), None)
 

@@ -136,9 +136,7 @@ class Choices:
         self.numbers = {_name(a): number for number, a in enumerate(actions) if a}
         #: The labels of subactions with more than one owner.
         self.shared = [n for n, a in enumerate(actions) if a and len(a.owners) > 1]
-        self._labels: dict[str, dict[Leaf, list[int]]] = {
-            field: {} for field in Footprint.__slots__
-        }
+        self._labels: dict[str, dict[Leaf, list[int]]] = {f: {} for f in Footprint.__slots__}
         for number, action in enumerate(actions):
             if action:
                 own = footprint(action, frozenset((_name(action),)))
@@ -175,10 +173,8 @@ def compatible(left: Choices, right: Choices, i: int, j: int) -> NDArray[np.bool
 
 def _naming(field: str, left: Choices, right: Choices) -> Iterator[tuple[int, int]]:
     """Pairs (of the left, of the right) in which one's footprint names the other in this field."""
-    for row, column in _named(field, left, right):
-        yield row, column
-    for column, row in _named(field, right, left):
-        yield row, column
+    yield from _named(field, left, right)
+    yield from ((row, column) for column, row in _named(field, right, left))
 
 
 def _named(field: str, naming: Choices, named: Choices) -> Iterator[tuple[int, int]]:

@@ -10,7 +10,7 @@ import numpy as np
 from planners.grounding import GroundAction, GroundEffect
 from planners.joint.composition import cost_of
 from planners.joint.conditions import Evaluator
-from planners.joint.model import Options, Steps
+from planners.joint.model import Options, Stepper, Steps
 from planners.joint.operators import Operators
 from planners.joint.states import StateCodec
 from planners.joint.tables import Ints, Rows
@@ -18,8 +18,8 @@ from planners.pddl.model_options import Cost
 from planners.system.errors import BadInput, Position
 
 
-class JointActionStepper:
-    """The `Stepper` of joint-action PDDL.
+class JointActionStepper(Stepper):
+    """The `Stepper` of joint-action PDDL: a joint action is written as a whole.
 
     Actions with the same parts are one joint action if they do the same; different results for the
     same parts are an error (`BadInput`), because no robot could tell them apart.  ``positions`` are
@@ -47,10 +47,7 @@ class JointActionStepper:
         self._cost = np.array([_cost_of(action, cost) for action in actions], np.int64)
 
     def steps(self, rows: Rows, options: Options | None = None) -> Steps:
-        """All joint steps applicable in the states of a table, sorted by source and labels.
-
-        ``options`` are not looked at: no robot chooses by itself.
-        """
+        """See `Stepper`; ``options`` are not looked at: no robot chooses by itself."""
         row, operator = self._operators.applicable(rows)
         result = (rows[row] & ~self._operators.deletes[operator]) | self._operators.adds[operator]
         for number, effects in self._operators.conditional.items():
@@ -130,18 +127,6 @@ class JointActionStepper:
                 elif not self._codec.column(self._operators.adds[[number]], fact)[0]:
                     self._codec.clear(result, fires, [fact])
         return result
-
-    def interfering_pairs(self) -> int:
-        """None interfere: a joint action is written as a whole."""
-        return 0
-
-    def conflict_in(self, rows: Rows) -> str | None:
-        """None: a joint action is written as a whole."""
-        return None
-
-    def frequent_conflict(self, rows: Rows) -> tuple[str, int] | None:
-        """None: a joint action is written as a whole."""
-        return None
 
 
 def _cost_of(action: GroundAction, cost: Cost) -> int:

@@ -8,9 +8,9 @@ applicable, a whole table of states at a time.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -82,18 +82,28 @@ class Steps:
         return len(self.source)
 
 
-class Stepper(Protocol):
-    """What composes joint steps: `planners.joint.composition` or `planners.joint.joint_actions`."""
+class Stepper(ABC):
+    """What composes joint steps: `planners.joint.composition` or `planners.joint.joint_actions`.
 
+    What is not abstract is said of robots that neither do joint actions nor ever interfere.
+    """
+
+    @abstractmethod
     def steps(self, rows: Rows, options: Options | None = None) -> Steps:
-        """All joint steps applicable in the states of a table; of some of the `choices` only."""
+        """All joint steps applicable in the states of a table, sorted by source and labels.
 
+        Of ``options`` only, some of the `choices`, if they are given.
+        """
+
+    @abstractmethod
     def choices(self, rows: Rows) -> Options:
-        """For each robot its labels that are possible in these states."""
+        """For each robot the labels that are possible in each state, by state (CSR)."""
 
+    @abstractmethod
     def most_steps(self, rows: Rows) -> int:
         """An upper bound on the joint steps out of these states, without composing them."""
 
+    @abstractmethod
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
         """Why these labels are no joint step in a state, in words."""
 
@@ -102,15 +112,19 @@ class Stepper(Protocol):
 
         None where robots' subactions are actions of their own.
         """
+        return None
 
     def interfering_pairs(self) -> int:
         """How many pairs of subactions of different robots may not share a step."""
+        return 0
 
     def conflict_in(self, rows: Rows) -> str | None:
         """Why two subactions that are both possible in one of these states interfere, in words."""
+        return None
 
     def frequent_conflict(self, rows: Rows) -> tuple[str, int] | None:
         """The `conflict_in` that is met in most of these states, and in how many."""
+        return None
 
 
 @dataclass(frozen=True, slots=True)

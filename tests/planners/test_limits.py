@@ -159,7 +159,7 @@ def test_limits_within_limits() -> None:
 
 
 @dataclass(frozen=True)
-class Stopping:
+class Stopping(Stepper):
     """A stepper that a limit stops after some tables of states."""
 
     stepper: Stepper
@@ -180,18 +180,6 @@ class Stopping:
 
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
         return self.stepper.why_not(row, labels)
-
-    def joint_action(self, row: Rows, labels: Sequence[int]) -> str | None:
-        return self.stepper.joint_action(row, labels)
-
-    def interfering_pairs(self) -> int:
-        return self.stepper.interfering_pairs()
-
-    def conflict_in(self, rows: Rows) -> str | None:
-        return self.stepper.conflict_in(rows)
-
-    def frequent_conflict(self, rows: Rows) -> tuple[str, int] | None:
-        return self.stepper.frequent_conflict(rows)
 
 
 def corners(problem: str = "corners-3x3") -> PlanningInstance:
