@@ -12,9 +12,7 @@ from coordlang.language.candidates import Candidates, all_pairs, from_listed, fr
 from coordlang.language.listed import ListedTask
 from coordlang.required.miscoordination import inseparable
 from planners.joint.states import split_atoms
-from planners.pddl import parse_domain, parse_problem
 from planners.pddl.model_options import ModelOptions
-from planners.pddl.sexpr import Source
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan
 from planners.system.errors import ProvedImpossible
@@ -22,6 +20,7 @@ from tests.support import naive
 from tests.support.composition_walk import walk
 from tests.support.domains import all_tasks
 from tests.support.random_models import graph_text
+from tests.support.texts import parsed
 
 #: More plans of one task are not listed.
 MOST = 40
@@ -33,8 +32,7 @@ def on_graph(seed: int, robots: int) -> Candidates | None:
     useless draw.
     """
     text, problem = graph_text(Random(seed), robots)
-    domain = parse_domain(Source("domain.pddl", text))
-    goal = parse_problem(Source("problem.pddl", problem), domain)
+    domain, goal = parsed(text, problem)
     try:
         candidates = (all_pairs if seed % 2 else from_problems)(domain, [goal], ModelOptions())
     except ProvedImpossible:

@@ -13,11 +13,9 @@ import pytest
 from planners.classical import selection
 from planners.classical.immediate import Immediate
 from planners.joint.tables import Rows
-from planners.loading import PlanningInstance, build
-from planners.pddl.domain import parse_domain
+from planners.loading import PlanningInstance
 from planners.pddl.model_options import Cost, ModelOptions, Unowned
-from planners.pddl.problem import parse_problem
-from planners.pddl.sexpr import Source
+from tests.support.texts import model_of
 
 COSTS: tuple[Cost, ...] = ("makespan", "makespan+actions")
 FORMS = {"explicit": 100_000, "select-then-apply": 0}
@@ -219,9 +217,7 @@ def written(way: str) -> Iterator[None]:
 def read(
     domain_text: str, problem_text: str, cost: Cost = "makespan", unowned: Unowned = "error"
 ) -> PlanningInstance:
-    domain = parse_domain(Source("domain.pddl", domain_text))
-    problem = parse_problem(Source("problem.pddl", problem_text), domain)
-    return build(domain, [problem], ModelOptions(unowned=unowned, cost=cost))
+    return model_of(domain_text, problem_text, ModelOptions(unowned=unowned, cost=cost))
 
 
 def random_state(loaded: PlanningInstance, seed: int) -> Rows:

@@ -10,17 +10,16 @@ from itertools import islice
 import pytest
 
 from planners.check.validate import State, validate
-from planners.loading import PlanningInstance, build, task_of
-from planners.pddl import parse_domain, parse_problem
+from planners.loading import PlanningInstance, task_of
 from planners.pddl.lifted import And, Formula, Not, Problem
 from planners.pddl.model_options import ModelOptions
-from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plans import Plans
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, ProvedImpossible
 from tests.support.naive_joint_steps import TooLarge, Twin
 from tests.support.random_pddl import RandomModel
+from tests.support.texts import model_of
 
 _MOST_STATES = 128
 _MOST_TRIES = 3_000
@@ -28,10 +27,8 @@ _MOST_PLANS = 300
 
 
 def built(text: RandomModel, cost: str = "makespan") -> PlanningInstance:
-    domain = parse_domain(Source("domain", text.domain))
-    problem = parse_problem(Source("problem", text.problem), domain)
     options = ModelOptions(unowned=text.unowned, cost=cost)  # type: ignore[arg-type]
-    return build(domain, [problem], options)
+    return model_of(text.domain, text.problem, options)
 
 
 def twin_of(loaded: PlanningInstance, text: RandomModel) -> Twin:

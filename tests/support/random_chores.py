@@ -12,10 +12,9 @@ from __future__ import annotations
 
 from random import Random
 
-from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
-from planners.pddl.sexpr import Source
+from tests.support.texts import parsed
 
 DOMAIN = """(define (domain chores) (:types robot chore thing)
  (:predicates (mine ?r - robot ?c - chore) (done ?c - chore) (got ?t - thing) (gets ?c - chore ?t - thing)
@@ -60,6 +59,5 @@ def random_chores(seed: int, robots: int) -> tuple[Domain, Problem, ModelOptions
         f"(:objects {' '.join(names)} - robot {' '.join(chores)} - chore {' '.join(things)} - thing)\n"
         f"(:init {' '.join(facts)}) (:goal (and {' '.join(goal)})))"
     )
-    domain = parse_domain(Source("chores-domain.pddl", DOMAIN))
     options = ModelOptions(cost=random.choice(["makespan", "makespan+actions", "makespan+actions"]))
-    return domain, parse_problem(Source("chores-problem.pddl", problem), domain), options
+    return (*parsed(DOMAIN, problem), options)

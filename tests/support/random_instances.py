@@ -7,13 +7,12 @@ from dataclasses import replace
 from random import Random
 
 from planners.loading import PlanningInstance, build
-from planners.pddl import parse_domain, parse_problem
 from planners.pddl.model_options import Cost, ModelOptions
-from planners.pddl.sexpr import Source
 from planners.search.reachable import Space, explore
 from planners.system.errors import BadInput
 from tests.support.random_models import random_model
 from tests.support.random_pddl import random_model as random_pddl
+from tests.support.texts import parsed
 
 
 def random_instance(seed: int, cost: Cost | None = None) -> PlanningInstance | None:
@@ -24,8 +23,7 @@ def random_instance(seed: int, cost: Cost | None = None) -> PlanningInstance | N
             domain, problem, options = random_model(seed, random.choice((2, 3)))
         else:
             text = random_pddl(seed, random.choice(["agent", "plain", "joint"]))
-            domain = parse_domain(Source("domain", text.domain))
-            problem = parse_problem(Source("problem", text.problem), domain)
+            domain, problem = parsed(text.domain, text.problem)
             options = ModelOptions(unowned=text.unowned, remember_actions=random.random() < 0.3)
         return build(domain, [problem], replace(options, cost=cost or options.cost))
     except BadInput:

@@ -10,10 +10,9 @@ from __future__ import annotations
 
 from random import Random
 
-from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import Cost, ModelOptions
-from planners.pddl.sexpr import Source
+from tests.support.texts import parsed
 
 
 def literals(random: Random, facts: list[str], most: int) -> list[str]:
@@ -117,22 +116,12 @@ def random_model(seed: int, robots: int) -> tuple[Domain, Problem, ModelOptions]
     cost: Cost = random.choice(["makespan", "makespan", "makespan+actions"])
     if random.random() < 0.4:
         text, problem = graph_text(random, robots)
-        domain = parse_domain(Source("random-domain.pddl", text))
-        return (
-            domain,
-            parse_problem(Source("random-problem.pddl", problem), domain),
-            ModelOptions(cost=cost),
-        )
+        return (*parsed(text, problem), ModelOptions(cost=cost))
     style = random.choice([joint_text, ma_text])
     text, facts = style(random, robots)
-    domain = parse_domain(Source("random-domain.pddl", text))
     names = " ".join(f"r{n + 1}" for n in range(robots))
     objects = f"(:objects {names} - robot)" if style is ma_text else ""
     init = " ".join(f"({f})" for f in facts if random.random() < 0.5)
     goal = " ".join(literals(random, facts, 2))
     problem = f"(define (problem p) (:domain random) {objects} (:init {init}) (:goal (and {goal})))"
-    return (
-        domain,
-        parse_problem(Source("random-problem.pddl", problem), domain),
-        ModelOptions(cost=cost),
-    )
+    return (*parsed(text, problem), ModelOptions(cost=cost))

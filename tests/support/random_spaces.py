@@ -12,13 +12,12 @@ import pytest
 
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.required.miscoordination import inseparable
-from planners.pddl import parse_domain, parse_problem
 from planners.pddl.model_options import ModelOptions
-from planners.pddl.sexpr import Source
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import BadInput, ProvedImpossible
 from tests.support.random_models import random_model
 from tests.support.random_pddl import random_model as random_pddl
+from tests.support.texts import parsed
 
 #: Nodes of a plan space up to which the walk is waited for, by the number of robots.
 MOST = {2: 3_000, 3: 250, 4: 60}
@@ -37,8 +36,7 @@ def candidates_of_kinds(seed: int) -> Candidates:
     """MA-PDDL with formulas, plain PDDL with shared actions, joint-action PDDL with drift."""
     random = Random(seed)
     text = random_pddl(seed, random.choice(["agent", "plain", "joint"]))
-    domain = parse_domain(Source("domain", text.domain))
-    problem = parse_problem(Source("problem", text.problem), domain)
+    domain, problem = parsed(text.domain, text.problem)
     options = ModelOptions(unowned=text.unowned, remember_actions=random.random() < 0.3)
     make = from_problems if random.random() < 0.3 else all_pairs
     return make(domain, [problem], options)

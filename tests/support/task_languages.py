@@ -18,16 +18,15 @@ from coordlang.language.partition import Partition
 from coordlang.language.words import Language
 from coordlang.required.miscoordination import Inseparable
 from planners.loading import build
-from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
-from planners.pddl.sexpr import Source
 from planners.search.plans import Plans
 from planners.search.reachable import explore
 from planners.system.errors import ProvedImpossible
 from tests.support.domains import DOMAINS, all_tasks, own_task
 from tests.support.random_chores import random_chores
 from tests.support.random_models import graph_text, random_model
+from tests.support.texts import parsed
 
 #: Every shipped domain; of the many maps that differ in size only, some.
 SHIPPED = [
@@ -126,8 +125,7 @@ def random_task_language(seed: int, robots: int) -> tuple[Candidates, TaskLangua
     else:  # robots on a graph
         options = ModelOptions(cost=random.choice(["makespan", "makespan", "makespan+actions"]))
         text, task = graph_text(random, robots)
-        domain = parse_domain(Source("random-domain.pddl", text))
-        problem = parse_problem(Source("random-problem.pddl", task), domain)
+        domain, problem = parsed(text, task)
     try:
         if seed % 2 == 0:
             candidates = from_problems(domain, [problem], options)

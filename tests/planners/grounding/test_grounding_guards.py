@@ -15,15 +15,13 @@ from planners.grounding import ground_actions
 from planners.grounding.actions import GroundAction
 from planners.grounding.bindings import Bindings
 from planners.grounding.instantiate import _Grounder
-from planners.loading import build
-from planners.pddl import parse_domain, parse_problem
 from planners.pddl.formula_tree import literals
 from planners.pddl.lifted import FALSE, Formula, StepAtom
 from planners.pddl.model_options import ModelOptions, Unowned
 from planners.pddl.robots import find_team
-from planners.pddl.sexpr import Source
 from tests.support.naive_grounding import NaiveGrounding, without_impossible
 from tests.support.random_pddl import random_model
+from tests.support.texts import model_of, parsed
 
 DOMAIN = """(define (domain halls) (:types robot place - thing hall - place)
   (:constants home - hall)
@@ -66,8 +64,7 @@ CONDITIONS = [
 
 
 def grounded(domain: str, problem: str, unowned: Unowned = "error") -> tuple[GroundAction, ...]:
-    lifted = parse_domain(Source("d", domain))
-    read = parse_problem(Source("p", problem), lifted)
+    lifted, read = parsed(domain, problem)
     return ground_actions(lifted, read, find_team(lifted, read, ModelOptions(unowned=unowned)))
 
 
@@ -75,8 +72,7 @@ def both(
     domain: str, problem: str, unowned: Unowned = "error"
 ) -> tuple[tuple[GroundAction, ...], tuple[GroundAction, ...]]:
     """The ground actions, and the same ones with preconditions and effects by definition."""
-    lifted = parse_domain(Source("d", domain))
-    read = parse_problem(Source("p", problem), lifted)
+    lifted, read = parsed(domain, problem)
     team = find_team(lifted, read, ModelOptions(unowned=unowned))
     twin = NaiveGrounding(lifted, read, team)
     schemas = {schema.name: schema for schema in lifted.schemas}
@@ -184,6 +180,5 @@ def test_the_facts_are_looked_up(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_it_is_used_by_the_model() -> None:
-    lifted = parse_domain(Source("d", DOMAIN.format(condition=CONDITIONS[0])))
-    loaded = build(lifted, [parse_problem(Source("p", PROBLEM), lifted)])
+    loaded = model_of(DOMAIN.format(condition=CONDITIONS[0]), PROBLEM)
     assert {a.label for a in loaded.model.actions} >= {"(act r1 p1)"}

@@ -5,16 +5,15 @@ from __future__ import annotations
 
 import pytest
 
-from planners.loading import PlanningInstance, build
-from planners.pddl import parse_domain, parse_problem
+from planners.loading import PlanningInstance
 from planners.pddl.lifted import Atom
 from planners.pddl.robots import static_atoms
-from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search
 from planners.search.reachable import explore
 from planners.system.errors import ProvedImpossible
 from tests.support.joint_twin import built
 from tests.support.random_pddl import Kind, random_model
+from tests.support.texts import model_of
 
 CARRY = """(define (domain carry) (:types robot box room)
  (:predicates (at ?r - robot ?x - room) (in ?b - box ?x - room) (empty ?r - robot)
@@ -33,12 +32,11 @@ TWO = "(and (holds r1 b1) (holds r1 b2))"
 
 
 def carry(init: str, goal: str) -> PlanningInstance:
-    domain = parse_domain(Source("d.pddl", CARRY))
-    text = (
+    return model_of(
+        CARRY,
         "(define (problem p) (:domain carry) (:objects r1 r2 - robot b1 b2 - box a b - room)"
-        f" (:init {init}) (:goal {goal}))"
+        f" (:init {init}) (:goal {goal}))",
     )
-    return build(domain, [parse_problem(Source("p.pddl", text), domain)])
 
 
 LIFT = "Action lift of r1 is never possible: nothing makes (empty r1) true."

@@ -11,18 +11,13 @@ from typing import Any
 import pytest
 
 from planners.grounding.reachability import reachable_arguments
-from planners.pddl import parse_domain, parse_problem, read_domain, read_problem
+from planners.pddl import read_domain, read_problem
 from planners.pddl.formula_tree import required_atoms
 from planners.pddl.lifted import Atom, Domain, Problem, Variable
 from planners.pddl.robots import objects_of
-from planners.pddl.sexpr import Source
 from tests.support.domains import DOMAINS
 from tests.support.random_pddl import KINDS, Kind, random_model
-
-
-def read(domain: str, problem: str) -> tuple[Domain, Problem]:
-    parsed = parse_domain(Source("domain", domain))
-    return parsed, parse_problem(Source("problem", problem), parsed)
+from tests.support.texts import parsed
 
 
 def least_model(domain: Domain, problem: Problem) -> dict[str, set[Any]]:
@@ -65,12 +60,12 @@ def found(domain: Domain, problem: Problem) -> dict[str, set[Any]]:
 def test_random_models(kind: Kind) -> None:
     for seed in range(25):
         text = random_model(seed, kind)
-        domain, problem = read(text.domain, text.problem)
+        domain, problem = parsed(text.domain, text.problem)
         assert found(domain, problem) == least_model(domain, problem)
 
 
 def test_conditions_with_constants_repeated_variables_and_more_types() -> None:
-    domain, problem = read(
+    domain, problem = parsed(
         """(define (domain d) (:types robot place - thing) (:constants hub - place)
         (:predicates (at ?x - thing ?y - place) (way ?a ?b ?c) (seen ?a ?b) (lit))
         (:action go :agent ?r - robot :parameters (?x - (either robot place) ?p - place ?q)

@@ -12,17 +12,15 @@ from planners.check.validate import validate
 from planners.classical import compile_classical
 from planners.classical.selectors import clashes
 from planners.joint.interference import conflict, footprint
-from planners.loading import PlanningInstance, build
-from planners.pddl import parse_domain, parse_problem
+from planners.loading import PlanningInstance
 from planners.pddl.lifted import StepAtom
-from planners.pddl.model_options import ModelOptions
-from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from planners.system.errors import ProvedImpossible
 from tests.support.joint_twin import built
 from tests.support.naive_classical import optimal_plans
 from tests.support.random_pddl import random_model
+from tests.support.texts import model_of
 
 LIFT = """(define (domain tables) (:types robot) (:predicates (level) (up ?r - robot) (spilled))
   (:action lift :agent ?r :parameters () :precondition (level) :effect (and (up ?r)
@@ -37,13 +35,8 @@ THREE = """(define (domain three) (:types robot) (:predicates (free) (up) (seen)
   (:action hold :agent ?r - robot :parameters () :precondition (free) :effect (seen)))"""
 
 
-def read(domain: str, problem: str) -> PlanningInstance:
-    lifted = parse_domain(Source("domain", domain))
-    return build(lifted, [parse_problem(Source("problem", problem), lifted)], ModelOptions())
-
-
 def tables(robots: str, goal: str, more: str = "") -> PlanningInstance:
-    return read(
+    return model_of(
         LIFT.format(more=more),
         f"(define (problem t) (:domain tables) (:objects {robots} - robot) (:init (level))"
         f" (:goal {goal}))",
@@ -106,7 +99,7 @@ def test_alone_it_spills_and_nobody_may_lean_on_it() -> None:
 
 
 def test_an_effect_that_needs_a_third_robot_counts_for_no_pair_without_it() -> None:
-    loaded = read(
+    loaded = model_of(
         THREE,
         "(define (problem p) (:domain three) (:objects r1 r2 r3 - robot) (:init (free))"
         " (:goal (up)))",
@@ -151,7 +144,7 @@ def test_an_unreachable_goal_comes_with_the_interference_met_most_often() -> Non
     text = LIFT.format(more="").replace(
         "(when (and (level) (forall", "(and (not (level)) (when (and (level) (forall"
     )
-    loaded = read(
+    loaded = model_of(
         text.replace("(and (not (level)) (spilled))", "(spilled))"),
         "(define (problem t) (:domain tables) (:objects r1 r2 - robot) (:init (level))"
         " (:goal (and (up r1) (up r2))))",
@@ -167,7 +160,7 @@ def test_an_unreachable_goal_comes_with_the_interference_met_most_often() -> Non
 
 @pytest.mark.parametrize("static", [True, False])
 def test_an_action_whose_effects_vanish_is_no_idling(static: bool) -> None:
-    loaded = read(
+    loaded = model_of(
         """(define (domain d) (:types robot) (:predicates (way) (there ?r - robot) (done))
         (:action look :agent ?r - robot :parameters () :effect (when (way) (there ?r)))
         (:action work :agent ?r - robot :parameters () :effect (done)))""",

@@ -8,13 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from planners.loading import PlanningInstance, build
-from planners.pddl import parse_domain, parse_problem
+from planners.loading import PlanningInstance
 from planners.pddl.model_options import ModelOptions
 from planners.pddl.robots import find_team
-from planners.pddl.sexpr import Source
 from planners.system.errors import BadInput, Note
 from tests.support.command import Command
+from tests.support.texts import model_of, parsed
 
 HIKERS = """(define (domain hike) (:types hiker place - object)
  (:predicates (at ?h - hiker ?p - place) (way ?a ?b - place))
@@ -35,11 +34,8 @@ def action(name: str, parameters: str) -> str:
 
 
 def read(domain_text: str, objects: str) -> PlanningInstance:
-    lifted = parse_domain(Source("domain.pddl", domain_text))
-    text = (
-        f"(define (problem p) (:domain {lifted.name}) (:objects {objects}) (:init) (:goal (on x)))"
-    )
-    return build(lifted, [parse_problem(Source("problem.pddl", text), lifted)])
+    text = f"(define (problem p) (:domain d) (:objects {objects}) (:init) (:goal (on x)))"
+    return model_of(domain_text, text)
 
 
 def test_a_guess_is_said_once_with_the_type_and_the_objects(
@@ -126,10 +122,8 @@ CRANES = """(define (domain d) (:types crane box)
 
 
 def team(domain_text: str, objects: str) -> tuple[str, ...]:
-    lifted = parse_domain(Source("domain.pddl", domain_text))
     text = f"(define (problem p) (:domain d) (:objects {objects}) (:goal (and)))"
-    problem = parse_problem(Source("problem.pddl", text), lifted)
-    return find_team(lifted, problem, ModelOptions()).robots
+    return find_team(*parsed(domain_text, text), ModelOptions()).robots
 
 
 @pytest.mark.parametrize(
@@ -159,18 +153,8 @@ def test_what_moves_or_holds_something_may_be_robots() -> None:
 def test_all_of_ferry_are_objects() -> None:
     """Without types no guess is made, and what may be robots is listed with its objects."""
     text = domain(action("sail", "?a ?b"), types="")
-    lifted = parse_domain(Source("domain.pddl", text))
-    problem = parse_problem(
-        Source(
-            "problem.pddl",
-            "(define (problem p) (:domain d) (:objects x l1 l2) (:init (port l1) (port l2)) (:goal (on x)))".replace(
-                "(port l1) (port l2)", ""
-            ),
-        ),
-        lifted,
-    )
     with pytest.raises(BadInput, match=r"No type is taken by every action\n  Say --robot-type"):
-        build(lifted, [problem])
+        read(text, "x l1 l2")
 
 
 @pytest.mark.parametrize("kind", ["robot", "agent"])
