@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The select-then-apply form, of linear size: robots select one after another, then it is applied.
 
-What no other robot can see is applied as it is selected (`planners.classical.immediate`).  A step
-in which all selections are of this kind is over with the last of them; else there is *work left*,
-in stages: all check; all undo (rarely); all apply.
+What no other robot can see is applied as it is selected (`planners.classical.staged.Immediate`).
+A step in which all selections are of this kind is over with the last of them; else there is *work
+left*, in stages: all check; all undo (rarely); all apply.
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from planners.classical.immediate import Immediate
 from planners.classical.selectors import Selectors
-from planners.classical.staged import STAGES, StagedAction, selected, staged_actions
+from planners.classical.staged import STAGES, Immediate, StagedAction, selected, staged_actions
 from planners.classical.task import Known
 from planners.classical.writer import (
     Writer,

@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from planners.grounding import GroundAction
 from planners.joint.composition import ComposingStepper
 from planners.joint.conditions import Evaluator
-from planners.joint.facts import FactTable
 from planners.joint.joint_actions import JointActionStepper
 from planners.joint.model import IDLE, JointModel, Stepper
-from planners.joint.states import StateCodec
+from planners.joint.states import FactTable, StateCodec
 from planners.pddl.lifted import Atom, Domain, Problem, StepAtom
 from planners.pddl.model_options import Cost
 from planners.pddl.robots import Team, fluent_predicates, natural, static_atoms

@@ -10,8 +10,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.joint.facts import FactTable
-from planners.joint.states import test_bits
+from planners.joint.states import FactTable, test_bits
 from planners.joint.tables import Bools, Ints, Rows
 from planners.pddl.formula_tree import Compound, Leaf, conjuncts, fold, literals, signed
 from planners.pddl.lifted import And, Atom, Formula, Not, Or, StepAtom, Truth

@@ -3,16 +3,119 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from planners.grounding import GroundAction, GroundEffect
 from planners.joint.conditions import Evaluator, speaks_of_step, split_condition
-from planners.joint.matching import Matcher
-from planners.joint.states import StateCodec
-from planners.joint.tables import Bools, Ints, Rows
+from planners.joint.states import StateCodec, TrueFacts, test_bits
+from planners.joint.tables import Bools, Ints, Rows, ranges
 from planners.pddl.lifted import TRUE, Formula
+
+#: Looking up one true fact takes about as long as testing so many.
+_LOOK_UP = 3
+
+
+@dataclass(frozen=True, slots=True)
+class _Level:
+    """One depth of the tree: each node's children (facts to test), and operators that end in it."""
+
+    first_child: Ints
+    child_fact: Ints
+    first_operator: Ints
+    operators: Ints
+
+    def below(self, rows: Rows, true: TrueFacts, row: Ints, node: Ints) -> tuple[Ints, Ints]:
+        """The children (row, child) whose fact is true, of pairs of a row and a node.
+
+        Either each child's fact is tested, or each true fact is looked up among the children,
+        whichever is less work.
+        """
+        counts = self.first_child[node + 1] - self.first_child[node]
+        facts_of_row = true.first[row + 1] - true.first[row]
+        if int(counts.sum()) <= _LOOK_UP * int(facts_of_row.sum()):
+            child = ranges(self.first_child[node], counts)
+            row = np.repeat(row, counts)
+            holds = test_bits(rows, row, self.child_fact[child])
+            return row[holds], child[holds]
+        fact = true.fact[ranges(true.first[row], facts_of_row)]
+        row, node = np.repeat(row, facts_of_row), np.repeat(node, facts_of_row)
+        parents = np.repeat(np.arange(len(self.first_child) - 1), np.diff(self.first_child))
+        facts = int(max(self.child_fact.max(), true.fact.max(initial=0))) + 1
+        keys, wanted = parents * facts + self.child_fact, node * facts + fact
+        child = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        found = keys[child] == wanted
+        return row[found], child[found]
+
+
+class Matcher:
+    """A tree in which the path to an operator tests each fact that it requires to be true once.
+
+    Parameters
+    ----------
+    required
+        For each operator the numbers of the facts that it requires to be true.
+    forbidden
+        For each operator the mask of facts that it requires to be false (operators x words).
+    """
+
+    def __init__(self, required: Sequence[frozenset[int]], forbidden: Rows) -> None:
+        self._forbidden = forbidden
+        self._has_forbidden = bool(forbidden.any())
+        frequency = Counter(fact for facts in required for fact in facts)
+        # Frequent facts first: operators then share long beginnings of their paths.
+        paths = [sorted(facts, key=lambda f: (-frequency[f], f)) for facts in required]
+        self._levels: list[_Level] = []
+        nodes: list[list[int]] = [list(range(len(required)))]
+        depth = 0
+        while nodes:
+            first_child, child_fact, first_operator, operators = [0], [], [0], []
+            following: list[list[int]] = []
+            for members in nodes:
+                children: dict[int, list[int]] = {}
+                for operator in members:
+                    if len(paths[operator]) == depth:
+                        operators.append(operator)
+                    else:
+                        children.setdefault(paths[operator][depth], []).append(operator)
+                for fact in sorted(children):
+                    child_fact.append(fact)
+                    following.append(children[fact])
+                first_child.append(len(child_fact))
+                first_operator.append(len(operators))
+            self._levels.append(
+                _Level(
+                    *(
+                        np.array(a, np.int64)
+                        for a in (first_child, child_fact, first_operator, operators)
+                    )
+                )
+            )
+            nodes, depth = following, depth + 1
+
+    def match(self, rows: Rows) -> tuple[Ints, Ints]:
+        """All pairs (row number, operator) with the operator's literals satisfied, sorted."""
+        true = TrueFacts.of(rows)
+        row = np.arange(len(rows))
+        node = np.zeros(len(rows), np.int64)
+        found_rows: list[Ints] = []
+        found_operators: list[Ints] = []
+        for level in self._levels:
+            counts = level.first_operator[node + 1] - level.first_operator[node]
+            found_rows.append(np.repeat(row, counts))
+            found_operators.append(level.operators[ranges(level.first_operator[node], counts)])
+            row, node = level.below(rows, true, row, node)
+        rows_out = np.concatenate(found_rows)
+        operators_out = np.concatenate(found_operators)
+        if self._has_forbidden:
+            fact_blocks = self._forbidden.shape[1]
+            clash = (rows[rows_out, :fact_blocks] & self._forbidden[operators_out]).any(axis=1)
+            rows_out, operators_out = rows_out[~clash], operators_out[~clash]
+        order = np.lexsort((operators_out, rows_out))
+        return rows_out[order], operators_out[order]
 
 
 class Operators:

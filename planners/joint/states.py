@@ -1,22 +1,67 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Joint states as rows of bits: encoding, keys, and what is true in them."""
+"""The facts of a joint model, numbered, and its states as rows of bits: encoding, keys, truth."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.joint.facts import FactTable
 from planners.joint.tables import Bools, Ints, Rows
+from planners.pddl.formula_tree import label
+from planners.pddl.lifted import Atom
 from planners.system.errors import BadInput
 from planners.system.messages import echoed
 
 _BLOCK_BITS = 64
+
+
+@dataclass(frozen=True, slots=True)
+class FactTable:
+    """The atoms that can be true in some state and false in another: the *facts* of a model.
+
+    ``atoms`` are in the order of their ``texts`` (PDDL, lower case, sorted as strings), which is
+    the order in which a state's key names them.  A fact's *number* is its position.
+    """
+
+    atoms: tuple[Atom, ...]
+    texts: tuple[str, ...] = field(init=False, compare=False)
+    index: dict[Atom, int] = field(init=False, compare=False, repr=False)
+    _number: dict[str, int] = field(init=False, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Number the atoms by their texts."""
+        by_text = {label(atom.predicate, atom.args): atom for atom in self.atoms}
+        texts = tuple(sorted(by_text))
+        object.__setattr__(self, "atoms", tuple(by_text[text] for text in texts))
+        object.__setattr__(self, "texts", texts)
+        object.__setattr__(self, "index", {by_text[text]: n for n, text in enumerate(texts)})
+        object.__setattr__(self, "_number", {text: n for n, text in enumerate(texts)})
+
+    @classmethod
+    def of(cls, atoms: Iterable[Atom]) -> FactTable:
+        """The table of some atoms, in any order."""
+        return cls(tuple(atoms))
+
+    def __len__(self) -> int:
+        """Count the facts."""
+        return len(self.atoms)
+
+    def __iter__(self) -> Iterator[Atom]:
+        """Go through the atoms by their numbers."""
+        return iter(self.atoms)
+
+    def __contains__(self, atom: Atom) -> bool:
+        """Say whether an atom is a fact of the model."""
+        return atom in self.index
+
+    def number_of(self, text: str) -> int | None:
+        """The number of the fact with this text, None if there is none."""
+        return self._number.get(text)
 
 
 @dataclass(frozen=True, slots=True)

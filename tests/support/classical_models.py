@@ -11,7 +11,7 @@ from functools import cache
 import pytest
 
 from planners.classical import selection
-from planners.classical.immediate import Immediate
+from planners.classical.staged import Immediate
 from planners.joint.tables import Rows
 from planners.loading import PlanningInstance
 from planners.pddl.model_options import Cost, ModelOptions, Unowned

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from coordlang.language.keys import keys_of, read_keys
-from planners.joint.facts import FactTable
-from planners.joint.states import StateCodec
+from planners.joint.states import FactTable, StateCodec
 from planners.joint.tables import Rows
 from planners.pddl.lifted import Atom
 from planners.system.errors import BadInput

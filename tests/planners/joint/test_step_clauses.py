@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planners.joint.conditions import Evaluator
-from planners.joint.facts import FactTable
-from planners.joint.states import StateCodec
+from planners.joint.states import FactTable, StateCodec
 from planners.joint.step_clauses import StepClauses, clauses
 from planners.pddl.lifted import And, Atom, Formula, Not, Or, StepAtom, Truth
 
