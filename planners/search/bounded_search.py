@@ -20,6 +20,7 @@ from planners.search.goals import FAR
 from planners.search.heuristics import Heuristic
 from planners.search.layers import Edges, StateTable, grown, joined_edges
 from planners.search.reachable import PieceSizes
+from planners.search.sampled_ways import mostly_lead
 from planners.search.state_variables import StateVariable
 from planners.search.unreachable import searched
 from planners.system.errors import ProvedImpossible
@@ -34,6 +35,8 @@ _FORMULA, _STEPS = 50_000, 20
 #: Combinations of labels, for each joint step that is tried without exact bounds, that are not even
 #: composed.
 _TOO_MANY = 10
+#: As many times more joint steps may be composed to see that no solver needs to be asked.
+_TRIED = 4
 #: How a round ended: the goal was met, or more joint steps were composed than are tried without
 #: exact bounds.
 _MET, _GROWN = -1, -2
@@ -156,9 +159,14 @@ class BoundedSearch:
         return found == _MET
 
     def _bounded_exactly(self) -> int:
-        """Ask the solver for the optimal cost; what the next round is bounded by."""
+        """Ask the solver for the optimal cost, if it may pay; what the next round is bounded by."""
+        most = _TRIED * self._probe
         self._share = 0
         at_least = self.bound if self.bound < FAR - 1 else 0
+        if self._model.cost == "makespan" and at_least:
+            last, left = self.table.rows(self.states[-1]), at_least - (len(self.states) - 1)
+            if mostly_lead(self._model, self._task.goal, self._heuristic, last, left, most):
+                return at_least
         self.exact = exact_bound(self._model, self._task, self._variables, at_least, self._pieces)
         return self.bound if self.exact is None else self.exact.makespan
 
