@@ -12,11 +12,11 @@ from coordlang.language.warping import Clause, separation_clause
 from coordlang.required.choices import Choices
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.clauses import without_implied
+from coordlang.vocabulary.counterexample_walk import CounterexampleWalk
 from coordlang.vocabulary.counterexamples import (
     Counterexample,
     Counterexamples,
     Mixtures,
-    counterexamples,
     many_counterexamples,
 )
 from coordlang.vocabulary.job import Evidence
@@ -35,19 +35,19 @@ class TaskPart:
     ----------
     choices
         The robots' choices in the plan space of just these tasks.
-    mixtures
-        Finds those of its plans that fail.
+    finder
+        Finds those of its plans that fail: for two robots a walk, else sets.
     """
 
     choices: Choices
-    mixtures: Mixtures
+    finder: CounterexampleWalk | Mixtures
 
     @classmethod
     def of(cls, space: PlanSpace, tasks: Bools) -> TaskPart:
         """These tasks of a plan space."""
         part = space.with_tasks(space.starts[tasks], space.second[tasks])
         choices = Choices(part)
-        return cls(choices, Mixtures(choices))
+        return cls(choices, CounterexampleWalk(choices) if space.robots == 2 else Mixtures(choices))
 
     @property
     def space(self) -> PlanSpace:
@@ -68,7 +68,10 @@ class TaskPart:
         ways
             For how many images each task stands.
         """
-        return many_counterexamples(self.mixtures, word[self.space.state], most, ways)
+        nodes = word[self.space.state]
+        if isinstance(self.finder, CounterexampleWalk):
+            return self.finder.failing(nodes, most, ways)
+        return many_counterexamples(self.finder, nodes, most, ways)
 
     def violated(self, word: Ints) -> dict[Clause, Counterexample]:
         """Clauses that a partition violates, each with the plans that it comes from.
@@ -85,8 +88,8 @@ class TaskPart:
         """
         words = word.tolist()
         found: dict[Clause, Counterexample] = {}
-        nodes = word[self.space.state]
-        for example in counterexamples(self.mixtures, nodes, _AT_A_TIME):
+        tables = self.failing(word, _AT_A_TIME)
+        for example in (table.one(row) for table in tables for row in range(len(table))):
             clause = separation_clause(example.states, words)
             assert clause, "the plans have one sentence, and none of them is the other"
             found.setdefault(clause, example)

@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tuples of two robots' plans that refute a partition, by a walk along plans in step.
+
+Where two robots have many tasks in a small space the walk is several times as fast as sets
+(`coordlang.vocabulary.counterexamples`), since it handles all tasks at once; for more robots it is
+hopeless.  It keeps, for every node, the way to a violation with the fewest steps at which the plans
+are in different states: such pairs give short clauses.  It is cut off where no mixture can fail,
+whatever the words are, and where what the plans can say next does not meet (Proposition 14 of
+docs/concepts.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from coordlang.required.choices import Choices
+from coordlang.required.composition_walk import FAILED, Moves, can_fail, moves
+from coordlang.vocabulary.counterexamples import Counterexamples
+from coordlang.vocabulary.leads import NO_LEAD, NO_WORD, PARTED, Leads
+from coordlang.vocabulary.next_words import NextWords
+from planners.joint.tables import Bools, Ints, unique_tuples
+from planners.search.edge_index import EdgeIndex
+from planners.search.plan_space import PlanSpace
+
+#: Where no way leads to a violation; some steps may be added to it.
+_FAR = np.iinfo(np.int64).max // 4
+#: Random ways to a violation that are taken from one start at most.
+_RANDOM_WAYS = 40
+
+
+@dataclass(frozen=True, slots=True)
+class _OpenMoves:
+    """The moves of a layer that lead to a violation; ``first`` (nodes + 1) delimits each node's."""
+
+    moves: Ints
+    first: Ints
+
+    @classmethod
+    def of_layer(cls, layer: _Layer, leads: Bools) -> _OpenMoves:
+        moves = np.flatnonzero(leads)
+        return cls(moves, np.searchsorted(layer.source[moves], np.arange(len(layer.nodes) + 1)))
+
+    def drawn(self, rows: Ints, random: np.random.Generator) -> Ints:
+        """One of those of each of these nodes."""
+        low, high = self.first[rows], self.first[rows + 1]
+        drawn: Ints = self.moves[random.integers(low, high)]
+        return drawn
+
+
+@dataclass(slots=True)
+class _Layer:
+    """Nodes of the walk with equally many steps to go.
+
+    A node is ``(x_1 .. x_n, y or failed, leads)``, failed as the number of nodes of the plan space.
+    Each move has the row of its node in ``source``, the plans' ``edges``, and in ``child`` the row
+    of the node that it leads to, one layer below.  Each node has in ``best`` the fewest steps at
+    which the plans are in different states on a way to a violation, in ``choice`` the move that
+    begins it, in ``open_moves`` all that do.
+    """
+
+    nodes: Ints
+    source: Ints
+    edges: Ints
+    child: Ints
+    best: Ints
+    choice: Ints
+    open_moves: _OpenMoves
+
+
+class CounterexampleWalk:
+    """Finds failing tuples of two robots' plans that have one sentence.
+
+    Parameters
+    ----------
+    choices
+        The robots' choices in the plan space.
+    """
+
+    def __init__(self, choices: Choices) -> None:
+        self._choices, self._index = choices, EdgeIndex.of(choices.space)
+
+    def failing(self, word: Ints, most: int, ways: int = 1) -> list[Counterexamples]:
+        """Those that differ at the fewest steps, and drawn ones; one table for a number of steps.
+
+        See `many_counterexamples`.
+        """
+        space = self._choices.space
+        if not self._choices.requires[space.starts].any():
+            return []
+        layers = _Walk(self._choices, self._index, word).layers()
+        _backward(space, layers)
+        return _retrace(space, layers, most, ways * _RANDOM_WAYS)
+
+
+class _Walk:
+    """The nodes from which some mixture can fail and the plans' sentences can agree."""
+
+    def __init__(self, choices: Choices, index: EdgeIndex, word: Ints) -> None:
+        self._choices, self._index = choices, index
+        self._space = choices.space
+        before, after = word[self._space.sources], word[self._space.targets()]
+        #: (edges): the word that a plan enters, `NO_WORD` where it goes on in its word.
+        self._entered = np.where(before == after, NO_WORD, after)
+        self._leads = Leads()
+        self._next = NextWords(self._space, word)
+
+    def layers(self) -> list[_Layer]:
+        """The nodes: ``layers[k]`` has k joint steps to go."""
+        space, robots = self._space, self._space.robots
+        starts = np.unique(space.starts)
+        starts = starts[self._choices.requires[starts]]
+        layers: list[_Layer] = []
+        arriving = np.zeros((0, 2 * robots), np.int64)
+        for number in reversed(range(len(space.layers))):
+            here = starts[space.layer[starts] == number]
+            fresh = np.zeros((len(here), 2 * robots), np.int64)
+            fresh[:, : robots + 1] = here[:, None]
+            both = np.concatenate((fresh, arriving))
+            bounds = (
+                [len(space)] * robots
+                + [len(space) + 1]
+                + [int(both[:, k].max(initial=0)) + 1 for k in range(robots + 1, 2 * robots)]
+            )
+            nodes, place = unique_tuples(both, bounds)
+            if layers:
+                layers[-1].child = place[len(fresh) :]
+            if number == 0:
+                layers.append(_layer(nodes, np.zeros(0, np.int64), np.zeros((0, robots), np.int64)))
+                break
+            layer, arriving = self._expand(nodes)
+            layers.append(layer)
+        layers.reverse()
+        return layers
+
+    def _expand(self, nodes: Ints) -> tuple[_Layer, Ints]:
+        """A layer with the moves out of its nodes, and the nodes that they lead to."""
+        robots, failed = self._space.robots, len(self._space)
+        sources: list[Ints] = [np.zeros(0, np.int64)]
+        edges: list[Ints] = [np.zeros((0, robots), np.int64)]
+        children: list[Ints] = [np.zeros((0, 2 * robots), np.int64)]
+        # A failed mixture has no edges: -1 as prefix finds none.
+        y = nodes[:, robots]
+        walking = np.column_stack((nodes[:, :robots], np.where(y == failed, FAILED, y)))
+        for move in moves(self._space, self._index, walking):
+            kept, target, lead = self._in_agreement(nodes, move)
+            mixed = move.mixed[kept]
+            fails = can_fail(self._choices, target, mixed)
+            kept, mixed = kept[fails], np.where(mixed == FAILED, failed, mixed)[fails]
+            sources.append(move.source[kept])
+            edges.append(move.edges[kept])
+            children.append(np.column_stack((target[fails], mixed, lead[fails])))
+        layer = _layer(nodes, np.concatenate(sources), np.concatenate(edges))
+        return layer, np.concatenate(children)
+
+    def _in_agreement(self, nodes: Ints, move: Moves) -> tuple[Ints, Ints, Ints]:
+        """The moves after which the sentences can agree, with the nodes reached and the leads."""
+        robots = self._space.robots
+        kept = np.arange(len(move.source))
+        first = self._entered[move.edges[:, 0]]
+        leads: list[Ints] = []
+        for other in range(1, robots):
+            before = nodes[move.source[kept], robots + other]
+            lead = self._leads.after(before, first, self._entered[move.edges[kept, other]])
+            agree = lead != PARTED
+            kept, first = kept[agree], first[agree]
+            leads = [known[agree] for known in (*leads, lead)]
+        target = self._space.targets(move.edges[kept])
+        lead = np.column_stack(leads)
+        agree = self._next.can_agree(target, lead, self._leads)
+        return kept[agree], target[agree], lead[agree]
+
+
+def _layer(nodes: Ints, source: Ints, edges: Ints) -> _Layer:
+    """A layer of which only the nodes and the moves out of them are known."""
+    none = np.zeros(0, np.int64)
+    return _Layer(nodes, source, edges, none, none, none, _OpenMoves(none, none))
+
+
+def _backward(space: PlanSpace, layers: list[_Layer]) -> None:
+    """Set ``best`` and ``choice`` of each node, goals first."""
+    robots = space.robots
+    goal = layers[0]
+    bad = (goal.nodes[:, robots] == len(space)) & (goal.nodes[:, robots + 1 :] == NO_LEAD).all(
+        axis=1
+    )
+    goal.best = np.where(bad, 0, _FAR)
+    for below, layer in pairwise(layers):
+        x = layer.nodes[:, :robots]
+        differs = (x[:, 1:] != x[:, :1]).sum(axis=1)
+        value = below.best[layer.child] if len(layer.child) else np.zeros(0, np.int64)
+        best = np.full(len(layer.nodes), _FAR)
+        np.minimum.at(best, layer.source, value)
+        choice = np.full(len(layer.nodes), -1)
+        tight = np.flatnonzero((value == best[layer.source]) & (value < _FAR))
+        choice[layer.source[tight][::-1]] = tight[::-1]
+        layer.choice = choice
+        layer.open_moves = _OpenMoves.of_layer(layer, value < _FAR)
+        layer.best = np.where(best < _FAR, best + differs, _FAR)
+
+
+def _retrace(
+    space: PlanSpace, layers: list[_Layer], most: int, ways: int = _RANDOM_WAYS
+) -> list[Counterexamples]:
+    """Ways from the nodes at which the plans and their mixture are one, and no sentence leads."""
+    robots = space.robots
+    # Columns: fewest steps at which the plans differ, layer, row of the layer.
+    starts = [np.zeros((0, 3), np.int64)]
+    for number, layer in enumerate(layers[1:], 1):
+        x = layer.nodes[:, : robots + 1]
+        diagonal = (x == x[:, :1]).all(axis=1) & (layer.nodes[:, robots + 1 :] == NO_LEAD).all(
+            axis=1
+        )
+        hit = np.flatnonzero(diagonal & (layer.best < _FAR))
+        starts.append(np.column_stack((layer.best[hit], np.full(len(hit), number), hit)))
+    table = np.concatenate(starts)
+    table = table[np.lexsort(table.T[::-1])][:most]
+    if not len(table):
+        return []
+    # Few starts: more ways to a violation from each, drawn at random (always the same ones).
+    random = np.random.default_rng(0)
+    repeated = min(ways, most // len(table) - 1)
+    found = []
+    for number in np.unique(table[:, 1]).tolist():
+        rows = table[table[:, 1] == number, 2]
+        found.append(_follow(space, layers, number, rows, None))
+        if repeated > 0:
+            rows = np.repeat(rows, repeated)
+            found.append(_follow(space, layers, number, rows, random))
+    return found
+
+
+def _follow(
+    space: PlanSpace,
+    layers: list[_Layer],
+    number: int,
+    rows: Ints,
+    random: np.random.Generator | None,
+) -> Counterexamples:
+    """Ways from nodes of a layer to violations: the best, or at each node any that leads to one."""
+    start = layers[number].nodes[rows, 0]
+    edges = np.empty((len(rows), number, space.robots), np.int64)
+    for step, layer in enumerate(layers[number:0:-1]):
+        move = layer.choice[rows] if random is None else layer.open_moves.drawn(rows, random)
+        edges[:, step] = layer.edges[move]
+        rows = layer.child[move]
+    states = np.empty((len(start), space.robots, number + 1), np.int64)
+    states[:, :, 0] = space.state[start][:, None]
+    states[:, :, 1:] = space.state[space.targets(edges)].transpose(0, 2, 1)
+    return Counterexamples(start, edges, states)

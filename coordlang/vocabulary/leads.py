@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Leads: the words by which one plan's sentence is ahead of another's, numbered."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planners.joint.tables import Ints
+
+#: The lead of two sentences that are alike.
+NO_LEAD = 0
+#: What follows where neither sentence is the beginning of the other.
+PARTED = -1
+#: In place of a word where a plan goes on in the word where it is.
+NO_WORD = -1
+#: Combinations of leads and words up to which those that are asked for are marked in a table.
+_LARGEST_TABLE = 4_000_000
+
+
+class Leads:
+    """Numbers of leads, as they are met.
+
+    A lead is which of two plans is ahead, 1 or 2, and the words; `NO_LEAD` is (0, no words).
+    """
+
+    def __init__(self) -> None:
+        self._leads: list[tuple[int, tuple[int, ...]]] = [(0, ())]
+        self._number = {self._leads[NO_LEAD]: NO_LEAD}
+        self._after: dict[tuple[int, int, int], int] = {}
+        self._beginnings: list[tuple[int, ...]] = []
+
+    def beginnings(self) -> Ints:
+        """(leads, 3): which of the two plans is ahead, 0 for neither, and its first two words.
+
+        `NO_WORD` where it is ahead by fewer.
+        """
+        rows = [
+            (ahead, *(*words, NO_WORD, NO_WORD)[:2])
+            for ahead, words in self._leads[len(self._beginnings) :]
+        ]
+        self._beginnings += rows
+        return np.array(self._beginnings, np.int64)
+
+    def after(self, lead: Ints, first: Ints, second: Ints) -> Ints:
+        """The leads when the plans enter words ``first`` and ``second``, or `NO_WORD`.
+
+        `PARTED` where their sentences part.  One entry for each of ``lead``.
+        """
+        words = int(max(first.max(initial=NO_WORD), second.max(initial=NO_WORD))) + 2
+        codes = (lead * words + (first + 1)) * words + (second + 1)
+        most = len(self._leads) * words * words
+        if most > _LARGEST_TABLE:
+            different, inverse = np.unique(codes, return_inverse=True)
+            sorted_out: Ints = self._each(different, words)[inverse.reshape(-1)]
+            return sorted_out
+        asked = np.zeros(most, np.bool_)
+        asked[codes] = True
+        different = np.flatnonzero(asked)
+        answers = np.zeros(most, np.int64)
+        answers[different] = self._each(different, words)
+        found: Ints = answers[codes]
+        return found
+
+    def _each(self, codes: Ints, words: int) -> Ints:
+        lead, entered = np.divmod(codes, words * words)
+        first, second = np.divmod(entered, words)
+        rows = zip(lead.tolist(), (first - 1).tolist(), (second - 1).tolist(), strict=True)
+        return np.array([self._one(row) for row in rows], np.int64)
+
+    def _one(self, key: tuple[int, int, int]) -> int:
+        known = self._after.get(key)
+        if known is None:
+            known = self._after[key] = self._between(*key)
+        return known
+
+    def _between(self, lead: int, first: int, second: int) -> int:
+        """The number of the lead when the plans enter these words."""
+        ahead, words = self._leads[lead]
+        mine = _entered(words if ahead == 1 else (), first)
+        theirs = _entered(words if ahead == 2 else (), second)
+        shared = min(len(mine), len(theirs))
+        if mine[:shared] != theirs[:shared]:
+            return PARTED
+        if len(mine) == len(theirs):
+            return NO_LEAD
+        rest = (1, mine[shared:]) if len(mine) > shared else (2, theirs[shared:])
+        if rest not in self._number:
+            self._number[rest] = len(self._leads)
+            self._leads.append(rest)
+        return self._number[rest]
+
+
+def _entered(words: tuple[int, ...], word: int) -> tuple[int, ...]:
+    return words if word == NO_WORD else (*words, word)
