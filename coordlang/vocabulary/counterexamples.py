@@ -94,12 +94,6 @@ class Counterexamples:
         return Counterexamples(self.start[rows], self.edges[rows], self.states[rows])
 
 
-def counterexamples(mixtures: Mixtures, word: Ints, most: int) -> Iterator[Counterexample]:
-    """`many_counterexamples` one by one."""
-    for found in many_counterexamples(mixtures, word, most):
-        yield from map(found.one, range(len(found)))
-
-
 def many_counterexamples(
     mixtures: Mixtures, word: Ints, most: int, ways: int = 1
 ) -> list[Counterexamples]:

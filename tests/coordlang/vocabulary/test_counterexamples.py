@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Partitions refuted over sets, against plans that are listed and every mixture of them."""
+"""Partitions refuted over sets and by a walk, against listed plans and every mixture of them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ import pytest
 
 from coordlang.language.candidates import from_problems
 from coordlang.required.choices import Choices
-from coordlang.vocabulary.counterexamples import Counterexample, Mixtures, counterexamples
+from coordlang.vocabulary.counterexample_walk import CounterexampleWalk
+from coordlang.vocabulary.counterexamples import Counterexample, Mixtures, many_counterexamples
 from coordlang.vocabulary.sentence_sets import NOTHING, SILENCE, SentenceSets
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import BadInput, ProvedImpossible, UsageError
@@ -41,17 +42,23 @@ def compared(spaces: Iterator[PlanSpace], random: Random) -> Counter[bool]:
     """What is found under random words is there, and nothing is missed; how often was there any."""
     answers: Counter[bool] = Counter()
     for space in spaces:
-        mixtures = Mixtures(Choices(space))
+        choices = Choices(space)
+        mixtures, walk = Mixtures(choices), CounterexampleWalk(choices)
         for words in (1, 2, 3, 5):
             word = [random.randrange(words) for _ in space.rows]
             try:
                 holds = naive.is_language(space, dict(enumerate(word)), MOST[space.robots])
             except naive.TooLarge:
                 break
-            found = list(counterexamples(mixtures, np.array(word)[space.state], 20))
+            nodes = np.array(word)[space.state]
+            found = many_counterexamples(mixtures, nodes, 20)
+            if space.robots < 4:
+                assert bool(walk.failing(nodes, 20)) != holds
+                found += walk.failing(nodes, 20)
             assert bool(found) != holds
-            for example in found:
-                check(space, example, word)
+            for table in found:
+                for row in range(len(table)):
+                    check(space, table.one(row), word)
             answers[holds] += 1
     return answers
 
