@@ -51,6 +51,9 @@ class Store:
         """The table of a key; None if there is none, or none that is whole."""
         path = self._path(key)
         try:
+            if not path.is_file() and path.exists():  # a pipe would be waited for
+                self._ignore(path, "is no file")
+                return None
             data = path.read_bytes()
             if self.most_bytes is not None:
                 with suppress(OSError):  # a folder that is only read
