@@ -296,7 +296,9 @@ def _followed(found: RobotsChoices, options: ChoicesOptions) -> tuple[Monitor, A
     except NotAllowed as error:
         raise Refuted(str(error), remedy="After that nothing is guaranteed any more.") from None
     except MonitorError as error:
-        raise UsageError(str(error)) from None
+        raise UsageError(
+            str(error), remedy="Write actions and atoms as --robot and --json show them."
+        ) from None
 
 
 def _monitor_text(at: Monitor, answer: Answer | None) -> str:
