@@ -48,6 +48,7 @@ def test_a_line_says_what_it_was_made_with(finished: Path) -> None:
         assert set(line["versions"]) >= {"coordlang", "python", "numpy", "python-sat"}
 
 
+@pytest.mark.thorough
 def test_a_run_that_was_cut_off_goes_on(finished: Path, tmp_path: Path) -> None:
     """Two lines, in another order, and the third cut off in the middle, as a kill leaves it."""
     whole = (finished / "game.jsonl").read_text().splitlines(keepends=True)
@@ -92,6 +93,7 @@ def failing(unit: Unit, settings: Settings) -> dict[str, Any]:
     return {}
 
 
+@pytest.mark.thorough
 def test_an_error_ends_the_run_and_keeps_what_is_done(tmp_path: Path) -> None:
     recipe = Recipe("game", "", GAME.units, failing, GAME.section)
     with pytest.raises(ValueError, match="an error in a unit"):
@@ -99,6 +101,7 @@ def test_an_error_ends_the_run_and_keeps_what_is_done(tmp_path: Path) -> None:
     assert set(lines(tmp_path)) >= {"GWB5/greedy", "GWB5/separating"}
 
 
+@pytest.mark.thorough
 def test_an_interrupt_leaves_no_process(tmp_path: Path) -> None:
     command = [
         sys.executable,

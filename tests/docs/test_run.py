@@ -24,7 +24,7 @@ def test_matches() -> None:
 
 
 #: Pages of many commands, which take a while.
-LONG = ("cli", "library")
+LONG = ("cli", "library", "lifted", "simulation")
 
 
 @pytest.mark.parametrize(
