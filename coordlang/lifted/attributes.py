@@ -11,8 +11,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import shortest_path
 
 from coordlang.lifted.world import NONE, Pair, World
 from planners.joint.tables import Bools, Ints
@@ -88,6 +86,9 @@ def distances(world: World, relation: str) -> Ints:
 
 
 def _distances(world: World, relation: str) -> Ints:
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import shortest_path
+
     joined = _joined(world, relation)
     steps = shortest_path(csr_matrix(joined), unweighted=True)
     steps[~joined.any(axis=1)] = np.inf
