@@ -5,10 +5,10 @@
 
 Rows are those of Table 1, then ``open-RxC`` and ``ring-RxC`` (two robots, all pairs of states), and
 ``open-RxC-N`` (N robots); without any, Table 1 and some larger ones.  The columns: words, with the
-proved bound where that is smaller (7..8); refuted partitions (*rounds*), of abstract states and of
-equivariant words; failing tuples up to symmetry; walks of a part of the tasks; clauses; wall and
-CPU seconds of the whole build; and the load of the machine over the last minute.  Every number of
-words is that of a language verified by definition.  The time limit is for each row and seed.
+proved bound where that is smaller (7..8); refuted partitions (*rounds*); failing tuples up to
+symmetry; walks of a part of the tasks; clauses; wall and CPU seconds of the whole build; and the
+load of the machine over the last minute.  Every number of words is that of a language verified by
+definition.  The time limit is for each row and seed.
 """
 
 from __future__ import annotations
@@ -31,14 +31,12 @@ from planners.parallel.workers import Workers
 from planners.system.limits import time_limit
 
 FURTHER = ("open-2x6", "open-3x4", "open-3x5", "open-4x4", "ring-4x5")
-FIGURES = ("rounds", "abstract_rounds", "equivariant_rounds", "counterexamples", "walks", "clauses")
+FIGURES = ("rounds", "counterexamples", "walks", "clauses")
 COLUMNS = (
     ("row", 9),
     ("seed", 4),
     ("words", 7),
     ("rounds", 7),
-    ("abstract", 8),
-    ("equiv.", 7),
     ("tuples", 8),
     ("walks", 6),
     ("clauses", 8),

@@ -37,7 +37,7 @@ def t_map() -> tuple[Path, Path]:
 @pytest.fixture
 def language(coordlang: Command, t_map: tuple[Path, Path], tmp_path: Path) -> Path:
     path = tmp_path / "language.json"
-    assert coordlang("build", *t_map, "--tasks", "all", "-o", path).code == 0
+    assert coordlang("build", *t_map, "--tasks", "all", "--method", "greedy", "-o", path).code == 0
     return path
 
 

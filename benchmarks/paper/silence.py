@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from math import log2
 from statistics import fmean
@@ -16,17 +17,18 @@ from benchmarks.paper.plots import MARKERS, Lines, Series, lines
 from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
 from benchmarks.paper.suite import CORRIDOR, OTHERS, ROWS, World
 from coordlang.commands.building import build_language
+from coordlang.commands.tolerating import job_of
 from coordlang.language.candidates import Candidates
 from coordlang.language.sentences import sentence_counts
 from coordlang.language.tolerance import percent
-from coordlang.required.divergences import required_nodes, states_on_plans
+from coordlang.required.divergences import required_nodes
 from coordlang.required.miscoordination import Inseparable
-from coordlang.symmetry.group import symmetry_group
+from coordlang.vocabulary.annealing import AnnealingSettings
 from coordlang.vocabulary.few_words import few_words
 from coordlang.vocabulary.flexibility_bound import bits_bounds
 from coordlang.vocabulary.job import Assignment
-from coordlang.vocabulary.word_annealing import FewWordsSettings
 from planners.joint.tables import Ints
+from planners.parallel.workers import Workers
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 
@@ -42,7 +44,7 @@ WORLDS = (
 #: Words up to which the curve is drawn where no language is found before.
 _MOST = 8
 #: How long each number of words is annealed.
-_ANNEALING = FewWordsSettings(moves=15, least_moves=300, most_moves=1_000, coolings=2)
+_ANNEALING = AnnealingSettings(least_moves=300, patience=1, work=5_000_000)
 
 
 def units(settings: Settings) -> list[Unit]:
@@ -75,25 +77,15 @@ def _points(
     candidates: Candidates, spaces: Sequence[PlanSpace], seed: int, most: int
 ) -> Iterator[Result]:
     """One number of words after the other; the last is that of a coordination language."""
-    states = states_on_plans(spaces).tolist()
-    language, size = _language(candidates, states, seed)
-    symmetries = symmetry_group(candidates).permutations
+    job = job_of(candidates, Workers(), seed=seed)
+    language, size = _language(candidates, job.states, seed)
+    job = replace(job, incumbent=language)
     start: Assignment | None = None
     for words in range(1, most + 1):
         if words == size and language is not None:
             yield _point(candidates, spaces, language, words, 0.0, 0.0, is_best=True)
             return
-        found = few_words(
-            spaces,
-            states,
-            len(candidates.rows),
-            words,
-            seed=seed,
-            language=language,
-            start=start,
-            symmetries=symmetries,
-            settings=_ANNEALING,
-        )
+        found = few_words(job, words, start=start, settings=_ANNEALING)
         if found.stopped is not None:
             raise found.stopped
         start = found.partition

@@ -15,7 +15,7 @@ from typing import Any
 
 import coordlang
 from coordlang.commands.build_text import built_text
-from coordlang.commands.building import MethodOptions, build_language
+from coordlang.commands.building import EFFORT, MethodOptions, build_language
 from coordlang.commands.built import Built
 from coordlang.commands.command import command_of
 from coordlang.commands.failure import UNPROVED, code_of_interrupt, why_stopped
@@ -215,6 +215,8 @@ def _to_repair(
 def _arguments(options: BuildOptions) -> list[str]:
     """Return the keywords of a call as a language file records them."""
     named = {**asdict(options.way), "words": options.words, "worst": options.worst}
+    if options.way.effort == EFFORT:
+        del named["effort"]
     given = {name: value for name, value in named.items() if value}
     files = {"tasks": options.tasks, "start": options.start}
     given |= {k: fspath(file) for k, file in files.items() if isinstance(file, str | PathLike)}

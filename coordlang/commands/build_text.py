@@ -28,8 +28,20 @@ def built_text(built: Built, width: int) -> str:
         f"{figures['states_on_plans']:,} states on {built.candidates.model.kept_plans}, "
         f"{figures['divergences']:,} divergences, "
         f"{figures['walk_nodes']:,} nodes of plans, {total:.2f} s\n"
-        f"{_fewest(figures)}{_failures(built)}{_flexibility(figures)}{_readability(figures)}"
+        f"{_more_effort(built)}{_fewest(figures)}"
+        f"{_failures(built)}{_flexibility(figures)}{_readability(figures)}"
         f"{repaired}"
+    )
+
+
+def _more_effort(built: Built) -> str:
+    """What more effort might bring; a whole line."""
+    guarantee, effort = built.guarantee, built.job.effort
+    if guarantee.method != "best" or guarantee.proved_minimal:
+        return ""
+    return (
+        f"between {guarantee.lower_bound} and {guarantee.size} words are needed: a larger "
+        f"--effort than {effort} may find fewer or prove that there are none\n"
     )
 
 

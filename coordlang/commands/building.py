@@ -5,27 +5,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from coordlang.commands.built import Built, Clock, Verified, language_of
 from coordlang.explanation.simple import simple
 from coordlang.language.candidates import Candidates, require_solvable
 from coordlang.required.all_differences import differences
-from coordlang.vocabulary import EXACT, METHODS, Job, Outcome, greedy
+from coordlang.vocabulary import EXACT, METHODS, Job, Outcome
 from coordlang.vocabulary.flexible import flexible
+from coordlang.vocabulary.greedy import first_language
 from coordlang.vocabulary.hidden_slack import hidden_differences
-from coordlang.vocabulary.job import Assignment
 from planners.parallel.workers import Workers
 from planners.search.portions import require_room
-from planners.system.errors import UsageError
+from planners.system.errors import OutOfMemory, UsageError
 from planners.system.limits import little_time_after, run_until_stopped, start_clock, time_left
 from planners.system.options import option, record_from
 
-if TYPE_CHECKING:
-    pass
-
+#: Effort of ``--method best`` that takes a second or two on small tasks.
+EFFORT = 10
 #: How words are found: a key of `coordlang.vocabulary.METHODS`.
-Method = Literal["greedy", "separating", "minimal", "exhaustive"]
+Method = Literal["best", "greedy", "separating", "minimal", "exhaustive"]
 #: What the language should be like, of those with the fewest words, by the value of ``--prefer``.
 BuildPreference = Literal["flexible", "simple"]
 PREFERENCES: Mapping[BuildPreference, Callable[[Job, Outcome], Outcome]] = {
@@ -42,9 +41,15 @@ class MethodOptions:
     """
 
     method: Method = option(
-        "greedy",
-        "greedy: fast.  separating: fewest words that part plans where they differ first or last.  "
-        "minimal: fewest words at all, with proof.  exhaustive: brute force.",
+        "best",
+        "best: few words within some effort, and how many are needed at least.  greedy: fast.  "
+        "separating: fewest words that part plans where they differ first or last.  minimal: "
+        "fewest words at all, with proof.  exhaustive: brute force.",
+    )
+    effort: int = option(
+        EFFORT,
+        "best: what the search for fewer words may spend, in thousands of conflicts of its solver.",
+        least=0,
     )
     seed: int = option(0, "Seed of all random choices.", least=0)
     alpha_only: bool = option(
@@ -52,7 +57,7 @@ class MethodOptions:
     )
     prefer: BuildPreference | None = option(
         None,
-        "Of the languages with the fewest words (--method minimal or exhaustive) one whose ..  "
+        "Of the languages with the fewest words that were found one whose ..  "
         "flexible: sentences leave many plans open.  simple: words have short formulas.",
     )
 
@@ -62,10 +67,15 @@ class MethodOptions:
                 "--alpha-only belongs to --method separating",
                 remedy="Add --method separating, or leave out --alpha-only.",
             )
-        if self.prefer and not self.is_exact:
+        if self.effort != EFFORT and self.method != "best":
             raise UsageError(
-                f"--prefer {self.prefer} belongs to --method minimal or exhaustive",
-                remedy="Add --method minimal, or leave out --prefer.",
+                "--effort belongs to --method best",
+                remedy="Leave out --effort, or --method.",
+            )
+        if self.prefer and self.method in ("greedy", "separating"):
+            raise UsageError(
+                f"--prefer {self.prefer} belongs to --method best, minimal or exhaustive",
+                remedy=f"Leave out --method {self.method}, or --prefer.",
             )
 
     @property
@@ -76,7 +86,7 @@ class MethodOptions:
 
 def build_language(
     candidates: Candidates,
-    method: str = "greedy",
+    method: str = "best",
     *,
     reserve: float = 0.0,
     progress: Callable[[str], None] = lambda _: None,
@@ -115,7 +125,7 @@ def build_language(
     workers = workers or Workers()
     clock = Clock()
     hidden = candidates.model.hides_slack
-    if hidden and not options.is_exact:
+    if hidden and method in ("greedy", "separating"):
         raise UsageError(
             f"--method {method} parts plans where their states first differ, and with slack they "
             "may differ in where they wait",
@@ -132,13 +142,13 @@ def build_language(
         found,
         seed=options.seed,
         alpha_only=options.alpha_only,
+        effort=options.effort,
         progress=progress,
         check=verified.check,
         workers=workers,
     )
     if method != "greedy":
-        require_room(candidates.source)
-        job = _with_incumbent(job)
+        job = _with_incumbent(_within_room(job, options.method))
         clock.note("incumbent")
         if reserve:
             start_clock((1 - reserve) * time_left())
@@ -157,16 +167,24 @@ def build_language(
     )
 
 
+def _within_room(job: Job, method: Method) -> Job:
+    """Without effort if the plans of all tasks do not fit; other methods raise `OutOfMemory`."""
+    try:
+        require_room(job.candidates.source)
+    except OutOfMemory:
+        if method != "best":
+            raise
+        return replace(job, effort=0)
+    return job
+
+
 def _with_incumbent(job: Job) -> Job:
     """Verify a greedy partition, which is what is left when an anytime method is stopped.
 
     It is verified now because there is no time then.  Where states hide slack it has a word for
     each state: no plans are inseparable.
     """
-    if job.candidates.model.hides_slack:
-        first: Assignment = {state: word for word, state in enumerate(job.states)}
-    else:
-        first = greedy(job).partition
+    first = first_language(job)
     job.check(first)
     return replace(job, incumbent=first)
 

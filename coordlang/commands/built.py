@@ -31,7 +31,7 @@ from planners.system.notebook import Presented
 
 if TYPE_CHECKING:
     from coordlang.commands.repairing import Repaired
-    from coordlang.vocabulary.fewest_failures import FewWords
+    from coordlang.vocabulary.few_words import FewWords
 
 
 @dataclass(frozen=True, slots=True, repr=False)

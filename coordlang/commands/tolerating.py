@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from coordlang.commands.built import Built, Clock, language_of
 from coordlang.language.candidates import Candidates, require_solvable
@@ -12,14 +13,12 @@ from coordlang.required.all_differences import differences
 from coordlang.required.divergences import FirstDifferences, states_on_plans, without_divergences
 from coordlang.required.failures import Failures
 from coordlang.required.miscoordination import Inseparable
-from coordlang.symmetry.group import symmetry_group
 from coordlang.verification.by_definition import Verdict
 from coordlang.verification.candidates import verify_candidates
-from coordlang.vocabulary.few_words import few_words
-from coordlang.vocabulary.fewest_failures import FewWords
-from coordlang.vocabulary.greedy import greedy
+from coordlang.vocabulary.few_words import FewWords, few_words
+from coordlang.vocabulary.greedy import first_language
 from coordlang.vocabulary.hidden_slack import hidden_differences
-from coordlang.vocabulary.job import Assignment, Job
+from coordlang.vocabulary.job import Job
 from planners.parallel.workers import Workers
 from planners.search.portions import require_room
 from planners.system.limits import little_time_after
@@ -67,21 +66,9 @@ def build_few_words(
     require_room(candidates.source)
     workers = workers or Workers()
     clock = Clock()
-    first, language = _first_differences(candidates, workers, progress)
+    job = job_of(candidates, workers, seed=seed, progress=progress)
     clock.note("coordination")
-    states = tuple(states_on_plans(candidates.spaces).tolist())
-    job = Job(candidates, states, first, seed=seed, progress=progress)
-    found = few_words(
-        candidates.spaces,
-        states,
-        len(candidates.rows),
-        words,
-        worst=worst,
-        seed=seed,
-        language=language,
-        symmetries=symmetry_group(candidates).permutations if words > 1 else (),
-        progress=progress,
-    )
+    found = few_words(job, words, worst=worst)
     clock.note("vocabulary")
     partition = Partition.of_states(candidates.rows, found.partition)
     verdict = Verdict(False, candidates.count, 0, None)
@@ -118,20 +105,24 @@ def _figures(found: FewWords) -> dict[str, float]:
     }
 
 
-def _first_differences(
-    candidates: Candidates, workers: Workers, progress: Callable[[str], None]
-) -> tuple[FirstDifferences, Assignment | None]:
-    """Where coordination is required, and a language if there is one.
+def job_of(
+    candidates: Candidates,
+    workers: Workers,
+    *,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Job:
+    """What words are looked for, with a language as the incumbent if there is one.
 
     Where plans are inseparable there is none, and divergences are not defined; nor are they where
     states hide slack.
     """
+    states = tuple(states_on_plans(candidates.spaces).tolist())
     hidden = candidates.model.hides_slack
     try:
         found = (hidden_differences if hidden else differences)(candidates, workers, progress)
     except Inseparable:
-        return without_divergences(candidates.spaces), None
-    if hidden:
-        return found, {state: word for word, state in enumerate(found.states.tolist())}
-    job = Job(candidates, tuple(found.states.tolist()), found)
-    return found, greedy(job).partition
+        first = without_divergences(candidates.spaces)
+        return Job(candidates, states, first, seed=seed, progress=progress, workers=workers)
+    job = Job(candidates, states, found, seed=seed, progress=progress, workers=workers)
+    return replace(job, incumbent=first_language(job))

@@ -20,10 +20,9 @@ from coordlang.explanation.formula_problem import FormulaProblem
 from coordlang.explanation.variables import Valuation, valuation
 from coordlang.explanation.words import MappedStates, all_covers
 from coordlang.language.warping import Clause
-from coordlang.vocabulary.candidate_languages import CandidateLanguages
 from coordlang.vocabulary.clauses import most_constrained_first, without_implied
 from coordlang.vocabulary.job import Assignment, Job, Outcome
-from coordlang.vocabulary.problems_by_size import ProblemsBySize, SolverBudget, close_bounds
+from coordlang.vocabulary.loop import Budget, Languages, ProblemsBySize, close_bounds, find
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from planners.system.limits import run_until_stopped
 
@@ -99,7 +98,7 @@ class _Search:
         self._sizes = [len(variable.values) for variable in values.variables]
         self._before = self.lengths = formula_lengths(_mapped(job, values, found.partition))
         self.bound: Lengths = (found.size - 1, found.size - 1)  # each term limits a variable
-        self._languages: CandidateLanguages | None = None
+        self._languages: Languages | None = None
         self._problems: ProblemsBySize[Clause] = ProblemsBySize(
             self._start, PartitionProblem.separate_one
         )
@@ -125,7 +124,7 @@ class _Search:
         """Fewer terms, and then fewer variables in them, until none can be."""
         if self._found.size < 2 or len(self._job.states) * self.lengths[0] > _PLACES:
             return
-        self._languages = CandidateLanguages.of(self._job, self._found.evidence)
+        self._languages = self._found.languages or Languages.of(self._job)
         try:
             close_bounds(lambda: (self.bound[0], self.lengths[0]), self._decide)
             while self.bound[1] < self.lengths[1]:
@@ -133,28 +132,29 @@ class _Search:
         except _GaveUp:
             return
 
-    def _decide(self, terms: int, budget: SolverBudget) -> bool:
+    def _decide(self, terms: int, budget: Budget) -> bool:
         """Find a language with so many terms or prove that there is none.
 
         False if the budget was not enough.
         """
         if budget.conflicts > self._conflicts:
             raise _GaveUp
-        assert self._languages is not None
-        for _ in range(budget.rounds):
-            problem = self._problems.under(terms, self._languages.clauses)
-            try:
-                partition = problem.solve(budget.conflicts)
-            except Undecided:
-                return False
-            if partition is None:
-                self._problems.drop(terms)
-                self.bound = (terms + 1, terms + 1)
-                return True
-            if self._is_accepted(partition, problem):
-                self._problems.drop(terms)
-                return True
-        return False
+        languages = self._languages
+        assert languages is not None
+        try:
+            found = find(
+                lambda most: self._problems.under(terms, languages.clauses).solve(most),
+                lambda partition: self._is_accepted(
+                    partition, self._problems.under(terms, languages.clauses)
+                ),
+                budget,
+            )
+        except Undecided:
+            return False
+        self._problems.drop(terms)
+        if found is None:
+            self.bound = (terms + 1, terms + 1)
+        return True
 
     def _limit_fewer(self) -> None:
         """Find a language with as many terms that limit fewer variables, or prove there is none."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plans of tasks as tables, by which the failures of many partitions are measured, one by one.
+"""Plans of tasks as tables, by which many partitions are measured, one by one.
 
 All plans of a task are listed where they are few; of others some are drawn, and the measure is that
 of a task which has these plans only: near the true one, and a guide for a search.
@@ -14,7 +14,7 @@ from random import Random
 
 import numpy as np
 
-from coordlang.language.flexibility import Floats
+from coordlang.language.flexibility import MANY, Floats
 from coordlang.required.choices import Choices
 from planners.joint.tables import Ints, ranges
 from planners.search.plan_space import PlanSpace
@@ -30,7 +30,7 @@ _ODD = np.uint64(0x9E37_79B9_7F4A_7C15)
 
 @dataclass(frozen=True, slots=True)
 class PlanTable:
-    """Plans of the tasks that require coordination, and the mixtures that are optimal plans.
+    """Plans of some tasks, and the mixtures that are optimal plans.
 
     Attributes
     ----------
@@ -39,7 +39,9 @@ class PlanTable:
     states
         (plans, steps) The states that each plan passes through; shorter ones repeat their last.
     plan_of_task, plans
-        (tasks) The first plan of each task, and how many it has.
+        (tasks) The first plan of each task, and how many of it there are in the table.
+    count
+        (tasks) How many plans each task has, those that are not in the table included.
     parts
         (plans, robots) What each robot does in a plan: its number among the task's own.
     of_robot
@@ -60,6 +62,7 @@ class PlanTable:
     states: Ints
     plan_of_task: Ints
     plans: Ints
+    count: Floats
     parts: Ints
     of_robot: Ints
     cells: Ints
@@ -69,8 +72,20 @@ class PlanTable:
     is_complete: bool
 
     def __len__(self) -> int:
-        """Count the tasks that require coordination."""
+        """Count the tasks that are measured."""
         return len(self.plans)
+
+    def plans_left_open(self, word: Ints, tasks: Ints) -> Floats:
+        """How many plans of some of the tasks a sentence leaves open, in expectation.
+
+        E of `coordlang.language.flexibility`, of what was drawn where not all plans are listed.
+        """
+        plans = ranges(self.plan_of_task[tasks], self.plans[tasks])
+        number = np.repeat(np.arange(len(tasks)), self.plans[tasks])
+        first, _, sizes = _sentences(word[self.states[plans]], number)
+        squares = np.bincount(number[first], sizes.astype(np.float64) ** 2, minlength=len(tasks))
+        found: Floats = self.count[tasks] * squares / self.plans[tasks].astype(np.float64) ** 2
+        return found
 
     def failures(self, word: Ints, tasks: Ints) -> Floats:
         """How often robots fail in some of the tasks, under the word of each state.
@@ -136,19 +151,23 @@ def plan_table(
     most_tasks: int,
     seed: int,
     listed: int = LISTED,
+    mixtures: bool = True,
 ) -> PlanTable:
-    """List or draw the plans of the tasks that require coordination.
+    """List or draw the plans of tasks.
 
     Parameters
     ----------
     spaces
         The plan spaces of all tasks, over one table of ``states`` states.
     most_tasks
-        Of more tasks that require coordination so many are drawn.
+        Of more tasks so many are drawn.
     seed
         What is drawn depends on it.
     listed
         Plans of a task up to which all are listed.
+    mixtures
+        Whether mixtures are measured, too: then the tasks are those that require coordination, and
+        of a task with more plans fewer are drawn.
     """
     random = Random(seed)
     chosen = [(space, Choices(space)) for space in spaces]
@@ -156,7 +175,7 @@ def plan_table(
         (space, choices, start)
         for space, choices in chosen
         for start in space.starts.tolist()
-        if choices.requires[start]
+        if choices.requires[start] or not mixtures
     ]
     is_complete = len(asked) <= most_tasks
     if not is_complete:
@@ -167,7 +186,7 @@ def plan_table(
     for space, choices, start in asked:
         plans = Plans(space, start, counted[id(space)])
         is_complete &= plans.count <= listed
-        entries.append(_task(plans, choices, listed, random))
+        entries.append(_task(plans, choices, listed, mixtures, random))
     return _together(entries, sum(len(space.starts) for space in spaces), states, is_complete)
 
 
@@ -176,17 +195,18 @@ class _Task:
     """One task's plans: states, what each robot does, how many ways it has, optimal mixtures."""
 
     states: Ints
+    count: float
     parts: Ints
     of_robot: tuple[int, ...]
     cells: Ints
 
 
-def _task(plans: Plans, choices: Choices, listed: int, random: Random) -> _Task:
+def _task(plans: Plans, choices: Choices, listed: int, mixtures: bool, random: Random) -> _Task:
     space, robots = plans.space, plans.space.robots
     if plans.count <= listed:
         chosen = list(_paths(plans.start, choices))
     else:
-        number = max(2, round(_MIXTURES ** (1 / robots)))
+        number = max(2, round(_MIXTURES ** (1 / robots))) if mixtures else listed
         ranks: set[int] = set()
         while len(ranks) < number:
             ranks.add(random.randrange(plans.count))
@@ -200,9 +220,11 @@ def _task(plans: Plans, choices: Choices, listed: int, random: Random) -> _Task:
         ],
         np.int64,
     )
-    cells = parts if plans.count <= listed else _optimal(own, plans, choices)
+    is_listed = plans.count <= listed or not mixtures
+    cells = parts if is_listed else _optimal(own, plans, choices)
     states: Ints = space.state[np.array([nodes for _, nodes in chosen], np.int64)]
-    return _Task(states, parts, tuple(map(len, own)), cells)
+    count = float(min(plans.count, MANY))
+    return _Task(states, count, parts, tuple(map(len, own)), cells)
 
 
 def _paths(node: int, choices: Choices) -> Iterator[tuple[Plan, tuple[int, ...]]]:
@@ -254,6 +276,7 @@ def _together(entries: Sequence[_Task], tasks: int, states: int, is_complete: bo
         np.concatenate(padded) if padded else np.zeros((0, 1), np.int64),
         np.cumsum(plans) - plans,
         plans,
+        np.array([entry.count for entry in entries], np.float64),
         np.concatenate([entry.parts for entry in entries]) if entries else np.zeros((0, 1), int),
         np.array([entry.of_robot for entry in entries], np.int64),
         cells,

@@ -3,6 +3,7 @@
 
 from collections.abc import Callable
 
+from coordlang.vocabulary.best import best
 from coordlang.vocabulary.exhaustive import exhaustive
 from coordlang.vocabulary.greedy import greedy
 from coordlang.vocabulary.job import Job, Outcome
@@ -11,6 +12,7 @@ from coordlang.vocabulary.separating import separating
 
 #: The ways to a partition, by the name that ``--method`` takes.
 METHODS: dict[str, Callable[[Job], Outcome]] = {
+    "best": best,
     "greedy": greedy,
     "separating": separating,
     "minimal": minimal,
@@ -20,4 +22,14 @@ METHODS: dict[str, Callable[[Job], Outcome]] = {
 #: Those that find the least number of words.
 EXACT = ("minimal", "exhaustive")
 
-__all__ = ["EXACT", "METHODS", "Job", "Outcome", "exhaustive", "greedy", "minimal", "separating"]
+__all__ = [
+    "EXACT",
+    "METHODS",
+    "Job",
+    "Outcome",
+    "best",
+    "exhaustive",
+    "greedy",
+    "minimal",
+    "separating",
+]

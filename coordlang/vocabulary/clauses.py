@@ -57,3 +57,23 @@ def most_constrained_first(states: Iterable[int], clauses: Iterable[Clause]) -> 
             for state in states_of_pair:
                 demand[state] = demand.get(state, 0.0) + 1 / len(clause)
     return sorted(states, key=lambda s: (-demand.get(s, 0.0), s))
+
+
+def clique(edges: Iterable[Pair]) -> list[int]:
+    """A large clique, the best that greedy search finds from any state.
+
+    Its states need words of their own.
+    """
+    near: dict[int, set[int]] = {}
+    for a, b in sorted(edges):
+        near.setdefault(a, set()).add(b)
+        near.setdefault(b, set()).add(a)
+    best: list[int] = []
+    for start in sorted(near):
+        clique, candidates = [start], set(near[start])
+        while candidates:
+            chosen = max(candidates, key=lambda s: (len(near[s] & candidates), -s))
+            clique.append(chosen)
+            candidates &= near[chosen]
+        best = max(best, clique, key=len)
+    return best

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations, islice
 
 import networkx as nx
@@ -20,11 +21,8 @@ from coordlang.language.candidates import Candidates
 from coordlang.symmetry.graph import Renaming, joined_order
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.symmetry.of_part import symmetries_of_part
-from coordlang.vocabulary.necessary_clauses import NecessaryClauses
+from coordlang.vocabulary.loop import Budget, Languages, find
 from coordlang.vocabulary.partitions import Partitions, Refutation
-from coordlang.vocabulary.problems_by_size import SolverBudget
-from coordlang.vocabulary.refuter import Refuter
-from coordlang.vocabulary.sat import Undecided
 from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
 
@@ -64,14 +62,21 @@ class ContainedInstance:
     """
 
     def __init__(self, part: Part, seed: int) -> None:
-        self.states: list[int] = np.unique(part.space.state).tolist()
-        self.rounds = 0
-        self.known = NecessaryClauses(part.group)
         self._part, self._seed = part, seed
-        self._refuter: Refuter | None = None
-        self._partitions = Partitions(self.states, self.known.clauses, part.group.permutations)
+        self.states: list[int] = np.unique(part.space.state).tolist()
 
-    def refute(self, size: int, budget: SolverBudget) -> Refutation | None:
+    @cached_property
+    def languages(self) -> Languages:
+        """What is known of its languages."""
+        space = self._part.space
+        return Languages([space], self._part.group, len(space.rows), self._seed)
+
+    @cached_property
+    def _partitions(self) -> Partitions:
+        permutations = self._part.group.permutations
+        return Partitions(self.states, self.languages.clauses, permutations)
+
+    def refute(self, size: int, budget: Budget) -> Refutation | None:
         """That so many words do not suffice; None if they do for this part.
 
         Raises
@@ -79,26 +84,15 @@ class ContainedInstance:
         Undecided
             The budget was not enough.
         """
-        space = self._part.space
-        if self._refuter is None:
-            self._refuter = Refuter([space], self._part.group, len(space.rows), self._seed)
-        word = np.zeros(len(space.rows), np.int64)
-        for _ in range(budget.rounds):
-            partition = self._partitions.find(size, budget.conflicts)
-            if partition is None:
-                self._partitions.drop(size)
-                return Refutation(size, self.known.evidence, len(self.known.clauses))
-            word[list(partition)] = list(partition.values())
-            violated = self._refuter.violated(word)
-            if not violated:
-                return None
-            self.rounds += 1
-            self.known.add_all(violated)
-        raise Undecided
+        partitions, languages = self._partitions, self.languages
+        found = find(lambda most: partitions.find(size, most), languages.holds, budget)
+        partitions.drop(size)
+        return None if found is not None else Refutation.of(size, languages.known)
 
     def close(self) -> None:
         """Give back what the solvers hold."""
-        self._partitions.close()
+        if "_partitions" in self.__dict__:
+            self._partitions.close()
 
 
 def parts(candidates: Candidates, group: SymmetryGroup) -> list[Part]:

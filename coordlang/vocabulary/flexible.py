@@ -2,35 +2,36 @@
 """Among languages with equally many words, one whose sentences leave many plans open.
 
 Maximises the average of E = sum_s n_s^2 / N over the candidate tasks
-(`coordlang.language.flexibility`) by simulated annealing over partitions
-(`coordlang.vocabulary.annealing`), with the clauses that counterexamples give
-(`coordlang.language.warping`) as constraints.  A partition without counterexample is verified by
-definition before it counts.
+(`coordlang.language.flexibility`) by local search (`coordlang.vocabulary.annealing`), with
+necessary clauses as constraints.  A partition without counterexample is verified by definition
+before it counts.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from random import Random
 
 import numpy as np
 
 from coordlang.language.flexibility import Flexibility, Floats, flexibility
 from coordlang.required.divergences import required_nodes
-from coordlang.symmetry.group import symmetry_group
-from coordlang.vocabulary.annealing import Annealing, AnnealingSettings, Violations
+from coordlang.required.plan_table import plan_table
+from coordlang.vocabulary.annealing import Annealing, AnnealingSettings, Constraints, Measure
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from coordlang.vocabulary.job import Assignment, Job, Outcome
-from coordlang.vocabulary.necessary_clauses import task_parts
+from coordlang.vocabulary.loop import Languages
 from planners.joint.tables import Ints
 from planners.system.errors import OutOfMemory
 from planners.system.limits import run_until_stopped
 
-_USUAL = AnnealingSettings()
 #: The search ends where no language is more flexible by more than rounding.
 _ROUNDING = 1e-9
+#: Tasks of which a table has plans; of more some are drawn.
+_TASKS = 3_000
 
 
-def flexible(job: Job, found: Outcome, settings: AnnealingSettings = _USUAL) -> Outcome:
+def flexible(job: Job, found: Outcome, settings: AnnealingSettings | None = None) -> Outcome:
     """A language with as many words as ``found`` has, at least as flexible.
 
     Anytime: out of time or memory, or interrupted, the best verified language so far is returned,
@@ -44,7 +45,7 @@ def flexible(job: Job, found: Outcome, settings: AnnealingSettings = _USUAL) -> 
         ``found``), ``flexibility_bound`` (which no language exceeds) and
         ``communication_saving``; nothing of these where there are too many sentences to measure.
     """
-    search = _Search(job, found, settings)
+    search = _Search(job, found, settings or AnnealingSettings())
     stopped = run_until_stopped(search.run)
     return search.outcome(stopped)
 
@@ -54,8 +55,12 @@ class _Search:
 
     def __init__(self, job: Job, found: Outcome, settings: AnnealingSettings) -> None:
         self._job, self._found, self._settings = job, found, settings
+        self._languages = found.languages
+        self._constraints = Constraints()
         self.best: Assignment = found.partition
         self._bound: Floats | None = None
+        self._least = 0.0
+        self._pending: Ints | None = None
         self._moves = self._improvements = 0
 
     def outcome(self, stopped: BaseException | None) -> Outcome:
@@ -76,6 +81,8 @@ class _Search:
             )
         except OutOfMemory:
             return {}
+        if after.value < before.value:  # of many plans some were measured, and misled the search
+            after, self.best = before, self._found.partition
         bound = sum(after.plans) / len(after.plans)
         if self._bound is not None:
             bound = float(self._bound.mean())
@@ -91,55 +98,73 @@ class _Search:
 
     def run(self) -> None:
         """Anneal until the bound is reached, or it does not pay any more."""
-        spaces = self._job.candidates.spaces
-        requires = [required_nodes(space) for space in spaces]
-        self._bound = flexibility_bounds(spaces, requires)
-        if self._found.size < 2:
+        job, words = self._job, self._found.size
+        spaces = job.candidates.spaces
+        self._bound = flexibility_bounds(spaces, [required_nodes(space) for space in spaces])
+        if words < 2 or _is_met(self._bound, _measured(job, self.best)):
             return
-        parts = task_parts(spaces, requires, self._settings.tasks_of_a_part)
-        violations = Violations(self._job.states, parts, symmetry_group(self._job.candidates))
-        for clause in self._found.evidence:
-            violations.add(clause)
-        annealing = Annealing(
-            self._job, violations, self._found.size, self._bound, self._verified, self._settings
+        self._languages = languages = self._languages or Languages.of(job)
+        self._constraints.add(languages.clauses)
+        table = plan_table(
+            spaces, len(job.candidates.rows), most_tasks=_TASKS, seed=job.seed, mixtures=False
         )
-        annealing.begin(self.best)
-        self._cool_as_long_as_it_pays(annealing, violations, float(self._bound.mean()))
+        measure = Measure(
+            table,
+            table.plans_left_open,
+            lambda values: -float(values.mean()),
+            -float(table.count.mean()),
+        )
+        annealing = Annealing(
+            job.states,
+            words,
+            measure,
+            self._offer,
+            Random(job.seed),
+            constraints=self._constraints,
+            permutations=languages.known.group.permutations,
+            settings=self._settings,
+        )
+        annealing.begin(languages.word(self.best))
+        self._least = annealing.energy
+        for _ in annealing.search(lambda: self._least, self._report):
+            self._moves = annealing.moves
+            self._verify_pending()
+            if _is_met(self._bound, _measured(job, self.best)):
+                return
+            annealing.begin(languages.word(self.best))
 
-    def _cool_as_long_as_it_pays(
-        self, annealing: Annealing, violations: Violations, most: float
-    ) -> None:
-        settings, words = self._settings, self._found.size
-        moves = max(settings.least_moves, settings.moves * len(self._job.states) * words)
-        without_gain = 0
-        while (
-            without_gain < settings.patience
-            and annealing.work < settings.work
-            and annealing.best_value < most * (1 - _ROUNDING)
-        ):
-            before = annealing.best_value
-            for share in annealing.cool(moves):
-                self._moves = annealing.moves
-                self._job.progress(
-                    f"{words} words leave {annealing.best_value:,.2f} of at most {most:,.2f} plans "
-                    f"open: cooling {100 * share:.0f} %, {annealing.moves:,} moves, "
-                    f"{len(violations):,} clauses"
-                )
-            if annealing.best_value > settings.better * before:
-                moves, without_gain = 2 * moves, 0
-            else:
-                without_gain += 1
+    def _offer(self, word: Ints, _: Floats, energy: float) -> None:
+        """Look for counterexamples to a partition better than the best; none: it is the best."""
+        if energy >= self._least - _ROUNDING * abs(self._least):
+            return
+        languages = self._languages
+        assert languages is not None
+        known = len(languages.clauses)
+        if languages.holds({state: int(word[state]) for state in self._job.states}):
+            self._least, self._pending = energy, word.copy()
+        else:
+            self._constraints.add(languages.clauses[known:])
 
-    def _verified(self, word: Ints) -> None:
-        partition = {state: int(word[state]) for state in self._job.states}
-        self._job.check(partition)
-        self.best = partition
-        self._improvements += 1
+    def _verify_pending(self) -> None:
+        if self._pending is not None:
+            partition = {state: int(self._pending[state]) for state in self._job.states}
+            self._job.check(partition)
+            self.best, self._pending = partition, None
+            self._improvements += 1
+
+    def _report(self, what: str) -> None:
+        self._job.progress(
+            f"{self._found.size} words leave {-self._least:,.2f} plans open: {what}, "
+            f"{len(self._constraints):,} clauses"
+        )
+
+
+def _is_met(bound: Floats, measured: Flexibility) -> bool:
+    return measured.value >= float(bound.mean()) * (1 - _ROUNDING)
 
 
 def _measured(job: Job, partition: Assignment) -> Flexibility:
     word = np.zeros(len(job.candidates.rows), np.int64)
     word[list(partition)] = list(partition.values())
-    return flexibility(
-        job.candidates.spaces, [word[space.state] for space in job.candidates.spaces]
-    )
+    spaces = job.candidates.spaces
+    return flexibility(spaces, [word[space.state] for space in spaces])

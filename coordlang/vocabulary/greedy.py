@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from coordlang.vocabulary.job import Job, Outcome
+from coordlang.vocabulary.job import Assignment, Job, Outcome
 from coordlang.vocabulary.separations import Separation, separations
 
 
@@ -19,6 +19,13 @@ def greedy(job: Job) -> Outcome:
         greedy_partition(job.states, separations(job.first_differences.divergences)),
         job.lower_bound,
     )
+
+
+def first_language(job: Job) -> Assignment:
+    """A language to begin with: greedy's, or a word for each state where states hide slack."""
+    if job.candidates.model.hides_slack:
+        return {state: word for word, state in enumerate(job.states)}
+    return greedy(job).partition
 
 
 def greedy_partition(

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from coordlang.language.candidates import Candidates
 from coordlang.language.warping import Clause
@@ -13,6 +14,9 @@ from coordlang.symmetry.group import Symmetry
 from coordlang.vocabulary.counterexamples import Counterexample
 from planners.parallel.workers import Workers
 from planners.search.plan_space import PlanSpace
+
+if TYPE_CHECKING:
+    from coordlang.vocabulary.loop import Languages
 
 #: A partition while it is looked for: state number -> word number.
 Assignment = Mapping[int, int]
@@ -42,6 +46,8 @@ class Job:
         Of whatever is drawn at random.
     alpha_only
         For `separating`: separate plans where they part, never where they meet.
+    effort
+        For `best`: what it may spend, in thousands of conflicts of the solver.
     progress
         Called with a line of text now and then.
     check
@@ -57,6 +63,7 @@ class Job:
     incumbent: Assignment | None = None
     seed: int = 0
     alpha_only: bool = False
+    effort: int = 0
     progress: Callable[[str], None] = lambda _: None
     check: Callable[[Assignment], None] = lambda _: None
     workers: Workers = field(default_factory=lambda: Workers())
@@ -100,19 +107,19 @@ class Outcome:
         The work done, by name.
     stopped
         The error that ended the search early, None if it came to its end.
-    evidence
-        The necessary clauses that were met, in their order; empty for methods that meet none.
     refuting
-        Those by which the bound was proved, of the whole or of a part: no partition into
-        ``lower_bound - 1`` words satisfies them all.
+        Necessary clauses by which the bound was proved: no partition into ``lower_bound - 1`` words
+        satisfies them all.
+    languages
+        What the search met of all languages; None for methods that meet nothing.
     """
 
     partition: Assignment
     lower_bound: int
     figures: Mapping[str, float] = field(default_factory=dict)
     stopped: BaseException | None = None
-    evidence: Mapping[Clause, Evidence] = field(default_factory=dict)
     refuting: Mapping[Clause, Evidence] = field(default_factory=dict)
+    languages: Languages | None = None
 
     @property
     def size(self) -> int:

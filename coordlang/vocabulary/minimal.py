@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The least number of words, with proof: counterexamples in, SAT out.
 
-Loop for K words: find a partition that satisfies all clauses so far; look for plans of one sentence
-whose mixture fails; each such tuple gives a clause that every language must satisfy
-(`coordlang.language.warping`).  No partition left: K words do not suffice.  No counterexample left:
-a language.  Numbers of words are tried from below, and from above where that takes long, with the
-same clauses, until the two meet.  The result is least among partitions (the paper's ``D_MinW+``);
-Proposition 8 of docs/concepts.md allows for symmetries.
+The words of a known language are merged first, which gives the upper bound; then numbers of words
+are decided by the loop (`coordlang.vocabulary.loop`), with clauses that every language must satisfy
+(`coordlang.language.warping`), from below, and from above where that takes long.  The result is
+least among partitions (the paper's ``D_MinW+``); Proposition 8 of docs/concepts.md allows for
+symmetries.
 """
 
 from __future__ import annotations
@@ -15,34 +14,25 @@ import sys
 from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import replace
-from itertools import count
-
-import numpy as np
+from functools import cached_property
 
 from coordlang.language.warping import Clause
-from coordlang.symmetry.group import SymmetryGroup, symmetry_group
-from coordlang.vocabulary.abstractions import abstractions
 from coordlang.vocabulary.contained import ContainedInstance, parts, tasks_of_one_orbit
-from coordlang.vocabulary.equivariant import EquivariantSearch
-from coordlang.vocabulary.from_above import SearchFromAbove, Start
 from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome, word_count
-from coordlang.vocabulary.necessary_clauses import NecessaryClauses
+from coordlang.vocabulary.loop import Budget, Languages, close_bounds, find
+from coordlang.vocabulary.merging import merged
 from coordlang.vocabulary.partitions import Partitions, Refutation
-from coordlang.vocabulary.problems_by_size import SolverBudget
-from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import Undecided
-from coordlang.vocabulary.separating import short_separating_search
-from planners.joint.tables import Ints
-from planners.search.plan_space import PlanSpace
-from planners.system.errors import OutOfMemory
+from coordlang.vocabulary.tied_words import TiedWords
 from planners.system.limits import run_until_stopped
 
-#: Combinations of plans' next steps up to which separating words are looked for first.
-_SEPARATING_COMBINATIONS = 4_000_000
-#: Rounds in the whole space in a turn, each of which has twice as many as the one before.
-_ROUNDS = 8
-#: Refuted partitions that symmetric words may take in the first turn.
-_SYMMETRIC_ROUNDS = 500
+#: A thousand conflicts are a unit of effort; a refuted partition counts as so many ..
+_UNIT, _ROUND = 1_000, 250
+#: .. and besides as one for so many pairs of edges that leave one node; the first failing plans
+#: count as one for far fewer.
+_PAIRS, _FIRST_PAIRS = 1_000, 30
+#: Effort that is not enough for a tenth of the first failing plans is not begun with.
+_BEGINNING = 10
 
 
 def minimal(job: Job) -> Outcome:
@@ -51,19 +41,9 @@ def minimal(job: Job) -> Outcome:
     Anytime: out of time or memory, or interrupted, it returns the best language found with the
     lower bound proved so far, and the error in ``stopped``.
     """
-    with closing(_Search(job)) as search:
+    with closing(MinimalSearch(job)) as search:
         stopped = run_until_stopped(search.run)
-    if search.best is None:
-        assert stopped is not None
-        raise stopped
-    return Outcome(
-        search.best,
-        search.lower,
-        search.figures(),
-        stopped,
-        search.known.evidence,
-        search.refuting.clauses,
-    )
+    return search.outcome(stopped)
 
 
 def refuting_clauses(job: Job, size: int) -> Mapping[Clause, Evidence]:
@@ -76,247 +56,202 @@ def refuting_clauses(job: Job, size: int) -> Mapping[Clause, Evidence]:
     ValueError
         If there is a language with so few words.
     """
-    with closing(_Search(replace(job, incumbent=None))) as search:
-        if not search.refutes(size):
+    with closing(MinimalSearch(replace(job, incumbent=None))) as search:
+        budget = Budget()
+        while not search.decide(size, budget):
+            budget = budget.doubled()
+        if search.lower <= size:
             raise ValueError(f"there is a language with {size} words")
     return search.refuting.clauses
 
 
-class _Search:
+class MinimalSearch:
     """Closes in on the least number of words.
 
-    ``lower`` words are proved to be needed, as ``refuting`` says; ``best`` is a language.
+    Attributes
+    ----------
+    lower, refuting
+        So many words are proved to be needed, and why.
+    best
+        The language with the fewest words so far, None before there is one.
+    work
+        The conflicts of the solver, refuted partitions counted as some.
     """
 
-    def __init__(self, job: Job) -> None:
+    def __init__(self, job: Job, effort: int | None = None) -> None:
+        """Begin; the search ends after ``effort``, in thousands of ``work``, None: by its proof."""
         self._job = job
+        self._most = sys.maxsize if effort is None else effort * _UNIT
+        self._merges = 0
         self.lower = job.lower_bound
         self.best: Assignment | None = job.incumbent
-        self.known = NecessaryClauses(SymmetryGroup(()))
-        self.refuting = Refutation(1, self.known.evidence, 1)  # any clause refutes one word
-        self._partitions: Partitions | None = None
-        self._refuter: Refuter | None = None
-        self._abstractions: list[Ints] = []
-        self._equivariant: EquivariantSearch | None = None
-        self._figures_above: dict[str, float] = {}
-        self._contained: list[ContainedInstance] = []
-        self._rounds = 0
-        #: Rounds in the whole space, each of which takes far longer than those in a part.
-        self._most_rounds = sys.maxsize
+        self.refuting = Refutation(1, {}, 0)
+
+    @cached_property
+    def languages(self) -> Languages:
+        """What is known of all languages; collecting the first failing plans takes a while."""
+        languages = Languages.of(self._job)
+        self.refuting = Refutation(1, languages.known.evidence, 1)  # any clause refutes one word
+        return languages
+
+    @cached_property
+    def _partitions(self) -> Partitions:
+        known = self.languages.known
+        return Partitions(self._job.states, known.clauses, known.group.permutations)
+
+    @cached_property
+    def _tied(self) -> TiedWords:
+        return TiedWords(self._job, self.languages)
+
+    @cached_property
+    def _contained(self) -> list[ContainedInstance]:
+        candidates, group = self._job.candidates, self.languages.known.group
+        found = [*tasks_of_one_orbit(candidates, group), *parts(candidates, group)]
+        instances = [ContainedInstance(part, self._job.seed) for part in found]
+        return sorted(instances, key=lambda instance: len(instance.states))
+
+    @property
+    def upper(self) -> int:
+        """The number of words that is known to suffice."""
+        return len(self._job.states) if self.best is None else word_count(self.best)
 
     def run(self) -> None:
         """Close the bounds."""
-        job = self._job
-        if not job.first_differences.requiring:
-            self.best = dict.fromkeys(job.states, 0)
+        if not self._job.first_differences.requiring:
+            self.best = dict.fromkeys(self._job.states, 0)
             return
-        self._prepare()
-        self._look_for_separating_words()
-        separating = self.best
-        self._close_bounds()
-        if self.best is separating:
-            # It separates more than a language must: one that does not leaves more plans open.
-            self._decide(self.lower, SolverBudget())
-
-    def refutes(self, size: int) -> bool:
-        """Whether every partition that is a language has more words than ``size``."""
-        self._prepare()
-        return self._decide(size, SolverBudget(sys.maxsize, sys.maxsize)) and self.lower > size
-
-    def figures(self) -> dict[str, float]:
-        """The work done."""
-        figures: dict[str, float] = {
-            "rounds": self._rounds,
-            "clauses": len(self.known.clauses),
-            "symmetries": len(self.known.group.symmetries),
-        }
-        if self._refuter is not None:
-            figures |= {"counterexamples": len(self._refuter.pool), "walks": self._refuter.walks}
-        figures |= self._figures_above
-        if self._equivariant is not None:
-            rounds = figures.get("equivariant_rounds", 0) + self._equivariant.rounds
-            figures["equivariant_rounds"] = rounds
-        return figures
-
-    def close(self) -> None:
-        """Give back what the solvers hold."""
-        for part in (self._partitions, self._equivariant, *self._contained):
-            if part is not None:
-                part.close()
-
-    def _prepare(self) -> Refuter:
-        if self._refuter is None:
-            candidates, job = self._job.candidates, self._job
-            self.known.group = symmetry_group(candidates)
-            self._abstractions = abstractions(candidates, job.states)
-            self._refuter = Refuter(
-                candidates.spaces,
-                self.known.group,
-                len(candidates.rows),
-                job.seed,
-                job.progress,
-                self._first_words(),
-                job.workers,
-            )
-            contained = [
-                *tasks_of_one_orbit(candidates, self.known.group),
-                *parts(candidates, self.known.group),
-            ]
-            instances = [ContainedInstance(part, job.seed) for part in contained]
-            self._contained = sorted(instances, key=lambda instance: len(instance.states))
-        return self._refuter
-
-    def _first_words(self) -> Ints | None:
-        """The words that are refuted first: one word, or an abstraction if robots are many.
-
-        Under one word all plans of a task have one sentence: of three robots far too many tuples.
-        """
-        if len(self._job.candidates.model.robots) <= 2:
-            return None
-        states = len(self._job.states)
-        fine = (a for a in self._abstractions if len(np.unique(a)) ** 2 >= states)
-        return next(fine, None)
-
-    def _close_bounds(self) -> None:
-        """Decide numbers of words until the bounds meet: from below by proof, and from above.
-
-        What is quick is decided from below alone.
-        """
-        budget = self._decide_from_below(SolverBudget())
-        if self.lower >= self._upper:
+        if self._pairs // _FIRST_PAIRS > _BEGINNING * self._most:
             return
-        start = Start(self._job.states, self._prepare().copy(), self._abstractions, self._job.seed)
-        with closing(SearchFromAbove(start, self._report_above)) as above:
-            try:
-                self._meet(above, budget)
-            finally:
-                self._figures_above = above.figures()
+        self.merge()
+        known = self.best
+        close_bounds(lambda: (self.lower, self.upper), self.decide, lambda: self._is_spent)
+        if self.best is known and not self._is_spent:
+            # Merged words tell more states apart than a language must: fewer leave more plans open.
+            self.decide(self.lower, Budget())
 
-    def _meet(self, above: SearchFromAbove, budget: SolverBudget) -> None:
-        """Go on in turns, each with more effort than the one before, until the bounds meet."""
-        for turn in count(1):
-            for found in above.turn(self.lower, self._upper):
-                self._offer(found)
-            if self.lower >= self._upper:
-                return
-            self._most_rounds = max(SolverBudget().rounds, _ROUNDS << turn)
-            budget = self._decide_from_below(budget.doubled())
-            if self.lower >= self._upper:
-                return
-            self._look_for_symmetric_words(_SYMMETRIC_ROUNDS << (turn - 1))
-
-    def _decide_from_below(self, budget: SolverBudget) -> SolverBudget:
-        """Decide numbers of words with some effort for each; the effort that was not enough."""
-        while (lower := self.lower) < self._upper and self._decide(lower, budget):
-            if self.lower > lower:
-                budget = SolverBudget()  # the next number is another problem, and may be easy
-        return budget
-
-    def _look_for_symmetric_words(self, rounds: int) -> None:
-        """Look for as many words as are needed at least, words that go to words under symmetries.
-
-        The search from above leaves these to this one, which mostly proves its bounds long before
-        the other one has come down to them.
-        """
-        if self._equivariant is None:
-            self._equivariant = EquivariantSearch(self._job.states, self._prepare(), self._job.seed)
-        self._report_above(f"symmetric words: trying {self.lower}")
-        found = self._equivariant.find(self.lower, rounds)
-        if found is not None:
-            self._offer(found)
+    @cached_property
+    def _pairs(self) -> int:
+        """Pairs of edges that leave one node: what a walk through all tasks goes over."""
+        degrees = (space.out_degrees.astype(float) for space in self._job.candidates.spaces)
+        return sum(int((degree**2).sum()) for degree in degrees)
 
     @property
-    def _upper(self) -> int:
-        return len(self._job.states) if self.best is None else word_count(self.best)
+    def work(self) -> int:
+        """What was done so far."""
+        if "languages" not in self.__dict__:
+            return 0
+        rounds = self.languages.rounds + self._merges
+        return self._partitions.conflicts + rounds * (_ROUND + self._pairs // _PAIRS)
 
-    def _report_above(self, what: str) -> None:
-        self._job.progress(f"{what}, {self.lower} to {self._upper} needed")
+    @property
+    def _is_spent(self) -> bool:
+        return self.work >= self._most
 
-    def _look_for_separating_words(self) -> None:
-        """Take a separating partition with fewer words, if a short search finds one.
-
-        Not where it takes long and there are symmetries: equivariant words are fewer.
-        """
-        if self._job.candidates.model.hides_slack:
-            return  # there are no first differences of states
-        spaces = self._job.candidates.spaces
-        most = _SEPARATING_COMBINATIONS // (1 + len(self.known.group.symmetries))
-        if sum(map(_combinations, spaces)) > most:
+    def merge(self) -> None:
+        """Merge words of the best language as long as it stays a language."""
+        if self.best is None or self.upper <= self.lower:
             return
-        found = short_separating_search(replace(self._job, incumbent=self.best))
-        self.best = found.partition
-        # Its walk may be larger than ours, which needs none of it; but time that is over is over.
-        if found.stopped is not None and not isinstance(found.stopped, OutOfMemory):
-            raise found.stopped
+        languages, coarsest = self.languages, self.best
+        for coarser in merged(self.best, self._job.states, languages.refuter, self._job.seed):
+            coarsest = coarser
+            self._merges += 1
+            self._report(f"merging words: {word_count(coarser)} left")
+            if self._is_spent:
+                break
+        if coarsest is not self.best:
+            self._offer(coarsest)
 
-    def _decide(self, size: int, budget: SolverBudget) -> bool:
-        """Find a language with ``size`` words or prove that there is none.
+    def decide(self, size: int, budget: Budget) -> bool:
+        """Find a language with ``size`` words, or prove that there is none.
 
         False if the budget was not enough.
         """
         try:
-            found = self._refuted_within(size, budget) or self._refine(size, budget)
+            refuted = self._refuted_within(size, budget) or self._refuted(size, budget)
         except Undecided:
-            return False
-        if isinstance(found, Refutation):
+            return self._finds_tied(size, budget.rounds)
+        if refuted is not None:
             # In this order: a signal in between leaves clauses that refute too much.
-            self.refuting = found
-            self.lower = found.size + 1
-        else:
-            self._offer(found)
+            self.refuting = refuted
+            self.lower = size + 1
         return True
 
-    def _refuted_within(self, size: int, budget: SolverBudget) -> Refutation | None:
+    def _refuted(self, size: int, budget: Budget) -> Refutation | None:
+        """That there is no language with so few words; None, and one is offered, if there is."""
+
+        def partition(conflicts: int) -> dict[int, int] | None:
+            if self._is_spent:
+                raise Undecided
+            return self._partitions.find(size, min(conflicts, self._most - self.work))
+
+        found = find(partition, self._holds, budget)
+        self._partitions.drop(size)
+        if found is None:
+            return Refutation.of(size, self.languages.known)
+        self._offer(found)
+        self.merge()
+        return None
+
+    def _finds_tied(self, size: int, rounds: int) -> bool:
+        """Whether a language with so many words is soon found among those of some kinds."""
+        if self._is_spent or self.lower == size < self.upper - 1:
+            return False  # it is rather refuted than found while others are not decided
+        self._report(f"trying {size} words that some states decide")
+        found = self._tied.find(size, rounds)
+        if found is not None:
+            self._offer(found)
+        return found is not None
+
+    def _refuted_within(self, size: int, budget: Budget) -> Refutation | None:
         """A proof by an instance that this one contains, the smallest that has one."""
-        self._prepare()
         while self._contained:
             instance = self._contained[0]
-            self._job.progress(
-                f"trying {size} words for {len(instance.states):,} of the states, "
-                f"{self.lower} to {self._upper} needed: {len(instance.known.clauses):,} clauses"
-            )
-            refutation = instance.refute(size, budget)
-            self._rounds += instance.rounds
-            instance.rounds = 0
-            if refutation is not None:
-                return refutation
+            self._report(f"trying {size} words for {len(instance.states):,} of the states")
+            refuted = instance.refute(size, budget)
+            if refuted is not None:
+                return refuted
             # So many words suffice for it, and more will.
             self._contained.pop(0).close()
         return None
+
+    def outcome(self, stopped: BaseException | None) -> Outcome:
+        """The best language, with what is proved.  Raises ``stopped`` if there is none."""
+        if self.best is None:
+            assert stopped is not None
+            raise stopped
+        figures: dict[str, float] = {}
+        languages = self.__dict__.get("languages")
+        if languages is not None:
+            figures = {
+                "rounds": languages.rounds,
+                "clauses": len(languages.clauses),
+                "symmetries": len(languages.known.group.symmetries),
+                "counterexamples": len(languages.refuter.pool),
+                "walks": languages.refuter.walks,
+                "work": self.work,
+            }
+        return Outcome(self.best, self.lower, figures, stopped, self.refuting.clauses, languages)
+
+    def close(self) -> None:
+        """Give back what the solvers hold."""
+        for name in ("_partitions", "_tied"):
+            if name in self.__dict__:
+                self.__dict__[name].close()
+        for instance in self.__dict__.get("_contained", ()):
+            instance.close()
 
     def _offer(self, partition: Assignment) -> None:
         """Take a language, once it is verified by definition: what is left if time is over."""
         self._job.check(partition)
         self.best = partition
 
-    def _refine(self, size: int, budget: SolverBudget) -> Assignment | Refutation:
-        """The loop for one number of words: a language, or that there is none."""
-        refuter, rows = self._prepare(), len(self._job.candidates.rows)
-        if self._partitions is None:
-            permutations = self.known.group.permutations
-            self._partitions = Partitions(self._job.states, self.known.clauses, permutations)
-        refuted = 0
-        while (partition := self._partitions.find(size, budget.conflicts)) is not None:
-            if refuted >= min(budget.rounds, self._most_rounds):
-                raise Undecided
-            word = np.zeros(rows, np.int64)
-            word[list(partition)] = list(partition.values())
-            violated = refuter.violated(word)
-            if not violated:
-                self._partitions.drop(size)
-                return partition
-            refuted += 1
-            self._rounds += 1
-            self.known.add_all(violated)
-            self._job.progress(
-                f"trying {size} words, {self.lower} to {self._upper} needed: "
-                f"round {self._rounds}, {len(self.known.clauses):,} clauses"
-            )
-        self._partitions.drop(size)
-        return Refutation(size, self.known.evidence, len(self.known.clauses))
+    def _holds(self, partition: Assignment) -> bool:
+        self._report(f"trying {word_count(partition)} words")
+        return self.languages.holds(partition)
 
-
-def _combinations(space: PlanSpace) -> float:
-    """At most so many links has the walk to last differences: one edge for each plan, in step."""
-    of_goals = (np.bincount(space.goal[layer.source]) for layer in space.edges_by_layer())
-    return sum(float((edges.astype(np.float64) ** space.robots).sum()) for edges in of_goals)
+    def _report(self, what: str) -> None:
+        languages = self.languages
+        self._job.progress(
+            f"{what}, {self.lower} to {self.upper} needed: "
+            f"round {languages.rounds}, {len(languages.clauses):,} clauses"
+        )

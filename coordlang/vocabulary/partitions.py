@@ -10,12 +10,14 @@ from itertools import islice
 
 from coordlang.language.warping import Clause
 from coordlang.vocabulary.clauses import (
+    clique,
     most_constrained_first,
     most_frequent_pairs,
     without_implied,
 )
 from coordlang.vocabulary.job import Evidence
-from coordlang.vocabulary.problems_by_size import ProblemsBySize
+from coordlang.vocabulary.loop import ProblemsBySize
+from coordlang.vocabulary.necessary_clauses import NecessaryClauses
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from planners.search.sat import SolverName
 
@@ -40,6 +42,11 @@ class Refutation:
     evidence: Mapping[Clause, Evidence]
     known: int
 
+    @classmethod
+    def of(cls, size: int, known: NecessaryClauses) -> Refutation:
+        """All clauses that are known now refute so many words."""
+        return cls(size, known.evidence, len(known.clauses))
+
     @property
     def clauses(self) -> dict[Clause, Evidence]:
         """The clauses, and why each of them is necessary."""
@@ -60,6 +67,11 @@ class Partitions:
         The known clauses about these states, a list that only grows.
     permutations
         Where symmetries take each state; the images of every clause must be clauses.
+
+    Attributes
+    ----------
+    conflicts
+        Those of the solvers so far.
     """
 
     def __init__(
@@ -69,6 +81,7 @@ class Partitions:
         permutations: Sequence[Sequence[int]],
     ) -> None:
         self._states, self._clauses, self._permutations = states, clauses, permutations
+        self.conflicts = 0
         require = PartitionProblem.separate_one
         #: Numbers of words with which partitions are so few that the first solver finds none.
         self._hard: set[int] = set()
@@ -92,10 +105,17 @@ class Partitions:
         """
         if size not in self._hard:
             with suppress(Undecided):
-                return self._all.under(size, self._clauses).solve(_EASY)
+                return self._solved(self._all.under(size, self._clauses), _EASY)
             self._hard.add(size)
             self._all.drop(size)
-        return self._up_to_symmetry.under(size, self._clauses).solve(conflicts)
+        return self._solved(self._up_to_symmetry.under(size, self._clauses), conflicts)
+
+    def _solved(self, problem: PartitionProblem, conflicts: int) -> dict[int, int] | None:
+        before = problem.conflicts
+        try:
+            return problem.solve(conflicts)
+        finally:
+            self.conflicts += problem.conflicts - before
 
     def drop(self, size: int) -> None:
         """Forget a number of words that is decided."""
@@ -111,7 +131,10 @@ class Partitions:
         self, size: int, known: Sequence[Clause], solver: SolverName = "cadical153"
     ) -> PartitionProblem:
         clauses = without_implied(known, _COMPARISONS)
-        problem = PartitionProblem(most_constrained_first(self._states, clauses), size, solver)
+        # States that every language tells apart name their words first: no others are symmetric.
+        first = clique(pair for clause in clauses if len(clause) == 1 for pair in clause)
+        others = most_constrained_first(set(self._states).difference(first), clauses)
+        problem = PartitionProblem([*first, *others], size, solver)
         for clause in clauses:
             problem.separate_one(clause)
         return problem

@@ -15,11 +15,10 @@ from contextlib import closing
 from dataclasses import dataclass
 
 from coordlang.language.warping import Clause
-from coordlang.vocabulary.candidate_languages import CandidateLanguages
 from coordlang.vocabulary.clauses import most_constrained_first, without_implied
 from coordlang.vocabulary.hitting import LeastHitting, StateSet, greedy_hitting
 from coordlang.vocabulary.job import Assignment, Job
-from coordlang.vocabulary.problems_by_size import ProblemsBySize, SolverBudget, close_bounds
+from coordlang.vocabulary.loop import Budget, Languages, ProblemsBySize, close_bounds, find
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from planners.system.limits import run_until_stopped
 
@@ -90,7 +89,7 @@ class _Repair:
         self._job, self._old_words, self._default = job, old_words, default
         self._kept = {state: kept[state] for state in job.states if state in kept}
         self.best: dict[int, int] | None = None
-        self._languages = CandidateLanguages.of(job)
+        self._languages = Languages.of(job)
         self._hitting = LeastHitting(list(self._kept))
         self._seen = 0
         self._new_words_bound = 0
@@ -229,27 +228,27 @@ class _Repair:
         )
         return self._languages.holds(partition)
 
-    def _decide(self, new_words: int, budget: SolverBudget) -> bool:
+    def _decide(self, new_words: int, budget: Budget) -> bool:
         """Find a language with so many new words or prove that there is none.
 
         False if the budget was not enough.
         """
         size = self._old_words + new_words
-        for _ in range(budget.rounds):
-            try:
-                found = self._problems.under(size, self._languages.clauses).solve(budget.conflicts)
-            except Undecided:
-                return False
-            if found is None:
-                self._problems.drop(size)
-                self._new_words_bound = new_words + 1
-                return True
-            partition = {state: found[state] for state in self._job.states}
-            if self._holds(partition):
-                self._problems.drop(size)
-                self._accept(partition)
-                return True
-        return False
+
+        def partition(conflicts: int) -> dict[int, int] | None:
+            found = self._problems.under(size, self._languages.clauses).solve(conflicts)
+            return found and {state: found[state] for state in self._job.states}
+
+        try:
+            found = find(partition, self._holds, budget)
+        except Undecided:
+            return False
+        self._problems.drop(size)
+        if found is None:
+            self._new_words_bound = new_words + 1
+        else:
+            self._accept(found)
+        return True
 
     def _start(self, size: int, known: Sequence[Clause]) -> PartitionProblem:
         """Partitions with the fewest changes; an anchor for each old word fixes its name."""

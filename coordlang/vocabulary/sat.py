@@ -27,9 +27,18 @@ class PartitionProblem:
         The number of words that may be used.
     solver
         A solver of python-sat, by name.
+    named
+        Whether words are named in the order of the states; not if `tie` says which is which.
     """
 
-    def __init__(self, states: Sequence[int], size: int, solver: SolverName = "cadical153") -> None:
+    def __init__(
+        self,
+        states: Sequence[int],
+        size: int,
+        solver: SolverName = "cadical153",
+        *,
+        named: bool = True,
+    ) -> None:
         self.size = size
         self._last = 0
         self._solver = sat_solver(solver)
@@ -39,7 +48,13 @@ class PartitionProblem:
         self._all_separated: dict[Clause, int] = {}
         for variables in self._word.values():
             self._one_word(variables)
-        self._name_words_in_order()
+        if named:
+            self._name_words_in_order()
+
+    def tie(self, state: int, other: int, words: Sequence[int]) -> None:
+        """Let one state have the word ``words[w]`` where another has word ``w``."""
+        for own, word in zip(self._word[state], words, strict=True):
+            self._solver.add_clause([-own, self._word[other][word]])
 
     def separate_one(self, clause: Iterable[Pair]) -> None:
         """Require that one of these pairs of states lies in different words."""
@@ -105,6 +120,11 @@ class PartitionProblem:
             return None
         true = {v for v in self._solver.get_model() if v > 0}
         return {s: next(w for w, v in enumerate(own) if v in true) for s, own in self._word.items()}
+
+    @property
+    def conflicts(self) -> int:
+        """Those of the solver so far."""
+        return int(self._solver.accum_stats()["conflicts"])
 
     def close(self) -> None:
         """Give back what the solver holds."""

@@ -8,7 +8,7 @@ or where they meet, so a sentence can be understood without looking at whole pla
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from typing import Protocol
 
@@ -17,10 +17,10 @@ import numpy as np
 from coordlang.language.warping import Pair, pair
 from coordlang.required.last_differences import DifferenceWalk
 from coordlang.symmetry.group import symmetry_group
-from coordlang.vocabulary.clauses import most_constrained_first
+from coordlang.vocabulary.clauses import clique, most_constrained_first
 from coordlang.vocabulary.greedy import greedy_partition
 from coordlang.vocabulary.job import Assignment, Job, Outcome
-from coordlang.vocabulary.problems_by_size import ProblemsBySize, SolverBudget, close_bounds
+from coordlang.vocabulary.loop import Budget, ProblemsBySize, close_bounds, find
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from coordlang.vocabulary.separations import (
     Constraint,
@@ -29,15 +29,12 @@ from coordlang.vocabulary.separations import (
     ordered,
     separations,
 )
-from planners.system.errors import OutOfMemory
 from planners.system.limits import run_until_stopped
 
 #: Greedy partitions, each under the constraints that the one before broke, before SAT takes over.
 _GREEDY_ROUNDS = 20
 #: Constraints of one walk up to which all of them are listed.
 _LISTED = 200_000
-#: What a short search may spend on one number of words.
-_SHORT = SolverBudget(20, 2_000)
 
 
 def separating(job: Job) -> Outcome:
@@ -47,21 +44,8 @@ def separating(job: Job) -> Outcome:
     languages may have fewer words.  Anytime, like `minimal`.
     """
     source = _Alpha(job) if job.alpha_only else _AlphaOrBeta(job)
-    return _searched(job, _Search(job, source), _Search.run)
-
-
-def short_separating_search(job: Job) -> Outcome:
-    """A separating partition with fewer words than the job's incumbent, if it is found quickly.
-
-    Else the incumbent.
-    """
-    return _searched(job, _Search(job, _AlphaOrBeta(job)), _Search.run_shortly)
-
-
-def _searched(job: Job, search: _Search, run: Callable[[_Search], None]) -> Outcome:
-    with closing(search):
-        # After a walk that was too large to keep there may be other work to do, in time.
-        stopped = run_until_stopped(lambda: run(search), keep_time_after=OutOfMemory)
+    with closing(_Search(job, source)) as search:
+        stopped = run_until_stopped(search.run)
     if search.best is None:
         assert stopped is not None
         raise stopped
@@ -116,12 +100,6 @@ class _Search:
         self._prepare()
         close_bounds(lambda: (self.lower, self.upper), self.decide)
 
-    def run_shortly(self) -> None:
-        """Close the bounds from below, as far as each number of words is decided quickly."""
-        self._prepare()
-        while self.lower < self.upper and self.decide(self.lower, _SHORT):
-            pass
-
     def _prepare(self) -> None:
         self._source.prepare()
         self.lower = max(self.lower, len(self._source.apart))
@@ -130,34 +108,35 @@ class _Search:
             self._job.check(partition)
             self.best = partition
 
-    def decide(self, size: int, budget: SolverBudget) -> bool:
+    def decide(self, size: int, budget: Budget) -> bool:
         """Find a separating partition with ``size`` words, or prove that there is none.
 
         False: not with this budget.
         """
         known = self._source.known
-        for _ in range(budget.rounds):
+        problems = self._problems
+
+        def holds(partition: Assignment) -> bool:
+            self._rounds += 1
             self._job.progress(
                 f"trying {size} words, {self.lower} to {self.upper} needed: round {self._rounds}, "
                 f"{len(known):,} constraints"
             )
-            try:
-                partition = self._problems.under(size, known).solve(budget.conflicts)
-            except Undecided:
-                return False
-            self._rounds += 1
-            if partition is None:
-                self._problems.drop(size)
-                self.lower = size + 1
-                return True
             broken = self._source.broken(partition)
-            if not broken:
-                self._problems.drop(size)
-                self._job.check(partition)
-                self.best = partition
-                return True
-            known += broken
-        return False
+            known.extend(broken)
+            return not broken
+
+        try:
+            partition = find(lambda most: problems.under(size, known).solve(most), holds, budget)
+        except Undecided:
+            return False
+        problems.drop(size)
+        if partition is None:
+            self.lower = size + 1
+        else:
+            self._job.check(partition)
+            self.best = partition
+        return True
 
     def _start(self, size: int, known: Sequence[Constraint]) -> PartitionProblem:
         # Naming the words of states that need words of their own first leaves fewest symmetries.
@@ -200,7 +179,7 @@ class _Alpha:
         """List the constraints."""
         self.known = separations(self._job.first_differences.divergences)
         self._edges = {p for c in self.known if len(c) == 1 for p in c[0].pairs}
-        self.apart = _clique(self._edges)
+        self.apart = clique(self._edges)
 
     def greedy_partition(self) -> Assignment:
         """A separating partition."""
@@ -294,26 +273,6 @@ def _image(constraint: Constraint, permutation: Sequence[int]) -> Constraint:
         Separation(frozenset(pair(permutation[a], permutation[b]) for a, b in s.pairs))
         for s in constraint
     )
-
-
-def _clique(edges: Iterable[Pair]) -> list[int]:
-    """A large clique, the best that greedy search finds from any state.
-
-    Its states need words of their own.
-    """
-    near: dict[int, set[int]] = {}
-    for a, b in sorted(edges):
-        near.setdefault(a, set()).add(b)
-        near.setdefault(b, set()).add(a)
-    best: list[int] = []
-    for start in sorted(near):
-        clique, candidates = [start], set(near[start])
-        while candidates:
-            chosen = max(candidates, key=lambda s: (len(near[s] & candidates), -s))
-            clique.append(chosen)
-            candidates &= near[chosen]
-        best = max(best, clique, key=len)
-    return best
 
 
 def _dsatur(states: Sequence[int], edges: Iterable[Pair]) -> dict[int, int]:

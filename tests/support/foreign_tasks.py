@@ -266,7 +266,7 @@ def build(language: Language, seconds: float) -> dict[str, object]:
     tasks = varied_tasks(loaded, language.starts, language.goals)
     options = replace(loaded.options, remember_actions=language.remember_actions)
     candidates = from_listed(loaded.domain, loaded.problems, tasks, options)
-    first = build_language(candidates)
+    first = build_language(candidates, "greedy")
     with time_limit(seconds):
         built = build_language(candidates, "minimal")
     guarantee = built.language.guarantee

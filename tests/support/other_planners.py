@@ -73,10 +73,10 @@ def problem_rows(path: Path, seconds: float, *, other: bool) -> Iterator[Row]:
     problem = read_problem(path, domain)
     try:
         candidates = from_problems(domain, [problem])
-        language = build_language(candidates).language
+        language = build_language(candidates, "greedy").language
     except Inseparable:  # no state tells its plans apart; the last actions do
         candidates = from_problems(domain, [problem], ModelOptions(remember_actions=True))
-        language = build_language(candidates).language
+        language = build_language(candidates, "greedy").language
     spoken = next(languages_in_tasks(language, candidates))
     for words in two_sentences(spoken):
         last = None

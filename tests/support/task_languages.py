@@ -49,7 +49,7 @@ def shipped(name: str) -> tuple[Candidates, TaskLanguage]:
     for remember in (False, True):
         candidates = own_task(folder, stem, ModelOptions(remember_actions=remember))
         try:
-            language = build_language(candidates).language
+            language = build_language(candidates, "greedy").language
         except Inseparable:
             continue
         return candidates, in_its_task(candidates, language)

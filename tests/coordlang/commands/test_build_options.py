@@ -16,8 +16,9 @@ from tests.support.domains import all_tasks
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"method": "bogus"}, "bogus.*greedy, separating, minimal or exhaustive"),
+        ({"method": "bogus"}, "bogus.*best, greedy, separating, minimal or exhaustive"),
         ({"method": "minimal", "alpha_only": True}, "--alpha-only belongs to --method separating"),
+        ({"method": "minimal", "effort": 2}, "--effort belongs to --method best"),
         ({"method": "greedy", "prefer": "flexible"}, "--prefer flexible belongs to --method"),
         ({"method": "separating", "prefer": "flexible"}, "--prefer flexible belongs to --method"),
         ({"method": "minimal", "prefer": "short"}, "short.*flexible or simple"),

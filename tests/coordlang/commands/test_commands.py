@@ -156,7 +156,7 @@ def test_build_from_a_task_file(name: str, coordlang: Command, tmp_path: Path) -
 def test_build_for_given_problems(coordlang: Command, tmp_path: Path) -> None:
     files = GRID / "domain.pddl", GRID / "corners-3x3.pddl"
     path = tmp_path / "language.json"
-    assert coordlang("build", *files, "-o", path).code == 0
+    assert coordlang("build", *files, "--method", "greedy", "-o", path).code == 0
     data = json.loads(path.read_text())
     assert data["tasks"]["kind"] == "problems"
     assert data["tasks"]["tasks"][0]["init"] == ["(at r1 c0-0)", "(at r2 c2-2)"]

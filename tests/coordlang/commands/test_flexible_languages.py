@@ -55,3 +55,11 @@ def test_prefer_simple(tmp_path: Path, coordlang: Command) -> None:
     terms = sorted(len(formula["terms"]) for formula in shown.values())
     assert sum(terms[:-1]) == 2
     assert coordlang("verify", path, *SQUARE).code == 0
+
+
+def test_greedy_words_have_no_preference(tmp_path: Path, coordlang: Command) -> None:
+    arguments = ("--method", "greedy", "--prefer", "flexible", "-o", tmp_path / "l.json")
+    outcome = coordlang("build", *SQUARE, *arguments)
+    assert outcome.code == 2
+    assert "--prefer flexible belongs to --method best, minimal or exhaustive" in outcome.err
+    assert not (tmp_path / "l.json").exists()

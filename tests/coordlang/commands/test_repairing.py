@@ -223,7 +223,7 @@ def test_states_on_no_plan_keep_their_words() -> None:
     candidates = all_tasks("grid", "gw2-2x3")
     keys = candidates.model.codec.key
     task = own_task("grid", "gw2-2x3")
-    on_plans = {keys(task.rows[s]) for s in build_language(task).job.states}
+    on_plans = {keys(task.rows[s]) for s in build_language(task, "greedy").job.states}
     words = {keys(row): "go" if keys(row) in on_plans else "away" for row in candidates.rows}
     old = Language(("away", "go"), words, "away")
     built = repair_language(task, old)

@@ -153,7 +153,7 @@ def test_inseparable_plans_are_shown(coordlang: Command, tmp_path: Path) -> None
     assert "though they may wait in different ones" in outcome.err
     assert "--words-see-slack" in outcome.err
     assert not path.exists()
-    greedy = coordlang("build", *CELLS, "--slack", "1", "-o", path)
+    greedy = coordlang("build", *CELLS, "--slack", "1", "--method", "greedy", "-o", path)
     assert greedy.code == 2
     assert "--method minimal" in greedy.err
     seen = coordlang("build", *CELLS, "--slack", "1", "--words-see-slack", "-o", path)

@@ -145,7 +145,7 @@ def test_stopped_searches_return_languages(phase: str, monkeypatch: pytest.Monke
     candidates = all_tasks("grid", "gw2-2x3")
     built = build_language(candidates, "minimal")
     word = built.language.partition(candidates.model).word_of(candidates.rows).tolist()
-    found = Outcome({s: word[s] for s in built.job.states}, 5, evidence=built.refuting)
+    found = Outcome({s: word[s] for s in built.job.states}, 5)
     checked: list[Assignment] = []
 
     def late(*_: object) -> None:

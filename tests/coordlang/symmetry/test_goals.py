@@ -134,11 +134,11 @@ def test_a_language_is_the_same_and_inseparable_plans_are_shown(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     grid = all_tasks("grid", "gw4-3x3")
-    without = build_language(grid)
+    without = build_language(grid, "greedy")
     monkeypatch.setattr(
         "coordlang.required.all_differences.symmetric_goals", lambda c: symmetric_goals(c, 0, 0)
     )
-    assert build_language(grid).language.states == without.language.states
+    assert build_language(grid, "greedy").language.states == without.language.states
     shown = 0
     for seed in range(30):
         domain, problem, options = random_model(seed, 2)
@@ -146,6 +146,6 @@ def test_a_language_is_the_same_and_inseparable_plans_are_shown(
         if not candidates.count or all(map(separable, candidates.spaces)):
             continue
         with pytest.raises(Inseparable):
-            build_language(candidates)
+            build_language(candidates, "greedy")
         shown += 1
     assert shown

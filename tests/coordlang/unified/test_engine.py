@@ -531,7 +531,7 @@ def test_a_sentence_leaves_exactly_its_plans() -> None:
     problem = crossing(5)
     found = translate(problem)
     candidates = from_problems(found.domain, [found.problem])
-    language = build_language(candidates).language
+    language = build_language(candidates, "greedy").language
     task_language = next(languages_in_tasks(language, candidates))
     everything = sorted(str(steps_of(found, plan)) for plan in all_plans(problem))
     listed = []

@@ -30,7 +30,7 @@ from coordlang.vocabulary.contained import (
     parts,
     tasks_of_one_orbit,
 )
-from coordlang.vocabulary.problems_by_size import SolverBudget
+from coordlang.vocabulary.loop import Budget
 from planners.joint.tables import Bools
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
@@ -219,15 +219,15 @@ def test_parts_of_a_grid_are_its_rectangles() -> None:
 
 
 def reasons_of(candidates: Candidates, instance: ContainedInstance) -> list[Reason]:
-    return [_reason(candidates, *known) for known in instance.known.evidence.items()]
+    return [_reason(candidates, *known) for known in instance.languages.known.evidence.items()]
 
 
 def test_a_bound_of_a_part_holds_with_every_clause_checked_in_the_whole() -> None:
     """The square in the 2x3 grid needs three words; all that is said about it holds in the grid."""
     candidates = all_tasks("grid", "gw2-2x3")
     row, square = [ContainedInstance(p, 0) for p in parts(candidates, symmetry_group(candidates))]
-    assert row.refute(1, SolverBudget()) is None
-    refuted = square.refute(2, SolverBudget())
+    assert row.refute(1, Budget()) is None
+    refuted = square.refute(2, Budget())
     assert refuted is not None
     reasons = reasons_of(candidates, square)
     assert len(reasons) == len(refuted.clauses)
@@ -237,7 +237,7 @@ def test_a_bound_of_a_part_holds_with_every_clause_checked_in_the_whole() -> Non
     domain, robots = candidates.loaded.domain.name, list(candidates.model.robots)
     answer = check(Certificate(domain, robots, 2, reasons), candidates)
     assert (answer.lower_bound, answer.reasons) == (3, len(reasons))
-    assert square.refute(3, SolverBudget()) is None
+    assert square.refute(3, Budget()) is None
     for instance in (row, square):
         instance.close()
 
@@ -263,7 +263,7 @@ def test_a_forged_symmetry_of_a_part_is_refused() -> None:
     candidates = all_tasks("grid", "gw2-2x3")
     square = parts(candidates, symmetry_group(candidates))[-1]
     instance = ContainedInstance(square, 0)
-    instance.refute(2, SolverBudget())
+    instance.refute(2, Budget())
     instance.close()
     domain, robots = candidates.loaded.domain.name, list(candidates.model.robots)
     cells = sorted(
@@ -272,7 +272,7 @@ def test_a_forged_symmetry_of_a_part_is_refused() -> None:
     )
     space = candidates.spaces[0]
     refused = 0
-    for clause, evidence in list(instance.known.evidence.items())[:20]:
+    for clause, evidence in list(instance.languages.known.evidence.items())[:20]:
         if evidence.symmetry is not None:
             continue
         # Two neighbours change names, and all others stay: no symmetry of any part with them.
@@ -350,7 +350,7 @@ def test_two_words_are_too_few_on_a_ring_and_states_of_one_distance_show_it(cell
     candidates = on_graph(cells, ring(cells))
     found = tasks_of_one_orbit(candidates, symmetry_group(candidates))
     instance = ContainedInstance(found[0], 0)
-    refuted = instance.refute(2, SolverBudget())
+    refuted = instance.refute(2, Budget())
     instance.close()
     assert refuted is not None
     assert {s for clause in refuted.clauses for states in clause for s in states} <= set(

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
+from dataclasses import replace
 from fractions import Fraction
 from itertools import product
 from pathlib import Path
@@ -14,15 +15,16 @@ import pytest
 
 import coordlang as library
 from coordlang.commands.building import build_language
+from coordlang.commands.tolerating import job_of
 from coordlang.language.candidates import Candidates
+from coordlang.language.flexibility import flexibility
 from coordlang.required.choices import Choices
 from coordlang.required.divergences import states_on_plans
 from coordlang.required.failure import failure_probability
 from coordlang.required.plan_table import plan_table
 from coordlang.vocabulary import few_words as module
-from coordlang.vocabulary.few_words import few_words, partitions
-from coordlang.vocabulary.fewest_failures import canonical
-from coordlang.vocabulary.word_annealing import FewWordsSettings
+from coordlang.vocabulary.few_words import canonical, few_words, partitions
+from planners.parallel.workers import Workers
 from planners.system.errors import OutOfTime
 from tests.support import naive
 from tests.support.candidates import on_graph
@@ -120,7 +122,7 @@ def test_two_words_are_the_best_of_all_partitions(folder: str, stem: str, mean: 
     assert least["mean"] == mean
     assert tried == partitions(len(states), 2, 10_000) == 2_048
     for worst in (False, True):
-        found = few_words(candidates.spaces, states, len(candidates.rows), 2, worst=worst, seed=3)
+        found = few_words(job_of(candidates, Workers(), seed=3), 2, worst=worst)
         assert found.is_best
         assert found.measured == tried
         assert found.failures.worst == least["worst"] if worst else found.failures.mean == mean
@@ -135,12 +137,10 @@ def test_two_words_are_the_best_of_all_partitions(folder: str, stem: str, mean: 
 def test_the_worst_task_may_want_other_words_than_the_mean() -> None:
     candidates = on_graph(59, 2)
     assert candidates is not None
-    states = states_on_plans(candidates.spaces).tolist()
     least, _ = by_hand(candidates, 2)
     assert least == {"mean": Fraction(1, 60), "worst": Fraction(1, 3)}
     mean, worst = (
-        few_words(candidates.spaces, states, len(candidates.rows), 2, worst=worst).failures
-        for worst in (False, True)
+        few_words(job_of(candidates, Workers()), 2, worst=worst).failures for worst in (False, True)
     )
     assert (mean.mean, mean.worst) == (Fraction(1, 60), Fraction(1, 2))
     assert (worst.mean, worst.worst) == (Fraction(1, 45), Fraction(1, 3))
@@ -149,21 +149,29 @@ def test_the_worst_task_may_want_other_words_than_the_mean() -> None:
 def test_annealing_finds_the_best_two_words(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_ALL", 1)
     candidates = all_tasks("grid", "gw1-2x2")
-    states = states_on_plans(candidates.spaces).tolist()
-    found = few_words(candidates.spaces, states, len(candidates.rows), 2, seed=1)
+    found = few_words(job_of(candidates, Workers(), seed=1), 2)
     assert not found.is_best
     assert found.failures.mean == Fraction(5, 132)
     assert found.measured > 400
 
 
-def test_words_for_plans_that_are_too_many_to_list(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The exact count is the measure: a task with 252 plans, of which 50 may be listed."""
-    monkeypatch.setattr(module, "_TASKS", 0)
+def test_words_that_are_enough_are_a_language(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The loop is asked first: a task with 252 plans, of which none has to be measured."""
     candidates = own_task("grid", "corners-4x4")
-    states = states_on_plans(candidates.spaces).tolist()
-    settings = FewWordsSettings(least_moves=150, most_moves=150, coolings=1)
-    found = few_words(candidates.spaces, states, len(candidates.rows), 2, seed=1, settings=settings)
-    assert 0 < found.failures.mean < found.silence.mean / 2
+    found = few_words(job_of(candidates, Workers()), 4)
+    assert found.failures.worst == found.measured == 0
+    assert found.is_best
+    assert found.silence.mean > 0
+
+
+def test_plans_left_open_are_measured_as_they_are_defined() -> None:
+    candidates = all_tasks("grid", "gw1-2x2")
+    word = np.random.default_rng(2).integers(0, 3, len(candidates.rows))
+    words = [word[space.state] for space in candidates.spaces]
+    table = plan_table(candidates.spaces, len(word), most_tasks=10_000, seed=0, mixtures=False)
+    measured = table.plans_left_open(word, np.arange(len(table)))
+    assert measured == pytest.approx(flexibility(candidates.spaces, words).expected)
+    assert 1 < measured.mean() < table.count.mean()
 
 
 @pytest.mark.parametrize(("states", "words", "number"), [(3, 3, 5), (4, 2, 8), (5, 5, 52)])
@@ -175,18 +183,14 @@ def test_numbers_of_partitions(states: int, words: int, number: int) -> None:
 
 
 def test_a_limit_leaves_the_best_so_far() -> None:
-    candidates = all_tasks("grid", "gw2-2x3")
-    states = states_on_plans(candidates.spaces).tolist()
-
     def interrupt(text: str) -> None:
-        if "moves" in text and " 0 of" not in text:
+        if text.startswith("annealing") and " 0 of" not in text:
             raise KeyboardInterrupt
 
-    found = few_words(
-        candidates.spaces, states, len(candidates.rows), 3, seed=1, progress=interrupt
-    )
+    job = replace(job_of(all_tasks("grid", "gw2-2x3"), Workers(), seed=1), progress=interrupt)
+    found = few_words(job, 3)
     assert isinstance(found.stopped, KeyboardInterrupt)
-    assert found.measured > 50
+    assert found.measured > 5
     assert found.failures.mean < found.silence.mean
 
 
@@ -251,21 +255,17 @@ def test_what_is_no_number_of_words_is_refused(words: object) -> None:
         library.build(*SQUARE, words=words)
 
 
-def test_the_search_ends_as_soon_as_nothing_fails_and_then_nothing_is_missing() -> None:
+def test_a_limit_before_a_language_is_found_and_none_after() -> None:
     """A time limit that comes early leaves words that fail; one that comes late finds it ended."""
     problem = DOMAINS / "grid" / "gw2-2x3.pddl"
     ends = []
-    for after in (1, 4, 1_000):
-        heard = 0
+    for word in ("merging", "annealing"):
 
-        def limited(text: str, after: int = after) -> None:
-            nonlocal heard
-            heard += text.startswith("annealing")
-            if heard == after:
+        def limited(text: str, word: str = word) -> None:
+            if text.startswith(word):
                 raise OutOfTime("the time limit of the test is over")
 
-        built = library.build(SQUARE[0], problem, tasks="all", words=6, progress=limited)
+        built = library.build(SQUARE[0], problem, tasks="all", words=5, progress=limited)
         assert built.verdict.holds == (built.stopped is None)
         ends.append(built.verdict.holds)
-    assert ends == [False, False, True]
-    assert heard * 50 < FewWordsSettings().most_moves
+    assert ends == [False, True]

@@ -16,7 +16,7 @@ from coordlang.language.sentences import sentence
 from coordlang.language.warping import Clause, pair, separation_clause, warping_clause
 from coordlang.required.miscoordination import inseparable
 from coordlang.vocabulary.clauses import without_implied
-from coordlang.vocabulary.problems_by_size import ProblemsBySize
+from coordlang.vocabulary.loop import ProblemsBySize
 from coordlang.vocabulary.sat import PartitionProblem
 from planners.system.errors import ProvedImpossible
 from tests.support import naive

@@ -92,7 +92,7 @@ def test_as_few_changes_as_can_be(data: st.DataObject) -> None:
     """
     candidates = data.draw(st.sampled_from(small_worlds()))
     old_words = data.draw(st.integers(1, 3))
-    built = build_language(candidates)
+    built = build_language(candidates, "greedy")
     states = list(built.job.states)
     random = Random(data.draw(st.integers(0, 1000)))
     listed = [state for state in states if random.random() < 0.8]

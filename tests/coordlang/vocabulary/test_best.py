@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The default method: what some effort finds, what it says of it, and what none finds."""
+
+from __future__ import annotations
+
+import json
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+import coordlang as library
+from coordlang.commands.building import build_language
+from planners.system.errors import UsageError
+from tests.support.command import Command
+from tests.support.domains import DOMAINS, all_tasks, own_task
+
+CORNERS = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "corners-4x4.pddl"
+NINE = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "gw4-3x3.pddl"
+
+
+def test_few_words_that_leave_many_plans_open() -> None:
+    """Of one task: as few words as the exact method proves, and no less freedom than it leaves."""
+    found = build_language(own_task("grid", "corners-4x4"))
+    exact = build_language(own_task("grid", "corners-4x4"), "minimal", prefer="flexible")
+    assert found.language.guarantee.proved_minimal
+    assert found.language.guarantee.size == exact.language.guarantee.size == 2
+    assert found.figures["flexibility"] >= 86 > found.figures["work"] / 1_000
+    assert build_language(own_task("grid", "corners-4x4")).language == found.language
+
+
+def test_effort_buys_words_and_bounds() -> None:
+    candidates = all_tasks("grid", "gw3-2x4")
+    known = [
+        build_language(candidates, effort=effort).language.guarantee for effort in (0, 1, 5, 1_000)
+    ]
+    greedy = build_language(candidates, "greedy").language.guarantee
+    assert (known[0].size, known[0].lower_bound) == (greedy.size, 2)
+    assert known[-1].size == known[-1].lower_bound == 6
+    for less, more in pairwise(known):
+        assert less.lower_bound <= more.lower_bound <= more.size <= less.size
+    assert known[1].size < known[0].size, "words are merged with the least effort"
+
+
+def test_what_more_effort_might_bring(coordlang: Command, tmp_path: Path) -> None:
+    path = tmp_path / "l.json"
+    built = coordlang("build", *NINE, "--tasks", "all", "--effort", 1, "-o", path)
+    assert built.code == 0
+    guarantee = json.loads(path.read_text())["guarantee"]
+    said = f"between {guarantee['lower_bound']} and {guarantee['size']} words are needed"
+    assert f"{said}: a larger --effort than 1 may find fewer" in built.out
+    proved = coordlang("build", *CORNERS, "-o", path)
+    assert "proved minimal" in proved.out
+    assert "--effort" not in proved.out
+
+
+def test_effort_belongs_to_it(coordlang: Command, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="--effort belongs to --method best"):
+        library.build(*CORNERS, method="minimal", effort=3)
+    made = coordlang("build", *CORNERS, "--effort", -1, "-o", tmp_path / "l.json")
+    assert made.code == 2
