@@ -30,8 +30,8 @@ from planners.search.state_variables import state_variables
 _VARIABLES, _SUBGROUPS, _ACTIONS = 12, 60, 60
 #: Conflicts of the solver for one partition.
 _CONFLICTS = 2_000
-#: Refuted partitions of a kind in the first look; then of all kinds for each of the budget.
-_FIRST, _TOGETHER = 50, 8
+#: Refuted partitions of a kind in the first look; and of all kinds for each of the budget.
+_FIRST, _TOGETHER = 50, 4
 
 
 #: The number of a symmetry, and the lengths of the cycles in which words go.
@@ -66,28 +66,28 @@ class TiedWords:
     def __init__(self, job: Job, languages: Languages) -> None:
         self._states, self._candidates, self._languages = job.states, job.candidates, languages
         self._group = group_table(languages.refuter.pool.images)
-        self._problems: dict[int, list[tuple[PartitionProblem, _Kind]]] = {}
+        #: For each number of words the kinds that nobody has looked at, and those not decided.
+        self._left: dict[int, Iterator[_Kind]] = {}
+        self._open: dict[int, list[tuple[PartitionProblem, _Kind]]] = {}
+        self._ruled_out: dict[int, set[_Move]] = {}
 
     def find(self, size: int, rounds: int) -> Assignment | None:
         """A language with at most ``size`` words; None if none was found with some effort.
 
         First all kinds are looked at; those that are left then get ``rounds`` one after another.
         """
-        begin = self._languages.rounds
-        if size not in self._problems:
-            kinds = self._problems[size] = []
-            ruled_out: set[_Move] = set()
-            for kind in self._kinds(size):
-                if kind.moves & ruled_out:
-                    continue  # what a symmetry cannot do alone it cannot do with others
-                kinds.append((self._problem(size, kind), kind))
-                number = len(kinds)
-                if (found := self._look(kinds, number - 1, _FIRST)) is not None:
-                    return found
-                if len(kinds) < number and len(kind.moves) == 1:
-                    ruled_out |= kind.moves
-        kinds, number = self._problems[size], 0
-        while number < len(kinds) and self._languages.rounds - begin < _TOGETHER * rounds:
+        until = self._languages.rounds + _TOGETHER * rounds
+        if size not in self._left:
+            self._left[size], self._open[size] = self._kinds(size), []
+        kinds = self._open[size]
+        for kind in self._left[size]:
+            kinds.append((self._problem(size, kind), kind))
+            if (found := self._look(kinds, len(kinds) - 1, _FIRST)) is not None:
+                return found
+            if self._languages.rounds >= until:
+                return None
+        number = 0
+        while number < len(kinds) and self._languages.rounds < until:
             before = len(kinds)
             if (found := self._look(kinds, number, rounds)) is not None:
                 return found
@@ -96,7 +96,7 @@ class TiedWords:
 
     def close(self) -> None:
         """Give back what the solvers hold."""
-        for kinds in self._problems.values():
+        for kinds in self._open.values():
             for problem, _ in kinds:
                 problem.close()
 
@@ -110,6 +110,8 @@ class TiedWords:
             found = find(problem.solve, holds, Budget(rounds, _CONFLICTS))
             del kinds[number]
             problem.close()
+            if found is None and len(kind.moves) == 1:
+                self._ruled_out.setdefault(problem.size, set()).update(kind.moves)
             return found
         return None
 
@@ -126,7 +128,10 @@ class TiedWords:
         for subgroup in sorted(some, key=lambda chosen: len(chosen) > 2):
             actions = self._group.word_actions(subgroup, size, _SUBGROUPS)
             for action in islice(actions, _ACTIONS):
-                yield self._kind(action)
+                kind = self._kind(action)
+                # What a symmetry cannot do alone it cannot do with others.
+                if not kind.moves & self._ruled_out.get(size, set()):
+                    yield kind
 
     def _kind(self, action: WordAction) -> _Kind:
         """Words that go to words as an action says."""

@@ -94,7 +94,21 @@ def test_task_file_of_the_page(tmp_path: Path) -> None:
     files = [
         str(ROOT / "domains" / "three-cells" / name) for name in ("domain.pddl", "problem.pddl")
     ]
-    assert run(["build", *files, "--tasks", str(path), "-o", str(tmp_path / "l.json")]) == 0
+    assert (
+        run(
+            [
+                "build",
+                *files,
+                "--tasks",
+                str(path),
+                "--method",
+                "greedy",
+                "-o",
+                str(tmp_path / "l.json"),
+            ]
+        )
+        == 0
+    )
 
 
 def test_language_by_hand_of_the_page(reader: dict[str, Any], tmp_path: Path) -> None:

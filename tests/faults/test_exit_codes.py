@@ -66,7 +66,7 @@ def test_robots_of_a_language_file_that_contradict_the_domain(
 ) -> None:
     files = [DOMAINS / place / name for name in ("domain.pddl", "problem.pddl")]
     path = tmp_path / "l.json"
-    assert coordlang("build", *files, "-o", path).code == 0
+    assert coordlang("build", *files, "--method", "greedy", "-o", path).code == 0
     path.write_text(json.dumps(json.loads(path.read_text()) | {"robots": robots}))
     outcome = coordlang("verify", path, *files)
     assert outcome.code == 31, outcome.err

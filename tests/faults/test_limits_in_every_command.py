@@ -91,7 +91,7 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "BIG-MAP": folder / "big.map",
         "BIG-SCEN": folder / "big.scen",
     }
-    coordlang.build(found["DOMAIN"], still).language.save(found["LANGUAGE"])
+    coordlang.build(found["DOMAIN"], still, method="greedy").language.save(found["LANGUAGE"])
     coordlang.lift(found["GRID"], DOMAINS / "grid" / "gw1-2x2.pddl").save(found["LIFTED"])
     found["PLAN"].write_text("0: (move r1 c0-0 c0-1)\n")
     side = 1500

@@ -328,7 +328,7 @@ def test_words_of_pddl_as_predicates_are_renamed(
     domain.write_text(BARE.replace("(q)", f"({name})"))
     problem.write_text(BARE_TASK)
     language = tmp_path / "l.json"
-    built = coordlang("build", domain, problem, "-o", language)
+    built = coordlang("build", domain, problem, "--method", "greedy", "-o", language)
     assert built.code == 0, built.err
     out = tmp_path / "out"
     assert coordlang("export", language, domain, problem, "w0", "-o", out).code == 0

@@ -299,13 +299,18 @@ def test_factored_files_all_the_way(coordlang: Command, tmp_path: Path) -> None:
         0,
         f"{folder}: 1 optimal plan of 1 step; coordination is not required\n",
     )
-    assert coordlang("build", "--factored", folder, "--tasks", "all", "-o", language).code == 0
+    assert (
+        coordlang(
+            "build", "--factored", folder, "--tasks", "all", "--method", "greedy", "-o", language
+        ).code
+        == 0
+    )
     outcome = coordlang("verify", language, "--factored", folder)
     assert (outcome.code, "12 tasks" in outcome.out) == (0, True)
     file = folder / "domain-r1.pddl"
     assert (
         f"-o {file} would overwrite an input file"
-        in coordlang("build", "--factored", folder, "-o", file).err
+        in coordlang("build", "--factored", folder, "--method", "greedy", "-o", file).err
     )
 
 
@@ -422,7 +427,9 @@ def test_an_unsolvable_problem_is_named(coordlang: Command, files: Files, tmp_pa
     )
     assert (
         "--unsolvable skip"
-        not in coordlang("build", files.domain, other, "-o", "-", "--unsolvable", "skip").err
+        not in coordlang(
+            "build", files.domain, other, "--method", "greedy", "-o", "-", "--unsolvable", "skip"
+        ).err
     )
 
 
@@ -462,7 +469,18 @@ def test_a_state_in_which_nothing_is_true(coordlang: Command, files: Files, tmp_
     files.write(domain, text.format("(not (q r2))"))
     language = tmp_path / "l.json"
     assert (
-        coordlang("build", files.domain, files.problem, "--tasks", "all", "-o", language).code == 0
+        coordlang(
+            "build",
+            files.domain,
+            files.problem,
+            "--tasks",
+            "all",
+            "--method",
+            "greedy",
+            "-o",
+            language,
+        ).code
+        == 0
     )
     assert (
         "The task (no fact holds) -> (q r1)"
@@ -481,7 +499,19 @@ def test_a_good_language_survives_a_failing_build(
     coordlang: Command, language: Path, t_map: tuple[Path, Path], tmp_path: Path
 ) -> None:
     before = language.read_bytes()
-    assert coordlang("build", *t_map, "--tasks", task_file(tmp_path, []), "-o", language).code == 31
+    assert (
+        coordlang(
+            "build",
+            *t_map,
+            "--tasks",
+            task_file(tmp_path, []),
+            "--method",
+            "greedy",
+            "-o",
+            language,
+        ).code
+        == 31
+    )
     assert language.read_bytes() == before
     assert [p.name for p in tmp_path.iterdir() if p.name.startswith(".")] == []
 
@@ -641,7 +671,12 @@ def test_verifying_no_task_at_all(coordlang: Command, tmp_path: Path) -> None:
     )
     problem.write_text(text.replace("PASS", "(pass r1) (pass r2)"))
     stuck.write_text(text.replace("PASS", ""))
-    assert coordlang("build", domain, problem, "--tasks", "all", "-o", language).code == 0
+    assert (
+        coordlang(
+            "build", domain, problem, "--tasks", "all", "--method", "greedy", "-o", language
+        ).code
+        == 0
+    )
     outcome = coordlang("verify", language, domain, stuck, "--tasks", "all")
     assert (outcome.code, outcome.out) == (11, "")
     assert "there is no candidate task" in outcome.err

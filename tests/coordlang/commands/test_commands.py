@@ -147,7 +147,17 @@ def test_refuted_language(coordlang: Command, language: Path, t_map: tuple[Path,
 def test_build_from_a_task_file(name: str, coordlang: Command, tmp_path: Path) -> None:
     files = GRID / "domain.pddl", GRID / f"{name}.pddl"
     path = tmp_path / "language.json.gz"
-    built = coordlang("build", *files, "--tasks", GRID / f"{name}.tasks.json", "-o", path, "--json")
+    built = coordlang(
+        "build",
+        *files,
+        "--tasks",
+        GRID / f"{name}.tasks.json",
+        "--method",
+        "greedy",
+        "-o",
+        path,
+        "--json",
+    )
     assert built.code == 0
     assert json.loads(built.out)["tasks"] == 380
     assert coordlang("verify", path, *files, "--json").code == 0
@@ -178,7 +188,7 @@ def test_build_for_given_problems(coordlang: Command, tmp_path: Path) -> None:
 
 
 def test_build_to_stdout(coordlang: Command, t_map: tuple[Path, Path]) -> None:
-    outcome = coordlang("build", *t_map, "-o", "-")
+    outcome = coordlang("build", *t_map, "--method", "greedy", "-o", "-")
     assert json.loads(outcome.out)["format"] == "coordlang/language"
 
 
@@ -198,13 +208,18 @@ def test_inseparable_plans(coordlang: Command, tmp_path: Path) -> None:
     problem.write_text(
         "(define (problem p) (:domain lamps) (:objects r1 r2 - robot) (:init) (:goal (lit)))"
     )
-    outcome = coordlang("build", domain, problem, "-o", path)
+    outcome = coordlang("build", domain, problem, "--method", "greedy", "-o", path)
     assert outcome.code == 11
     assert "pass through the same states" in outcome.err
     assert "--remember-actions" in outcome.err
     assert "r1 follows this optimal plan:" in outcome.err
     assert not path.exists()
-    assert coordlang("build", domain, problem, "-o", path, "--remember-actions").code == 0
+    assert (
+        coordlang(
+            "build", domain, problem, "--method", "greedy", "-o", path, "--remember-actions"
+        ).code
+        == 0
+    )
     assert "(last r1 (press r1)) (last r2 idle) (lit)" in json.loads(path.read_text())["states"]
     assert coordlang("verify", path, domain, problem).code == 0
 

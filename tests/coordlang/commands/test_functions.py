@@ -110,7 +110,7 @@ def test_no_coordination_in_factored_files(tmp_path: Path) -> None:
     assert not found
     assert (found[0].plans, found.witness) == (1, None)
     assert coordlang.plans(factored=folder).count == 1
-    built = coordlang.build(factored=folder, tasks="all")
+    built = coordlang.build(factored=folder, tasks="all", method="greedy")
     assert coordlang.verify(built.language, factored=folder).tasks == 12
     with pytest.raises(coordlang.UsageError, match="--factored names all files"):
         coordlang.plans(*T_MAP, factored=folder)
@@ -165,10 +165,13 @@ def test_tasks_as_objects(tmp_path: Path) -> None:
     data = {"format": "coordlang/tasks", "version": 1, "tasks": tasks}
     path = tmp_path / "tasks.json"
     path.write_text(json.dumps(data))
-    counts = {coordlang.build(*CELLS, tasks=source).tasks for source in (tasks, data, path)}
+    counts = {
+        coordlang.build(*CELLS, tasks=source, method="greedy").tasks
+        for source in (tasks, data, path)
+    }
     assert counts == {1}
     with pytest.raises(coordlang.BadInput, match="missing required field `goal`"):
-        coordlang.build(*CELLS, tasks=[{"init": []}])
+        coordlang.build(*CELLS, tasks=[{"init": []}], method="greedy")
 
 
 def test_a_task_without_a_plan() -> None:
@@ -178,9 +181,11 @@ def test_a_task_without_a_plan() -> None:
         {"init": ["(at r1 c0-1)", "(at r2 c1-0)"], "goal": ["(at r1 c1-2)"]},
     ]
     with pytest.raises(coordlang.ProvedImpossible) as caught:
-        coordlang.build(*files, tasks=tasks)
+        coordlang.build(*files, tasks=tasks, method="greedy")
     assert "--unsolvable skip" in str(caught.value)
-    assert len(coordlang.build(*files, tasks=tasks, unsolvable="skip").skipped) == 1
+    assert (
+        len(coordlang.build(*files, tasks=tasks, unsolvable="skip", method="greedy").skipped) == 1
+    )
 
 
 def test_say_and_understand(language: Path, tmp_path: Path) -> None:
@@ -272,7 +277,7 @@ def test_parsed_objects_stand_for_files(language: Path) -> None:
     assert coordlang.plans(loaded).count == coordlang.plans(*T_MAP, cost="makespan+actions").count
     domain, problem = loaded.domain, loaded.problems[0]
     assert coordlang.plans(domain, problem).count == 2
-    built = coordlang.build(loaded, tasks="all")
+    built = coordlang.build(loaded, tasks="all", method="greedy")
     assert built.language.provenance.model["cost"] == "makespan+actions"
     assert coordlang.verify(built.language, loaded)
     assert coordlang.say(built.language, loaded, None, coordlang.plans(loaded)[0]).covered
@@ -285,7 +290,7 @@ def test_parsed_objects_stand_for_files(language: Path) -> None:
 
 def test_robots_by_type_of_a_loaded_domain() -> None:
     loaded = coordlang.load(*CELLS, robot_type="robot")
-    language = coordlang.build(loaded).language
+    language = coordlang.build(loaded, method="greedy").language
     assert coordlang.explain(language, loaded).covered
 
 
@@ -333,7 +338,7 @@ def test_results_show_themselves(language: Path) -> None:
         coordlang.inspect(*T_MAP),
         coordlang.coordination(*T_MAP),
         coordlang.coordination(*T_MAP)[0],
-        coordlang.build(*CELLS),
+        coordlang.build(*CELLS, method="greedy"),
         coordlang.verify(language, *T_MAP),
         coordlang.say(language, *T_MAP, coordlang.plans(*T_MAP)[0]),
         coordlang.understand(language, *T_MAP, "w0"),

@@ -127,7 +127,7 @@ def test_every_command_hands_on_who_does_the_pieces(
     coordlang: Command, t_map: tuple[Path, Path], tmp_path: Path
 ) -> None:
     language = tmp_path / "l.json"
-    assert coordlang("build", *t_map, "-o", language).code == 0
+    assert coordlang("build", *t_map, "--method", "greedy", "-o", language).code == 0
     for command in (
         ("coordination", *t_map),
         ("build", *t_map, "-o", language),

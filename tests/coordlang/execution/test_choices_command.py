@@ -20,7 +20,7 @@ CELLS = DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "prob
 @pytest.fixture
 def cells(coordlang: Command, tmp_path: Path) -> Path:
     path = tmp_path / "cells.json"
-    assert coordlang("build", *CELLS, "-o", path).code == 0
+    assert coordlang("build", *CELLS, "--method", "greedy", "-o", path).code == 0
     return path
 
 
@@ -142,7 +142,7 @@ def test_a_task_that_is_not_covered_and_refuted(
     check: list[str], coordlang: Command, cells: Path, tmp_path: Path
 ) -> None:
     other = other_task(tmp_path, "(at r1 a) (at r2 b)", "(at r1 c) (at r2 b)")
-    assert coordlang("build", CELLS[0], other, "-o", cells).code == 0
+    assert coordlang("build", CELLS[0], other, "--method", "greedy", "-o", cells).code == 0
     refuted = coordlang("choices", cells, *CELLS, "w0", *check)
     assert refuted.code == 1
     assert "r1 may follow 3 subplans" in refuted.out

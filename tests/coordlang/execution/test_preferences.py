@@ -223,7 +223,7 @@ def test_what_can_never_hold_is_avoided(coordlang: Command, tmp_path: Path) -> N
     text = (DOMAINS / "t-map" / "domain.pddl").read_text()
     domain.write_text(text.replace("(:predicates", "(:predicates (closed ?x)"))
     files, language = (domain, DOMAINS / "t-map" / "problem.pddl"), tmp_path / "l.json"
-    assert coordlang("build", *files, "-o", language).code == 0
+    assert coordlang("build", *files, "--method", "greedy", "-o", language).code == 0
 
     def preferring(wish: str) -> Outcome:
         return coordlang("plan", language, *files, "--prefer", wish)
@@ -251,7 +251,7 @@ def test_spelling_of_wishes() -> None:
 def test_the_command_says_what_became_of_the_wishes(coordlang: Command, tmp_path: Path) -> None:
     files = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "corners-3x3.pddl"
     asked = "plan", tmp_path / "language.json", *files
-    assert coordlang("build", *files, "-o", asked[1]).code == 0
+    assert coordlang("build", *files, "--method", "greedy", "-o", asked[1]).code == 0
     outcome = coordlang(*asked, "--prefer", "avoid:(at r1 c1-1)", "--prefer", "most-plans")
     assert outcome.code == 0
     assert "avoid:(at r1 c1-1): in every plan it keeps away from (at r1 c1-1)\n" in outcome.err

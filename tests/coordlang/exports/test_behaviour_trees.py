@@ -183,7 +183,7 @@ def test_the_tree_is_as_large_as_the_automaton() -> None:
 def test_command(coordlang: Command, tmp_path: Path) -> None:
     files = DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "problem.pddl"
     language, output = tmp_path / "l.json", tmp_path / "trees.xml"
-    coordlang("build", *files, "-o", language)
+    coordlang("build", *files, "--method", "greedy", "-o", language)
     shown = coordlang("export", language, *files, "w1 w0", "--to", "bt")
     assert shown.code == 0
     assert coordlang("export", language, *files, "w1 w0", "--to", "bt", "-o", output).out == ""
@@ -199,7 +199,7 @@ def test_names_that_xml_would_misread(coordlang: Command, tmp_path: Path) -> Non
     """Two hyphens end an XML comment; a word may have any name."""
     files = DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "problem.pddl"
     language = tmp_path / "l.json"
-    coordlang("build", *files, "-o", language)
+    coordlang("build", *files, "--method", "greedy", "-o", language)
     text = language.read_text().replace('"w1"', '"a--b<&"')
     language.write_text(text)
     shown = coordlang("export", language, *files, "a--b<& w0", "--to", "bt")

@@ -46,7 +46,7 @@ def test_a_language_is_verified_in_the_model_of_the_domain(
     files: tuple[Path, Path, Path], tmp_path: Path
 ) -> None:
     domain, a, b = files
-    built = coordlang.build(domain, a)
+    built = coordlang.build(domain, a, method="greedy")
     path = tmp_path / "a.json"
     built.language.save(path)
     assert "idle" not in json.loads(path.read_text())["model"]
@@ -83,7 +83,7 @@ def test_a_plan_with_what_is_left_out(
 ) -> None:
     domain, a, _ = files
     language, plan = tmp_path / "l.json", tmp_path / "plan"
-    assert coordlang("build", domain, a, "-o", language).code == 0
+    assert coordlang("build", domain, a, "--method", "greedy", "-o", language).code == 0
     actions = [["(move r1 c0-1 c1-1)", "(rest r2)"]]
     for text in (
         "0: (rest r2)\n0: (move r1 c0-1 c1-1)\n",
@@ -106,13 +106,13 @@ def test_all_pairs_are_those_of_the_same_states(tmp_path: Path) -> None:
     for number, start in enumerate(("(at r1 c1-0) (at r2 c1-1)", "(at r2 c1-0) (at r1 c1-1)")):
         problems.append(tmp_path / f"p{number}.pddl")
         problems[-1].write_text(walls.replace("(at r1 c0-1) (at r2 c1-0)", start))
-    language = coordlang.build(domain, problems[0], tasks="all").language
+    language = coordlang.build(domain, problems[0], tasks="all", method="greedy").language
     assert coordlang.verify(language, domain, problems[0])
     with pytest.raises(coordlang.BadInput, match="all pairs of other states"):
         coordlang.verify(language, domain, problems[1])
 
 
 def _built(domain: Path, problem: Path) -> dict[str, Any]:
-    language = coordlang.build(domain, problem).language
+    language = coordlang.build(domain, problem, method="greedy").language
     data: dict[str, Any] = json.loads(to_bytes(language))
     return data

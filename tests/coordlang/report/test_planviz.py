@@ -60,7 +60,7 @@ def test_a_plan_without_steps_has_one_in_which_nobody_moves(tmp_path: Path) -> N
     start = "(:goal (and (at r1 c0-0) (at r2 c2-2))))"
     problem = tmp_path / "p.pddl"
     problem.write_text(text.replace(goal, start))
-    built = door.build(domain, problem)
+    built = door.build(domain, problem, method="greedy")
     used = door.explain(built.language, domain, problem).words.used
     assert json.loads(planviz(used).plan)["actualPaths"] == ["W", "W"]
 

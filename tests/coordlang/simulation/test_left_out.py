@@ -53,7 +53,7 @@ def test_a_robot_may_be_called_human(tmp_path: Path) -> None:
     domain = DOMAINS / "corridor" / "domain.pddl"
     text = (DOMAINS / "corridor" / "problem.pddl").read_text()
     problem.write_text(text.replace("r1", "human").replace("r2", "wall"))
-    coordlang.build(domain, problem).language.save(words)
+    coordlang.build(domain, problem, method="greedy").language.save(words)
     found = coordlang.simulate(words, domain, problem, human="random", seed=1)
     run = found.runs[0]
     assert set(run.poses) == {"human", "wall"}

@@ -572,7 +572,12 @@ def test_a_language_file_for_the_problem_that_the_library_read(
     coordlang: Command, tmp_path: Path
 ) -> None:
     path, file = DOMAINS / "handover", tmp_path / "language.json"
-    assert coordlang("build", path / "domain.pddl", path / "two-doors.pddl", "-o", file).code == 0
+    assert (
+        coordlang(
+            "build", path / "domain.pddl", path / "two-doors.pddl", "--method", "greedy", "-o", file
+        ).code
+        == 0
+    )
     problem = read("handover", "two-doors")
     result = solve(problem, language=str(file))
     assert (result.status, result.log_messages) == (Status.SOLVED_OPTIMALLY, [])

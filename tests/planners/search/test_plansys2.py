@@ -61,7 +61,7 @@ def test_plansys2_reads_each_plan_and_so_do_we(folder: str, problem: str, tmp_pa
 def test_command(coordlang: Command, tmp_path: Path) -> None:
     files = DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "problem.pddl"
     language = tmp_path / "l.json"
-    coordlang("build", *files, "-o", language)
+    coordlang("build", *files, "--method", "greedy", "-o", language)
     shown = coordlang("plan", language, *files, "w1 w0", "--format", "plansys2").out
     assert [(time, action) for time, action, _ in items(shown)] == [
         (0.0, "(move r1 a c)"),
