@@ -10,7 +10,7 @@ from coordlang.commands.built import Built, Clock, language_of
 from coordlang.language.candidates import Candidates, require_solvable
 from coordlang.language.partition import Partition
 from coordlang.required.all_differences import differences
-from coordlang.required.divergences import FirstDifferences, states_on_plans, without_divergences
+from coordlang.required.divergences import states_on_plans, without_divergences
 from coordlang.required.failures import Failures
 from coordlang.required.miscoordination import Inseparable
 from coordlang.verification.by_definition import Verdict
