@@ -3,28 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from coordlang.language.warping import Clause, separation_clause
+from coordlang.language.warping import Clause
 from coordlang.required.choices import Choices
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.clauses import without_implied
 from coordlang.vocabulary.counterexample_walk import CounterexampleWalk
-from coordlang.vocabulary.counterexamples import (
-    Counterexample,
-    Counterexamples,
-    Mixtures,
-    many_counterexamples,
-)
+from coordlang.vocabulary.counterexamples import Counterexamples, Mixtures, many_counterexamples
 from coordlang.vocabulary.job import Evidence
 from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
-
-#: Counterexamples taken at a time.
-_AT_A_TIME = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,55 +63,6 @@ class TaskPart:
             return self.finder.failing(nodes, most, ways)
         return many_counterexamples(self.finder, nodes, most, ways)
 
-    def violated(self, word: Ints) -> dict[Clause, Counterexample]:
-        """Clauses that a partition violates, each with the plans that it comes from.
-
-        Parameters
-        ----------
-        word
-            (states) the word of each state number.
-
-        Returns
-        -------
-        dict[Clause, Counterexample]
-            Empty if the partition is a language for these tasks.
-        """
-        words = word.tolist()
-        found: dict[Clause, Counterexample] = {}
-        tables = self.failing(word, _AT_A_TIME)
-        for example in (table.one(row) for table in tables for row in range(len(table))):
-            clause = separation_clause(example.states, words)
-            assert clause, "the plans have one sentence, and none of them is the other"
-            found.setdefault(clause, example)
-        return found
-
-
-def task_parts(
-    spaces: Sequence[PlanSpace], requires: Sequence[Bools], tasks: int
-) -> list[TaskPart]:
-    """The tasks that require coordination, in parts of about so many tasks.
-
-    Parameters
-    ----------
-    spaces
-        The plan spaces of the tasks.
-    requires
-        (nodes) of each space, which nodes require coordination.
-    tasks
-        About how many tasks a part has.
-    """
-    parts = []
-    for space, required in zip(spaces, requires, strict=True):
-        wanted = required[space.starts]
-        goals = space.goal[space.starts]
-        count = 1 + len(np.unique(space.starts[wanted])) // tasks
-        parts += [
-            TaskPart.of(space, mine)
-            for number in range(count)
-            if (mine := wanted & (goals % count == number)).any()
-        ]
-    return parts
-
 
 class NecessaryClauses:
     """A growing list of necessary clauses with all their images under a group of symmetries.
@@ -138,10 +79,6 @@ class NecessaryClauses:
         self.group = group
         self.clauses: list[Clause] = []
         self.evidence: dict[Clause, Evidence] = {}
-
-    def add(self, found: Mapping[Clause, Counterexample], space: PlanSpace) -> None:
-        """`add_all`, of clauses that plans of a space give."""
-        self.add_all({clause: Evidence(space, example, None) for clause, example in found.items()})
 
     def add_all(self, found: Mapping[Clause, Evidence]) -> None:
         """Add clauses with their images; those that others of them imply are left out."""
