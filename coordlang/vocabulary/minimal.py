@@ -166,10 +166,12 @@ class MinimalSearch:
 
         False if the budget was not enough.
         """
+        if size > self.lower and self._finds_tied(size, budget.rounds):
+            return True
         try:
             refuted = self._refuted_within(size, budget) or self._refuted(size, budget)
         except Undecided:
-            return self._finds_tied(size, budget.rounds)
+            return size == self.lower == self.upper - 1 and self._finds_tied(size, budget.rounds)
         if refuted is not None:
             # In this order: a signal in between leaves clauses that refute too much.
             self.refuting = refuted
@@ -194,8 +196,8 @@ class MinimalSearch:
 
     def _finds_tied(self, size: int, rounds: int) -> bool:
         """Whether a language with so many words is soon found among those of some kinds."""
-        if self._is_spent or self.lower == size < self.upper - 1:
-            return False  # it is rather refuted than found while others are not decided
+        if self._is_spent:
+            return False
         self._report(f"trying {size} words that some states decide")
         found = self._tied.find(size, rounds)
         if found is not None:
@@ -204,7 +206,7 @@ class MinimalSearch:
 
     def _refuted_within(self, size: int, budget: Budget) -> Refutation | None:
         """A proof by an instance that this one contains, the smallest that has one."""
-        while self._contained:
+        while size == self.lower and self._contained:
             instance = self._contained[0]
             self._report(f"trying {size} words for {len(instance.states):,} of the states")
             refuted = instance.refute(size, budget)

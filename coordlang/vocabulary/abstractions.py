@@ -1,0 +1,269 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Abstractions of the states: a few abstract states, by which words may be given.
+
+"Where robot 1 is", "where robot 1 is, and whether robot 2 is on a black or a white square".  Where
+states are many, languages whose words say no more than that are found at once where a search among
+all partitions finds none.  An abstraction is a choice of what is looked at and proves nothing:
+whether a partition is a language is decided elsewhere.
+
+What is looked at are the state variables (`planners.search.state_variables`), and of the graph of a
+variable's values, which actions join: two colours, nearness, directions, coordinates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+
+import networkx as nx
+import numpy as np
+
+from coordlang.language.candidates import Candidates
+from planners.joint.model import JointModel
+from planners.joint.tables import Bools, Ints
+from planners.search.state_variables import StateVariable, state_variables
+
+#: Variables that are looked at, and values of one for which distances are taken, at most.
+_VARIABLES, _VALUES = 12, 200
+#: Coordinates that values may have: more are those of a ring, of which each says next to nothing.
+_COORDINATES = 3
+#: States beyond which nothing is looked for.
+_STATES = 20_000
+#: A distance between values that nothing joins.
+_FAR = np.iinfo(np.int64).max
+
+
+@dataclass(frozen=True)
+class _Values:
+    """The values of a state variable in all states, and the undirected graph of its values.
+
+    Attributes
+    ----------
+    of_state
+        (states) the number of the value, -1 where none of its facts is true.
+    names
+        Each value's fact, without the objects that all facts of the variable name: what two robots
+        have in common that are in the same place.
+    graph
+        Values are neighbours if an action takes one to the other.
+    """
+
+    of_state: Ints
+    names: tuple[str, ...]
+    graph: nx.Graph[int]
+
+    @classmethod
+    def of(cls, variable: StateVariable, candidates: Candidates) -> _Values:
+        """The values of one variable."""
+        codec = candidates.model.codec
+        atoms = [codec.facts.atoms[fact] for fact in variable.facts]
+        own = set.intersection(*(set(atom.args) for atom in atoms))
+        of_state = np.full(len(candidates.rows), -1)
+        for number, fact in enumerate(variable.facts):
+            of_state[codec.column(candidates.rows, fact)] = number
+        number_of = {fact: number for number, fact in enumerate(variable.facts)}
+        graph: nx.Graph[int] = nx.empty_graph(len(atoms))
+        for needed, made in variable.changes.values():
+            graph.add_edges_from((number_of[fact], number_of[made]) for fact in needed)
+        names = (
+            " ".join((atom.predicate, *("?" if a in own else a for a in atom.args)))
+            for atom in atoms
+        )
+        return cls(of_state, tuple(names), graph)
+
+    @cached_property
+    def away(self) -> Ints:
+        """(values, values) how many actions lie between two values."""
+        found = np.full((len(self.names),) * 2, _FAR)
+        for value, lengths in nx.all_pairs_shortest_path_length(self.graph):
+            found[value, list(lengths)] = list(lengths.values())
+        return found
+
+    @cached_property
+    def colours(self) -> Ints:
+        """(states) two colours: whether the first value, or a part's, is an odd number away."""
+        colour = np.zeros(len(self.names) + 1, np.int64)  # the last: no value
+        for part in nx.connected_components(self.graph):
+            for value, length in nx.single_source_shortest_path_length(
+                self.graph, min(part)
+            ).items():
+                colour[value] = length % 2
+        found: Ints = colour[self.of_state]
+        return found
+
+    @cached_property
+    def coordinates(self) -> tuple[Bools, ...]:
+        """(cuts, values) of each coordinate: on which side of its cuts values are.
+
+        A cut parts the values that are nearer to one of two neighbours than to the other.  Two cuts
+        cross if both sides of one meet both sides of the other.  Cuts that do not cross, or are
+        linked by such, are those of one coordinate: on a grid, of the rows or of the columns.
+        """
+        sides = {}
+        for a, b in self.graph.edges:
+            nearer = self.away[a] < self.away[b]
+            side = nearer ^ nearer[0]
+            sides[side.tobytes()] = side
+        cuts = list(sides.values())
+        if len(cuts) > _VALUES:
+            return ()
+        together: nx.Graph[int] = nx.empty_graph(len(cuts))
+        together.add_edges_from(
+            (n, m) for n, m in combinations(range(len(cuts)), 2) if not _cross(cuts[n], cuts[m])
+        )
+        parts = sorted(sorted(part) for part in nx.connected_components(together))
+        if not 2 <= len(parts) <= _COORDINATES:
+            return ()
+        return tuple(np.stack([cuts[n] for n in part]) for part in parts)
+
+    def coordinate(self, cuts: Bools) -> Ints:
+        """(states) the value of one coordinate."""
+        return _numbered(np.append(_numbered(cuts), -1)[self.of_state][None])
+
+    def coordinate_colours(self, cuts: Bools) -> Ints:
+        """(states) two colours of the values of one coordinate."""
+        found: Ints = np.append(cuts.sum(axis=0) % 2, 0)[self.of_state]
+        return found
+
+    def of_other(self, other: _Values) -> Ints | None:
+        """(states) the value that has the other one's name; None if the two have none in common."""
+        number_of = {name: number for number, name in enumerate(self.names)}
+        numbers = np.array([*(number_of.get(name, -1) for name in other.names), -1])
+        return numbers[other.of_state] if (numbers >= 0).any() else None
+
+    def is_near(self, other: Ints) -> Bools:
+        """(states) whether another value is this one or one beside it."""
+        known = (self.of_state >= 0) & (other >= 0)
+        return known & (self.away[self.of_state, other] <= 1)
+
+    def direction(self, other: Ints, cuts: Bools) -> Ints:
+        """(states) across which of some cuts are neighbours that are nearer to another value."""
+        towards = np.zeros((len(self.names) + 1,) * 2, np.int64)
+        for a, b in self.graph.edges:
+            crossed = np.flatnonzero(cuts[:, a] != cuts[:, b])
+            if len(crossed):
+                bit = 1 << int(crossed[0]) % 62
+                towards[a, :-1] |= np.where(self.away[b] < self.away[a], bit, 0)
+                towards[b, :-1] |= np.where(self.away[a] < self.away[b], bit, 0)
+        found: Ints = towards[self.of_state, other]
+        return found
+
+
+def abstractions(candidates: Candidates, states: Sequence[int]) -> list[Ints]:
+    """Abstractions of the states, those with few abstract states first.
+
+    In each one variable is told, or a coordinate of it or a second one besides; and of the others
+    colours, with nearness or a direction as seen from the first one.
+
+    Parameters
+    ----------
+    candidates
+        The tasks, whose table has the states.
+    states
+        Those that matter, by their numbers in the table.
+
+    Returns
+    -------
+    list[Ints]
+        (states of the table) the number of the abstract state of each.  All of them merge
+        some of the states that matter, and no two are the same.
+    """
+    if not 0 < len(candidates.rows) <= _STATES:
+        return []
+    variables = _variables(candidates)
+    mine = np.array(states)
+    found: dict[bytes, Ints] = {}
+    for columns in _chosen(variables):
+        classes = _numbered(columns)
+        here = _numbered(classes[None, mine])
+        if 0 < here.max() < len(mine) - 1:
+            found.setdefault(here.tobytes(), classes)
+    return sorted(found.values(), key=lambda classes: int(classes[mine].max()))
+
+
+def up_to_symmetry(classes: Sequence[Ints], images: Sequence[Ints]) -> list[Ints]:
+    """Abstractions without those that a symmetry makes of an earlier one.
+
+    Parameters
+    ----------
+    classes
+        (states) the abstract state of each state, of each abstraction.
+    images
+        (states) where symmetries take every state.
+    """
+    met: set[bytes] = set()
+    chosen = []
+    for abstract in classes:
+        if _numbered(abstract[None]).tobytes() not in met:
+            chosen.append(abstract)
+            met.update(_numbered(abstract[None, to]).tobytes() for to in images)
+    return chosen
+
+
+def _variables(candidates: Candidates) -> list[_Values]:
+    """The variables that change, those with many values first."""
+    model: JointModel = candidates.model
+    found = [
+        _Values.of(variable, candidates)
+        for variable in state_variables(model, candidates.rows[0])
+        if len(variable.facts) <= _VALUES
+    ]
+    return [values for values in found if np.ptp(values.of_state)][:_VARIABLES]
+
+
+def _chosen(variables: Sequence[_Values]) -> Iterator[Sequence[Ints | Bools]]:
+    """What is looked at in each abstraction: a list of columns (states)."""
+    for told in variables:
+        others = [values for values in variables if values is not told]
+        colours = [values.colours for values in others]
+        own = told.of_state
+        yield [own]
+        yield [own, *colours]
+        yield from _seen_from(told, others, colours)
+        for cuts in told.coordinates:
+            all_of_others = [values.of_state for values in others]
+            yield [told.coordinate(cuts), told.colours, *all_of_others]
+        if others and all(values.coordinates for values in others):
+            yield [own, *(v.coordinate_colours(c) for v in others for c in v.coordinates)]
+    if len(variables) > 2:
+        for one, other in combinations(variables, 2):
+            rest = [v.colours for v in variables if v is not one and v is not other]
+            yield [one.of_state, other.of_state]
+            yield [one.of_state, other.of_state, *rest]
+
+
+def _seen_from(
+    told: _Values, others: Sequence[_Values], colours: Sequence[Ints]
+) -> Iterator[Sequence[Ints | Bools]]:
+    """What is looked at of others that have values in common with the variable that is told."""
+    seen = [at for values in others if (at := told.of_other(values)) is not None]
+    if not seen:
+        return
+    base = [told.of_state, *colours]
+    near = [told.is_near(at) for at in seen]
+    yield [*base, *near]
+    yield [*base, *(np.where(close, at, -1) for close, at in zip(near, seen, strict=True))]
+    for cuts in told.coordinates:
+        yield [*base, *(told.direction(at, cuts) for at in seen)]
+
+
+def _cross(one: Bools, other: Bools) -> bool:
+    """Whether both sides of one cut meet both sides of another."""
+    return bool((one & other).any() and (one & ~other).any() and (~one & other).any()) and not bool(
+        (one | other).all()
+    )
+
+
+def _numbered(columns: Sequence[Ints | Bools] | Ints | Bools) -> Ints:
+    """(n) a number for each position of some columns (n): equal ones alike, in order of meeting."""
+    number = np.zeros(len(columns[0]), np.int64)
+    for column in columns:
+        own, values = column.astype(np.int64), int(column.max()) + 2
+        _, number = np.unique(number * values + own + 1, return_inverse=True)
+    _, first, number = np.unique(number, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    found: Ints = rank[number]
+    return found
