@@ -10,7 +10,7 @@ partition of a kind is a language says nothing of the others (Proposition 18 of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 
@@ -63,6 +63,12 @@ class _Kind:
     problem: _Orbits | None = None
     rounds: int = 0
 
+    def rules_out(self, other: _Kind) -> bool:
+        """Whether the other kind has no language if this one has none, as far as that is seen."""
+        if len(self.action.words) == 1:
+            return self.tied is other.tied
+        return self.tied is None and self.action is other.action
+
     def close(self) -> None:
         """Give back what the solver holds."""
         if self.problem is not None:
@@ -102,10 +108,12 @@ class _Kinds:
         first = self.deepens and self.effort == _FIRST
         self.effort = _DEEP if first else self.effort.doubled()
 
-    def close(self) -> None:
-        """Give back what the solvers hold."""
-        for kind in (*self.open, *self.undecided):
-            kind.close()
+    def leave_out(self, which: Callable[[_Kind], bool]) -> None:
+        """Leave out some kinds."""
+        for kinds in self.open, self.undecided:
+            for kind in filter(which, kinds):
+                kind.close()
+            kinds[:] = [kind for kind in kinds if not which(kind)]
 
 
 class TiedWords:
@@ -130,19 +138,14 @@ class TiedWords:
         subgroups = self._group.subgroups(every, _SUBGROUPS)
         # Large ones first: they are quick.  All partitions are what the loop looks at.
         self._subgroups = self._group.up_to_conjugation(subgroups, every)[:0:-1]
-        #: For each number of words kinds with an abstraction, and kinds without.
-        self._kinds: dict[int, tuple[_Kinds, _Kinds]] = {}
-        #: Actions, and for a number of words abstractions, under which nothing is a language.
-        self._ruled_out: set[tuple[int, int]] = set()
+        self._kinds: dict[int, list[_Kinds]] = {}
 
     def find(self, size: int, rounds: int) -> Assignment | None:
         """A language with at most ``size`` words; None if none was found with some effort.
 
         The next call with this size goes on, and spends more on what was looked at before.
         """
-        if size not in self._kinds:
-            self._kinds[size] = self._of_size(size)
-        for kinds in self._kinds[size]:
+        for kinds in self._of_size(size):
             if (found := self._among(kinds, size, _TOGETHER * rounds)) is not None:
                 self.drop(size)
                 return found
@@ -151,7 +154,7 @@ class TiedWords:
     def drop(self, size: int) -> None:
         """Forget a number of words that is decided."""
         for kinds in self._kinds.pop(size, ()):
-            kinds.close()
+            kinds.leave_out(lambda _: True)
 
     def close(self) -> None:
         """Give back what the solvers hold."""
@@ -163,34 +166,39 @@ class TiedWords:
         until = self._languages.rounds + rounds
         while kinds.open and self._languages.rounds < until:
             kind = kinds.open.pop(0)
-            if not {(size, id(kind.tied)), (size, id(kind.action))} & self._ruled_out:
-                try:
-                    found = self._of_kind(kind, size, kinds.next_effort())
-                except Undecided:
-                    kinds.leave_undecided(kind)
-                    continue
-                if found is not None:
-                    kind.close()
-                    return found
-                if kind.tied is None:
-                    self._ruled_out.add((size, id(kind.action)))
-                elif len(kind.action.words) == 1:
-                    self._ruled_out.add((size, id(kind.tied)))
+            try:
+                found = self._of_kind(kind, size, kinds.next_effort())
+            except Undecided:
+                kinds.leave_undecided(kind)
+                continue
             kind.close()
+            if found is not None:
+                return found
+            for others in self._kinds[size]:
+                others.leave_out(kind.rules_out)
         if not kinds.open:
             kinds.begin_again()
         return None
 
-    def _of_size(self, size: int) -> tuple[_Kinds, _Kinds]:
-        actions = self._actions(size)
-        states = list(self._states)
-        nothing = WordAction({0: tuple(range(size))})
-        few = [a for a in self._abstractions if _TIED * len(np.unique(a[states])) <= len(states)]
-        abstract = [
-            *(_Kind(nothing, tied) for tied in self._abstractions),
-            *(_Kind(action, tied) for tied in few for action in actions),
-        ]
-        return _Kinds(abstract, deepens=False), _Kinds([*map(_Kind, actions)], deepens=True)
+    def _of_size(self, size: int) -> Iterator[_Kinds]:
+        """The kinds with an abstraction alone, then those with both, and those with symmetries."""
+        if size not in self._kinds:
+            nothing = WordAction({0: tuple(range(size))})
+            alone = [_Kind(nothing, tied) for tied in self._abstractions]
+            self._kinds[size] = [_Kinds(alone, deepens=False)]
+        known = self._kinds[size]
+        yield known[0]
+        if len(known) == 1:
+            actions = self._actions(size)
+            left = [kind.tied for kind in (*known[0].open, *known[0].undecided)]
+            few = [tied for tied in left if tied is not None and self._ties_many(tied)]
+            both = [_Kind(action, tied) for tied in few for action in actions]
+            known.append(_Kinds(both, deepens=False))
+            known.append(_Kinds([_Kind(action) for action in actions], deepens=True))
+        yield from known[1:]
+
+    def _ties_many(self, tied: Ints) -> bool:
+        return _TIED * len(np.unique(tied[list(self._states)])) <= len(self._states)
 
     def _actions(self, size: int) -> list[WordAction]:
         """The actions of subgroups on words, without those that some single symmetry rules out.
