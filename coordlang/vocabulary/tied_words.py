@@ -129,7 +129,7 @@ class TiedWords:
 
     def __init__(self, job: Job, languages: Languages) -> None:
         self._states, self._languages = job.states, languages
-        self._refuter = languages.refuter
+        self._refuter = languages.refuter.copy()
         self._random = np.random.default_rng(job.seed)
         images = languages.refuter.pool.images
         self._abstractions = up_to_symmetry(abstractions(job.candidates, job.states), images)

@@ -1,17 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Languages in which the words of some states decide those of others."""
+"""Words of a kind: languages are found, and nothing is ever proved by not finding one."""
 
 from __future__ import annotations
 
+from collections import Counter
+from itertools import product
+from random import Random
+
+import numpy as np
 import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates
 from coordlang.language.partition import Partition
+from coordlang.symmetry.subgroups import group_table
 from coordlang.verification.candidates import verify_candidates
+from coordlang.vocabulary.abstractions import abstractions
+from coordlang.vocabulary.failing_tuples import agree
 from coordlang.vocabulary.job import Assignment, Job
-from coordlang.vocabulary.loop import Languages
-from coordlang.vocabulary.tied_words import TiedWords, _values
+from coordlang.vocabulary.loop import Budget, Languages
+from coordlang.vocabulary.orbit_words import OrbitWords
+from coordlang.vocabulary.recent_tuples import RecentTuples
+from coordlang.vocabulary.tied_words import TiedWords, _Kind, _Kinds, _Orbits
 from planners.parallel.workers import Workers
 from tests.support.domains import all_tasks
 
@@ -39,7 +49,126 @@ def test_what_is_found_is_a_language_of_its_kind(stem: str, least: int) -> None:
         == len({*tied})
         for tied in (
             *([language[to[s]] for s in job.states] for to in languages.known.group.permutations),
-            *(value[list(job.states)].tolist() for value in _values(candidates)),
+            *(a[list(job.states)].tolist() for a in abstractions(candidates, job.states)),
         )
-    ), "the word says where a state's image is, or the value of a variable says the word"
+    ), "the word says where a state's image is, or an abstraction says the word"
     assert found(candidates, least - 1)[2] is None
+
+
+def test_the_same_seed_finds_the_same() -> None:
+    candidates = all_tasks("grid", "gw2-2x3")
+    assert found(candidates, 6)[2] == found(candidates, 6)[2] is not None
+
+
+@pytest.mark.parametrize("finds", ["nothing", "all words"])
+def test_what_is_not_found_raises_no_bound(monkeypatch: pytest.MonkeyPatch, finds: str) -> None:
+    """Whatever is found, least numbers and bounds stay the same."""
+    find = TiedWords.find
+    asked: list[int] = []
+
+    def told(search: TiedWords, size: int, rounds: int) -> Assignment | None:
+        asked.append(size)
+        return None if finds == "nothing" else find(search, size, rounds)
+
+    monkeypatch.setattr(TiedWords, "find", told)
+    monkeypatch.setattr(Budget.__init__, "__defaults__", (1, 30_000))
+    built = build_language(all_tasks("grid", "gw2-2x3"), "minimal")
+    guarantee = built.language.guarantee
+    assert (guarantee.size, guarantee.lower_bound) == (5, 5)
+    assert built.verdict.holds
+    assert asked
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_partitions_of_a_kind_are_found_iff_there_are_some(seed: int) -> None:
+    """Under growing clauses and their images: against all partitions of six states."""
+    random = Random(seed)
+    one, other = np.array([1, 0, 3, 2, 4, 5]), np.array([0, 1, 2, 3, 5, 4])
+    group = group_table([np.arange(6), one, other, one[other]])
+    subgroups = group.subgroups(frozenset(range(4)), 10)
+    actions = [action for h in subgroups for action in group.word_actions(h, 3, 10)]
+    recent = RecentTuples(Languages.of(job_of("gw1-2x2")).refuter, 1)
+    answers = Counter[bool]()
+    for action, tied in product(actions, (None, np.array([0, 1, 0, 1, 2, 3]))):
+        kind = OrbitWords.of(range(6), group, action, 3, tied)
+        if kind is None:
+            continue
+        left = {
+            tuple(kind.partition(np.array(choice)).tolist())
+            for choice in product(*(range(len(words)) for words in kind.words))
+        }
+        problem = _Orbits.of(kind, [group.elements[h] for h in action.subgroup], recent)
+        for _ in range(4):
+            pairs = [[random.sample(range(6), 2) for _ in range(2)] for _ in range(2)]
+            codes = [[min(pair) * 6 + max(pair) for pair in clause] for clause in pairs]
+            images = group.right_cosets(frozenset(action.words))
+            problem.separate_one_of_each(np.array([[*row, -1] for row in codes]), images)
+            left = {
+                word
+                for word in left
+                if all(
+                    any(word[to[a]] != word[to[b]] for a, b in clause)
+                    for to in group.elements
+                    for clause in pairs
+                )
+            }
+            partition = problem.solve(10_000)
+            assert (partition is not None) == bool(left)
+            assert partition is None or tuple(partition[state] for state in range(6)) in left
+            answers[bool(left)] += 1
+        problem.close()
+    assert min(answers[True], answers[False]) >= 3, answers
+
+
+def test_a_few_kinds_are_looked_at_to_their_end() -> None:
+    """At first all alike; then each has half of what one had that used all of it up."""
+    kinds = [_Kind(group_table([np.arange(3)]).cyclic_action(0, (0, 1))) for _ in range(4)]
+    looked_at = _Kinds([*kinds], deepens=True)
+    rounds: list[list[int]] = []
+    for _ in range(3):
+        rounds.append([])
+        while looked_at.open:
+            kind = looked_at.open.pop(0)
+            rounds[-1].append(looked_at.next_effort().rounds)
+            if kind is not kinds[1]:  # it stops for its conflicts
+                kind.rounds = rounds[-1][-1]
+            looked_at.leave_undecided(kind)
+        looked_at.begin_again()
+    assert rounds == [[50] * 4, [800, 400, 400, 200], [1600, 800, 800, 400]]
+
+
+def test_kinds_rule_out_others() -> None:
+    """An abstraction with all symmetries, an action with all abstractions."""
+    group = group_table([np.arange(3), np.array([1, 0, 2])])
+    nothing, action = group.cyclic_action(0, (0, 1)), group.cyclic_action(1, (1, 0))
+    one, other = np.array([0, 1, 0]), np.array([0, 0, 1])
+    assert _Kind(nothing, one).rules_out(_Kind(action, one))
+    assert not _Kind(nothing, one).rules_out(_Kind(action, other))
+    assert not _Kind(nothing, one).rules_out(_Kind(action))
+    assert _Kind(action).rules_out(_Kind(action, one))
+    assert not _Kind(action, one).rules_out(_Kind(action))
+
+
+@pytest.mark.parametrize("least", [1, 20])
+def test_recent_tuples_are_some_of_those_that_agree(least: int) -> None:
+    """None iff the partition is a language for the tuples known; each agrees, none twice."""
+    refuter, random = Languages.of(job_of("gw2-2x3")).refuter, np.random.default_rng(0)
+    recent = RecentTuples(refuter, 50, least)
+    sizes: Counter[bool] = Counter()
+    for words in (1, 2, 3, 4, 6, 9, 14, 30) * 4:
+        word = random.integers(words, size=len(refuter.pool.images[0]))
+        known = recent.agreeing(word)
+        every = refuter.agreeing(word)
+        assert bool(known) == bool(every)
+        here = {(f.length, f.to.tobytes(), row) for f in known for row in f.rows.tolist()}
+        assert len(here) == sum(len(f.rows) for f in known)
+        assert here <= {(f.length, f.to.tobytes(), row) for f in every for row in f.rows.tolist()}
+        for some in known:
+            sequences = refuter.pool.sequences(some, some.rows)
+            assert agree(word, sequences.transpose(2, 1, 0)).all()
+        sizes[len(here) < sum(len(f.rows) for f in every)] += 1
+    assert min(sizes[True], sizes[False]) >= 1, sizes
+
+
+def job_of(stem: str) -> Job:
+    return build_language(all_tasks("grid", stem), "greedy").job

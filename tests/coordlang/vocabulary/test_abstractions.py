@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Abstractions of states against what they are to say, worked out from the states' texts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Hashable
+
+import numpy as np
+import pytest
+
+from coordlang.language.candidates import Candidates
+from coordlang.language.keys import keys_of
+from coordlang.symmetry.group import symmetry_group
+from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
+from planners.joint.tables import Ints
+from tests.support.domains import all_tasks
+
+Cell = tuple[int, int]
+
+
+def places(candidates: Candidates) -> list[list[Cell]]:
+    """Where each robot is, in each state."""
+    keys = keys_of(candidates.model.codec, candidates.rows)
+    at = [sorted(re.findall(r"\(at (r\d) c(\d+)-(\d+)\)", key)) for key in keys]
+    return [[(int(row), int(column)) for _, row, column in state] for state in at]
+
+
+def partition(labels: list[Hashable]) -> bytes:
+    """The partition that labels make, as numbers in order of meeting."""
+    number = {label: n for n, label in enumerate(dict.fromkeys(labels))}
+    return np.array([number[label] for label in labels]).tobytes()
+
+
+def as_labels(classes: Ints) -> bytes:
+    return partition(classes.tolist())
+
+
+def colour(cell: Cell) -> int:
+    return sum(cell) % 2
+
+
+def beside(one: Cell, other: Cell) -> bool:
+    return abs(one[0] - other[0]) + abs(one[1] - other[1]) <= 1
+
+
+def side(one: int, other: int) -> int:
+    return (one > other) - (one < other)
+
+
+@pytest.mark.parametrize(
+    "says",
+    [
+        lambda a, b: a,
+        lambda a, b: (a, colour(b)),
+        lambda a, b: (a, colour(b), beside(a, b)),
+        lambda a, b: (a, colour(b), b if beside(a, b) else None),
+        lambda a, b: (a, colour(b), side(a[0], b[0])),
+        lambda a, b: (a, colour(b), side(a[1], b[1])),
+        lambda a, b: (a, b[0] % 2, b[1] % 2),
+        lambda a, b: (a[0], colour(a), b),
+        lambda a, b: (a[1], colour(a), b),
+    ],
+)
+def test_what_abstractions_of_a_grid_say(says: Callable[[Cell, Cell], Hashable]) -> None:
+    """Of two robots on 3x3 cells, up to the robots' names."""
+    candidates = all_tasks("grid", "gw4-3x3")
+    found = {as_labels(a) for a in abstractions(candidates, range(len(candidates.rows)))}
+    assert partition([says(a, b) for a, b in places(candidates)]) in found
+    assert partition([says(b, a) for a, b in places(candidates)]) in found
+
+
+def test_abstractions_of_a_ring() -> None:
+    """Its cuts all cross each other: there are no coordinates, but colours and nearness."""
+    candidates = all_tasks("grid", "gwb3-3x4")
+    found = abstractions(candidates, range(len(candidates.rows)))
+    both = places(candidates)
+    labels = {as_labels(classes) for classes in found}
+    assert {partition([a for a, _ in both]), partition([(a, colour(b)) for a, b in both])} < labels
+    assert len(found) == 8, "four, for each robot"
+
+
+def test_places_without_a_joint_colour() -> None:
+    """On three cells that all touch each other a colour is whether a robot is in the first one."""
+    candidates = all_tasks("three-cells")
+    found = {as_labels(a) for a in abstractions(candidates, range(len(candidates.rows)))}
+    keys = keys_of(candidates.model.codec, candidates.rows)
+    robot = [re.findall(r"\(\S+ (\S+) (\S+)\)", key) for key in keys]
+    assert partition([dict(state)[sorted(dict(state))[0]] for state in robot]) in found
+
+
+@pytest.mark.parametrize(
+    ("folder", "stem"),
+    [
+        ("grid", "gw2-2x3"),
+        ("t-map", "problem"),
+        ("grid-joint", "gw2-2x3"),
+        ("handover", "exchange"),
+        ("flags", "two-up"),
+        ("push-box", "around"),
+        ("two-arms", "exchange"),
+    ],
+)
+def test_every_abstraction_merges_states_and_is_another(folder: str, stem: str) -> None:
+    candidates = all_tasks(folder, stem)
+    states = sorted({s for space in candidates.spaces for s in space.state.tolist()})
+    found = abstractions(candidates, states)
+    sizes = [len(set(classes[states].tolist())) for classes in found]
+    assert sizes == sorted(sizes)
+    assert all(1 < size < len(states) for size in sizes)
+    assert len({as_labels(classes[states]) for classes in found}) == len(found)
+    assert all(len(classes) == len(candidates.rows) for classes in found)
+
+
+def test_of_abstractions_that_look_alike_one_is_left() -> None:
+    """Where robot 1 is, or where robot 2 is; and each that is left is no image of another."""
+    candidates = all_tasks("grid", "gw2-2x3")
+    every = abstractions(candidates, range(len(candidates.rows)))
+    images = [np.array(to) for to in symmetry_group(candidates).permutations]
+    images = [np.arange(len(candidates.rows)), *images]
+    left = up_to_symmetry(every, images)
+    assert len(left) < len(every)
+    for number, classes in enumerate(left):
+        mine = {as_labels(classes[to]) for to in images}
+        assert not any(as_labels(other) in mine for other in left[number + 1 :])
+    for classes in every:
+        assert any(as_labels(classes) in {as_labels(one[to]) for to in images} for one in left)
