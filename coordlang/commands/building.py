@@ -49,6 +49,7 @@ class MethodOptions:
     effort: int = option(
         EFFORT,
         "best: what the search for fewer words may spend, in thousands of conflicts of its solver.",
+        "N",
         least=0,
     )
     seed: int = option(0, "Seed of all random choices.", least=0)

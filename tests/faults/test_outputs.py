@@ -14,6 +14,8 @@ import pytest
 from coordlang.commands.built import Built
 from coordlang.language.file import read_language
 from coordlang.verification.certificate_file import read_certificate
+from coordlang.vocabulary.loop import Budget
+from coordlang.vocabulary.minimal import MinimalSearch
 from planners.system.errors import OutOfTime, UsageError
 from planners.system.writing import write_atomically
 from tests.support.command import Command
@@ -250,10 +252,14 @@ def test_a_search_that_is_stopped_leaves_no_old_certificate(
 ) -> None:
     """In place of the old certificate is that of the bound that was proved."""
 
-    def late(*_: object) -> None:
-        raise error
+    decide = MinimalSearch.decide
 
-    monkeypatch.setattr(sys.modules["coordlang.vocabulary.separating"]._Search, "decide", late)
+    def late(search: MinimalSearch, size: int, budget: Budget) -> bool:
+        if size > 1:  # that one word is not enough is known
+            raise error
+        return decide(search, size, budget)
+
+    monkeypatch.setattr(MinimalSearch, "decide", late)
     tasks = [DOMAINS / "grid" / name for name in ("domain.pddl", "gw2-2x3.pddl")]
     arguments = "--tasks", "all", "--method", "minimal"
     outcome = coordlang("build", *tasks, *arguments, *PAIR)

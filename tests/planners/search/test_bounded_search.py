@@ -101,7 +101,7 @@ def compared(models: Iterable[PlanningInstance]) -> Counter[str]:
     return met
 
 
-@pytest.mark.parametrize(("robots", "number"), [(2, 40), (3, 30), (None, 50)])
+@pytest.mark.parametrize(("robots", "number"), [(2, 40), (3, 30), (None, 90)])
 def test_bounds_lose_no_optimal_plan(robots: int | None, number: int) -> None:
     met = compared(instances(range(number), robots))
     assert met["solved"] >= 10
