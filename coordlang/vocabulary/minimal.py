@@ -15,16 +15,19 @@ from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from coordlang.language.warping import Clause
-from coordlang.vocabulary.contained import ContainedInstance, parts, tasks_of_one_orbit
 from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome, word_count
 from coordlang.vocabulary.loop import Budget, Languages, close_bounds, find
 from coordlang.vocabulary.merging import merged
 from coordlang.vocabulary.partitions import Partitions, Refutation
 from coordlang.vocabulary.sat import Undecided
-from coordlang.vocabulary.tied_words import TiedWords
 from planners.system.limits import run_until_stopped
+
+if TYPE_CHECKING:  # they load networkx
+    from coordlang.vocabulary.contained import ContainedInstance
+    from coordlang.vocabulary.tied_words import TiedWords
 
 #: A thousand conflicts are a unit of effort; a refuted partition counts as so many ..
 _UNIT, _ROUND = 1_000, 250
@@ -101,10 +104,18 @@ class MinimalSearch:
 
     @cached_property
     def _tied(self) -> TiedWords:
+        from coordlang.vocabulary.tied_words import TiedWords
+
         return TiedWords(self._job, self.languages)
 
     @cached_property
     def _contained(self) -> list[ContainedInstance]:
+        from coordlang.vocabulary.contained import (
+            ContainedInstance,
+            parts,
+            tasks_of_one_orbit,
+        )
+
         candidates, group = self._job.candidates, self.languages.known.group
         found = [*tasks_of_one_orbit(candidates, group), *parts(candidates, group)]
         instances = [ContainedInstance(part, self._job.seed) for part in found]
