@@ -39,9 +39,10 @@ def _more_effort(built: Built) -> str:
     guarantee, effort = built.guarantee, built.job.effort
     if guarantee.method != "best" or guarantee.proved_minimal:
         return ""
+    larger = "larger limit" if built.stopped else f"larger --effort than {effort}"
     return (
-        f"between {guarantee.lower_bound} and {guarantee.size} words are needed: a larger "
-        f"--effort than {effort} may find fewer or prove that there are none\n"
+        f"between {guarantee.lower_bound} and {guarantee.size} words are needed: a {larger} "
+        "may find fewer or prove that there are none\n"
     )
 
 
