@@ -7,6 +7,7 @@ What is read is never executed: a file holds arrays without Python objects.
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -51,7 +52,7 @@ class Store:
         """The table of a key; None if there is none, or none that is whole."""
         path = self._path(key)
         try:
-            if not path.is_file() and path.exists():  # a pipe would be waited for
+            if not stat.S_ISREG(path.stat().st_mode):  # a pipe would be waited for
                 self._ignore(path, "is no file")
                 return None
             data = path.read_bytes()
