@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
 from multiprocessing.connection import wait
@@ -51,6 +52,8 @@ def in_processes(
             executor.submit(int)
         yield futures
     except OSError as error:
+        if any(process.exitcode is not None for process in context.started if process.pid):
+            raise BrokenProcessPool(f"a worker ended as it was started: {error}") from None
         kind = OutOfMemory if lacks_memory(error) else UsageError
         raise kind(
             f"worker processes cannot be started: {error.strerror or error}",
