@@ -54,7 +54,7 @@ suppress_warnings = [
     "ref.python",  # two classes of one name, in an annotation that does not say which
 ]
 #: Names of other projects that are imported for annotations only, and types with arguments.
-nitpick_ignore_regex = [("py:.*", r"Axes|Figure|Drawing|Point|types\.Annotated|.*\[.*")]
+nitpick_ignore_regex = [("py:.*", r"Axes|Figure|Drawing|types\.Annotated|.*\[.*")]
 
 default_role = "autolink"  # a name in single backticks links to its entry, where it has one
 autodoc_member_order = "bysource"

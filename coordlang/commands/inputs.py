@@ -21,6 +21,7 @@ from coordlang.commands.options import (
     TasksSource,
     no_progress,
 )
+from coordlang.sites.coordinates import Point, checked, read_coordinates
 from planners.loading import PlanningInstance, build
 from planners.pddl import read_domain, read_problem
 from planners.pddl.factored import read_factored
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from coordlang.language.tolerance import Tolerance
     from coordlang.language.words import Language
     from coordlang.lifted.language import LiftedLanguage
-    from coordlang.sites.coordinates import Point
 
 #: Options that are fixed in a loaded domain.
 _FIXED = frozenset({"cost", "unowned", "remember_actions", "slack", "words_see_slack"})
@@ -218,8 +218,6 @@ def read_plain_language(language: LanguageSource) -> tuple[Language, Position]:
 
 def read_coordinates_of(given: CoordinatesSource | None, problem: Problem) -> Mapping[str, Point]:
     """Coordinates of places: those given, else those of a file beside the problem, else none."""
-    from coordlang.sites.coordinates import checked, read_coordinates
-
     if isinstance(given, str | PathLike):
         return read_coordinates(fspath(given))
     if given is not None:

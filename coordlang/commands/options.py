@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from coordlang.language.listed import ListedTask
     from coordlang.language.words import Language
     from coordlang.lifted.language import LiftedLanguage
-    from coordlang.sites.coordinates import Point
     from planners.loading import PlanningInstance
     from planners.pddl.lifted import Domain, Problem
 
@@ -32,7 +31,7 @@ TasksSource = Union[File, Mapping[str, Any], "Sequence[ListedTask | Mapping[str,
 LanguageSource = Union[File, "Language", "LiftedLanguage"]
 LiftedSource = Union[File, "LiftedLanguage"]
 #: A file of coordinates, or place -> (x, y).
-CoordinatesSource = Union[File, "Mapping[str, Point]"]
+CoordinatesSource = File | Mapping[str, tuple[float, float]]
 #: A sentence: ``"w1 w0"``, its words ``("w1", "w0")``, or one of `explain`.
 SentenceSource = str | Iterable[str]
 
