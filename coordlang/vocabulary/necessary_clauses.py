@@ -16,6 +16,9 @@ from coordlang.vocabulary.job import Evidence
 from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
 
+#: So many failing tuples are always wanted of a walk, which finds many in one go.
+_OF_WALK = 20_000
+
 
 @dataclass(frozen=True, slots=True)
 class TaskPart:
@@ -60,7 +63,7 @@ class TaskPart:
         """
         nodes = word[self.space.state]
         if isinstance(self.finder, CounterexampleWalk):
-            return self.finder.failing(nodes, most, ways)
+            return self.finder.failing(nodes, max(most, _OF_WALK), ways)
         return many_counterexamples(self.finder, nodes, most, ways)
 
 

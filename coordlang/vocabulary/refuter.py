@@ -31,9 +31,8 @@ from planners.search.plan_space import PlanSpace
 _LEAST_PARTS = 8
 #: .. of about so many tasks at most.
 _TASKS_OF_A_PART = 1_500
-#: Failing tuples of a part that are collected at the beginning, and later at a time; of two robots,
-#: where a walk finds many in one go.
-_AT_FIRST, _LATER, _OF_TWO = 4_000, 100, 20_000
+#: Failing tuples of a part that are collected at the beginning, and later at a time.
+_AT_FIRST, _LATER = 4_000, 100
 #: Longer tuples are left out of what is looked at once there are so many.
 _ENOUGH = 2_000
 _COLUMNS = ("start", "edges", "states")
@@ -52,7 +51,6 @@ class _Walked:
 
     def failing(self, word: Ints, most: int) -> list[Counterexamples]:
         """See `TaskPart.failing`."""
-        most = _OF_TWO if self.part.space.robots == 2 else most
         return self.part.failing(word, most, ways=len(self.images))
 
     @property
