@@ -77,10 +77,6 @@ class OrbitWords:
             word[members] = words[own]
         return word
 
-    def random_choice(self, random: np.random.Generator) -> Ints:
-        """A choice for every orbit, each with the same probability."""
-        return random.integers([len(words) for words in self.words])
-
 
 class _TiedStates:
     """States some of which decide the words of others: a forest with permutations on its edges.

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -115,11 +115,6 @@ def search(model: JointModel, task: PlanningTask) -> PlanSpace:
             remedy="Say --no-cache, or set COORDLANG_CACHE to a folder that you may write to.",
         )
     return found
-
-
-def search_each(model: JointModel, tasks: Sequence[PlanningTask]) -> PlanSpace:
-    """`search` for each task, as one plan space in which every task has a goal of its own."""
-    return optimal_plans.joined([search(model, task) for task in tasks])
 
 
 def _plan_space(table: Table, model: JointModel, task: PlanningTask) -> PlanSpace:
