@@ -26,7 +26,6 @@ from coordlang.commands.terminal import covered_code, echo, line_width, warn_of_
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.cover import Cover
 from coordlang.explanation.demands import SentenceDemands, sentence_demands
-from coordlang.explanation.descriptions import WordDescriptions, describe_words
 from coordlang.explanation.lifted_words import LiftedWords, lifted_words
 from coordlang.explanation.text import (
     cover_data,
@@ -38,7 +37,13 @@ from coordlang.explanation.text import (
 from coordlang.explanation.text import (
     shown as formula_text,
 )
-from coordlang.explanation.words import MappedStates, all_covers, mapped_states
+from coordlang.explanation.words import (
+    MappedStates,
+    WordDescriptions,
+    all_covers,
+    describe_words,
+    mapped_states,
+)
 from coordlang.language.candidates import describe
 from coordlang.language.sentences import TaskSentence, task_sentences
 from coordlang.language.tolerance import tolerance_data

@@ -69,19 +69,9 @@ Term = tuple[Literal, ...]
 class Cover:
     """A formula that is true in all states of one word and false in those of all other words.
 
-    It is a disjunction of terms.
-
-    Parameters
-    ----------
-    terms
-        The terms.
-    counts
-        ``counts[k]`` is the number of the word's states in which ``terms[k]`` is true (one state
-        may satisfy several).
-    states
-        The number of the word's states.
-    fewest
-        Whether it is proved that no disjunction of fewer terms does it.
+    It is a disjunction of terms.  ``counts[k]`` is the number of the word's ``states`` in which
+    ``terms[k]`` is true (one state may satisfy several).  ``fewest``: it is proved that no
+    disjunction of fewer terms does it.
     """
 
     terms: tuple[Term, ...]

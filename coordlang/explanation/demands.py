@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise
 
@@ -12,13 +12,12 @@ import numpy as np
 
 from coordlang.explanation.cover import Cover
 from coordlang.language.partition import Partition
+from coordlang.required.choices import Choices
 from planners.joint.model import JointModel, own_text
 from planners.joint.tables import Bools, Ints, find_rows
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 
-#: More sets of plan-space nodes than this in one step, and a robot's subplans are not counted.
-_SETS = 5_000
 #: States at which it is computed which robots decide the next word.
 _STATES = 500
 
@@ -33,21 +32,13 @@ Subplan = tuple[str | None, ...]
 class RobotPart:
     """What a sentence leaves to one robot.
 
-    Parameters
-    ----------
-    robot
-        Its name.
-    subplans
-        The number of its different subplans in the plans with the sentence; None: too many to
-        count.
-    listed
-        All of them if they are few, else empty.
-    by_step
-        For each step the subactions that it does then in some of the plans.
+    ``subplans`` is the number of its different subplans in the plans with the sentence; ``listed``
+    are all of them if they are few, else empty.  ``by_step`` are for each step the subactions that
+    it does then in some of the plans.
     """
 
     robot: str
-    subplans: int | None
+    subplans: int
     listed: tuple[Subplan, ...]
     by_step: tuple[Subplan, ...]
 
@@ -56,18 +47,11 @@ class RobotPart:
 class WordChange:
     """A change from one word of the sentence to the next one.
 
-    Parameters
-    ----------
-    before, after
-        The two words.
-    earliest, latest
-        The first and the last step (from 1) at whose end plans make it.
-    robots
-        The fewest robots whose subactions decide it: wherever plans make the change, these robots'
-        subactions settle whether a joint step to a mapped state makes it, whatever the others do.
-        No robots: every such step makes it.
-    ways
-        What they do, one entry each, and the steps in which plans make the change in this way.
+    ``earliest`` and ``latest`` are the first and the last step (from 1) at whose end plans make it.
+    ``robots`` are the fewest robots whose subactions decide it: wherever plans make the change,
+    these robots' subactions settle whether a joint step to a mapped state makes it, whatever the
+    others do; no robots: every such step makes it.  ``ways`` are what they do, one entry each, and
+    the steps in which plans make the change in this way.
     """
 
     before: str
@@ -80,21 +64,7 @@ class WordChange:
 
 @dataclass(frozen=True, slots=True)
 class SentenceDemands:
-    """What one sentence of one task demands.
-
-    Parameters
-    ----------
-    sentence
-        Its words.
-    plans
-        The number of optimal plans with it.
-    steps
-        Their makespan.
-    parts
-        Each robot's part.
-    changes
-        The changes of word, in order.
-    """
+    """What one sentence of one task demands: ``steps`` is the makespan of its ``plans``."""
 
     sentence: tuple[str, ...]
     plans: int
@@ -125,6 +95,7 @@ def sentence_demands(
     start = int(space.starts[0])
     _, first = np.unique(passed, return_index=True)
     sentence = word[first].tolist()
+    choices = Choices(space)
     changes = []
     for number, pair in enumerate(pairwise(sentence), 1):
         order = _named_first(space.model.robots, formulas[partition.words[pair[1]]])
@@ -133,7 +104,7 @@ def sentence_demands(
         sentence=tuple(partition.words[w] for w in sentence),
         plans=counts(space)[start],
         steps=space.cost_of(0)[0],
-        parts=tuple(_part(space, robot, few) for robot in range(len(space.model.robots))),
+        parts=tuple(_part(choices, robot, few) for robot in range(space.robots)),
         changes=tuple(changes),
     )
 
@@ -152,19 +123,19 @@ def words_passed(space: PlanSpace, word: Ints) -> Ints:
     return passed
 
 
-def _part(space: PlanSpace, robot: int, few: int) -> RobotPart:
-    name = space.model.robots[robot]
-    steps = range(space.cost_of(0)[0], 0, -1)
-    by_step = tuple(
-        _subplan(space.model, robot, np.unique(space.robot_labels(robot, edges)).tolist())
-        for edges in (space.layer_edges(layer).edges for layer in steps)
+def _part(choices: Choices, robot: int, few: int) -> RobotPart:
+    space = choices.space
+    steps = (space.layer_edges(layer).edges for layer in range(space.cost_of(0)[0], 0, -1))
+    labels = [np.unique(space.robot_labels(robot, edges)).tolist() for edges in steps]
+    own = int(choices.of_node[robot, space.starts[0]])
+    subplans = choices.sets.size(own)
+    listed = choices.sets.sequences(own) if subplans <= few else ()
+    return RobotPart(
+        space.model.robots[robot],
+        subplans,
+        tuple(_subplan(space.model, robot, sequence) for sequence in listed),
+        tuple(_subplan(space.model, robot, used) for used in labels),
     )
-    found = _subplans(space, robot, few)
-    if found is None:
-        return RobotPart(name, None, (), by_step)
-    number, listed = found
-    texts = tuple(_subplan(space.model, robot, labels) for labels in listed)
-    return RobotPart(name, number, texts, by_step)
 
 
 def _subplan(model: JointModel, robot: int, labels: Sequence[int]) -> Subplan:
@@ -175,42 +146,6 @@ def _subplan(model: JointModel, robot: int, labels: Sequence[int]) -> Subplan:
 def _own_text(model: JointModel, robot: int, label: int) -> str | None:
     text = model.label_text(robot, label)
     return None if text is None else own_text(text, model.robots[robot])
-
-
-def _subplans(space: PlanSpace, robot: int, few: int) -> tuple[int, list[tuple[int, ...]]] | None:
-    """The number of a robot's subplans, and all of them (labels) if they are at most ``few``.
-
-    Found over the sets of nodes that one sequence of own subactions leaves possible; None if there
-    are too many such sets.
-    """
-    start = (int(space.starts[0]),)
-    sets: dict[tuple[int, ...], int] = {start: 1}
-    sequences: dict[tuple[int, ...], list[tuple[int, ...]]] = {start: [()]}
-    for _ in range(space.cost_of(0)[0]):
-        reached: dict[tuple[int, ...], int] = defaultdict(int)
-        longer: dict[tuple[int, ...], list[tuple[int, ...]]] = defaultdict(list)
-        for nodes, number in sets.items():
-            for label, after in _moves(space, robot, nodes):
-                reached[after] += number
-                longer[after] += [(*before, label) for before in sequences[nodes]]
-        if len(reached) > _SETS:
-            return None
-        sets = reached
-        sequences = {nodes: found[: few + 1] for nodes, found in longer.items()}
-    total = sum(sets.values())
-    if total > few:
-        return total, []
-    return total, sorted(labels for found in sequences.values() for labels in found)
-
-
-def _moves(
-    space: PlanSpace, robot: int, nodes: Sequence[int]
-) -> Iterator[tuple[int, tuple[int, ...]]]:
-    """The robot's subactions that lead on from some of the nodes, and where they may lead."""
-    _, edges = space.edges_from(np.array(nodes))
-    labels = space.robot_labels(robot, edges)
-    for label in np.unique(labels).tolist():
-        yield label, tuple(np.unique(space.targets(edges[labels == label])).tolist())
 
 
 def _named_first(robots: Sequence[str], formula: Cover) -> list[int]:

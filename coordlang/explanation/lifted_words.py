@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from coordlang.explanation.boxes import Points
-from coordlang.explanation.minimise import minimise
+from coordlang.explanation.minimise import Points, minimise
 from coordlang.language.words import Language
 from coordlang.lifted.features import Feature
 from coordlang.lifted.file import read_values
@@ -20,6 +19,7 @@ from coordlang.lifted.wording import condition, english, formula
 from coordlang.lifted.world import States, World
 from coordlang.sites.coordinates import Point
 from planners.joint.model import JointModel
+from planners.joint.tables import Ints
 from planners.pddl.lifted import Domain, Problem
 from planners.system.errors import Position, note
 
@@ -28,13 +28,8 @@ from planners.system.errors import Position, note
 class LiftedWords:
     """Words as formulas over features, the same in every problem of the domain.
 
-    Attributes
-    ----------
-    features
-        The features.
-    terms
-        Word -> the terms of its formula, a disjunction.  It is exact for all values that the lifted
-        language knows and those that states here have.
+    ``terms``: word -> the terms of its formula, a disjunction.  It is exact for all values that the
+    lifted language knows and those that states here have.
     """
 
     features: tuple[Feature, ...]
@@ -99,34 +94,32 @@ def _terms(
     features: Sequence[Feature], values: Mapping[Vector, str], words: Sequence[str]
 ) -> dict[str, tuple[str, ...]]:
     """Word -> terms, of the words that have values."""
-    vectors = np.array(sorted(values), np.int64).reshape(len(values), len(features))
-    word = np.array([values[vector] for vector in map(tuple, vectors.tolist())], object)
-    domains = [sorted(set(column)) for column in vectors.T.tolist()]
-    number = np.array(
-        [np.searchsorted(own, column) for own, column in zip(domains, vectors.T, strict=True)],
-        np.int64,
-    ).reshape(len(features), len(values))
+    vectors = sorted(values)
+    word = np.array([values[vector] for vector in vectors], object)
+    table = np.array(vectors, np.int64).reshape(len(vectors), len(features))
+    domains = [np.unique(column) for column in table.T]
+    number = np.zeros_like(table)
+    for column, own in enumerate(domains):
+        number[:, column] = np.searchsorted(own, table[:, column])
     sizes = tuple(map(len, domains))
     found = {}
     for name in words:
         mine = word == name
         if mine.any():
-            boxes = minimise(Points(sizes, number.T[mine], number.T[~mine]))
-            found[name] = tuple(_term(features, domains, box) for box in boxes.prime)
+            points = Points(sizes, number[mine], number[~mine])
+            terms = []
+            for box in minimise(points).prime:
+                allowed = [own[box[s]] for own, s in zip(domains, points.spans, strict=True)]
+                terms.append(_term(features, allowed, sizes))
+            found[name] = tuple(terms)
     return found
 
 
-def _term(
-    features: Sequence[Feature], domains: Sequence[Sequence[int]], box: np.ndarray[Any, Any]
-) -> str:
+def _term(features: Sequence[Feature], allowed: Sequence[Ints], sizes: Sequence[int]) -> str:
     """A conjunction of limits on features; the empty one is ``true``."""
     parts = []
-    first = 0
-    for feature, own in zip(features, domains, strict=True):
-        allowed = [value for value, inside in zip(own, box[first:], strict=False) if inside]
-        first += len(own)
-        if len(allowed) == len(own):
-            continue
-        limits = [condition(feature, value) for value in allowed]
-        parts.append(limits[0] if len(limits) == 1 else f"({' or '.join(limits)})")
+    for feature, values, size in zip(features, allowed, sizes, strict=True):
+        if len(values) < size:
+            limits = [condition(feature, value) for value in values.tolist()]
+            parts.append(limits[0] if len(limits) == 1 else f"({' or '.join(limits)})")
     return " and ".join(parts) or "true"

@@ -1,26 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The fewest boxes that hold some points and avoid others.
+"""The fewest boxes that hold some points and avoid others: two-level minimisation, multi-valued.
 
-Two-level minimisation with multi-valued variables.
-
-The way of espresso (Rudell and Sangiovanni-Vincentelli 1987): expand points to prime boxes, take an
-irredundant cover, reduce and expand again.  Where it is small enough, a SAT solver then looks for a
-cover with one box less until it proves that there is none.
+A *box* allows a set of values for each variable; as a row of bits it has one column for each value
+of each variable.  It is *prime* for ``off`` points if it holds none of them and no value can be
+allowed in addition.  The way of espresso (Rudell and Sangiovanni-Vincentelli 1987): expand points
+to prime boxes, take an irredundant cover, reduce and expand again.  Where it is small enough, a SAT
+solver then looks for a cover with one box less until it proves that there is none.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 from math import comb
 from random import Random
 
 import numpy as np
-from numpy.typing import NDArray
 
-from coordlang.explanation.boxes import Bits, Points, conflicting, expand
 from coordlang.vocabulary.sat import Undecided, satisfiable
+from planners.joint.tables import Bools, Ints
 from planners.search.sat import sat_solver
 from planners.system.errors import CoordlangError
 
@@ -35,6 +35,46 @@ _SUBSETS = 3_000
 _CLIQUE = 400
 
 
+@dataclass(frozen=True)
+class Points:
+    """Points to hold (``on``) and to avoid (``off``), (points, variables).
+
+    They are values of variables with ``sizes[v]`` values each.
+    """
+
+    sizes: tuple[int, ...]
+    on: Ints
+    off: Ints
+
+    @cached_property
+    def offset(self) -> Ints:
+        """The first column of each variable."""
+        sizes = np.array(self.sizes, np.int64)
+        return np.cumsum(sizes) - sizes
+
+    @cached_property
+    def spans(self) -> list[slice]:
+        """The columns of each variable."""
+        return [slice(o, o + n) for o, n in zip(self.offset.tolist(), self.sizes, strict=True)]
+
+    def blocked(self, box: Bools, points: Ints) -> Bools:
+        """In which variables each point lies outside a box."""
+        return np.asarray(~box[points + self.offset])
+
+    def inside(self, boxes: Bools, points: Ints) -> Bools:
+        """Which points lie in which boxes: (boxes, points)."""
+        held = np.ones((len(boxes), len(points)), np.bool_)
+        for columns in (points + self.offset).T:
+            held &= boxes[:, columns]
+        return held
+
+    def supercube(self, numbers: Sequence[int] | Ints) -> Bools:
+        """The least box around some of the ``on`` points."""
+        box = np.zeros(sum(self.sizes), np.bool_)
+        box[(self.on[numbers] + self.offset).reshape(-1)] = True
+        return box
+
+
 @dataclass(frozen=True, slots=True)
 class Boxes:
     """Prime boxes that together hold all ``on`` points, the largest first.
@@ -44,44 +84,82 @@ class Boxes:
     suffice.
     """
 
-    prime: Bits
-    least: Bits
+    prime: Bools
+    least: Bools
     fewest: bool
 
 
 def minimise(points: Points, quick: bool = False) -> Boxes:
     """The fewest prime boxes found that hold all ``on`` points and no ``off`` point.
 
-    Each has few variables limited.
-
-    ``quick``: one pass, no proof.  Deterministic.  ``on`` and ``off`` must be disjoint.
+    Each has few variables limited.  ``quick``: one pass, no proof.  Deterministic.  ``on`` and
+    ``off`` must be disjoint.
     """
-    width = sum(points.sizes)
     if not len(points.on):
-        return Boxes(np.zeros((0, width), np.bool_), np.zeros((0, width), np.bool_), True)
+        none = np.zeros((0, sum(points.sizes)), np.bool_)
+        return Boxes(none, none, True)
     if not len(points.off):
-        return Boxes(
-            np.ones((1, width), np.bool_),
-            points.supercube(np.arange(len(points.on)))[None, :],
-            True,
-        )
+        everything = points.supercube(np.arange(len(points.on)))[None, :]
+        return Boxes(np.ones_like(everything), everything, True)
     boxes = _irredundant(points, np.array(_pass(points, None)))
-    if quick:
-        return _least(points, _shorten(points, boxes), False)
-    needed = _apart(points, boxes)
-    boxes = _search(points, boxes, len(needed))
-    fewest = len(boxes) == len(needed)
-    while not fewest:
-        smaller = _fewer(points, len(boxes) - 1, needed)
-        if smaller is None:
-            break
-        fewest = not len(smaller)
-        if not fewest:
-            boxes = smaller
+    fewest = False
+    if not quick:
+        needed = _apart(points, boxes)
+        boxes = _search(points, boxes, len(needed))
+        fewest = len(boxes) == len(needed)
+        while not fewest and (smaller := _fewer(points, len(boxes) - 1, needed)) is not None:
+            fewest = not len(smaller)
+            boxes = boxes if fewest else smaller
     return _least(points, _shorten(points, boxes), fewest)
 
 
-def _search(points: Points, best: Bits, bound: int) -> Bits:
+# ---- covers by expanding points
+
+
+def expand(points: Points, seed: Bools, wanted: Ints, order: Sequence[int] | None = None) -> Bools:
+    """A prime box around the box ``seed``, which must hold no ``off`` point.
+
+    Variables are opened one after the other, each to all values that keep the ``off`` points out:
+    in the given order, or else first what takes in most of the ``wanted`` points (and then brings
+    most of them nearest). O(variables² · points).
+    """
+    box = seed.copy()
+    out_off = points.blocked(box, points.off)
+    out_on = points.blocked(box, wanted)
+    left = list(range(len(points.sizes))) if order is None else list(order)
+    while left:
+        critical = out_off.sum(axis=1) == 1
+        tried = left if order is None else left[:1]
+        opened = {v: _opened(points, box, v, critical & out_off[:, v]) for v in tried}
+        chosen = tried[0] if len(tried) == 1 else _most(opened, out_on, wanted)
+        box[points.spans[chosen]] = opened[chosen]
+        out_off[:, chosen] &= ~opened[chosen][points.off[:, chosen]]
+        out_on[:, chosen] &= ~opened[chosen][wanted[:, chosen]]
+        left.remove(chosen)
+    return box
+
+
+def _opened(points: Points, box: Bools, variable: int, critical: Bools) -> Bools:
+    """The values of a variable that can be allowed: not those that alone keep an ``off`` point out.
+
+    Each ``off`` point has one value, so what can be allowed one by one can be allowed together.
+    """
+    free = np.ones(points.sizes[variable], np.bool_)
+    free[points.off[critical, variable]] = False
+    return np.asarray(free | box[points.spans[variable]])
+
+
+def _most(opened: Mapping[int, Bools], out: Bools, wanted: Ints) -> int:
+    """The variable that takes in most points, each other one that they miss counted by halves."""
+    near = np.exp2(-out.sum(axis=1, dtype=np.float64))
+
+    def gain(v: int) -> tuple[float, bool, int]:
+        return float(near[out[:, v] & opened[v][wanted[:, v]]].sum()), bool(opened[v].all()), -v
+
+    return max(opened, key=gain)
+
+
+def _search(points: Points, best: Bools, bound: int) -> Bools:
     """Passes with other orders of points and variables; the best cover out of all their primes."""
     pool = {box.tobytes(): box for box in best}
     work = 0
@@ -90,20 +168,14 @@ def _search(points: Points, best: Bits, bound: int) -> Bits:
             break
         fresh = _pass(points, Random(number))
         pool |= {box.tobytes(): box for box in fresh}
-        best = min(best, _irredundant(points, np.array(list(pool.values()))), key=_rank)
+        found = _irredundant(points, np.array(list(pool.values())))
+        best = min(best, found, key=lambda boxes: (len(boxes), int((~boxes).sum())))
         work += len(fresh) * len(points.sizes) ** 2 * (len(points.off) + len(points.on))
     return best
 
 
-def _rank(boxes: Bits) -> tuple[int, int]:
-    return len(boxes), int((~boxes).sum())
-
-
-def _pass(points: Points, random: Random | None) -> list[Bits]:
-    """Prime boxes that hold every ``on`` point.
-
-    Greedy ones, or some in random orders of the variables.
-    """
+def _pass(points: Points, random: Random | None) -> list[Bools]:
+    """Prime boxes that hold every ``on`` point: greedy ones, or some in random orders."""
     left = np.arange(len(points.on))
     if random:
         order = list(range(len(left)))
@@ -111,18 +183,16 @@ def _pass(points: Points, random: Random | None) -> list[Bits]:
         left = left[order]
     found = []
     while len(left):
-        seed = points.supercube(left[:1])
         variables = None
         if random and random.random() < 0.5:
             variables = list(range(len(points.sizes)))
             random.shuffle(variables)
-        box = expand(points, seed, points.on[left], variables)
-        found.append(box)
-        left = left[~points.inside(box[None, :], points.on[left])[0]]
+        found.append(expand(points, points.supercube(left[:1]), points.on[left], variables))
+        left = left[~points.inside(found[-1][None, :], points.on[left])[0]]
     return found
 
 
-def _irredundant(points: Points, pool: Bits) -> Bits:
+def _irredundant(points: Points, pool: Bools) -> Bools:
     """A cover from a pool: what takes in most first, then without what the others hold together."""
     held = points.inside(pool, points.on)
     limited = (~pool).sum(axis=1)
@@ -143,29 +213,29 @@ def _irredundant(points: Points, pool: Bits) -> Bits:
     return np.asarray(pool[chosen])
 
 
-def _apart(points: Points, boxes: Bits) -> list[int]:
+# ---- fewer boxes, by SAT
+
+
+def _apart(points: Points, boxes: Bools) -> list[int]:
     """``on`` points of which no box can hold two: that many boxes are needed."""
-    times = points.inside(boxes, points.on).sum(axis=0)
-    order = np.argsort(times, kind="stable")
-    step = max(1, len(order) // _CLIQUE)
+
+    def conflict(one: int, other: int) -> bool:
+        a, b = points.on[one], points.on[other]
+        return bool(((points.off == a) | (points.off == b)).all(axis=1).any())
+
+    order = np.argsort(points.inside(boxes, points.on).sum(axis=0), kind="stable")
     found: list[int] = []
-    for number in order[::step].tolist():
+    for number in order[:: max(1, len(order) // _CLIQUE)].tolist():
         if len(found) == len(boxes):
             break
-        if all(conflicting(points, number, other) for other in found):
+        if all(conflict(number, other) for other in found):
             found.append(number)
     return found
 
 
-def _fewer(points: Points, number: int, needed: Sequence[int]) -> Bits | None:
-    """Boxes, ``number`` of them.
-
-    An empty table if it is proved that there are none; None if that was too much work.
-
-    Variables of the SAT problem: box t allows column c; box t holds the ``on`` point i.
-    """
-    size = number * (len(points.on) + len(points.off)) * len(points.sizes)
-    if size > _LITERALS:
+def _fewer(points: Points, number: int, needed: Sequence[int]) -> Bools | None:
+    """Boxes, ``number`` of them; none if it is proved that none do, None if it is too much work."""
+    if number * (len(points.on) + len(points.off)) * len(points.sizes) > _LITERALS:
         return None
     width = sum(points.sizes)
     with sat_solver("glucose4", _box_clauses(points, number, needed)) as solver:
@@ -179,10 +249,8 @@ def _fewer(points: Points, number: int, needed: Sequence[int]) -> Bits | None:
     holds = model[number * width :].reshape(number, len(points.on))
     seeds = [points.supercube(np.flatnonzero(row)) for row in holds if row.any()]
     boxes = np.array([expand(points, seed, points.on) for seed in seeds])
-    if (
-        points.inside(boxes, points.off).any()
-        or not points.inside(boxes, points.on).any(axis=0).all()
-    ):
+    held = points.inside(boxes, points.on).any(axis=0).all()
+    if points.inside(boxes, points.off).any() or not held:
         raise CoordlangError(
             "the boxes that Glucose found do not hold the points that they must hold",
             remedy="This is a defect of the solver, not of the input: please report it.",
@@ -193,7 +261,8 @@ def _fewer(points: Points, number: int, needed: Sequence[int]) -> Bits | None:
 def _box_clauses(points: Points, number: int, needed: Sequence[int]) -> Iterator[list[int]]:
     """Clauses: ``number`` boxes hold all ``on`` points and no ``off`` point.
 
-    No two of the ``needed`` points are in one box, so that each can have a box of its own.
+    Variables: box t allows column c; box t holds the ``on`` point i.  No two of the ``needed``
+    points are in one box, so that each can have a box of its own.
     """
     width = sum(points.sizes)
     on = (points.on + points.offset + 1).tolist()
@@ -215,22 +284,22 @@ def _box_clauses(points: Points, number: int, needed: Sequence[int]) -> Iterator
         yield [holds(box, point)]
 
 
-def _shorten(points: Points, boxes: Bits) -> Bits:
-    """Each box again, around the points that only it holds.
+# ---- shorter boxes
 
-    Few variables limited, then prime again.
-    """
+
+def _shorten(points: Points, boxes: Bools) -> Bools:
+    """Each box again, around the points that only it holds: few variables limited, then prime."""
     boxes = boxes.copy()
     for _ in range(2):
         held = points.inside(boxes, points.on)
         times = held.sum(axis=0)
         for number in np.argsort(held.sum(axis=1), kind="stable").tolist():
-            own = held[number] & (times == 1)
-            if not own.any():
+            own = np.flatnonzero(held[number] & (times == 1))
+            if not len(own):
                 continue
-            seed = _freed(points, points.supercube(np.flatnonzero(own)))
-            candidate = expand(points, seed, points.on)
-            if _length(points, candidate, own) <= _length(points, boxes[number], own):
+            least = points.supercube(own)
+            candidate = expand(points, _freed(points, least), points.on)
+            if _length(points, candidate, least) <= _length(points, boxes[number], least):
                 boxes[number] = candidate
                 times -= held[number]
                 held[number] = points.inside(candidate[None, :], points.on)[0]
@@ -238,77 +307,57 @@ def _shorten(points: Points, boxes: Bits) -> Bits:
     return _irredundant(points, boxes)
 
 
-def _length(points: Points, box: Bits, own: NDArray[np.bool_]) -> tuple[int, int]:
-    least = points.supercube(np.flatnonzero(own))
-    parts = [
-        _said(least[start : start + size], box[start : start + size])
-        for start, size in zip(points.offset.tolist(), points.sizes, strict=True)
-    ]
-    return sum(p > 0 for p in parts), sum(parts)
+def _length(points: Points, box: Bools, least: Bools) -> tuple[int, int]:
+    """The variables limited, and the values mentioned, between the least box and this one."""
+    said = [_said(least[span], box[span]) for span in points.spans]
+    return sum(own > 0 for own in said), sum(said)
 
 
-def _said(least: Bits, most: Bits) -> int:
+def _said(least: Bools, most: Bools) -> int:
     """Values that must be mentioned to limit a variable to something between two sets."""
     return 0 if most.all() else min(int(least.sum()), int((~most).sum()))
 
 
-def _freed(points: Points, seed: Bits) -> Bits:
-    """The box with as few variables limited as keep all ``off`` points out.
-
-    In total or (many variables) greedily.
-    """
+def _freed(points: Points, seed: Bools) -> Bools:
+    """The box with as few variables limited as keep all ``off`` points out."""
     packed = np.unique(np.packbits(points.blocked(seed, points.off), axis=1), axis=0)
     outside = np.unpackbits(packed, axis=1, count=len(points.sizes)).astype(np.bool_)
-    kept = _hitting(
-        outside,
-        [
-            _said(seed[s : s + n], seed[s : s + n])
-            for s, n in zip(points.offset.tolist(), points.sizes, strict=True)
-        ],
-    )
+    kept = _hitting(outside, [_said(seed[span], seed[span]) for span in points.spans])
     box = seed.copy()
-    for v, (start, size) in enumerate(zip(points.offset.tolist(), points.sizes, strict=True)):
+    for v, span in enumerate(points.spans):
         if v not in kept:
-            box[start : start + size] = True
+            box[span] = True
     return box
 
 
-def _hitting(rows: NDArray[np.bool_], weights: Sequence[int]) -> set[int]:
-    """Columns of which every row has one.
+def _hitting(rows: Bools, weights: Sequence[int]) -> Sequence[int]:
+    """Columns of which every row has one: the fewest, and of these the least weight.
 
-    The fewest, and of these the least weight; greedily if there are too many sets to try.
+    Greedily if there are too many sets to try.
     """
-    count = rows.shape[1]
+    every = range(rows.shape[1])
     tried = 0
-    for size in range(count + 1):
-        tried += comb(count, size)
+    for size in range(len(every) + 1):
+        tried += comb(len(every), size)
         if tried > _SUBSETS:
-            return _hitting_greedily(rows, weights)
-        hitting = [
-            c for c in combinations(range(count), size) if rows[:, list(c)].any(axis=1).all()
-        ]
+            break
+        hitting = [c for c in combinations(every, size) if rows[:, list(c)].any(axis=1).all()]
         if hitting:
-            return set(min(hitting, key=lambda c: (sum(weights[v] for v in c), c)))
-    return _hitting_greedily(rows, weights)
-
-
-def _hitting_greedily(rows: NDArray[np.bool_], weights: Sequence[int]) -> set[int]:
-    """Always next: the column in most rows that are not hit yet; then without superfluous ones."""
-    count = rows.shape[1]
+            return min(hitting, key=lambda c: (sum(weights[v] for v in c), c))
     chosen: list[int] = []
     left = rows
-    while len(left):
+    while len(left):  # next: the column in most rows that are not hit yet
         gain = left.sum(axis=0)
-        chosen.append(int(np.lexsort((np.arange(count), np.array(weights), -gain))[0]))
+        chosen.append(min(every, key=lambda v: (-gain[v], weights[v], v)))
         left = left[~left[:, chosen[-1]]]
-    for v in sorted(chosen, key=lambda v: -weights[v]):
+    for v in sorted(chosen, key=lambda v: -weights[v]):  # without superfluous ones
         others = [c for c in chosen if c != v]
         if rows[:, others].any(axis=1).all():
             chosen = others
-    return set(chosen)
+    return chosen
 
 
-def _least(points: Points, boxes: Bits, fewest: bool) -> Boxes:
+def _least(points: Points, boxes: Bools, fewest: bool) -> Boxes:
     held = points.inside(boxes, points.on)
     order = np.argsort(-held.sum(axis=1), kind="stable")
     prime, held = boxes[order], held[order]

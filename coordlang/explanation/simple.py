@@ -2,10 +2,9 @@
 """Among languages with equally many words, one whose words have short formulas.
 
 One word is "every other state"; the formulas of the others have as few terms as possible, and these
-limit as few variables as possible (`coordlang.explanation.formula_problem`).  Exact: numbers of
-terms are decided as numbers of words are by `coordlang.vocabulary.minimal`, with the clauses of
-counterexamples.  Where that takes too long, the best so far is verified, and the bound says how
-much shorter it might be.
+limit as few variables as possible (`FormulaProblem`).  Exact: numbers of terms are decided as
+numbers of words are by `coordlang.vocabulary.minimal`, with the clauses of counterexamples.  Where
+that takes too long, the best so far is verified, and the bound says how much shorter it might be.
 """
 
 from __future__ import annotations
@@ -16,14 +15,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from coordlang.explanation.formula_problem import FormulaProblem
 from coordlang.explanation.variables import Valuation, valuation
 from coordlang.explanation.words import MappedStates, all_covers
 from coordlang.language.warping import Clause
 from coordlang.vocabulary.clauses import most_constrained_first, without_implied
 from coordlang.vocabulary.job import Assignment, Job, Outcome
 from coordlang.vocabulary.loop import Budget, Languages, ProblemsBySize, close_bounds, find
-from coordlang.vocabulary.sat import PartitionProblem, Undecided
+from coordlang.vocabulary.sat import PartitionProblem, Undecided, at_most
+from planners.joint.tables import Ints
 from planners.system.limits import run_until_stopped
 
 #: The terms of all formulas, and the variables that these limit.
@@ -79,10 +78,6 @@ def formula_lengths(mapped: MappedStates) -> Lengths:
     )
 
 
-class _GaveUp(Exception):
-    """A question is too hard."""
-
-
 class _Search:
     """``best`` is the language with the shortest formulas, of ``lengths``, that was verified.
 
@@ -100,7 +95,7 @@ class _Search:
         self.bound: Lengths = (found.size - 1, found.size - 1)  # each term limits a variable
         self._languages: Languages | None = None
         self._problems: ProblemsBySize[Clause] = ProblemsBySize(
-            self._start, PartitionProblem.separate_one
+            self._problem, PartitionProblem.separate_one
         )
 
     def close(self) -> None:
@@ -129,7 +124,7 @@ class _Search:
             close_bounds(lambda: (self.bound[0], self.lengths[0]), self._decide)
             while self.bound[1] < self.lengths[1]:
                 self._limit_fewer()
-        except _GaveUp:
+        except Undecided:  # a question is too hard
             return
 
     def _decide(self, terms: int, budget: Budget) -> bool:
@@ -138,7 +133,7 @@ class _Search:
         False if the budget was not enough.
         """
         if budget.conflicts > self._conflicts:
-            raise _GaveUp
+            raise Undecided
         languages = self._languages
         assert languages is not None
         try:
@@ -158,24 +153,18 @@ class _Search:
 
     def _limit_fewer(self) -> None:
         """Find a language with as many terms that limit fewer variables, or prove there is none."""
-        assert self._languages is not None
+        languages = self._languages
+        assert languages is not None
         terms, limits = self.lengths
-        problem = self._problem(terms, self._languages.clauses, limits - 1)
-        with closing(problem):
-            seen = len(self._languages.clauses)
-            while True:
-                try:
-                    partition = problem.solve(self._conflicts)
-                except Undecided:
-                    raise _GaveUp from None
-                if partition is None:
-                    self.bound = self.lengths
-                    return
+        with closing(self._problem(terms, languages.clauses, limits - 1)) as problem:
+            seen = len(languages.clauses)
+            while (partition := problem.solve(self._conflicts)) is not None:
                 if self._is_accepted(partition, problem):
                     return
-                for clause in self._languages.clauses[seen:]:
+                for clause in languages.clauses[seen:]:
                     problem.separate_one(clause)
-                seen = len(self._languages.clauses)
+                seen = len(languages.clauses)
+            self.bound = self.lengths
 
     def _is_accepted(self, partition: dict[int, int], problem: PartitionProblem) -> bool:
         """Whether a partition is a language; then it is the best."""
@@ -193,10 +182,9 @@ class _Search:
         self.best, self.lengths = partition, lengths
         return True
 
-    def _start(self, terms: int, known: Sequence[Clause]) -> PartitionProblem:
-        return self._problem(terms, known, None)
-
-    def _problem(self, terms: int, known: Sequence[Clause], limits: int | None) -> FormulaProblem:
+    def _problem(
+        self, terms: int, known: Sequence[Clause], limits: int | None = None
+    ) -> FormulaProblem:
         clauses = without_implied(known, _COMPARISONS)
         order = most_constrained_first(self._job.states, clauses)
         problem = FormulaProblem(order, self._found.size, self._value, self._sizes, terms, limits)
@@ -210,3 +198,90 @@ def _mapped(job: Job, values: Valuation, partition: Assignment) -> MappedStates:
     words = sorted(set(partition.values()))
     word = np.array([words.index(partition[state]) for state in job.states], np.int64)
     return MappedStates(tuple(f"w{n}" for n in range(len(words))), values, word)
+
+
+class FormulaProblem(PartitionProblem):
+    """A partition, and for all words but one a formula.
+
+    A word's formula is a disjunction of terms; a term limits some variables to some of their
+    values.  The formula is true in all states of the word and false in all others.  The word that
+    has none is that of every other state.  Variables: term allows value, term limits variable,
+    state is in term, term is of word.  Terms are ordered by their words, which breaks symmetry.
+
+    ``order`` are numbers of states, in the order by which words are named, ``size`` the number of
+    words, ``value`` for each state its value in each variable, ``values`` how many each variable
+    has.  All formulas together have ``terms`` terms, and limit at most ``limits`` variables (None:
+    any number).
+    """
+
+    def __init__(
+        self,
+        order: Sequence[int],
+        size: int,
+        value: dict[int, Ints],
+        values: Sequence[int],
+        terms: int,
+        limits: int | None = None,
+    ) -> None:
+        super().__init__(order, size)
+        self._first = np.cumsum([0, *values])[:-1]
+        self._allows = [[self._new() for _ in range(sum(values))] for _ in range(terms)]
+        self._limits = [[self._new() for _ in values] for _ in range(terms)]
+        self._of_word = [[self._new() for _ in range(size)] for _ in range(terms)]
+        self._values = values
+        for term in range(terms):
+            self._one_word(self._of_word[term])
+            self._limit_variables(term)
+        self._order_terms()
+        self._say_states({state: value[state] for state in order})
+        if limits is not None:
+            self._allow_limits(limits)
+
+    def lengths(self) -> tuple[int, int]:
+        """The number of terms of the partition found last, and of the variables that they limit."""
+        true = {v for v in self._solver.get_model() if v > 0}
+        return len(self._limits), sum(v in true for row in self._limits for v in row)
+
+    def _allow_limits(self, number: int) -> None:
+        variables = [variable for row in self._limits for variable in row]
+        clauses, self._last = at_most(variables, number, self._last)
+        for clause in clauses:
+            self._solver.add_clause(clause)
+
+    def _limit_variables(self, term: int) -> None:
+        """A term that does not allow all values of a variable limits it."""
+        for v, (first, number) in enumerate(zip(self._first.tolist(), self._values, strict=True)):
+            for allowed in self._allows[term][first : first + number]:
+                self._solver.add_clause([allowed, self._limits[term][v]])
+
+    def _order_terms(self) -> None:
+        for before, after in zip(self._of_word, self._of_word[1:], strict=False):
+            for word, later in enumerate(before):
+                for earlier in after[:word]:
+                    self._solver.add_clause([-later, -earlier])
+
+    def _say_states(self, value: dict[int, Ints]) -> None:
+        """A state in a term has the term's word, and one in no term the word that has none."""
+        other = [self._new() for _ in range(self.size)]
+        self._one_word(other)
+        for row in self._of_word:
+            for without, own in zip(other, row, strict=True):
+                self._solver.add_clause([-without, -own])
+        for state, numbers in value.items():
+            inside = [self._inside(term, numbers) for term in range(len(self._allows))]
+            for word, own in enumerate(self._word[state]):
+                self._solver.add_clause([-own, other[word], *inside])
+                for of_word, holds in zip(self._of_word, inside, strict=True):
+                    self._solver.add_clause([-holds, -of_word[word], own])
+            for holds in inside:
+                for word, own in enumerate(self._word[state]):
+                    self._solver.add_clause([-holds, -own, -other[word]])
+
+    def _inside(self, term: int, numbers: Ints) -> int:
+        """A variable that is true just where the term allows all values of a state."""
+        holds = self._new()
+        allowed = [self._allows[term][column] for column in (self._first + numbers).tolist()]
+        for variable in allowed:
+            self._solver.add_clause([-holds, variable])
+        self._solver.add_clause([holds, *(-variable for variable in allowed)])
+        return holds

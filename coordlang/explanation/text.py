@@ -10,8 +10,7 @@ from typing import Any
 
 from coordlang.explanation.cover import Cover, Literal, Term
 from coordlang.explanation.demands import RobotPart, SentenceDemands, WordChange
-from coordlang.explanation.descriptions import WordDescriptions
-from coordlang.explanation.words import MappedStates
+from coordlang.explanation.words import MappedStates, WordDescriptions
 from planners.joint.model import show
 from planners.system.notebook import counted
 
@@ -82,12 +81,10 @@ def cover_data(cover: Cover) -> dict[str, Any]:
                 "states": count,
                 "literals": [
                     {
-                        "variable": literal.variable.name,
-                        "values": [
-                            None if value is None else show(value) for value in literal.listed
-                        ],
+                        "variable": one.variable.name,
+                        "values": [None if value is None else show(value) for value in one.listed],
                     }
-                    for literal in term
+                    for one in term
                 ],
             }
             for term, count in zip(cover.terms, cover.counts, strict=True)
@@ -139,12 +136,10 @@ def _part_lines(part: RobotPart, steps: int) -> list[str]:
     if not steps:
         return [f"  {part.robot} has nothing to do."]
     if part.subplans == 1:
-        only = part.listed[0] if part.listed else [own[0] for own in part.by_step]
-        return [f"  {part.robot}: {_sequence(only)}."]
+        return [f"  {part.robot}: {_sequence([own[0] for own in part.by_step])}."]
     if part.listed:
-        first = sum(
-            1 for _ in takewhile(lambda step: len(set(step)) == 1, zip(*part.listed, strict=True))
-        )
+        by_step = zip(*part.listed, strict=True)
+        first = len(list(takewhile(lambda own: len(set(own)) == 1, by_step)))
         head = f": {_sequence(part.listed[0][:first])}, then one of" if first else " may choose:"
         return [
             f"  {part.robot}{head}",
@@ -155,10 +150,7 @@ def _part_lines(part: RobotPart, steps: int) -> list[str]:
 
 def _ways(part: RobotPart) -> str:
     """How many of the combinations that a table of steps shows are subplans."""
-    if part.subplans is None:
-        return "very many ways, among these"
-    combinations = prod(map(len, part.by_step))
-    if part.subplans == combinations:
+    if part.subplans == prod(map(len, part.by_step)):
         return f"{part.subplans:,} ways, any combination of"
     return f"{part.subplans:,} ways, not every combination of these (choices lists them)"
 

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""PDDL fluents -> multi-valued variables.
-
-``at(r2) = c3`` in the place of one truth value for each atom.
+"""PDDL fluents -> multi-valued variables: ``at(r2) = c3`` in place of a truth value for each atom.
 
 A *mutex group* of atoms is one variable: at most one of them is true in the mapped states, and in
 those that can be reached from them as far as looked at.  Groups are looked for among atoms that
@@ -31,16 +29,10 @@ _AT_ONCE = 200
 class Variable:
     """A multi-valued variable.
 
-    Parameters
-    ----------
-    name
-        What is shown: ``at(r2)``.
-    values
-        Ground atoms, each standing for "this one of the variable's atoms is true", or None: none of
-        them is.
-    texts
-        For each value what is shown as subject and value: ``at(r2)`` and ``c3``; a subject alone is
-        a fact, as ``free(r1)`` with an empty value.
+    ``name`` is what is shown: ``at(r2)``.  ``values`` are ground atoms, each standing for "this one
+    of the variable's atoms is true", or None: none of them is.  ``texts`` are for each value what
+    is shown as subject and value: ``at(r2)`` and ``c3``; a subject alone is a fact, as ``free(r1)``
+    with an empty value.
     """
 
     name: str
@@ -85,7 +77,7 @@ def valuation(model: JointModel, rows: Rows) -> Valuation:
     sometimes, always = np.asarray(holds.any(axis=0)), np.asarray(holds.all(axis=0))
     variables: list[Variable] = []
     columns: list[Ints] = []
-    for group in mutex_groups(atoms, everywhere, model.robots):
+    for group in _mutex_groups(atoms, everywhere, model.robots):
         used = [number for number in group.atoms if sometimes[number]]
         if not used or always[used[0]]:
             continue
@@ -95,9 +87,8 @@ def valuation(model: JointModel, rows: Rows) -> Valuation:
         for value, number in enumerate(used):
             column[holds[:, number]] = value
         columns.append(column)
-    if not columns:
-        return Valuation((), np.zeros((len(rows), 0), np.int64))
-    return Valuation(tuple(variables), np.stack(columns, axis=1))
+    table = np.array(columns, np.int64).reshape(len(columns), len(rows))
+    return Valuation(tuple(variables), table.T)
 
 
 def truth(model: JointModel, rows: Rows) -> tuple[tuple[Atom, ...], Bools]:
@@ -135,218 +126,138 @@ def _surroundings(model: JointModel, rows: Rows) -> Rows:
     return seen
 
 
-def _variable(
-    group: MutexGroup, used: Sequence[int], atoms: Sequence[Atom], none: bool
-) -> Variable:
+def _variable(group: _Group, used: Sequence[int], atoms: Sequence[Atom], none: bool) -> Variable:
     rest = dict(zip(group.atoms, group.rest, strict=True))
-    predicates = sorted({predicate for predicate, _ in group.rest})
     key = f"({', '.join(group.key)})" if group.key else ""
-    texts = []
-    for number in used:
-        predicate, others = rest[number]
-        texts.append((predicate + key, _value(group.key, others)))
+    texts = [(rest[number][0] + key, _value(group.key, rest[number][1])) for number in used]
     values: list[Atom | None] = [atoms[number] for number in used]
-    name = "/".join(predicates) + key
+    name = "/".join(sorted({predicate for predicate, _ in group.rest})) + key
     if none:
         values.append(None)
         texts.append((name, "none"))
     return Variable(name, tuple(values), tuple(texts))
 
 
-def _value(key: Key, others: tuple[str, ...]) -> str:
-    """The other arguments in short."""
-    texts = [_without_key(key, other) for other in others]
+def _value(key: Sequence[str], others: Sequence[str]) -> str:
+    """The other arguments in short; a remembered subaction without the robot of the key."""
+    texts = [
+        " ".join(name for name in other[1:-1].split() if name not in key)
+        if other.startswith("(")
+        else other
+        for other in others
+    ]
     if len(texts) == 1:
         return texts[0]
     return f"({', '.join(texts)})" if texts else ""
 
 
-def _without_key(key: Key, argument: str) -> str:
-    """An argument; a remembered subaction without the robot, which the key names."""
-    if not argument.startswith("("):
-        return argument
-    return " ".join(name for name in argument[1:-1].split() if name not in key)
+# ---- mutex groups
 
-
-#: The arguments that the atoms of a group agree in.
-Key = tuple[str, ...]
 #: A predicate with the positions of the arguments that are its key.
 _Shape = tuple[str, tuple[int, ...]]
-#: For each shape its keys, and the numbers of the atoms with each.
-_Shapes = dict[_Shape, dict[Key, list[int]]]
 
 
 @dataclass(frozen=True, slots=True)
-class MutexGroup:
-    """Atoms of which at most one is true in every state.
+class _Group:
+    """The numbers of atoms that agree in the arguments ``key``.
 
-    Parameters
-    ----------
-    key
-        The arguments that they agree in.
-    atoms
-        Their numbers.
-    rest
-        For each of them its predicate and its other arguments.
+    ``rest`` are for each of them its predicate and its other arguments.
     """
 
-    key: Key
+    key: tuple[str, ...]
     atoms: list[int]
     rest: list[tuple[str, tuple[str, ...]]]
 
+    def owner(self, robots: Sequence[str]) -> int:
+        """The number of the first robot that the key names; the number of robots if none."""
+        return min((robots.index(k) for k in self.key if k in robots), default=len(robots))
 
-def mutex_groups(atoms: Sequence[Atom], holds: Bools, robots: Sequence[str]) -> list[MutexGroup]:
-    """A partition of the atoms into mutex groups, those of robots and large ones first.
 
-    Groups of which one atom is always true, and then large ones, are preferred.
+def _mutex_groups(atoms: Sequence[Atom], holds: Bools, robots: Sequence[str]) -> list[_Group]:
+    """A partition of the atoms into groups of which at most one atom is true in every state.
 
-    Parameters
-    ----------
-    atoms
-        The atoms by number.
-    holds
-        Which are true in each state, (states, atoms).
-    robots
-        The robots' names.
+    Groups of which one atom is always true, and then large ones, are preferred; those of robots and
+    large ones are listed first.  ``holds`` says which are true in each state, (states, atoms).
     """
-    table = _AtomTable(_shapes(atoms), holds, _never_together(holds))
-    candidates = [
-        (_rank(table, family, group, robots), family, group)
-        for family in _families(table)
-        for group in _groups_of(table, family, atoms)
-    ]
+    table = _AtomTable(atoms, holds)
+    candidates: list[tuple[tuple[object, ...], str, _Group]] = []
+    for family in table.families():
+        for group in table.groups(family):
+            if len(group.atoms) > 1 and table.exclusive(group):
+                owner, inexact = group.owner(robots), not table.exhaustive(group)
+                size = -len(group.atoms)
+                own = owner == len(robots)
+                rank = (inexact, own, size, len(family), family, owner, group.key)
+                candidates.append((rank, family[0][0], group))
+    for number, atom in enumerate(atoms):  # what is left is a fact of its own
+        single = _Group(atom.args, [number], [(atom.predicate, ())])
+        candidates.append(((True, True, 0), atom.predicate, single))
     taken: set[int] = set()
-    chosen: list[tuple[tuple[object, ...], MutexGroup]] = []
-    for _, family, group in sorted(candidates, key=lambda c: c[0]):
+    chosen = []
+    for _, predicate, group in sorted(candidates, key=lambda candidate: candidate[0]):
         if taken.isdisjoint(group.atoms):
             taken.update(group.atoms)
-            chosen.append((_order(group, robots, family[0][0]), group))
-    for number, atom in enumerate(atoms):
-        if number not in taken:
-            single = MutexGroup(atom.args, [number], [(atom.predicate, ())])
-            chosen.append((_order(single, robots, atom.predicate), single))
-    return [group for _, group in sorted(chosen, key=lambda c: c[0])]
+            owner = group.owner(robots)
+            own = owner == len(robots)
+            chosen.append(((own, len(group.atoms) < 2, predicate, owner, group.key), group))
+    return [group for _, group in sorted(chosen, key=lambda one: one[0])]
 
 
-@dataclass(frozen=True, slots=True)
 class _AtomTable:
     """The atoms by shape and key, and what is known of them in all states."""
 
-    shapes: _Shapes
-    holds: Bools
-    never_together: Bools
+    def __init__(self, atoms: Sequence[Atom], holds: Bools) -> None:
+        self._atoms, self._holds = atoms, holds
+        weights = holds.astype(np.float32)
+        self._together: Bools = np.asarray(weights.T @ weights > 0)
+        np.fill_diagonal(self._together, False)
+        self._shapes: dict[_Shape, dict[tuple[str, ...], list[int]]] = defaultdict(
+            lambda: defaultdict(list)
+        )
+        for number, atom in enumerate(atoms):
+            for size in range(len(atom.args) + 1):
+                for positions in combinations(range(len(atom.args)), size):
+                    key = tuple(atom.args[p] for p in positions)
+                    self._shapes[atom.predicate, positions][key].append(number)
 
-    def members(self, family: Sequence[_Shape], key: Key) -> list[int]:
-        """The atoms of some shapes with a key."""
-        return [number for shape in family for number in self.shapes[shape].get(key, ())]
+    def groups(self, family: Sequence[_Shape]) -> list[_Group]:
+        """The atoms of some shapes, by key."""
+        groups = []
+        for key in sorted({key for shape in family for key in self._shapes[shape]}):
+            group = _Group(key, [], [])
+            for predicate, positions in family:
+                for number in self._shapes[predicate, positions].get(key, ()):
+                    args = enumerate(self._atoms[number].args)
+                    group.atoms.append(number)
+                    group.rest.append((predicate, tuple(a for p, a in args if p not in positions)))
+            groups.append(group)
+        return groups
 
-    def keys(self, family: Sequence[_Shape]) -> list[Key]:
-        """All keys of some shapes, sorted."""
-        return sorted({key for shape in family for key in self.shapes[shape]})
+    def exclusive(self, group: _Group) -> bool:
+        """Whether no two of the atoms are true together."""
+        return not self._together[np.ix_(group.atoms, group.atoms)].any()
 
-    def exclusive(self, members: Sequence[int]) -> bool:
-        """Whether no two of some atoms are true together."""
-        pairs = self.never_together[np.ix_(members, members)].copy()
-        np.fill_diagonal(pairs, True)
-        return bool(pairs.all())
+    def exhaustive(self, group: _Group) -> bool:
+        """Whether one of the atoms is true in every state."""
+        return bool(self._holds[:, group.atoms].any(axis=1).all())
 
-    def exhaustive(self, members: Sequence[int]) -> bool:
-        """Whether one of some atoms is true in every state."""
-        return bool(self.holds[:, members].any(axis=1).all())
+    def families(self) -> Iterator[tuple[_Shape, ...]]:
+        """Single shapes, and two or three shapes that are one variable only together.
 
-
-def _never_together(holds: Bools) -> Bools:
-    weights = holds.astype(np.float32)
-    return np.asarray(weights.T @ weights == 0)
-
-
-def _shapes(atoms: Sequence[Atom]) -> _Shapes:
-    """For each predicate and choice of key positions: key -> atoms with it."""
-    shapes: _Shapes = defaultdict(lambda: defaultdict(list))
-    for number, atom in enumerate(atoms):
-        for size in range(len(atom.args) + 1):
-            for positions in combinations(range(len(atom.args)), size):
-                key = tuple(atom.args[p] for p in positions)
-                shapes[atom.predicate, positions][key].append(number)
-    return shapes
-
-
-def _families(table: _AtomTable) -> Iterator[tuple[_Shape, ...]]:
-    """Single shapes, and two or three shapes that are one variable only together.
-
-    The latter are of different predicates, as ``(holds r b)`` and ``(free r)`` are: of these
-    exactly one is true for each key.
-    """
-    shapes = sorted(table.shapes)
-    for shape in shapes:
-        yield (shape,)
-    incomplete = [shape for shape in shapes if _is_incomplete(table, shape)]
-    for size in (2, 3):
-        for family in combinations(incomplete, size):
-            if _may_join(family) and _is_exact(table, family):
-                yield family
-
-
-def _is_incomplete(table: _AtomTable, shape: _Shape) -> bool:
-    """Whether the atoms of each key exclude each other, but for some key none may be true."""
-    members = table.shapes[shape].values()
-    return (
-        bool(shape[1])
-        and all(table.exclusive(own) for own in members)
-        and not all(table.exhaustive(own) for own in members)
-    )
-
-
-def _may_join(family: Sequence[_Shape]) -> bool:
-    """Whether shapes have different predicates and keys of one length."""
-    predicates = {predicate for predicate, _ in family}
-    lengths = {len(positions) for _, positions in family}
-    return len(predicates) == len(family) and len(lengths) == 1
-
-
-def _is_exact(table: _AtomTable, family: Sequence[_Shape]) -> bool:
-    """Whether for each key exactly one of the shapes' atoms is true in every state."""
-    members = [table.members(family, key) for key in table.keys(family)]
-    return all(table.exclusive(own) and table.exhaustive(own) for own in members)
-
-
-def _groups_of(
-    table: _AtomTable, family: Sequence[_Shape], atoms: Sequence[Atom]
-) -> Iterator[MutexGroup]:
-    """The mutex groups of two or more atoms, one for each key."""
-    for key in table.keys(family):
-        members = table.members(family, key)
-        if len(members) < 2 or not table.exclusive(members):
-            continue
-        rest = [
-            _rest(atoms[number], positions)
-            for predicate, positions in family
-            for number in table.shapes[predicate, positions].get(key, ())
-        ]
-        yield MutexGroup(key, members, rest)
-
-
-def _rest(atom: Atom, key: tuple[int, ...]) -> tuple[str, tuple[str, ...]]:
-    return atom.predicate, tuple(a for place, a in enumerate(atom.args) if place not in key)
-
-
-def _rank(
-    table: _AtomTable, family: tuple[_Shape, ...], group: MutexGroup, robots: Sequence[str]
-) -> tuple[object, ...]:
-    """The order in which groups are taken."""
-    owner = _owner(group, robots)
-    without_owner = owner == len(robots)
-    inexact = not table.exhaustive(group.atoms)
-    size = len(group.atoms)
-    return (inexact, without_owner, -size, len(family), family, owner, group.key)
-
-
-def _order(group: MutexGroup, robots: Sequence[str], predicate: str) -> tuple[object, ...]:
-    """The order in which groups are listed."""
-    owner = _owner(group, robots)
-    return (owner == len(robots), len(group.atoms) < 2, predicate, owner, group.key)
-
-
-def _owner(group: MutexGroup, robots: Sequence[str]) -> int:
-    """The number of the first robot that a group's key names; the number of robots if none."""
-    return min((robots.index(k) for k in group.key if k in robots), default=len(robots))
+        The latter are of different predicates, as ``(holds r b)`` and ``(free r)`` are: of these
+        exactly one is true for each key.
+        """
+        shapes = sorted(self._shapes)
+        incomplete = []
+        for shape in shapes:
+            yield (shape,)
+            groups = self.groups((shape,))
+            if shape[1] and all(map(self.exclusive, groups)):
+                incomplete += [] if all(map(self.exhaustive, groups)) else [shape]
+        for size in (2, 3):
+            for family in combinations(incomplete, size):
+                predicates, positions = zip(*family, strict=True)
+                if len(set(predicates)) == size and len(set(map(len, positions))) == 1:
+                    groups = self.groups(family)
+                    if all(self.exclusive(own) and self.exhaustive(own) for own in groups):
+                        yield family

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The words of a language as formulas."""
+"""The words of a language as formulas: each by itself, or one after the other."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from itertools import compress
 
 import numpy as np
 
-from coordlang.explanation.boxes import Bits, Points
 from coordlang.explanation.cover import Cover, Literal, Term
-from coordlang.explanation.minimise import minimise
-from coordlang.explanation.variables import Valuation, valuation
+from coordlang.explanation.minimise import Points, minimise
+from coordlang.explanation.variables import Valuation, Variable, valuation
 from coordlang.language.words import Language
 from planners.joint.model import JointModel
-from planners.joint.tables import Ints, Rows, find_rows, unique_rows
+from planners.joint.tables import Bools, Ints, Rows, find_rows, unique_rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,14 +23,7 @@ class MappedStates:
 
     In all other states the formulas are arbitrary: several may be true there, or none.
 
-    Parameters
-    ----------
-    words
-        The words by number.
-    valuation
-        The states as values of variables.
-    word
-        The word number of each state.
+    ``word`` has the number in ``words`` of each state's word.
     """
 
     words: tuple[str, ...]
@@ -90,63 +82,109 @@ def all_covers(mapped: MappedStates) -> dict[str, Cover]:
 def cover(
     mapped: MappedStates, word: int, against: Sequence[int] | None = None, quick: bool = False
 ) -> Cover:
-    """The formula of a word that is false in all states of some other words.
+    """The formula of a word that is false in all states of the words ``against``; None: all others.
 
-    Parameters
-    ----------
-    mapped
-        The states.
-    word
-        The number of the word.
-    against
-        The numbers of the other words; None: all.
-    quick
-        Whether to look for few terms in one pass only, without proof.
+    ``quick``: look for few terms in one pass only, without proof.
     """
-    value = mapped.valuation.value
+    value, variables = mapped.valuation.value, mapped.valuation.variables
     mine = mapped.word == word
     other = ~mine if against is None else np.isin(mapped.word, list(against)) & ~mine
-    variables = mapped.valuation.variables
     points = Points(tuple(len(v.values) for v in variables), value[mine], value[other])
-    boxes = minimise(points, quick)
-    terms = tuple(
-        _term(mapped, points, least, prime)
-        for least, prime in zip(boxes.least, boxes.prime, strict=True)
-    )
-    counts = (
-        points.inside(_box_of(mapped, terms), points.on).sum(axis=1)
-        if terms
-        else np.zeros(0, np.int64)
-    )
-    return Cover(terms, tuple(int(c) for c in counts), int(mine.sum()), boxes.fewest)
+    found = minimise(points, quick)
+    terms, counts = [], []
+    for least, prime in zip(found.least, found.prime, strict=True):
+        term, box = _shortest(variables, points, least, prime)
+        terms.append(term)
+        counts.append(int(points.inside(box[None, :], points.on).sum()))
+    return Cover(tuple(terms), tuple(counts), int(mine.sum()), found.fewest)
 
 
-def _term(
-    mapped: MappedStates, points: Points, least: Sequence[bool], prime: Sequence[bool]
-) -> Term:
-    """The shortest term between the least box and the prime one."""
-    literals = []
-    for variable, start in zip(mapped.valuation.variables, points.offset.tolist(), strict=True):
-        stop = start + len(variable.values)
-        if all(prime[start:stop]):
+def _shortest(
+    variables: Sequence[Variable], points: Points, least: Bools, prime: Bools
+) -> tuple[Term, Bools]:
+    """The shortest term between the least box and the prime one, and its box."""
+    literals, box = [], prime.copy()
+    for variable, span in zip(variables, points.spans, strict=True):
+        if prime[span].all():
             continue
         limits = [
-            Literal(variable, frozenset(compress(variable.values, box[start:stop])))
-            for box in (least, prime)
+            (Literal(variable, frozenset(compress(variable.values, values))), values)
+            for values in (least[span], prime[span])
         ]
-        literals.append(min(limits, key=lambda limit: (limit.length, limit.is_negative)))
-    return tuple(literals)
+        literal, box[span] = min(limits, key=lambda one: (one[0].length, one[0].is_negative))
+        literals.append(literal)
+    return tuple(literals), box
 
 
-def _box_of(mapped: MappedStates, terms: Sequence[Term]) -> Bits:
-    rows = []
-    for term in terms:
-        values = {literal.variable.name: literal.values for literal in term}
-        rows.append(
-            [
-                value in values.get(variable.name, variable.values)
-                for variable in mapped.valuation.variables
-                for value in variable.values
-            ]
-        )
-    return np.array(rows, np.bool_)
+# ---- in which form words are described: each by itself, or one after the other
+
+#: Formulas of up to this length need no order, and those of over that length are beyond reading in
+#: any order.
+_SHORT, _LONG = 3, 300
+#: An order is worth it where it takes at most this part of the length.
+_SHORTER = 0.6
+#: Words tried at each place of the order.
+_TRIED = 4
+
+
+@dataclass(frozen=True, slots=True)
+class WordDescriptions:
+    """The words with their formulas, in the order in which they are described.
+
+    A formula None means "every other state".  ``in_order``: each formula is about the states only
+    that no earlier one holds; otherwise each is exact by itself, in all mapped states.
+    """
+
+    rules: tuple[tuple[str, Cover | None], ...]
+    in_order: bool
+
+    @property
+    def length(self) -> int:
+        """How long a description is.
+
+        Values that are mentioned, terms after the first of a formula, and one for "every other
+        state".
+        """
+        return sum(formula.length if formula else 1 for _, formula in self.rules)
+
+
+def describe_words(
+    mapped: MappedStates, formulas: dict[str, Cover], each: bool = False
+) -> WordDescriptions:
+    """The shorter way to describe the words.
+
+    With ``each`` every one by a formula of its own, exact by itself.
+    """
+    if each or len(formulas) < 2:
+        return WordDescriptions(tuple(formulas.items()), False)
+    apart = _apart(formulas)
+    if not _SHORT * len(formulas) < apart.length <= _LONG * len(formulas):
+        return apart
+    ordered = _in_order(mapped, formulas)
+    return ordered if ordered.length <= _SHORTER * apart.length else apart
+
+
+def _apart(formulas: dict[str, Cover]) -> WordDescriptions:
+    """The longest formula, if it mentions more than one value, is "every other state"."""
+    longest = max(formulas, key=lambda word: (formulas[word].length, formulas[word].states))
+    if formulas[longest].length < 2:
+        return WordDescriptions(tuple(formulas.items()), False)
+    others = tuple((word, formula) for word, formula in formulas.items() if word != longest)
+    return WordDescriptions((*others, (longest, None)), False)
+
+
+def _in_order(mapped: MappedStates, formulas: dict[str, Cover]) -> WordDescriptions:
+    """One word after another, each with its formula against the words still to come.
+
+    Next is the word with the shortest formula, of the few that look shortest.
+    """
+    left = dict(formulas)
+    rules: list[tuple[str, Cover | None]] = []
+    while len(left) > 1:
+        numbers = [mapped.words.index(word) for word in left]
+        for word in sorted(left, key=lambda w: left[w].length)[:_TRIED]:
+            left[word] = cover(mapped, mapped.words.index(word), numbers, quick=True)
+        best = min(left, key=lambda w: left[w].length)
+        rules.append((best, cover(mapped, mapped.words.index(best), numbers)))
+        del left[best]
+    return WordDescriptions((*rules, (next(iter(left)), None)), True)

@@ -15,10 +15,9 @@ from typing import Any
 import numpy as np
 
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.explanation.descriptions import WordDescriptions, describe_words
 from coordlang.explanation.lifted_words import LiftedWords
 from coordlang.explanation.text import term_text
-from coordlang.explanation.words import all_covers, mapped_states
+from coordlang.explanation.words import WordDescriptions, all_covers, describe_words, mapped_states
 from coordlang.language.words import Language
 from coordlang.report.layout import graph_layout, spread
 from coordlang.report.places import place_layout

@@ -14,7 +14,7 @@ are worked out once for each different pair.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import prod
@@ -45,6 +45,7 @@ class LabelSets:
         self._moves: list[dict[int, int] | None] = [{}]
         self._union: dict[tuple[int, int], int] = {}
         self._within: dict[tuple[int, int], bool] = {}
+        self._sizes = {END: 1}
 
     def __len__(self) -> int:
         """Count the different sets."""
@@ -105,6 +106,19 @@ class LabelSets:
                 for label, after in self.moves(one).items()
             )
         return known
+
+    def size(self, number: int) -> int:
+        """How many sequences a set has."""
+        if number not in self._sizes:
+            self._sizes[number] = sum(map(self.size, self.moves(number).values()))
+        return self._sizes[number]
+
+    def sequences(self, number: int) -> Iterator[tuple[int, ...]]:
+        """The sequences of a set, in the order of labels."""
+        if number == END:
+            yield ()
+        for label, after in self.moves(number).items():
+            yield from ((label, *rest) for rest in self.sequences(after))
 
     # ---- many at once
 

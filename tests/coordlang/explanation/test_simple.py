@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from coordlang.commands.building import build_language
-from coordlang.explanation.formula_problem import FormulaProblem
-from coordlang.explanation.simple import _Search, simple
+from coordlang.explanation.simple import FormulaProblem, _Search, simple
 from coordlang.explanation.variables import valuation
 from coordlang.explanation.words import mapped_states, word_formulas
 from coordlang.vocabulary.job import Assignment, Outcome
