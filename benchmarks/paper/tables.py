@@ -8,7 +8,7 @@ from statistics import fmean
 
 from benchmarks.frame import markdown
 from benchmarks.paper.recipe import Record
-from coordlang.required.sampled import wilson
+from coordlang.required.failures import wilson
 
 #: Columns of a table: their heads, and what they show of a record.
 Columns = Mapping[str, Callable[[Record], object]]

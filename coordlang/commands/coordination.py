@@ -19,9 +19,8 @@ from coordlang.commands.witness import witness_data, witness_text
 from coordlang.commands.workers import opened_workers
 from coordlang.language.tolerance import percent
 from coordlang.required.failure import mean
-from coordlang.required.failures import Failures, estimate_data, estimate_text
+from coordlang.required.failures import FailureEstimate, Failures
 from coordlang.required.miscoordination import Miscoordination
-from coordlang.required.sampled import FailureEstimate
 from coordlang.required.task_answers import FewestActions, answers
 from planners.search.plan_file import json_count
 from planners.system.notebook import Presented, counted, html_table
@@ -66,7 +65,7 @@ class TaskCoordination(Presented):
             "requires_coordination": self.required,
             "miscoordination": witness_data(self.witness),
             "failure": None if self.failure is None else float(self.failure),
-            **({"failure_estimate": estimate_data(self.estimate)} if self.estimate else {}),
+            **({"failure_estimate": self.estimate.data()} if self.estimate else {}),
             **({"slack": self.slack} if self.slack else {}),
             **({"fewest_actions": self.fewest.data()} if self.fewest else {}),
         }
@@ -94,7 +93,7 @@ class TaskCoordination(Presented):
         if self.failure is not None:
             share = percent(float(self.failure))
         elif self.estimate is not None:
-            share = estimate_text(self.estimate)
+            share = self.estimate.text()
         else:
             return fewest
         said = f"\nWithout a word, robots that choose by themselves fail in {share} of all runs."

@@ -15,21 +15,17 @@ are worked out once for each different pair.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import product
 from math import prod
 
 import numpy as np
 
 from planners.joint.tables import Bools, Ints, unique_tuples
-from planners.search.plan_space import PlanSpace
+from planners.search.plan_space import LayerEdges, PlanSpace
 from planners.system.limits import reaching
 
 #: The set that holds only the empty sequence.
 END = 0
-#: Up to so many entries for each pair that is asked for, a table of all pairs of sets is filled in
-#: place of sorting.
-_TABLE = 32
 
 
 class LabelSets:
@@ -150,19 +146,10 @@ class LabelSets:
         """For each pair whether ``one[k]`` is `within` ``other[k]``."""
         answers: Bools = one == other
         left = np.flatnonzero(~answers)
-        if len(self) ** 2 <= _TABLE * len(left):
-            codes = one[left] * len(self) + other[left]
-            table = np.zeros(len(self) ** 2, np.bool_)
-            table[codes] = True
-            asked = np.flatnonzero(table)
-            rows = zip(*(part.tolist() for part in np.divmod(asked, len(self))), strict=True)
-            table[asked] = [self.within(a, b) for a, b in rows]
-            answers[left] = table[codes]
-        else:
-            pairs = np.column_stack((one[left], other[left]))
-            different, inverse = unique_tuples(pairs, [len(self)] * 2)
-            known = np.array([self.within(a, b) for a, b in different.tolist()], np.bool_)
-            answers[left] = known[inverse]
+        pairs = np.column_stack((one[left], other[left]))
+        different, inverse = unique_tuples(pairs, [len(self)] * 2)
+        known = np.array([self.within(a, b) for a, b in different.tolist()], np.bool_)
+        answers[left] = known[inverse]
         return answers
 
     def all_within(self, one: Sequence[int], other: Sequence[int]) -> bool:
@@ -172,20 +159,6 @@ class LabelSets:
 
 #: A robot's choices below some node: each first label with the set of what may follow it.
 Moves = dict[int, int]
-
-
-@dataclass(frozen=True, slots=True)
-class _RobotEdges:
-    """What one robot's labels say of a layer's edges.
-
-    ``here`` (nodes of the layer) are the sets ``C_i``, ``labels`` (nodes) how many first labels
-    they have, ``following`` (edges) what the robot may do after the label of an edge, whichever
-    edge with that label is taken.
-    """
-
-    here: Ints
-    labels: Ints
-    following: Ints
 
 
 class Choices:
@@ -225,18 +198,23 @@ class Choices:
             fails = self.requires[edges.target]
             combinations_of_labels = np.ones(len(nodes))
             for robot in range(self._robots):
-                own = self._robot_edges(robot, edges.edges, edges.source - nodes[0], edges.target)
-                self.of_node[robot, nodes] = own.here
-                combinations_of_labels *= own.labels
+                here, labels, following = self._robot_edges(robot, edges)
+                self.of_node[robot, nodes] = here
+                combinations_of_labels *= labels
                 # A proper superset of what is optimal below: some sequence of it is not.
-                fails |= own.following != self.of_node[robot, edges.target]
+                fails |= following != self.of_node[robot, edges.target]
             # Different edges have different labels: fewer edges than combinations, and one is none.
             self.requires[nodes] = combinations_of_labels > degrees
             self.requires[edges.source[fails]] = True
 
-    def _robot_edges(self, robot: int, edges: Ints, source: Ints, target: Ints) -> _RobotEdges:
-        labels = self.space.robot_labels(robot, edges)
-        table = np.column_stack((source, labels, self.of_node[robot, target]))
+    def _robot_edges(self, robot: int, edges: LayerEdges) -> tuple[Ints, Ints, Ints]:
+        """What one robot's labels say of a layer's edges.
+
+        (nodes) the sets ``C_i``, (nodes) how many first labels they have, (edges) what the robot
+        may do after the label of an edge, whichever edge with that label is taken.
+        """
+        labels, after = self.space.robot_labels(robot, edges.edges), self.of_node[robot]
+        table = np.column_stack((edges.source - edges.source.min(), labels, after[edges.target]))
         rows, inverse = unique_tuples(table, [int(column.max()) + 1 for column in table.T])
         fresh = np.ones(len(rows), np.bool_)
         fresh[1:] = (rows[1:, :2] != rows[:-1, :2]).any(axis=1)
@@ -247,7 +225,7 @@ class Choices:
         sizes = np.diff(np.append(start, len(groups)))
         here = self.sets.sets(start, sizes, groups[:, 1], following)
         group_of_row = np.cumsum(fresh) - 1
-        return _RobotEdges(here, sizes, following[group_of_row[inverse]])
+        return here, sizes, following[group_of_row[inverse]]
 
     # ---- does a mixture of given choices fail?
 

@@ -69,13 +69,8 @@ def first_differences(
     Where no plans are inseparable, the divergences at a node depend on that node only, whatever was
     done before: Proposition 2 of docs/concepts.md.
 
-    Parameters
-    ----------
-    spaces
-        The plan spaces, over one table of states.
-    spoken_for
-        For each plan space, for how many goals each of its goals counts (default: for itself):
-        tasks, nodes and edges are counted so often.
+    ``spaces`` are over one table of states; ``spoken_for`` says for each of them for how many goals
+    each of its goals counts (default: for itself): tasks, nodes and edges are counted so often.
     """
     sets = LabelSets()
     search = DivergenceSearch(spaces[0].robots)

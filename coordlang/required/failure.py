@@ -132,19 +132,8 @@ def failure_probability(
 ) -> FailureProbability:
     """Count how often robots miscoordinate in all tasks of some plan spaces.
 
-    Parameters
-    ----------
-    spaces
-        The plan spaces.
-    words
-        For each the word number of each node; None: silence.
-    most
-        The most additions.
-
-    Raises
-    ------
-    TooManyToCount
-        Beyond that.
+    ``words`` are for each of the ``spaces`` the word number of each node; None: silence.  Raises
+    `TooManyToCount` beyond ``most`` additions.
     """
     sets = WeightedSets(LabelSets())
     found: list[Fraction] = []
@@ -158,19 +147,8 @@ def failure_of_sentence(
 ) -> Fraction:
     """How often robots miscoordinate in a task once a sentence was said.
 
-    Parameters
-    ----------
-    space, start
-        The optimal plans of the task, and the node of its initial state.
-    fits
-        Those with the sentence, as a plan space of one task.
-    most
-        The most additions.
-
-    Raises
-    ------
-    TooManyToCount
-        Beyond that.
+    ``space`` holds the optimal plans of the task, from the node ``start`` on, and ``fits`` those with
+    the sentence, as a plan space of one task.  Raises `TooManyToCount` beyond ``most`` additions.
     """
     sets = WeightedSets(LabelSets())
     begin = int(fits.starts[0])
@@ -199,16 +177,8 @@ _Parts = tuple[Multiple, ...]
 class FailureCount:
     """The failure probabilities of the tasks of one plan space.
 
-    Parameters
-    ----------
-    space
-        The optimal plans of the tasks.
-    word
-        The word number of each node; None: silence.
-    sets
-        Weighted sets, which plan spaces of one model may share.
-    most
-        The most additions of ``sets`` and this count together.
+    ``word`` is the word number of each node, None: silence.  Plan spaces of one model may share
+    ``sets``; ``most`` additions are made by them and this count together.
     """
 
     def __init__(
@@ -238,15 +208,11 @@ class FailureCount:
             )
 
         with reaching(so_far, self.space.model.smaller("smaller tasks")):
-            found = self._probabilities(asked)
+            said = self.by_sentence(asked) if asked else {}
+            found = {
+                node: self._probability(node, [*said[node].values()]) for node in sorted(asked)
+            }
         return [found.get(start, Fraction(0)) for start in starts]
-
-    def _probabilities(self, asked: set[int]) -> dict[int, Fraction]:
-        """Of these starting nodes, from the goals up."""
-        if not asked:
-            return {}
-        said = self.by_sentence(asked)
-        return {node: self._probability(node, list(said[node].values())) for node in sorted(asked)}
 
     def by_sentence(self, nodes: set[int]) -> dict[int, dict[int, _Parts]]:
         """The plans from these nodes, and from all below them, by the number of their sentence."""
@@ -284,17 +250,14 @@ class FailureCount:
 
     def _probability(self, start: int, said: Sequence[_Parts]) -> Fraction:
         robots = self.space.robots
-        sizes = [self._size(plans) for plans in said]
-        found = Fraction(0)
-        for size, plans in zip(sizes, said, strict=True):
-            factors, chosen = zip(*plans, strict=True)
+        found, plans = Fraction(0), 0
+        for parts in said:
+            factors, chosen = zip(*parts, strict=True)
+            size = factors[0] * self._sets.totals[chosen[0]]
             good = prod(factors) * self.good(chosen, start)
             found += Fraction(size**robots - good, size ** (robots - 1))
-        return found / sum(sizes)
-
-    def _size(self, plans: _Parts) -> int:
-        times, number = plans[0]
-        return times * self._sets.totals[number]
+            plans += size
+        return found / plans
 
     def good(self, chosen: tuple[int, ...], node: int) -> int:
         """How many choices of one sequence from each weighted set are an optimal plan from a node.
@@ -302,10 +265,9 @@ class FailureCount:
         Each counts as often as its weights multiply to.
         """
         key = (*chosen, node)
-        known = self._good.get(key)
-        if known is None:
-            known = self._good[key] = self._count(chosen, node)
-        return known
+        if key not in self._good:
+            self._good[key] = self._count(chosen, node)
+        return self._good[key]
 
     def _count(self, chosen: tuple[int, ...], node: int) -> int:
         sets, choices = self._sets, self.choices
@@ -318,17 +280,11 @@ class FailureCount:
         total = 0
         for edge in self.space.out_edges(node):
             sets.work += 1
-            following = [
-                own.get(label) for own, label in zip(moves, self._labels[edge], strict=True)
-            ]
-            times, after = 1, []
-            for multiple in following:
-                if multiple is None:
-                    break
-                times *= multiple[0]
-                after.append(multiple[1])
-            else:
-                total += times * self.good(tuple(after), self._targets[edge])
+            labels = self._labels[edge]
+            if all(label in own for own, label in zip(moves, labels, strict=True)):
+                steps = (own[label] for own, label in zip(moves, labels, strict=True))
+                times, after = zip(*steps, strict=True)
+                total += prod(times) * self.good(after, self._targets[edge])
         self._check()
         return total
 

@@ -92,12 +92,10 @@ class DifferenceWalk:
         None at all: the partition satisfies Theorem 3 for these tasks.  O(links).
         """
         state = self._space.state
-        ending = np.zeros(
-            0, np.int64
-        )  # per node: a link (of any layer, numbered through) or goal node that ends badly
-        endings: list[
-            Ints
-        ] = []  # rows (q, t_1 .. t_n), or (-1, t_1 .. t_n) for different goal states
+        # Per node: a link (of any layer, numbered through) or goal node that ends badly.
+        ending = np.zeros(0, np.int64)
+        # Rows (q, t_1 .. t_n), or (-1, t_1 .. t_n) for different goal states.
+        endings: list[Ints] = []
         offset = 0
         for number, layer in enumerate(self._layers):
             x = state[layer.x]

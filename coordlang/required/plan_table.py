@@ -32,30 +32,17 @@ _ODD = np.uint64(0x9E37_79B9_7F4A_7C15)
 class PlanTable:
     """Plans of some tasks, and the mixtures that are optimal plans.
 
-    Attributes
-    ----------
-    tasks
-        How many tasks there are in all, those that require no coordination included.
-    states
-        (plans, steps) The states that each plan passes through; shorter ones repeat their last.
-    plan_of_task, plans
-        (tasks) The first plan of each task, and how many of it there are in the table.
-    count
-        (tasks) How many plans each task has, those that are not in the table included.
-    parts
-        (plans, robots) What each robot does in a plan: its number among the task's own.
-    of_robot
-        (tasks, robots) How many different sequences each robot has.
-    cells
-        (cells, robots) What each robot does in a mixture that is optimal, sorted by task and by
-        what robot 1 does.
-    part_of_task, cell_of_part
-        (tasks) The number of the first sequence of robot 1 in each task, all tasks counted on, and
-        (sequences + 1) the first cell of each of them.
-    tasks_of_state
-        For each state the tasks with plans through it.
-    is_complete
-        Whether all plans of all tasks are listed: then the measure is exact but for rounding.
+    ``tasks`` are how many there are in all, those that require no coordination included.
+    ``states`` (plans, steps) are those that each plan passes through; shorter ones repeat their
+    last.  ``plan_of_task`` and ``plans`` (tasks) are the first plan of each task, and how many of
+    it there are in the table; ``count`` (tasks) how many it has.  ``parts`` (plans, robots) is what
+    each robot does in a plan, its number among the task's own sequences, of which each robot has
+    ``of_robot`` (tasks, robots).  ``cells`` (cells, robots) is what each robot does in a mixture
+    that is optimal, sorted by task and by what robot 1 does: ``part_of_task`` (tasks) is the number
+    of the first sequence of robot 1 in each task, all tasks counted on, and ``cell_of_part``
+    (sequences + 1) the first cell of each.  ``tasks_of_state`` are for each state the tasks with
+    plans through it.  ``is_complete``: all plans of all tasks are listed, and the measure is exact
+    but for rounding.
     """
 
     tasks: int
@@ -155,19 +142,10 @@ def plan_table(
 ) -> PlanTable:
     """List or draw the plans of tasks.
 
-    Parameters
-    ----------
-    spaces
-        The plan spaces of all tasks, over one table of ``states`` states.
-    most_tasks
-        Of more tasks so many are drawn.
-    seed
-        What is drawn depends on it.
-    listed
-        Plans of a task up to which all are listed.
-    mixtures
-        Whether mixtures are measured, too: then the tasks are those that require coordination, and
-        of a task with more plans fewer are drawn.
+    ``spaces`` hold all tasks, over one table of ``states`` states; of more than ``most_tasks`` tasks
+    so many are drawn, by ``seed``.  All plans of a task are listed up to ``listed`` of them.  If
+    ``mixtures`` are measured, too, the tasks are those that require coordination, and of a task
+    with more plans fewer are drawn.
     """
     random = Random(seed)
     chosen = [(space, Choices(space)) for space in spaces]

@@ -13,9 +13,8 @@ import numpy as np
 
 from coordlang.language.tolerance import percent
 from coordlang.required.choices import Choices, LabelSets
-from coordlang.required.failures import NONE, Failures, failures
+from coordlang.required.failures import NONE, FailureEstimate, Failures, failures
 from coordlang.required.miscoordination import Miscoordination, miscoordination
-from coordlang.required.sampled import FailureEstimate
 from planners.joint.composition import cost_of
 from planners.joint.model import JointModel, PlanningTask
 from planners.joint.tables import Ints
@@ -76,10 +75,7 @@ class FewestActions:
 def answers(loaded: PlanningInstance, workers: Workers) -> list[TaskAnswer]:
     """Search the task of each problem and decide whether it requires coordination, as jobs.
 
-    Raises
-    ------
-    ProvedImpossible
-        For the first task without a plan.
+    Raises `ProvedImpossible` for the first task without a plan.
     """
     model, tasks = loaded.model, loaded.tasks
     effort = float(len(model.codec.facts) * sum(map(len, model.labels)))  # a guess: no search yet
@@ -91,6 +87,12 @@ def answers(loaded: PlanningInstance, workers: Workers) -> list[TaskAnswer]:
     return [_read_answer(table) for table in workers.tables(batch)]
 
 
+#: An answer as JSON holds it: makespan, plans, witness, failures, and what the fewest actions do:
+#: plans, whether coordination is required, failure.  Exact numbers are texts.
+_Failures = tuple[str | None, tuple[int, int] | None, str]
+_Record = tuple[int, str, Miscoordination | None, _Failures, tuple[str, bool, float] | None]
+
+
 def _answer(shared: tuple[JointModel, Sequence[PlanningTask], Store | None], number: int) -> Table:
     """One job: a task."""
     model, tasks, folder = shared
@@ -98,53 +100,40 @@ def _answer(shared: tuple[JointModel, Sequence[PlanningTask], Store | None], num
         space = search(model, tasks[number])
     witness = miscoordination(space, 0)
     found = NONE if witness is None else failures([space], [None], _ADDITIONS)
-    return {
-        "makespan": np.array(space.least_makespan(0)),
-        "plans": np.array(_plans(space)),
-        "fewest": np.frombuffer(b"null" if witness is None else _fewest(space, found), np.uint8),
-        "witness": np.frombuffer(msgspec.json.encode(witness), np.uint8),
-        "failures": np.frombuffer(_to_json(found), np.uint8),
-    }
+    estimate = found.estimate and (found.estimate.failures, found.estimate.runs)
+    said = (None if found.mean is None else str(found.mean), estimate, found.why_not)
+    fewest = None if witness is None else _fewest(space, found)
+    record: _Record = (space.least_makespan(0), _plans(space), witness, said, fewest)
+    return {"answer": np.frombuffer(msgspec.json.encode(record), np.uint8)}
 
 
 def _plans(space: PlanSpace) -> str:
     return str(counts(space)[int(space.starts[0])])
 
 
-def _fewest(space: PlanSpace, found: Failures) -> bytes:
-    """What holds of the plans with the fewest actions as JSON, null if it is no better."""
+def _fewest(space: PlanSpace, found: Failures) -> tuple[str, bool, float] | None:
+    """What holds of the plans with the fewest actions, None if it is no better."""
     fewer = fewest_actions(space)
     if fewer is None:
-        return b"null"
+        return None
     required = bool(Choices(fewer).requires[fewer.starts[0]])
     own = failures([fewer], [None], _ADDITIONS) if required else NONE
     if required and (own.mean is None or found.mean is None or own.mean >= found.mean):
-        return b"null"
-    return msgspec.json.encode((_plans(fewer), required, float(own.mean or 0)))
-
-
-def _to_json(found: Failures) -> bytes:
-    """Exact numbers as text."""
-    mean = None if found.mean is None else str(found.mean)
-    estimate = found.estimate
-    drawn = None if estimate is None else (estimate.failures, estimate.runs)
-    return msgspec.json.encode((mean, drawn, found.why_not))
-
-
-def _from_json(data: bytes) -> Failures:
-    mean, drawn, why_not = msgspec.json.decode(data)
-    exact = None if mean is None else Fraction(mean)
-    return Failures(exact, exact, FailureEstimate(*drawn) if drawn else None, why_not)
+        return None
+    return _plans(fewer), required, float(own.mean or 0)
 
 
 def _read_answer(table: Table) -> TaskAnswer:
-    witness = msgspec.json.decode(table["witness"].tobytes(), type=Miscoordination | None)
-    found = _from_json(table["failures"].tobytes())
-    fewest = msgspec.json.decode(table["fewest"].tobytes())
-    if fewest is not None:
-        plans, required, failure = fewest
-        fewest = FewestActions(int(plans), required, failure)
-    return TaskAnswer(int(table["makespan"]), int(str(table["plans"])), witness, found, fewest)
+    record = msgspec.json.decode(table["answer"].tobytes(), type=_Record)
+    makespan, plans, witness, (mean, drawn, why_not), fewest = record
+    exact = None if mean is None else Fraction(mean)
+    return TaskAnswer(
+        makespan,
+        int(plans),
+        witness,
+        Failures(exact, exact, FailureEstimate(*drawn) if drawn else None, why_not),
+        FewestActions(int(fewest[0]), *fewest[1:]) if fewest else None,
+    )
 
 
 #: The cost that has these plans only.

@@ -16,15 +16,12 @@ from itertools import product
 import numpy as np
 
 from coordlang.required.choices import Choices
-from planners.joint.tables import Bools, Ints, ranges, spans, unique_tuples
-from planners.search.edge_index import EdgeIndex
+from planners.joint.tables import Bools, unique_tuples
 from planners.search.plan_space import PlanSpace
 from planners.system.limits import reaching
 
 #: The labels of all robots in one joint step.
 Labels = tuple[int, ...]
-#: Moves of one layer that are handled at a time.
-_PIECE = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,70 +112,12 @@ def _shared_plans(
 
 # ---- plans through the same states
 
-
-@dataclass(frozen=True, slots=True)
-class _Bundles:
-    """The edges that join the same two nodes, bundled: plans through the same states choose freely.
-
-    ``order`` lists the edges bundle by bundle; ``first`` (bundles + 1) delimits them in it.  Per
-    bundle ``source`` and ``target``; per robot the different ``labels`` of a bundle, delimited by
-    ``starts`` (bundles + 1); ``leaks``: is some mixture of a bundle's edges none of them?
-    """
-
-    order: Ints
-    first: Ints
-    source: Ints
-    target: Ints
-    starts: tuple[Ints, ...]
-    labels: tuple[Ints, ...]
-    leaks: Bools
-
-    @classmethod
-    def of(cls, space: PlanSpace) -> _Bundles:
-        """The bundles of a plan space, sorted by source; O(edges log edges)."""
-        source, target = space.sources, space.targets()
-        pairs, number = unique_tuples(np.column_stack((source, target)), [len(space)] * 2)
-        order = np.argsort(number, kind="stable")
-        first = np.searchsorted(number[order], np.arange(len(pairs) + 1))
-        starts, labels = [], []
-        combinations = np.ones(len(pairs))
-        for robot in range(space.robots):
-            own = space.robot_labels(robot)
-            bounds = [len(pairs), int(own.max(initial=0)) + 1]
-            different, _ = unique_tuples(np.column_stack((number, own)), bounds)
-            starts.append(np.searchsorted(different[:, 0], np.arange(len(pairs) + 1)))
-            labels.append(different[:, 1])
-            combinations *= np.diff(starts[-1])
-        leaks = combinations > np.diff(first)
-        return cls(order, first, pairs[:, 0], pairs[:, 1], tuple(starts), tuple(labels), leaks)
-
-    def edges(self, bundle: int) -> list[int]:
-        """The edges of a bundle."""
-        found: list[int] = self.order[self.first[bundle] : self.first[bundle + 1]].tolist()
-        return found
-
-    def mixtures(self, bundle: int) -> Iterable[Labels]:
-        """All combinations of the robots' labels on a bundle's edges."""
-        return product(
-            *(
-                labels[starts[bundle] : starts[bundle + 1]].tolist()
-                for labels, starts in zip(self.labels, self.starts, strict=True)
-            )
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class _Step:
-    """One layer of the walk: how its rows ``(x, y)`` were reached, and where from.
-
-    ``parent`` (-1: it begins here) is a row of the layer above, ``bundle`` what the plans took,
-    ``edge`` what the mixture took.
-    """
-
-    rows: Ints
-    parent: Ints
-    bundle: Ints
-    edge: Ints
+#: Edges that join the same two nodes: plans through the same states choose among them freely.
+_Bundle = list[int]
+#: A node ``(x, y)`` of the walk: where the plans are, and where their mixture is.
+_Pair = tuple[int, int]
+#: How the walk came to a node: from which one, and what the plans and their mixture did.
+_Came = tuple[_Pair, _Bundle, Labels]
 
 
 def witness_in_same_states(space: PlanSpace) -> Trail | None:
@@ -188,91 +127,92 @@ def witness_in_same_states(space: PlanSpace) -> Trail | None:
     the plans are.  So the walk begins only where some are not; O(nodes of a layer) for each node in
     the worst case.
     """
-    bundles = _Bundles.of(space)
-    if not bundles.leaks.any():
-        return None
-    history: list[_Step] = []
+    leaking = np.flatnonzero(_leaks(space))
+    history: list[dict[_Pair, _Came | None]] = []
 
     def so_far() -> str:
-        nodes = sum(len(step.rows) for step in history)
         return (
-            f"{len(history)} of {len(space.layers) - 1} steps along equal states, {nodes:,} nodes"
+            f"{len(history)} of {len(space.layers) - 1} steps along equal states, "
+            f"{sum(map(len, history)):,} nodes"
         )
 
     with reaching(so_far, space.model.smaller("smaller tasks")):
-        return _walk_in_same_states(space, bundles, history)
-
-
-def _walk_in_same_states(space: PlanSpace, bundles: _Bundles, history: list[_Step]) -> Trail | None:
-    index = EdgeIndex.of(space)
-    leaking = np.unique(bundles.source[bundles.leaks])
-    none = np.zeros(0, np.int64)
-    arriving = _Step(np.zeros((0, 2), np.int64), none, none, none)
-    for layer in range(len(space.layers) - 1, 0, -1):
-        here = leaking[space.layer[leaking] == layer]
-        new = np.full(len(here), -1)
-        step = _Step(
-            np.concatenate((arriving.rows, np.column_stack((here, here)))),
-            np.concatenate((arriving.parent, new)),
-            np.concatenate((arriving.bundle, new)),
-            np.concatenate((arriving.edge, new)),
-        )
-        history.append(step)
-        found = _moves_in_same_states(space, bundles, index, step.rows)
-        if isinstance(found, tuple):
-            return _trail_in_same_states(space, bundles, history, *found)
-        away = found.rows[:, 0] != found.rows[:, 1]
-        rows, one = np.unique(found.rows[away], axis=0, return_index=True)
-        one = np.flatnonzero(away)[one]
-        arriving = _Step(rows, found.parent[one], found.bundle[one], found.edge[one])
+        arriving: dict[_Pair, _Came] = {}
+        for layer in range(len(space.layers) - 1, 0, -1) if len(leaking) else ():
+            here = leaking[space.layer[leaking] == layer].tolist()
+            history.append({pair: arriving[pair] for pair in sorted(arriving)})
+            history[-1].update(((node, node), None) for node in here)
+            arriving, broken = _steps_in_same_states(space, history[-1])
+            if broken is not None:
+                return _trail_in_same_states(space, history, broken)
     return None
 
 
-def _moves_in_same_states(
-    space: PlanSpace, bundles: _Bundles, index: EdgeIndex, rows: Ints
-) -> _Step | tuple[int, int]:
-    """All moves out of rows ``(x, y)``; or the row and the bundle of the first mixture to break."""
-    low = np.searchsorted(bundles.source, rows[:, 0])
-    high = np.searchsorted(bundles.source, rows[:, 0], side="right")
-    found: list[Ints] = [np.zeros((0, 3), np.int64)]
-    sizes = ((high - low) * space.out_degrees[rows[:, 1]]).astype(np.float64)
-    for span in spans(sizes, _PIECE):
-        counts = (high - low)[span]
-        row = np.repeat(np.arange(span.start, span.stop), counts)
-        bundle = ranges(low[span], counts)
-        # On the diagonal a bundle without leak leads back to the diagonal.
-        walks = (rows[row, 0] != rows[row, 1]) | bundles.leaks[bundle]
-        row, bundle = row[walks], bundle[walks]
-        prefix = rows[row, 1]
-        for robot, (starts, labels) in enumerate(zip(bundles.starts, bundles.labels, strict=True)):
-            counts = starts[bundle + 1] - starts[bundle]
-            label = labels[ranges(starts[bundle], counts)]
-            row, bundle, prefix = (np.repeat(part, counts) for part in (row, bundle, prefix))
-            prefix = index.follow(robot, prefix, label)
-            broken = np.flatnonzero(prefix < 0)
-            if len(broken):
-                return int(row[broken[0]]), int(bundle[broken[0]])
-        found.append(np.column_stack((row, bundle, prefix)))
-    row, bundle, edge = np.concatenate(found).T
-    below = np.column_stack((bundles.target[bundle], space.targets(edge)))
-    return _Step(below, row, bundle, edge)
+def _leaks(space: PlanSpace) -> Bools:
+    """(nodes) out of which some mixture of the edges of a bundle is none of them.
+
+    O(edges log edges).
+    """
+    ends = np.column_stack((space.sources, space.targets()))
+    pairs, bundle = unique_tuples(ends, [len(space)] * 2)
+    mixtures = np.ones(len(pairs))
+    for robot in range(space.robots):
+        own = space.robot_labels(robot)
+        bounds = [max(1, len(pairs)), int(own.max(initial=0)) + 1]
+        different, _ = unique_tuples(np.column_stack((bundle, own)), bounds)
+        mixtures *= np.bincount(different[:, 0], minlength=len(pairs))
+    found = np.zeros(len(space), np.bool_)
+    found[pairs[mixtures > np.bincount(bundle, minlength=len(pairs)), 0]] = True
+    return found
+
+
+def _steps_in_same_states(
+    space: PlanSpace, layer: Mapping[_Pair, object]
+) -> tuple[dict[_Pair, _Came], _Came | None]:
+    """The nodes one step on that are off the diagonal; and the first mixture that breaks, if any.
+
+    First is the one with the fewest robots after which no edge fits.
+    """
+    below: dict[_Pair, _Came] = {}
+    broken: list[tuple[int, _Came]] = []
+    for x, y in layer:
+        bundles: dict[int, _Bundle] = {}
+        for edge in space.out_edges(x):
+            bundles.setdefault(space.target_of(edge), []).append(edge)
+        targets = {space.labels_of(edge): space.target_of(edge) for edge in space.out_edges(y)}
+        for target in sorted(bundles):
+            labels = zip(*map(space.labels_of, bundles[target]), strict=True)
+            for mixed in product(*(sorted(set(own)) for own in labels)):
+                came = ((x, y), bundles[target], mixed)
+                if mixed not in targets:
+                    broken.append((_fitting(mixed, targets), came))
+                elif targets[mixed] != target:
+                    below.setdefault((target, targets[mixed]), came)
+    _, first = min(broken, key=lambda one: one[0], default=(0, None))
+    return below, first
+
+
+def _fitting(mixed: Labels, targets: Iterable[Labels]) -> int:
+    """For how many robots, from the first on, some joint action has these labels."""
+    return max(
+        next(k for k, (own, other) in enumerate(zip(mixed, labels, strict=True)) if own != other)
+        for labels in targets
+    )
 
 
 def _trail_in_same_states(
-    space: PlanSpace, bundles: _Bundles, history: Sequence[_Step], row: int, bundle: int
+    space: PlanSpace, history: Sequence[Mapping[_Pair, _Came | None]], broken: _Came
 ) -> Trail:
     """The plans behind a break: from a start to where the mixture leaves them, and on."""
-    y = int(history[-1].rows[row, 1])
-    breaking = next(m for m in bundles.mixtures(bundle) if space.edge_with(y, m) is None)
-    steps = [(bundles.edges(bundle), breaking)]
-    for step in reversed(history):
-        parent = int(step.parent[row])
-        if parent < 0:
-            start, before = _way_to(space, int(step.rows[row, 0]))
+    steps: list[tuple[_Bundle, Labels]] = []
+    came: _Came | None = broken
+    for layer in reversed(history):
+        if came is None:
             break
-        mixed = space.labels_of(int(step.edge[row]))
-        steps.append((bundles.edges(int(step.bundle[row])), mixed))
-        row = parent
+        pair, edges, mixed = came
+        steps.append((edges, mixed))
+        came = layer[pair]
+    start, before = _way_to(space, pair[0])
     steps.reverse()
 
     def plan_of(robots: Sequence[int]) -> list[int] | None:

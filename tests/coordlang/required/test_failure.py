@@ -18,7 +18,7 @@ from coordlang.required.failure import (
     failure_of_sentence,
     failure_probability,
 )
-from coordlang.required.sampled import estimated_failure
+from coordlang.required.failures import estimated_failure
 from tests.support import naive_failures
 from tests.support.domains import all_tasks, own_task
 from tests.support.naive import TooLarge
