@@ -147,8 +147,9 @@ def failure_of_sentence(
 ) -> Fraction:
     """How often robots miscoordinate in a task once a sentence was said.
 
-    ``space`` holds the optimal plans of the task, from the node ``start`` on, and ``fits`` those with
-    the sentence, as a plan space of one task.  Raises `TooManyToCount` beyond ``most`` additions.
+    ``space`` holds the optimal plans of the task, from the node ``start`` on, and ``fits`` those
+    with the sentence, as a plan space of one task.  Raises `TooManyToCount` beyond ``most``
+    additions.
     """
     sets = WeightedSets(LabelSets())
     begin = int(fits.starts[0])

@@ -142,7 +142,7 @@ def plan_table(
 ) -> PlanTable:
     """List or draw the plans of tasks.
 
-    ``spaces`` hold all tasks, over one table of ``states`` states; of more than ``most_tasks`` tasks
+    ``spaces`` hold all tasks, over one table of ``states`` states; of more than ``most_tasks``
     so many are drawn, by ``seed``.  All plans of a task are listed up to ``listed`` of them.  If
     ``mixtures`` are measured, too, the tasks are those that require coordination, and of a task
     with more plans fewer are drawn.

@@ -100,8 +100,8 @@ def _answer(shared: tuple[JointModel, Sequence[PlanningTask], Store | None], num
         space = search(model, tasks[number])
     witness = miscoordination(space, 0)
     found = NONE if witness is None else failures([space], [None], _ADDITIONS)
-    estimate = found.estimate and (found.estimate.failures, found.estimate.runs)
-    said = (None if found.mean is None else str(found.mean), estimate, found.why_not)
+    drawn = None if found.estimate is None else (found.estimate.failures, found.estimate.runs)
+    said = (None if found.mean is None else str(found.mean), drawn, found.why_not)
     fewest = None if witness is None else _fewest(space, found)
     record: _Record = (space.least_makespan(0), _plans(space), witness, said, fewest)
     return {"answer": np.frombuffer(msgspec.json.encode(record), np.uint8)}
