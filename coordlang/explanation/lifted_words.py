@@ -13,7 +13,7 @@ from coordlang.explanation.minimise import Points, minimise
 from coordlang.language.words import Language
 from coordlang.lifted.features import Feature
 from coordlang.lifted.file import read_values
-from coordlang.lifted.language import LiftedLanguage, Vector
+from coordlang.lifted.language import LiftedLanguage, Vector, vectors
 from coordlang.lifted.notation import feature_of
 from coordlang.lifted.wording import condition, english, formula
 from coordlang.lifted.world import States, World
@@ -86,7 +86,7 @@ def lifted_words(
             "the problem.",
         )
         return None
-    occurring = dict(zip(map(tuple, lifted.vectors(states).tolist()), given, strict=True))
+    occurring = dict(zip(map(tuple, vectors(features, states).tolist()), given, strict=True))
     return LiftedWords(features, _terms(features, {**values, **occurring}, language.words))
 
 

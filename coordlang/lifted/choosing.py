@@ -31,10 +31,7 @@ class SimplestHitting:
 
     Weights are asked for from below, so what is found is proved to be lightest.
 
-    Parameters
-    ----------
-    weights
-        That of each member, by number; positive.
+    ``weights`` are those of the members, by number; positive.
     """
 
     def __init__(self, weights: Sequence[int]) -> None:
@@ -66,12 +63,7 @@ def undominated(inside: Bools, weights: Ints) -> Ints:
 
     Left out is what is in no set, or only in those of one other member that is not heavier.
 
-    Parameters
-    ----------
-    inside
-        What is in which sets: (members, sets).
-    weights
-        The weight of each member.
+    ``inside`` says what is in which sets: (members, sets).
     """
     order = np.lexsort((np.arange(len(weights)), weights))
     _, first = np.unique(np.packbits(inside[order], axis=1), axis=0, return_index=True)
@@ -145,19 +137,11 @@ def merge_classes(
     refuting: Callable[[int, Ints], Mapping[Clause, object]],
     progress: Callable[[str], None],
 ) -> Merged:
-    """As few words as are found.
+    """As few words as are found for ``count`` classes.
 
-    Parameters
-    ----------
-    count
-        How many classes there are.
-    classes
-        Per problem the class of each state; one word for each class is a language.
-    known
-        Per problem clauses that every language satisfies.
-    refuting
-        ``refuting(problem, words of states)``: clauses that these words violate; none if they are a
-        language for the problem.
+    ``classes`` are for each problem the class of each state; one word for each class is a language.
+    ``known`` are for each problem clauses that every language satisfies; ``refuting(problem, words
+    of states)`` gives clauses that these words violate, none if they are a language for it.
     """
     clauses = dict.fromkeys(
         _over_classes(clause, own)

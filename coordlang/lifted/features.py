@@ -1,28 +1,199 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Features: small numbers that a state of any problem of a domain has, written as s-expressions.
 
-Terms name objects: ``(at r1)`` is the x with ``(at r1 x)``, ``(inverse holds r1)`` the x with
-``(holds x r1)``.  What is named, r1, is a robot or another object that all problems have.  Numbers:
-an attribute of a term (`coordlang.lifted.attributes`), a distance, a count of true atoms, in which
-``_`` stands for any object, the size of a concept, or a gap between two
-(`coordlang.lifted.concepts`).  Features: ``(sign (- N N))``, the sign of a difference, from -1 to
-1; ``(mod N m)``; ``(min N m)``; ``(same T T)``, whether two terms name one object.  All have few
-values, however large the problem is; `UNDEFINED` where a term names nothing.
+*Concepts* are sets of objects, by the constructors of description logic: ``all``; ``room``, the
+objects of a type or those of which a predicate is true; ``(one r1)``; ``(not C)``; ``(and C D)``;
+``(some R C)``, the x with (R x y) for some y in C.  Roles R: a predicate with two arguments,
+``(inverse R)``, and ``(closure R)``: one or more steps.
+
+*Terms* name objects: ``(at r1)`` is the x with ``(at r1 x)``, ``(inverse holds r1)`` the x with
+``(holds x r1)``.  What is named, r1, is a robot or another object that all problems have.
+
+*Numbers*: an attribute of a term (`coordlang.lifted.world`), a distance, a count of true atoms, in
+which ``_`` stands for any object, ``(size C)``, and ``(gap P C D)``, the fewest links of a static
+relation from C to D.
+
+*Features*: ``(sign (- N N))``, the sign of a difference, from -1 to 1; ``(mod N m)``; ``(min N
+m)``; ``(same T T)``, whether two terms name one object.  All have few values, however large the
+problem is; `UNDEFINED` where a term names nothing.
+
+What a concept is in states is a table (states, objects); all others are one value for each state.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
-from coordlang.lifted.attributes import attribute, distances
-from coordlang.lifted.concepts import Expression, Gap, Size
-from coordlang.lifted.world import ANY, NONE, States
-from planners.joint.tables import Ints
+from coordlang.lifted.world import ANY, NONE, States, attribute, distances, links
+from planners.joint.tables import Bools, Ints
 
 #: The value of a feature whose terms name no object, or one without the attribute.
 UNDEFINED = -2
+
+
+class Expression:
+    """What is written as an s-expression: its head, and then its parts."""
+
+    __slots__ = ()
+    HEAD: ClassVar[str]
+    __match_args__: ClassVar[tuple[str, ...]]
+
+    @property
+    def parts(self) -> list[object]:
+        """What it is made of."""
+        return [getattr(self, name) for name in self.__match_args__]
+
+    def __str__(self) -> str:
+        return f"({' '.join((self.HEAD, *map(str, self.parts)))})"
+
+    @property
+    def complexity(self) -> int:
+        """How much there is to say: one for each head and each name."""
+        return 1 + sum(part.complexity for part in self.parts if isinstance(part, Expression))
+
+    def __call__(self, states: States) -> Any:
+        """Its values: one for each state, or for each state and object."""
+        raise NotImplementedError
+
+
+# ---- concepts
+
+
+@dataclass(frozen=True, slots=True)
+class Role(Expression):
+    """A predicate with two arguments, read in either direction, one step or any number of them."""
+
+    predicate: str
+    inverse: bool = False
+    closure: bool = False
+
+    def __str__(self) -> str:
+        text = f"(inverse {self.predicate})" if self.inverse else self.predicate
+        return f"(closure {text})" if self.closure else text
+
+    @property
+    def complexity(self) -> int:
+        """One, and one more for any number of steps."""
+        return 1 + self.closure
+
+    def some(self, states: States, members: Bools) -> Bools:
+        """The objects that the role relates with one of ``members``: (states, objects)."""
+        found = self._step(states, members)
+        while self.closure:
+            more = found | self._step(states, found)
+            if (more == found).all():
+                break
+            found = more
+        return found
+
+    def _step(self, states: States, members: Bools) -> Bools:
+        world = states.world
+        if self.predicate in world.relations:
+            linked = links(world, self.predicate).astype(np.float32)
+            reached: Bools = members.astype(np.float32) @ (linked if self.inverse else linked.T) > 0
+            return reached
+        found = np.zeros_like(members)
+        if world.predicates.get(self.predicate) == 2:
+            state, *ends = states.atoms(self.predicate)
+            one, other = reversed(ends) if self.inverse else ends
+            hit = members[state, other]
+            found[state[hit], one[hit]] = True
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class Everything(Expression):
+    """All objects."""
+
+    def __str__(self) -> str:
+        return "all"
+
+    def __call__(self, states: States) -> Bools:
+        return np.ones((len(states), len(states.world.objects)), bool)
+
+
+@dataclass(frozen=True, slots=True)
+class Named(Expression):
+    """The objects of a type, or of which a predicate with one argument is true."""
+
+    name: str
+
+    def __str__(self) -> str:
+        return self.name
+
+    def __call__(self, states: States) -> Bools:
+        world = states.world
+        found = np.zeros((len(states), len(world.objects)), bool)
+        always = [*world.types.get(self.name, ())]
+        always += [args[0] for args in world.statics.get(self.name, ()) if len(args) == 1]
+        found[:, [world.number[name] for name in always]] = True
+        if world.predicates.get(self.name) == 1:
+            state, own = states.atoms(self.name)
+            found[state, own] = True
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class One(Expression):
+    """The object of a name; none where the problem does not have it."""
+
+    HEAD = "one"
+    name: str
+
+    def __call__(self, states: States) -> Bools:
+        own = np.array([name == self.name for name in states.world.objects], bool)
+        return np.tile(own, (len(states), 1))
+
+
+@dataclass(frozen=True, slots=True)
+class Without(Expression):
+    """The objects that are not in a concept."""
+
+    HEAD = "not"
+    concept: Concept
+
+    def __call__(self, states: States) -> Bools:
+        others: Bools = ~states.get(self.concept)
+        return others
+
+
+@dataclass(frozen=True, slots=True)
+class Both(Expression):
+    """The objects in two concepts."""
+
+    HEAD = "and"
+    one: Concept
+    other: Concept
+
+    def __call__(self, states: States) -> Bools:
+        common: Bools = states.get(self.one) & states.get(self.other)
+        return common
+
+
+@dataclass(frozen=True, slots=True)
+class Some(Expression):
+    """The objects that a role relates with one in a concept."""
+
+    HEAD = "some"
+    role: Role
+    concept: Concept
+
+    @property
+    def complexity(self) -> int:
+        """That of its parts."""
+        return self.role.complexity + self.concept.complexity
+
+    def __call__(self, states: States) -> Bools:
+        return self.role.some(states, states.get(self.concept))
+
+
+Concept = Everything | Named | One | Without | Both | Some
+
+
+# ---- terms and numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +212,7 @@ class Term(Expression):
         """One, and one more for the other direction."""
         return 1 + self.inverse
 
-    def _read(self, states: States) -> Ints:
+    def __call__(self, states: States) -> Ints:
         return states.image(self.predicate, self.named, self.inverse)
 
 
@@ -56,8 +227,8 @@ class Attribute(Expression):
     def __str__(self) -> str:
         return f"({self.name} {self.relation + ' ' if self.relation else ''}{self.term})"
 
-    def _read(self, states: States) -> Ints:
-        of_object = np.append(attribute(states.world, self.name, self.relation or None), NONE)
+    def __call__(self, states: States) -> Ints:
+        of_object = np.append(attribute(states.world, self.name, self.relation), NONE)
         number: Ints = of_object[states.get(self.term)]
         return number
 
@@ -71,7 +242,7 @@ class Distance(Expression):
     one: Term
     other: Term
 
-    def _read(self, states: States) -> Ints:
+    def __call__(self, states: States) -> Ints:
         here, there = states.get(self.one), states.get(self.other)
         far = distances(states.world, self.relation)[here, there]
         return np.where((here == NONE) | (there == NONE), NONE, far)
@@ -92,11 +263,48 @@ class Count(Expression):
         """One, and one more for each object that is named."""
         return 1 + sum(arg != ANY for arg in self.args)
 
-    def _read(self, states: States) -> Ints:
+    def __call__(self, states: States) -> Ints:
         return states.count(self.predicate, self.args)
 
 
+@dataclass(frozen=True, slots=True)
+class Size(Expression):
+    """How many objects are in a concept."""
+
+    HEAD = "size"
+    concept: Concept
+
+    def __call__(self, states: States) -> Ints:
+        size: Ints = states.get(self.concept).sum(axis=1)
+        return size
+
+
+@dataclass(frozen=True, slots=True)
+class Gap(Expression):
+    """The fewest links of a static relation from an object of one concept to one of another."""
+
+    HEAD = "gap"
+    relation: str
+    one: Concept
+    other: Concept
+
+    def __call__(self, states: States) -> Ints:
+        here: Bools = states.get(self.one)
+        there: Bools = states.get(self.other)
+        far = distances(states.world, self.relation)
+        never = len(far) + 1
+        far = np.where(far == NONE, never, far)
+        least = np.full(len(states), never)
+        for start in range(len(far)):
+            near = np.where(there, far[start], never).min(axis=1, initial=never)
+            least = np.where(here[:, start], np.minimum(least, near), least)
+        return np.where(least == never, NONE, least)
+
+
 Number = Attribute | Distance | Count | Size | Gap
+
+
+# ---- features
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +317,7 @@ class Sign(Expression):
     def __str__(self) -> str:
         return f"(sign (- {self.one} {self.other}))"
 
-    def _read(self, states: States) -> Ints:
+    def __call__(self, states: States) -> Ints:
         one, other = states.get(self.one), states.get(self.other)
         return np.where((one == NONE) | (other == NONE), UNDEFINED, np.sign(one - other))
 
@@ -127,7 +335,7 @@ class Residue(Expression):
         """That of the number, and the modulus."""
         return self.number.complexity + self.modulus
 
-    def _read(self, states: States) -> Ints:
+    def __call__(self, states: States) -> Ints:
         number = states.get(self.number)
         return np.where(number == NONE, UNDEFINED, number % self.modulus)
 
@@ -145,7 +353,7 @@ class Least(Expression):
         """That of the number, and twice the most: what is large in small problems is nothing."""
         return self.number.complexity + 2 * self.most
 
-    def _read(self, states: States) -> Ints:
+    def __call__(self, states: States) -> Ints:
         number = states.get(self.number)
         return np.where(number == NONE, UNDEFINED, np.minimum(number, self.most))
 
@@ -158,7 +366,7 @@ class Same(Expression):
     one: Term
     other: Term
 
-    def _read(self, states: States) -> Ints:
+    def __call__(self, states: States) -> Ints:
         one, other = states.get(self.one), states.get(self.other)
         return np.where((one == NONE) | (other == NONE), UNDEFINED, one == other)
 

@@ -48,18 +48,8 @@ def grounded(
 ) -> Language:
     """The words of the states on plans of candidate tasks.
 
-    Parameters
-    ----------
-    lifted
-        The lifted language.
-    candidates, states
-        The tasks, and the states on their plans.
-    known
-        Unless the words were verified, the language covers no task: it guarantees nothing.
-    producer
-        Who made it, and how.
-    every_word
-        Whether it has the words that no state here has.
+    Unless the words are ``known`` to be verified, the language covers no task: it guarantees
+    nothing.  With ``every_word`` it has the words that no state here has, too.
     """
     partition = lifted.partition(states, every_word=every_word)
     size = len(partition.words)

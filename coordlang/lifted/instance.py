@@ -7,11 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-import numpy as np
-
 from coordlang.language.candidates import Candidates
 from coordlang.language.partition import Partition
 from coordlang.lifted.features import Feature
+from coordlang.lifted.language import vectors
 from coordlang.lifted.world import States, World
 from coordlang.sites.coordinates import Point
 from coordlang.verification.candidates import verify_candidates
@@ -40,8 +39,7 @@ class Instance:
 
     def vectors(self, chosen: Sequence[Feature]) -> Ints:
         """The values of features: (states, features)."""
-        columns = [self.states.get(feature) for feature in chosen]
-        return np.array(columns, np.int64).reshape(len(columns), len(self.states)).T
+        return vectors(chosen, self.states)
 
     def holds(
         self, words: Ints, workers: Workers | None = None, progress: Progress | None = None

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,6 +20,18 @@ _ENTRIES = 20_000_000
 
 #: The values of all features in a state.
 Vector = tuple[int, ...]
+
+
+def vectors(features: Sequence[Feature], states: States) -> Ints:
+    """The features' values: (states, features).  So many states at a time as fit."""
+    if len(states) <= (some := max(1, _ENTRIES // max(1, len(states.world.objects)))):
+        columns = [states.get(feature) for feature in features]
+        return np.array(columns, np.int64).reshape(len(columns), len(states)).T
+    parts = (
+        States(states.world, states.rows[first : first + some])
+        for first in range(0, len(states), some)
+    )
+    return np.concatenate([vectors(features, part) for part in parts])
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,23 +55,12 @@ class Verified:
 class LiftedLanguage:
     """Words as functions of features, for every problem of a domain.
 
-    Attributes
-    ----------
-    features
-        What is looked at.
-    words
-        The words.
-    values
-        The features' values -> word.  Values that no known problem has get a word of their own.
-    robots, domain, model
-        Whose words these are, as in language files (`coordlang.language.provenance`).
-    names_robots
-        Whether the robots were named when it was learned, as in ``--robots``; if not, the robots of
-        another problem are found as always, and have to be the same.
-    verified
-        The problems on which this was verified; nothing is claimed of others.
-    producer
-        Who made it, and how.
+    ``values`` gives the ``words`` of the features' values; values that no known problem has get a
+    word of their own.  ``robots``, ``domain`` and ``model`` say whose words these are, as in
+    language files (`coordlang.language.provenance`).  ``names_robots``: the robots were named when
+    it was learned, as in ``--robots``; if not, the robots of another problem are found as always,
+    and have to be the same.  It was ``verified`` on these problems; nothing is claimed of others.
+    ``producer`` says who made it, and how.
     """
 
     features: tuple[Feature, ...]
@@ -74,20 +75,9 @@ class LiftedLanguage:
 
     def words_of(self, states: States) -> list[str]:
         """The word of each state of any problem of the domain."""
-        different, number = np.unique(self.vectors(states), axis=0, return_inverse=True)
+        different, number = np.unique(vectors(self.features, states), axis=0, return_inverse=True)
         words = [self._word(tuple(vector)) for vector in different.tolist()]
         return [words[k] for k in number.reshape(-1).tolist()]
-
-    def vectors(self, states: States) -> Ints:
-        """The features' values: (states, features).  So many states at a time as fit."""
-        if len(states) <= (some := max(1, _ENTRIES // max(1, len(states.world.objects)))):
-            columns = [states.get(feature) for feature in self.features]
-            return np.array(columns, np.int64).reshape(len(columns), len(states)).T
-        parts = (
-            States(states.world, states.rows[first : first + some])
-            for first in range(0, len(states), some)
-        )
-        return np.concatenate([self.vectors(part) for part in parts])
 
     def partition(self, states: States, *, every_word: bool = False) -> Partition:
         """The words of different states, as a partition.
@@ -97,7 +87,7 @@ class LiftedLanguage:
         """
         found = self.words_of(states)
         have = {*found, *self.words} if every_word else set(found)
-        names = sorted(have, key=lambda word: (word not in self.words, _natural(word)))
+        names = sorted(have, key=lambda word: (word not in self.words, len(word), word))
         number = {name: k for k, name in enumerate(names)}
         word = np.array([number[name] for name in found], np.int64)
         most = int(np.bincount(word, minlength=1).argmax())
@@ -105,7 +95,3 @@ class LiftedLanguage:
 
     def _word(self, vector: Vector) -> str:
         return self.values.get(vector) or "v" + ".".join(map(str, vector))
-
-
-def _natural(word: str) -> tuple[int, str]:
-    return len(word), word

@@ -44,26 +44,14 @@ _TRIED = 8
 class Learned:
     """Features of which the words of a language are functions.
 
-    Attributes
-    ----------
-    features
-        In the order of their complexity.
-    word
-        The number of the word for the features' values, for those that occur.
-    proved
-        Whether fewer words are proved not to suffice, as functions of these features.
-    sizes
-        For each problem, known ones first, the numbers of states, tasks and words.
-    tried, pool
-        How many features were looked at (with the concepts and numbers of which they are made), and
-        how many of them differ.
-    rounds
-        How often classes were refuted.
-    taken
-        How many problems were learned from: the known ones, and those held back that refuted what
-        had been learned.
-    stopped
-        What ended the search for fewer words, or None: the words are verified all the same.
+    ``features`` in the order of their complexity; ``word`` is the number of the word for the
+    features' values, for those that occur; ``proved``: fewer words do not suffice, as functions of
+    these features.  ``sizes`` are for each problem, known ones first, the numbers of states, tasks
+    and words.  ``tried`` counts the features looked at (with the concepts and numbers of which they
+    are made), ``pool`` those of them that differ, ``rounds`` how often classes were refuted,
+    ``taken`` the problems learned from: the known ones, and those held back that refuted what had
+    been learned.  ``stopped`` is what ended the search for fewer words, or None: the words are
+    verified all the same.
     """
 
     features: tuple[Feature, ...]
@@ -106,11 +94,8 @@ def learn(
     learned from ``known``.  Places of different maps are named, as landmarks, only where no other
     features suffice.
 
-    Raises
-    ------
-    ProvedImpossible
-        If no features up to this ``complexity`` suffice; the error has the states that must be told
-        apart.
+    Raises `ProvedImpossible` if no features up to this ``complexity`` suffice; the error has the
+    states that must be told apart.
     """
     learner = _Learner([*known, *held_back], complexity, seed, workers or Workers(), progress)
     for own in known:
@@ -171,9 +156,8 @@ class _Learner:
         candidates = own.candidates
         rows = len(candidates.rows)
         self.taken.append(own)
-        self._refuters.append(
-            Refuter(candidates.spaces, group, rows, self._seed, self._progress, refuted)
-        )
+        found = Refuter(candidates.spaces, group, rows, self._seed, self._progress, refuted)
+        self._refuters.append(found)
         self._clauses.append({})
 
     def begin(self, landmarks: bool = False) -> None:
@@ -265,19 +249,16 @@ class _Learner:
     def _choose(self, excluded: Sequence[int]) -> list[int]:
         """The simplest features that nothing refutes in the problems that were taken."""
         hitting = SimplestHitting([feature.complexity for feature in self._pool.features])
-        for number, clauses in enumerate(self._clauses):
-            for clause in clauses:
-                hitting.add(self._separating(number, clause, excluded))
-        chosen = hitting.find()
-        number = 0
-        while number < len(self._tables):  # until none of them refutes the same features
-            found = self._violated(number, chosen)
-            for clause in found:
-                hitting.add(self._separating(number, clause, excluded))
-            number = 0 if found else number + 1
-            if found:
-                chosen = hitting.find()
-        return chosen
+        new = list(enumerate(map(list, self._clauses)))
+        while True:
+            for number, clauses in new:
+                for clause in clauses:
+                    hitting.add(self._separating(number, clause, excluded))
+            chosen = hitting.find()
+            refuted = ((n, self._violated(n, chosen)) for n in range(len(self._tables)))
+            new = [next(((n, found) for n, found in refuted if found), (0, []))]
+            if not new[0][1]:
+                return chosen
 
     def _violated(self, number: int, chosen: Sequence[int]) -> list[Clause]:
         """Clauses that the classes of features violate in one problem."""

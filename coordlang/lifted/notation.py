@@ -4,31 +4,29 @@
 from __future__ import annotations
 
 import re
-from typing import cast
+from dataclasses import fields, replace
+from typing import Any
 
-from coordlang.lifted.concepts import (
-    Both,
-    Concept,
-    Everything,
-    Gap,
-    Named,
-    One,
-    Role,
-    Size,
-    Some,
-    Without,
-)
 from coordlang.lifted.features import (
     Attribute,
+    Both,
     Count,
     Distance,
+    Everything,
+    Expression,
     Feature,
+    Gap,
     Least,
-    Number,
+    Named,
+    One,
     Residue,
+    Role,
     Same,
     Sign,
+    Size,
+    Some,
     Term,
+    Without,
 )
 from planners.system.errors import BadInput, Position
 from planners.system.messages import echoed
@@ -41,6 +39,20 @@ LARGEST = 1_000_000
 
 Tree = str | list["Tree"]
 
+#: What is written as its head and its parts in order, by its kind.
+_MADE: dict[tuple[str, str], type[Expression]] = {
+    ("Feature", "mod"): Residue,
+    ("Feature", "min"): Least,
+    ("Feature", "same"): Same,
+    ("Number", "distance"): Distance,
+    ("Number", "size"): Size,
+    ("Number", "gap"): Gap,
+    ("Concept", "one"): One,
+    ("Concept", "not"): Without,
+    ("Concept", "and"): Both,
+    ("Concept", "some"): Some,
+}
+
 
 def feature_of(text: str, position: Position) -> Feature:
     """The feature that a text defines.
@@ -48,7 +60,7 @@ def feature_of(text: str, position: Position) -> Feature:
     Raises `BadInput` for anything else.
     """
     try:
-        found = _feature(_tree(text))
+        found: Feature | None = _read("Feature", _tree(text))
     except (ValueError, IndexError):
         found = None
     if found is None or str(found) != " ".join(text.split()):
@@ -79,35 +91,38 @@ def _tree(text: str) -> Tree:
     return whole
 
 
-def _feature(tree: Tree) -> Feature | None:
-    match tree:
-        case ["sign", ["-", one, other]]:
-            return Sign(_number(one), _number(other))
-        case ["mod", number, str(modulus)] if 1 < int(modulus) < LARGEST:
-            return Residue(_number(number), int(modulus))
-        case ["min", number, str(most)] if 0 < int(most) < LARGEST:
-            return Least(_number(number), int(most))
-        case ["same", one, other]:
-            return Same(_term(one), _term(other))
-    return None
+def _read(kind: str, tree: Tree) -> Any:
+    """What a text is as something of a kind, the type of a field.  Raises `ValueError` if none."""
+    match kind, tree:
+        case "str", str():
+            return tree
+        case "int", str() if 0 < int(tree) < LARGEST:
+            return int(tree)
+        case "Feature", ["mod", _, "1"]:
+            raise ValueError
+        case "Feature", ["sign", ["-", one, other]]:
+            return Sign(_read("Number", one), _read("Number", other))
+        case (("Term" | "Role"), _):
+            return _term(tree) if kind == "Term" else _role(tree)
+        case "Concept", str():
+            return Everything() if tree == "all" else Named(tree)
+        case _, [str(head), *parts]:
+            made = _MADE.get((kind, head))
+            if made is None:
+                return _number(kind, head, parts)
+            kinds = [str(field.type) for field in fields(made)]  # type: ignore[arg-type]
+            return made(*(_read(own, part) for own, part in zip(kinds, parts, strict=True)))
+    raise ValueError
 
 
-def _number(tree: Tree) -> Number:
-    match tree:
-        case ["distance", str(relation), one, other]:
-            return Distance(relation, _term(one), _term(other))
-        case ["count", str(predicate), *args]:
-            names = tuple(arg for arg in args if isinstance(arg, str))
-            if len(names) == len(args):
-                return Count(predicate, names)
-        case ["size", concept]:
-            return Size(_concept(concept))
-        case ["gap", str(relation), one, other]:
-            return Gap(relation, _concept(one), _concept(other))
-        case [("row" | "column") as name, term]:
-            return Attribute(cast(str, name), "", _term(term))
-        case [("degree" | "position") as name, str(relation), term]:
-            return Attribute(cast(str, name), relation, _term(term))
+def _number(kind: str, head: str, parts: list[Tree]) -> Attribute | Count:
+    match kind, head, parts:
+        case "Number", "count", [predicate, *args]:
+            return Count(_read("str", predicate), tuple(_read("str", arg) for arg in args))
+        case "Number", ("row" | "column"), [term]:
+            return Attribute(head, "", _term(term))
+        case "Number", ("degree" | "position"), [str(relation), term]:
+            return Attribute(head, relation, _term(term))
     raise ValueError
 
 
@@ -120,31 +135,12 @@ def _term(tree: Tree) -> Term:
     raise ValueError
 
 
-def _concept(tree: Tree) -> Concept:
-    match tree:
-        case "all":
-            return Everything()
-        case str(name):
-            return Named(name)
-        case ["one", str(name)]:
-            return One(name)
-        case ["not", concept]:
-            return Without(_concept(concept))
-        case ["and", one, other]:
-            return Both(_concept(one), _concept(other))
-        case ["some", role, concept]:
-            return Some(_role(role), _concept(concept))
-    raise ValueError
-
-
 def _role(tree: Tree) -> Role:
     match tree:
         case str(predicate):
             return Role(predicate)
         case ["inverse", str(predicate)]:
             return Role(predicate, inverse=True)
-        case ["closure", ["inverse", str(predicate)]]:
-            return Role(predicate, inverse=True, closure=True)
-        case ["closure", str(predicate)]:
-            return Role(predicate, closure=True)
+        case ["closure", one]:
+            return replace(_role(one), closure=True)  # twice is refused: it is written once
     raise ValueError

@@ -9,32 +9,29 @@ from itertools import combinations, product
 
 import numpy as np
 
-from coordlang.lifted.attributes import positions
-from coordlang.lifted.concepts import (
-    Both,
-    Concept,
-    Everything,
-    Gap,
-    Named,
-    One,
-    Role,
-    Size,
-    Some,
-    Without,
-)
 from coordlang.lifted.features import (
     Attribute,
+    Both,
+    Concept,
     Count,
     Distance,
+    Everything,
     Feature,
+    Gap,
     Least,
+    Named,
     Number,
+    One,
     Residue,
+    Role,
     Same,
     Sign,
+    Size,
+    Some,
     Term,
+    Without,
 )
-from coordlang.lifted.world import ANY, States, World, named_objects
+from coordlang.lifted.world import ANY, States, World, named_objects, positions
 from planners.joint.tables import Ints
 
 #: Objects that a count names, at most.
@@ -52,14 +49,9 @@ _MOSTS = (1, 2, 3)
 class Pool:
     """Features that differ in given states, simple ones first.
 
-    Attributes
-    ----------
-    features
-        Of all features that tell the same states apart the simplest one.
-    values
-        What they are: (features, states), states of all tables one after another.
-    tried
-        How many features were looked at, and concepts and numbers of which they are made.
+    Of all ``features`` that tell the same states apart the simplest one.  ``values`` is what they
+    are: (features, states), states of all tables one after another.  ``tried`` counts the features
+    looked at, and the concepts and numbers of which they are made.
     """
 
     features: tuple[Feature, ...]
@@ -72,7 +64,7 @@ def pool_of(states: Sequence[States], most: int, landmarks: bool = False) -> Poo
 
     With ``landmarks`` they may name places that all problems have, however different their maps.
     """
-    vocabulary = _Vocabulary.of([own.world for own in states], landmarks)
+    vocabulary = _Vocabulary([own.world for own in states], landmarks)
     concepts = _concepts(vocabulary, states, most)
     found = set(_numbers(vocabulary, concepts, most))
     numbers = _different_numbers(found, states)
@@ -80,9 +72,11 @@ def pool_of(states: Sequence[States], most: int, landmarks: bool = False) -> Poo
     table: list[Ints] = []
     seen: set[bytes] = set()
     tried = len(concepts) + len(found)
-    for feature in _ordered(_features(vocabulary, numbers, most), most):
+    features = {one for one in _features(vocabulary, numbers, most) if one.complexity <= most}
+    for feature in sorted(features, key=_simplest):
         tried += 1
-        values = _values(feature, states)
+        # Not kept in states: there are many features, of which few are used.
+        values = np.concatenate([feature(own) for own in states])
         key, classes = _partition(values)
         if classes > 1 and key not in seen:
             seen.add(key)
@@ -92,14 +86,8 @@ def pool_of(states: Sequence[States], most: int, landmarks: bool = False) -> Poo
     return Pool(tuple(kept), np.array(table, np.int64).reshape(shape), tried)
 
 
-def _ordered(found: Iterable[Feature], most: int) -> list[Feature]:
-    chosen = (feature for feature in set(found) if feature.complexity <= most)
-    return sorted(chosen, key=lambda feature: (feature.complexity, str(feature)))
-
-
-def _values(feature: Feature, states: Sequence[States]) -> Ints:
-    """A feature's values, not kept: there are many features, of which few are used."""
-    return np.concatenate([feature.read(own) for own in states])
+def _simplest(one: Feature | Number) -> tuple[int, str]:
+    return one.complexity, str(one)
 
 
 def _partition(values: Ints) -> tuple[bytes, int]:
@@ -110,57 +98,28 @@ def _partition(values: Ints) -> tuple[bytes, int]:
     return np.argsort(np.argsort(first))[number].astype(np.int16).tobytes(), len(classes)
 
 
-# What there is to say
-
-
-@dataclass(frozen=True, slots=True)
 class _Vocabulary:
     """What features may mention.
 
-    Attributes
-    ----------
-    named
-        Objects that all problems have.
-    fluents
-        Fluent predicates with their numbers of arguments.
-    relations
-        Static relations.
-    paths
-        Those of them along which all problems have positions.
-    sets
-        Types, and predicates with one argument.
+    ``named`` objects that all problems have, ``fluents`` with their numbers of arguments, static
+    ``relations``, those ``paths`` of them along which all problems have positions, and ``sets``:
+    types, and predicates with one argument.
     """
 
-    named: tuple[str, ...]
-    fluents: tuple[tuple[str, int], ...]
-    relations: tuple[str, ...]
-    paths: tuple[str, ...]
-    sets: tuple[str, ...]
-
-    @classmethod
-    def of(cls, worlds: Sequence[World], landmarks: bool) -> _Vocabulary:
-        fluents = {known for world in worlds for known in world.predicates.items()}
-        relations = sorted({name for world in worlds for name in world.relations})
-        paths = (
+    def __init__(self, worlds: Sequence[World], landmarks: bool) -> None:
+        self.named = named_objects(worlds, landmarks)
+        self.fluents = sorted({known for world in worlds for known in world.predicates.items()})
+        self.relations = sorted({name for world in worlds for name in world.relations})
+        self.paths = [
             name
-            for name in relations
+            for name in self.relations
             if all(positions(world.relations.get(name, ())) for world in worlds)
-        )
-        sets = {name for world in worlds for name in world.types}
-        sets |= {name for name, arity in fluents if arity == 1}
-        sets |= {
-            name
-            for world in worlds
-            for name, tuples in world.statics.items()
-            if len(tuples[0]) == 1
-        }
-        return cls(
-            named_objects(worlds, landmarks),
-            tuple(sorted(fluents)),
-            tuple(relations),
-            tuple(paths),
-            tuple(sorted(sets - {str(Everything())})),  # what is called so is not read back
-        )
+        ]
+        sets = {name for name, arity in self.fluents if arity == 1}
+        for world in worlds:
+            sets.update(world.types)
+            sets.update(n for n, tuples in world.statics.items() if len(tuples[0]) == 1)
+        self.sets = sorted(sets - {str(Everything())})  # what is called so is not read back
 
     def terms(self) -> Iterator[Term]:
         for predicate, arity in self.fluents:
@@ -209,16 +168,10 @@ def _numbers(vocabulary: _Vocabulary, concepts: Sequence[Concept], most: int) ->
         for args in product((ANY, *vocabulary.named), repeat=arity):
             if sum(arg != ANY for arg in args) <= _NAMED:
                 yield Count(predicate, args)
-    yield from _numbers_of_concepts(vocabulary, concepts, most - 2)
-
-
-def _numbers_of_concepts(
-    vocabulary: _Vocabulary, concepts: Sequence[Concept], most: int
-) -> Iterator[Number]:
-    """Sizes and gaps of at most a complexity."""
-    yield from (Size(concept) for concept in concepts if 1 + concept.complexity <= most)
+    # A feature adds two to the complexity of its number.
+    yield from (Size(concept) for concept in concepts if 3 + concept.complexity <= most)
     for one, other in combinations(concepts, 2):
-        if 1 + one.complexity + other.complexity <= most:
+        if 3 + one.complexity + other.complexity <= most:
             yield from (Gap(relation, one, other) for relation in vocabulary.relations)
 
 
@@ -226,8 +179,8 @@ def _different_numbers(found: Iterable[Number], states: Sequence[States]) -> lis
     """The simplest of equal numbers; none that is the same in all states."""
     kept = []
     seen: set[bytes] = set()
-    for number in sorted(set(found), key=lambda own: (own.complexity, str(own))):
-        parts = [number.read(own) for own in states]
+    for number in sorted(found, key=_simplest):
+        parts = [number(own) for own in states]
         values = np.concatenate(parts)
         key = values.astype(np.int32).tobytes()
         if key not in seen and len(values) and (values != values[0]).any():
@@ -246,7 +199,7 @@ def _concepts(vocabulary: _Vocabulary, states: Sequence[States], most: int) -> l
     for complexity in range(1, most - 2):
         level: list[Concept] = []
         for concept in sorted(_next_concepts(vocabulary, levels, complexity), key=str):
-            members = [concept.read(own) for own in states]
+            members = [concept(own) for own in states]
             key = b"".join(np.packbits(own).tobytes() for own in members)
             if key not in seen:
                 seen.add(key)

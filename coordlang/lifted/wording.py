@@ -5,29 +5,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from coordlang.lifted.concepts import (
-    Both,
-    Everything,
-    Expression,
-    Gap,
-    Named,
-    One,
-    Role,
-    Size,
-    Some,
-    Without,
-)
 from coordlang.lifted.features import (
     UNDEFINED,
     Attribute,
+    Both,
     Count,
     Distance,
+    Everything,
+    Expression,
     Feature,
+    Gap,
     Least,
+    Named,
+    One,
     Residue,
+    Role,
     Same,
     Sign,
+    Size,
+    Some,
     Term,
+    Without,
 )
 from coordlang.lifted.world import ANY
 
@@ -53,35 +51,26 @@ _FORMS: Mapping[type[Expression], tuple[str, str]] = {
 }
 
 
-def formula(feature: Feature) -> str:
-    """A feature as a formula, ``column(at(r1)) mod 3``."""
-    return _formula(feature)
-
-
-def english(feature: Feature) -> str:
-    """A feature in words."""
-    return _english(feature)
-
-
 def condition(feature: Feature, value: int) -> str:
     """What it means that a feature has a value: ``column(at(r1)) mod 3 = 1``."""
     if value == UNDEFINED:
         return f"{formula(feature)} undefined"
     match feature:
         case Sign(one, other):
-            return f"{_formula(one)} {_SIGNS.get(value, '?')} {_formula(other)}"
+            return f"{formula(one)} {_SIGNS.get(value, '?')} {formula(other)}"
         case Least(number, most):
-            return f"{_formula(number)} {'>=' if value == most else '='} {value}"
+            return f"{formula(number)} {'>=' if value == most else '='} {value}"
         case Same(first, second):
-            return f"{_formula(first)} {'=' if value else '!='} {_formula(second)}"
+            return f"{formula(first)} {'=' if value else '!='} {formula(second)}"
         case Residue():
             return f"{formula(feature)} = {value}"
 
 
-def _formula(part: object) -> str:
+def formula(part: object) -> str:
+    """A feature, or a part of one, as a formula: ``column(at(r1)) mod 3``."""
     match part:
         case Attribute(name, relation, term):
-            return f"{relation + '-' if relation else ''}{name}({_formula(term)})"
+            return f"{relation + '-' if relation else ''}{name}({formula(term)})"
         case Count(predicate, args):
             return f"#{predicate}({', '.join(args)})"
         case Term(predicate, named, inverse):
@@ -89,17 +78,18 @@ def _formula(part: object) -> str:
         case Role(predicate, inverse, closure):
             return f"{predicate}{'^-1' * inverse}{'+' * closure}"
         case Expression():
-            return _FORMS[type(part)][0].format(*map(_formula, part.parts))
+            return _FORMS[type(part)][0].format(*map(formula, part.parts))
     return str(part)
 
 
-def _english(part: object) -> str:
+def english(part: object) -> str:
+    """A feature, or a part of one, in words."""
     match part:
         case Attribute("degree", relation, term):
-            return f"the number of objects that {relation} links with {_english(term)}"
+            return f"the number of objects that {relation} links with {english(term)}"
         case Attribute(name, relation, term):
             along = f" along {relation}" if relation else ""
-            return f"the {name}{along} of {_english(term)}"
+            return f"the {name}{along} of {english(term)}"
         case Count(predicate, args):
             shown = (".." if arg == ANY else arg for arg in args)
             return f"the number of true atoms ({' '.join((predicate, *shown))})"
@@ -110,5 +100,5 @@ def _english(part: object) -> str:
             steps = " in one or more steps" * closure
             return f"{'inversely ' * inverse}{predicate}-related{steps}"
         case Expression():
-            return _FORMS[type(part)][1].format(*map(_english, part.parts))
+            return _FORMS[type(part)][1].format(*map(english, part.parts))
     return str(part)

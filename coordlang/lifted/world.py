@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The problem that features are read in: its objects, what never changes, and tables of states.
 
-Numbers of objects are positions in the sorted list of their names.
+Numbers of objects are positions in the sorted list of their names.  Objects also have numbers
+whatever the state: where a place lies, and how it is linked.
 """
 
 from __future__ import annotations
@@ -28,26 +29,18 @@ ANY = "_"
 
 Pair = tuple[str, str]
 Table = TypeVar("Table", Ints, Bools)
+#: What can be read of states: concepts, numbers, features.
+Readable = Callable[["States"], Any]
 
 
 @dataclass(frozen=True)
 class World:
     """A problem of a domain, as features see it.
 
-    Attributes
-    ----------
-    objects
-        All objects, by name, sorted.
-    robots
-        The names of the robots, in the order of the model.
-    types
-        Type -> its objects.
-    statics
-        Predicate -> the argument tuples of its static atoms, sorted.
-    model
-        The joint model, whose states are read.
-    points
-        Where places lie, x to the right and y down: of a file, else of names such as ``c2-3``.
+    All ``objects`` by name, sorted; ``robots`` in the order of the model; ``types``: each type's
+    objects; ``statics``: the argument tuples of each predicate's static atoms, sorted; the joint
+    ``model`` whose states are read; ``points``: where places lie, x to the right and y down, of a
+    file, else of names such as ``c2-3``.
     """
 
     objects: tuple[str, ...]
@@ -56,6 +49,7 @@ class World:
     statics: Mapping[str, Sequence[tuple[str, ...]]]
     model: JointModel
     points: Mapping[str, Point] = field(default_factory=dict)
+    known: dict[tuple[str, str], Any] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(
@@ -80,9 +74,7 @@ class World:
             {kind: frozenset(own) for kind, own in sorted(types.items())},
             ordered,
             model,
-            _points(
-                ordered, {name: p for name, p in (known or {}).items() if name in problem.objects}
-            ),
+            _points(ordered, {n: p for n, p in (known or {}).items() if n in problem.objects}),
         )
 
     @classmethod
@@ -104,15 +96,11 @@ class World:
             found[atom.predicate] = min(arity, found.get(atom.predicate, arity))
         return found
 
-    @cached_property
-    def _known(self) -> dict[tuple[str, str], Any]:
-        return {}
-
     def once(self, name: str, relation: str, computed: Callable[[], Table]) -> Table:
         """A table about a static relation, which is computed once."""
-        if (name, relation) not in self._known:
-            self._known[name, relation] = computed()
-        found: Table = self._known[name, relation]
+        if (name, relation) not in self.known:
+            self.known[name, relation] = computed()
+        found: Table = self.known[name, relation]
         return found
 
     @cached_property
@@ -125,19 +113,6 @@ class World:
         return {name: own for name, own in pairs.items() if own}
 
 
-class Readable:
-    """What can be read of states: concepts, numbers, features."""
-
-    __slots__ = ()
-
-    def read(self, states: States) -> Any:
-        """Its values: one for each state, or for each state and object."""
-        return self._read(states)
-
-    def _read(self, states: States) -> Any:
-        raise NotImplementedError
-
-
 @dataclass(frozen=True)
 class States:
     """States of a world, and what was read of them before."""
@@ -145,6 +120,7 @@ class States:
     world: World
     rows: Rows
     known: dict[Readable, Any] = field(default_factory=dict, repr=False)
+    tables: dict[str, tuple[Ints, ...]] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -152,7 +128,7 @@ class States:
     def get(self, what: Readable) -> Any:
         """What something is in all states; it is read once."""
         if what not in self.known:
-            self.known[what] = what.read(self)
+            self.known[what] = what(self)
         return self.known[what]
 
     @cached_property
@@ -160,18 +136,14 @@ class States:
         """The true facts of each state."""
         return TrueFacts.of(self.world.model.codec.facts_part(self.rows))
 
-    @cached_property
-    def _tables(self) -> dict[str, tuple[Ints, ...]]:
-        return {}
-
     def atoms(self, predicate: str) -> tuple[Ints, ...]:
         """The true atoms of a fluent predicate: their states, then the numbers of their arguments.
 
         All arrays are as long as there are such atoms in all states together.
         """
-        if predicate not in self._tables:
-            self._tables[predicate] = self._atoms(predicate)
-        return self._tables[predicate]
+        if predicate not in self.tables:
+            self.tables[predicate] = self._atoms(predicate)
+        return self.tables[predicate]
 
     def _atoms(self, predicate: str) -> tuple[Ints, ...]:
         world = self.world
@@ -243,3 +215,89 @@ def _points(
         if not known.keys() >= set(names):
             points |= from_names(names, links) or {}
     return points
+
+
+# ---- numbers of objects
+
+
+def attribute(world: World, name: str, relation: str) -> Ints:
+    """The number that each object has, `NONE` where it has none: (objects).
+
+    ``row`` and ``column`` of places whose coordinates are known (``relation`` is empty);
+    ``position`` along a static relation whose links are paths, from each path's beginning;
+    ``degree``, how many objects a static relation links a place with.
+    """
+    return world.once(name, relation, lambda: _attribute(world, name, relation))
+
+
+def _attribute(world: World, name: str, relation: str) -> Ints:
+    if name == "degree":
+        degree = _joined(world, relation).sum(axis=1)
+        return np.where(degree > 0, degree, NONE)
+    if relation:
+        known = positions(world.relations.get(relation, ()))
+    else:
+        known = _coordinates(world, 0 if name == "column" else 1)
+    return np.array([known.get(name, NONE) for name in world.objects], np.int64)
+
+
+def _coordinates(world: World, axis: int) -> Mapping[str, int]:
+    """Coordinates, from 0; where they are no whole numbers, the number of smaller ones."""
+    own = {name: point[axis] for name, point in world.points.items()}
+    different = sorted(set(own.values()))
+    if all(value == int(value) for value in different):
+        return {name: int(value - different[0]) for name, value in own.items()}
+    rank = {value: number for number, value in enumerate(different)}
+    return {name: rank[value] for name, value in own.items()}
+
+
+def positions(pairs: Sequence[Pair]) -> Mapping[str, int]:
+    """Places on paths, from 0; empty if the links are no paths."""
+    following = dict(pairs)
+    before = {other: one for one, other in pairs}
+    if len(following) < len(pairs) or len(before) < len(pairs):
+        return {}
+    found: dict[str, int] = {}
+    for start in sorted(following.keys() - before.keys()):
+        place: str | None = start
+        steps = 0
+        while place is not None:
+            found[place] = steps
+            place, steps = following.get(place), steps + 1
+    return found if len(found) == len(following.keys() | before.keys()) else {}
+
+
+def links(world: World, relation: str) -> Bools:
+    """(objects, objects): whether a static relation links the first object with the second."""
+
+    def linked() -> Bools:
+        table = np.zeros((len(world.objects), len(world.objects)), np.bool_)
+        for one, other in world.relations.get(relation, ()):
+            table[world.number[one], world.number[other]] = True
+        return table
+
+    return world.once("links", relation, linked)
+
+
+def _joined(world: World, relation: str) -> Bools:
+    """(objects, objects): whether the relation links two objects in either direction."""
+    linked = links(world, relation)
+    return linked | linked.T
+
+
+def distances(world: World, relation: str) -> Ints:
+    """(objects, objects): links of a static relation from one to another, `NONE` without a way.
+
+    What it links with nothing has no distance to itself either.
+    """
+    return world.once("distance", relation, lambda: _distances(world, relation))
+
+
+def _distances(world: World, relation: str) -> Ints:
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import shortest_path
+
+    joined = _joined(world, relation)
+    steps = shortest_path(csr_matrix(joined), unweighted=True)
+    steps[~joined.any(axis=1)] = np.inf
+    return np.where(np.isfinite(steps), steps, NONE).astype(np.int64)

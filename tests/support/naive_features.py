@@ -6,29 +6,27 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from coordlang.lifted.concepts import (
-    Both,
-    Concept,
-    Everything,
-    Gap,
-    Named,
-    One,
-    Role,
-    Size,
-    Some,
-    Without,
-)
 from coordlang.lifted.features import (
     UNDEFINED,
     Attribute,
+    Both,
+    Concept,
     Count,
     Distance,
+    Everything,
     Feature,
+    Gap,
+    Named,
     Number,
+    One,
     Residue,
+    Role,
     Same,
     Sign,
+    Size,
+    Some,
     Term,
+    Without,
 )
 
 #: The argument tuples of the atoms that are true, by predicate.

@@ -21,11 +21,14 @@ from hypothesis.strategies import (
 )
 from hypothesis.strategies import data as strategy_data
 
-from coordlang.lifted.concepts import (
+from coordlang.lifted.features import (
+    UNDEFINED,
     Both,
     Concept,
     Everything,
+    Feature,
     Gap,
+    Least,
     Named,
     One,
     Role,
@@ -33,7 +36,6 @@ from coordlang.lifted.concepts import (
     Some,
     Without,
 )
-from coordlang.lifted.features import UNDEFINED, Feature, Least
 from coordlang.lifted.notation import feature_of
 from coordlang.lifted.pool import pool_of
 from coordlang.lifted.world import States, World
