@@ -56,6 +56,9 @@ class Expression:
 
     def __call__(self, states: States) -> Any:
         """Its values: one for each state, or for each state and object."""
+        return self._read(states)
+
+    def _read(self, states: States) -> Any:
         raise NotImplementedError
 
 
@@ -111,7 +114,7 @@ class Everything(Expression):
     def __str__(self) -> str:
         return "all"
 
-    def __call__(self, states: States) -> Bools:
+    def _read(self, states: States) -> Bools:
         return np.ones((len(states), len(states.world.objects)), bool)
 
 
@@ -124,7 +127,7 @@ class Named(Expression):
     def __str__(self) -> str:
         return self.name
 
-    def __call__(self, states: States) -> Bools:
+    def _read(self, states: States) -> Bools:
         world = states.world
         found = np.zeros((len(states), len(world.objects)), bool)
         always = [*world.types.get(self.name, ())]
@@ -143,7 +146,7 @@ class One(Expression):
     HEAD = "one"
     name: str
 
-    def __call__(self, states: States) -> Bools:
+    def _read(self, states: States) -> Bools:
         own = np.array([name == self.name for name in states.world.objects], bool)
         return np.tile(own, (len(states), 1))
 
@@ -155,7 +158,7 @@ class Without(Expression):
     HEAD = "not"
     concept: Concept
 
-    def __call__(self, states: States) -> Bools:
+    def _read(self, states: States) -> Bools:
         others: Bools = ~states.get(self.concept)
         return others
 
@@ -168,7 +171,7 @@ class Both(Expression):
     one: Concept
     other: Concept
 
-    def __call__(self, states: States) -> Bools:
+    def _read(self, states: States) -> Bools:
         common: Bools = states.get(self.one) & states.get(self.other)
         return common
 
@@ -186,7 +189,7 @@ class Some(Expression):
         """That of its parts."""
         return self.role.complexity + self.concept.complexity
 
-    def __call__(self, states: States) -> Bools:
+    def _read(self, states: States) -> Bools:
         return self.role.some(states, states.get(self.concept))
 
 
@@ -212,7 +215,7 @@ class Term(Expression):
         """One, and one more for the other direction."""
         return 1 + self.inverse
 
-    def __call__(self, states: States) -> Ints:
+    def _read(self, states: States) -> Ints:
         return states.image(self.predicate, self.named, self.inverse)
 
 
@@ -227,7 +230,7 @@ class Attribute(Expression):
     def __str__(self) -> str:
         return f"({self.name} {self.relation + ' ' if self.relation else ''}{self.term})"
 
-    def __call__(self, states: States) -> Ints:
+    def _read(self, states: States) -> Ints:
         of_object = np.append(attribute(states.world, self.name, self.relation), NONE)
         number: Ints = of_object[states.get(self.term)]
         return number
@@ -242,7 +245,7 @@ class Distance(Expression):
     one: Term
     other: Term
 
-    def __call__(self, states: States) -> Ints:
+    def _read(self, states: States) -> Ints:
         here, there = states.get(self.one), states.get(self.other)
         far = distances(states.world, self.relation)[here, there]
         return np.where((here == NONE) | (there == NONE), NONE, far)
@@ -263,7 +266,7 @@ class Count(Expression):
         """One, and one more for each object that is named."""
         return 1 + sum(arg != ANY for arg in self.args)
 
-    def __call__(self, states: States) -> Ints:
+    def _read(self, states: States) -> Ints:
         return states.count(self.predicate, self.args)
 
 
@@ -274,7 +277,7 @@ class Size(Expression):
     HEAD = "size"
     concept: Concept
 
-    def __call__(self, states: States) -> Ints:
+    def _read(self, states: States) -> Ints:
         size: Ints = states.get(self.concept).sum(axis=1)
         return size
 
@@ -288,7 +291,7 @@ class Gap(Expression):
     one: Concept
     other: Concept
 
-    def __call__(self, states: States) -> Ints:
+    def _read(self, states: States) -> Ints:
         here: Bools = states.get(self.one)
         there: Bools = states.get(self.other)
         far = distances(states.world, self.relation)
@@ -317,7 +320,7 @@ class Sign(Expression):
     def __str__(self) -> str:
         return f"(sign (- {self.one} {self.other}))"
 
-    def __call__(self, states: States) -> Ints:
+    def _read(self, states: States) -> Ints:
         one, other = states.get(self.one), states.get(self.other)
         return np.where((one == NONE) | (other == NONE), UNDEFINED, np.sign(one - other))
 
@@ -335,7 +338,7 @@ class Residue(Expression):
         """That of the number, and the modulus."""
         return self.number.complexity + self.modulus
 
-    def __call__(self, states: States) -> Ints:
+    def _read(self, states: States) -> Ints:
         number = states.get(self.number)
         return np.where(number == NONE, UNDEFINED, number % self.modulus)
 
@@ -353,7 +356,7 @@ class Least(Expression):
         """That of the number, and twice the most: what is large in small problems is nothing."""
         return self.number.complexity + 2 * self.most
 
-    def __call__(self, states: States) -> Ints:
+    def _read(self, states: States) -> Ints:
         number = states.get(self.number)
         return np.where(number == NONE, UNDEFINED, np.minimum(number, self.most))
 
@@ -366,7 +369,7 @@ class Same(Expression):
     one: Term
     other: Term
 
-    def __call__(self, states: States) -> Ints:
+    def _read(self, states: States) -> Ints:
         one, other = states.get(self.one), states.get(self.other)
         return np.where((one == NONE) | (other == NONE), UNDEFINED, one == other)
 
