@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
 from typing import Literal
@@ -107,19 +107,14 @@ def from_problems(
     there is no other.
     """
     loaded = build(domain, problems, options)
-    listed: list[ListedTask] = []
-    spaces: list[PlanSpace] = []
-    skipped: list[str] = []
-    for problem, task in zip(problems, loaded.tasks, strict=True):
-        try:
-            spaces.append(search(loaded.model, task))
-        except ProvedImpossible:
-            if not skip_unsolvable or len(skipped) == len(problems) - 1:
-                raise
-            skipped.append(problem.source.name)
-            continue
-        listed.append(listed_task(domain, problem, task))
-    return Candidates.searched("problems", loaded, spaces, listed, skipped)
+    pairs = zip(problems, loaded.tasks, strict=True)
+    listed = [listed_task(domain, problem, task) for problem, task in pairs]
+    names = [problem.source.name for problem in problems]
+
+    def found(number: int) -> PlanSpace:
+        return search(loaded.model, loaded.tasks[number])
+
+    return _one_by_one("problems", loaded, listed, names, found, skip_unsolvable)
 
 
 def all_pairs(
@@ -199,7 +194,7 @@ def from_listed(
             remedy="Is a fluent missing or one too many?  List all fluents that are true.",
         )
     if space is None:
-        return _one_by_one(loaded, listed, tasks, position, skip_unsolvable)
+        return _listed_one_by_one(loaded, listed, tasks, position, skip_unsolvable)
     by_goal: dict[Goal, list[Rows]] = {}
     for task in tasks:
         by_goal.setdefault(task.goal, []).append(task.init)
@@ -219,7 +214,7 @@ def from_listed(
     return Candidates.explored("file", loaded, space, kept, len(reached), listed, skipped)
 
 
-def _one_by_one(
+def _listed_one_by_one(
     loaded: PlanningInstance,
     listed: Sequence[ListedTask],
     tasks: Sequence[PlanningTask],
@@ -235,20 +230,39 @@ def _one_by_one(
             "is not checked",
             position=position,
         )
-    found: dict[Goal, list[PlanSpace]] = {}
-    spaces: list[PlanSpace] = []
-    kept: list[ListedTask] = []
-    skipped: list[str] = []
-    for number, (text, task) in enumerate(zip(listed, tasks, strict=True), 1):
+    plans: dict[Goal, list[PlanSpace]] = {}
+
+    def found(number: int) -> PlanSpace:
         try:
-            spaces.append(_search_once(loaded.model, task, found))
+            return _search_once(loaded.model, tasks[number], plans)
         except ProvedImpossible as error:
-            if not skip_unsolvable or len(skipped) == len(tasks) - 1:
-                raise _unsolvable(number, text, position, error.remedy) from None
-            skipped.append(_named(number, text))
-            continue
-        kept.append(text)
-    return Candidates.searched("file", loaded, spaces, kept, skipped)
+            raise _unsolvable(number + 1, listed[number], position, error.remedy) from None
+
+    names = [_named(number, text) for number, text in enumerate(listed, 1)]
+    return _one_by_one("file", loaded, listed, names, found, skip_unsolvable)
+
+
+def _one_by_one(
+    kind: Kind,
+    loaded: PlanningInstance,
+    listed: Sequence[ListedTask],
+    names: Sequence[str],
+    found: Callable[[int], PlanSpace],
+    skip_unsolvable: bool,
+) -> Candidates:
+    """Tasks searched by number; those without a plan are left out if they may be, but for one."""
+    kept: list[ListedTask] = []
+    spaces: list[PlanSpace] = []
+    skipped: list[str] = []
+    for number, (text, name) in enumerate(zip(listed, names, strict=True)):
+        try:
+            spaces.append(found(number))
+            kept.append(text)
+        except ProvedImpossible:
+            if not skip_unsolvable or len(skipped) == len(names) - 1:
+                raise
+            skipped.append(name)
+    return Candidates.searched(kind, loaded, spaces, kept, skipped)
 
 
 def _search_once(
@@ -270,26 +284,24 @@ def _search_once(
     return found[task.goal][-1]
 
 
+def _texts(task: ListedTask) -> tuple[str, str]:
+    """Its initial state and its goal."""
+    return " ".join(task.init) or NO_FACT, " ".join(task.goal) or "(and)"
+
+
 def _named(number: int, task: ListedTask) -> str:
-    return f"task {number} ({_init_text(task)} -> {_goal_text(task)})"
+    return f"task {number} ({' -> '.join(_texts(task))})"
 
 
 def _unsolvable(
     number: int, task: ListedTask, position: Position | None, remedy: str | None
 ) -> ProvedImpossible:
+    init, goal = _texts(task)
     return ProvedImpossible(
-        f"task {number}: the goal {_goal_text(task)} cannot be reached from {_init_text(task)}",
+        f"task {number}: the goal {goal} cannot be reached from {init}",
         position=position,
         remedy=remedy,
     )
-
-
-def _init_text(task: ListedTask) -> str:
-    return " ".join(task.init) or NO_FACT
-
-
-def _goal_text(task: ListedTask) -> str:
-    return " ".join(task.goal) or "(and)"
 
 
 def from_recorded(

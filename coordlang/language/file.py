@@ -87,14 +87,13 @@ def read_language(path: str | Path) -> Language:
 def language_from_bytes(data: bytes, position: Position) -> Language:
     """The language in the text of a language file; see `read_language`."""
     record = LANGUAGE.decode(data, position)
-    large = msgspec.json.decode(data[data.index(b"{") :], type=_Large)
-    if large.also:
+    if msgspec.json.decode(data[data.index(b"{") :], type=_Older).also:
         raise BadInput(
             "states have several words here ('also'), which is no longer read",
             position=position,
             remedy="Build the language again, without --overlap.",
         )
-    refuse_duplicates(data, position, memoryview(large.states), len(record.states))
+    refuse_duplicates(data, position)
     refuse_first(_faults_of_words(record), position)
     _check_seen(record, position)
     robots = [] if record.robots is UNSET else record.robots
@@ -217,6 +216,5 @@ def _check_seen(record: LanguageRecord, position: Position) -> None:
         require_seen(name, position, what)
 
 
-class _Large(msgspec.Struct):
-    states: msgspec.Raw
+class _Older(msgspec.Struct):
     also: Any = None

@@ -15,7 +15,7 @@ fewer than its states, such a plan would save less than nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,14 +74,10 @@ def flexibility(spaces: Sequence[PlanSpace], words: Sequence[Ints]) -> Flexibili
     sentences of a node).  Raises `OutOfMemory` when the sentences become too many to hold.
     """
     parts = [_measure(space, word) for space, word in zip(spaces, words, strict=True)]
+    _, *columns = (field.name for field in fields(Flexibility))
     return Flexibility(
         tuple(n for part in parts for n in part.plans),
-        np.concatenate([part.expected for part in parts]),
-        np.concatenate([part.first for part in parts]),
-        np.concatenate([part.most for part in parts]),
-        np.concatenate([part.words for part in parts]),
-        np.concatenate([part.first_words for part in parts]),
-        np.concatenate([part.steps for part in parts]),
+        *(np.concatenate([getattr(part, name) for part in parts]) for name in columns),
     )
 
 
@@ -136,8 +132,7 @@ def _measure(space: PlanSpace, word: Ints) -> Flexibility:
     share_of_edge = edge_shares(space, counted)
     sentences = Sentences()
     first_sentence = np.zeros(len(space), np.int64)
-    # Of the layer below: sorted by node, bounds of each node's entries, sentence and share of each
-    # entry.
+    # The entries of the layer below, sorted by node: each one's node, sentence and share.
     node, said, share = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
     starts = np.unique(space.starts)
     together, most, words, first = (np.zeros(len(space)) for _ in range(4))
@@ -199,9 +194,7 @@ def summed(node: Ints, said: Ints, share: Floats) -> tuple[Ints, Ints, Floats]:
     """Entries of one node and sentence added up, sorted by node."""
     size = int(said.max(initial=0)) + 1
     code, inverse = np.unique(node * size + said, return_inverse=True)
-    total: Floats = np.bincount(inverse.reshape(-1), share, minlength=len(code)).astype(
-        np.float64, copy=False
-    )
+    total: Floats = np.bincount(inverse.reshape(-1), share, minlength=len(code)).astype(np.float64)
     return code // size, code % size, total
 
 

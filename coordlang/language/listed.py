@@ -54,10 +54,7 @@ def model_of_listed(
 
     Everything static comes from the first problem.
 
-    Raises
-    ------
-    BadInput
-        For a text that is no atom or formula of the problem.
+    Raises `BadInput` for a text that is no atom or formula of the problem.
     """
     ground = [ground_task(domain, problems[0], task, position) for task in listed]
     loaded = build(domain, problems, options, inits=[init for init, _ in ground])
@@ -105,11 +102,6 @@ def ground_task(
     return _read_init(domain, problem, task, position), ground_goal(domain, problem, goal)
 
 
-def _names(domain: Domain, problem: Problem, text: str, position: Position | None) -> Names:
-    document = parse(Source(position.file if position else "task", text))
-    return replace(Names.of(document, domain), functions={}, objects=problem.objects)
-
-
 def _read_init(
     domain: Domain, problem: Problem, task: ListedTask, position: Position | None
 ) -> frozenset[Atom]:
@@ -140,7 +132,8 @@ def _read_text(domain: Domain, problem: Problem, text: str, position: Position |
             raise BadInput(
                 "expected one PDDL literal", remedy="As in (at r1 a) or (not (at r1 a))."
             )
-        names = _names(domain, problem, parts[0], position)
+        document = parse(Source(position.file if position else "task", parts[0]))
+        names = replace(Names.of(document, domain), functions={}, objects=problem.objects)
         return read_formula(names, names.document.root)
     except BadInput as error:
         raise BadInput(f"{text}: {error.what}", position=position, remedy=error.remedy) from None

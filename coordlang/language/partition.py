@@ -15,16 +15,9 @@ from planners.joint.tables import Ints, Rows, find_rows, unique_rows
 class Partition:
     """A partition ``f: states -> words`` of the states of a joint model (the paper, section 4).
 
-    Attributes
-    ----------
-    words
-        The names of the words; a word's number is its position here.
-    rows
-        The states that are listed, a sorted table (states, blocks).
-    word
-        The word number of each listed state.
-    default
-        The word number of every other state.
+    ``words`` are the names of the words, a word's number is its position there; ``rows`` the states
+    that are listed, a sorted table (states, blocks), and ``word`` the number of each one's word;
+    ``default`` that of every other state.
     """
 
     words: tuple[str, ...]

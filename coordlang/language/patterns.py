@@ -15,13 +15,12 @@ from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coordlang.language.listed import ListedTask, goal_atoms
-from planners.joint.tables import Ints
+from planners.joint.tables import Bools
 from planners.loading import PlanningInstance
 from planners.search.optimal_plans import distances
-from planners.search.reachable import Space, explore
+from planners.search.reachable import explore
 from planners.system.errors import ProvedImpossible, UsageError
 
 #: Entries of the table (goals, states) filled at a time.
@@ -39,72 +38,53 @@ def varied_tasks(
     is no such task. O(reachable joint steps x goals).
     """
     model = loaded.model
-    space = explore(model, loaded.tasks[0].init[None, :])
-    facts = model.codec.truth(space.rows)
-    here = _starts(space, facts, loaded.tasks[0].init, starts)
-    wanted = _goals(space, facts, goals) if goals else []
-    keys = [
-        tuple(model.codec.facts.texts[f] for f in np.flatnonzero(facts[state])) for state in here
-    ]
+    task = loaded.tasks[0]
+    space = explore(model, task.init[None, :])
+    facts, names = model.codec.truth(space.rows), model.codec.facts.texts
+    free = np.zeros(len(names), np.bool_)
+    for pattern in starts:
+        free[_matching(names, pattern)] = True
+    own = facts[space.numbers(task.init[None, :])[0]]
+    here = np.flatnonzero((facts == own)[:, ~free].all(axis=1))
     if goals:
-        texts = [tuple(model.codec.facts.texts[f] for f in goal) for goal in wanted]
+        wanted = _goals(facts, [_matching(names, pattern) for pattern in goals])
+        texts = [tuple(names[fact] for fact in goal) for goal in wanted]
         reached = [facts[:, list(goal)].all(axis=1) for goal in wanted]
     else:
-        texts = [goal_atoms(loaded.tasks[0].goal)]
-        reached = [model.holds(loaded.tasks[0].goal, space.rows)]
-    pairs: list[tuple[int, int]] = []
+        texts, reached = [goal_atoms(task.goal)], [model.holds(task.goal, space.rows)]
+    found: list[ListedTask] = []
     size = max(1, _BATCH // len(space))
     for first in range(0, len(reached), size):
         far = distances(space, np.stack(reached[first : first + size]))[:, here]
-        pairs += [
-            (int(start), int(goal) + first)
-            for goal, start in zip(*np.nonzero(far > 0), strict=True)
-        ]
-    if not pairs:
+        for goal, start in zip(*(part.tolist() for part in np.nonzero(far > 0)), strict=True):
+            key = tuple(names[fact] for fact in np.flatnonzero(facts[here[start]]))
+            found.append(ListedTask(key, texts[goal + first]))
+    if not found:
         raise ProvedImpossible(
             f"there is no such task: none of {len(here):,} starts reaches one of {len(texts):,} "
             "goals that it is not at",
             remedy="Give patterns that match more atoms: ? stands for any one name.",
         )
-    return tuple(
-        sorted(
-            (ListedTask(keys[s], texts[g]) for s, g in pairs),
-            key=lambda task: (task.init, task.goal),
-        )
-    )
+    return tuple(sorted(found, key=lambda task: (task.init, task.goal)))
 
 
-def _starts(
-    space: Space, facts: NDArray[np.bool_], init: NDArray[np.uint64], patterns: Sequence[str]
-) -> Ints:
-    free = np.zeros(facts.shape[1], np.bool_)
-    for pattern in patterns:
-        free[_matching(space, pattern)] = True
-    own = facts[space.numbers(init[None, :])[0]]
-    return np.flatnonzero((facts == own)[:, ~free].all(axis=1))
-
-
-def _goals(
-    space: Space, facts: NDArray[np.bool_], patterns: Sequence[str]
-) -> list[tuple[int, ...]]:
-    matching = [_matching(space, pattern) for pattern in patterns]
-    columns = sorted({f for found in matching for f in found})
+def _goals(facts: Bools, matching: Sequence[Sequence[int]]) -> list[tuple[int, ...]]:
+    """The conjunctions of one matching fact of each pattern that some state satisfies."""
+    columns = sorted({fact for found in matching for fact in found})
     goals: set[tuple[int, ...]] = set()
     for row in np.unique(facts[:, columns], axis=0):
         true = {columns[n] for n in np.flatnonzero(row)}
-        choices = [[f for f in found if f in true] for found in matching]
+        choices = [[fact for fact in found if fact in true] for found in matching]
         goals |= {tuple(sorted(set(choice))) for choice in product(*choices)}
     return sorted(goals)
 
 
-def _matching(space: Space, pattern: str) -> list[int]:
+def _matching(names: Sequence[str], pattern: str) -> list[int]:
     """The numbers of the facts that a pattern matches."""
     wanted = " ".join(pattern.lower().replace("(", " ( ").replace(")", " ) ").split())
     wanted = wanted.replace("( ", "(").replace(" )", ")")
     expression = re.escape(wanted).replace(r"\?", r"[^ ()]+")
-    found = [
-        n for n, fact in enumerate(space.model.codec.facts.texts) if re.fullmatch(expression, fact)
-    ]
+    found = [n for n, fact in enumerate(names) if re.fullmatch(expression, fact)]
     if not found:
         raise UsageError(
             f"no fluent of this problem matches {pattern}",

@@ -25,18 +25,10 @@ from planners.system.notebook import counted
 class Guarantee:
     """What is known of a language's number of words; of one that was read, what its file claims.
 
-    Attributes
-    ----------
-    method
-        How the language was made.
-    size
-        Its number of words.
-    lower_bound
-        A proved bound on the number of words of any partition that is a language for its tasks.
-    proved_minimal
-        Whether the size equals that bound.
-    coordination_language
-        Whether all plans of a task with one sentence mix freely.
+    ``method`` is how the language was made, ``size`` its number of words, ``lower_bound`` a proved
+    bound on the number of words of any partition that is a language for its tasks;
+    ``proved_minimal``: the two are equal; ``coordination_language``: all plans of a task with one
+    sentence mix freely.
     """
 
     method: str
@@ -73,18 +65,10 @@ class Guarantee:
 class Provenance:
     """What a language file records besides the states and their words (docs/formats.md).
 
-    Attributes
-    ----------
-    robots
-        The robots, in the order of joint actions.
-    guarantee
-        What is known of the number of words; None where nothing is claimed.
-    domain, model, tasks, producer
-        The entries of these names in a language file.
-    lifted
-        The features of which the words are functions, if they are; empty otherwise.
-    tolerance
-        What may go wrong, or be longer, under the words; None: nothing.
+    The ``robots`` are in the order of joint actions; the ``guarantee`` says what is known of the
+    number of words (None: nothing is claimed); ``domain``, ``model``, ``tasks`` and ``producer``
+    are the entries of these names; ``lifted`` the features of which the words are functions, if
+    they are; ``tolerance`` what may go wrong, or be longer, under the words (None: nothing).
     """
 
     robots: tuple[str, ...] = ()
@@ -101,32 +85,28 @@ def provenance_of(
     candidates: Candidates, guarantee: Guarantee, producer: Mapping[str, Any]
 ) -> Provenance:
     """The provenance of a language built for candidate tasks."""
-    loaded = candidates.loaded
+    loaded, options = candidates.loaded, candidates.loaded.options
+    domain, problem = loaded.domain, loaded.problems[0]
     tasks: dict[str, Any] = {"kind": candidates.kind, "count": candidates.count}
     if candidates.kind == "all":
         tasks["states_sha256"] = states_sha256(candidates)
     else:
         tasks["tasks"] = task_data(candidates.listed)
+    fluents = key_predicates(domain, options.remember_actions, options.words_see_slack)
     return Provenance(
         robots=loaded.model.robots,
         guarantee=guarantee,
-        domain={
-            "name": loaded.domain.name,
-            "sha256": domain_sha256(loaded.domain),
-            "fluents": key_predicates(
-                loaded.domain, loaded.options.remember_actions, loaded.options.words_see_slack
-            ),
-        },
+        domain={"name": domain.name, "sha256": domain_sha256(domain), "fluents": fluents},
         model={
-            "cost": loaded.options.cost,
-            "unowned": loaded.options.unowned,
-            "remember_actions": loaded.options.remember_actions,
-            **({"words_see_slack": True} if loaded.options.words_see_slack else {}),
-            "problem_sha256": loaded.problems[0].source.sha256,
-            "world_sha256": world_sha256(loaded.domain, loaded.problems[0]),
+            "cost": options.cost,
+            "unowned": options.unowned,
+            "remember_actions": options.remember_actions,
+            **({"words_see_slack": True} if options.words_see_slack else {}),
+            "problem_sha256": problem.source.sha256,
+            "world_sha256": world_sha256(domain, problem),
         },
         tasks=tasks,
-        tolerance=Tolerance(slack=loaded.options.slack) if loaded.options.slack else None,
+        tolerance=Tolerance(slack=options.slack) if options.slack else None,
         producer=producer,
     )
 

@@ -131,32 +131,18 @@ def recorded_candidates(
     position: Position,
 ) -> Candidates:
     """The candidate tasks that a language file records, else the problems' own ones."""
-    kind = language.provenance.tasks["kind"]
-    if kind == "problems" and not language.provenance.tasks["count"]:
+    kind, count = language.provenance.tasks["kind"], language.provenance.tasks["count"]
+    if kind == "problems" and not count:
         return from_problems(domain, problems, options)
     try:
         if kind == "all":
             candidates = all_pairs(domain, problems, options)
-            if candidates.count != language.provenance.tasks["count"]:
-                have = (
-                    f"{problems[0].source.name} has"
-                    if len(problems) == 1
-                    else f"these {len(problems)} problems have"
-                )
-                raise BadInput(
-                    f"the language records {language.provenance.tasks['count']:,} tasks, "
-                    f"but {have} {candidates.count:,} pairs of "
-                    "reachable states",
-                    remedy="Give the problems that the language was built for, or say --tasks all "
-                    "to check these.",
-                )
-            _require_same_states(language, candidates)
+            _require_same_pairs(language, candidates)
             return candidates
         listed = recorded_list(language)
-        if not listed or len(listed) != language.provenance.tasks["count"]:
+        if not listed or len(listed) != count:
             raise BadInput(
-                f"the language records {language.provenance.tasks['count']} tasks but "
-                f"lists {len(listed)}",
+                f"the language records {count} tasks but lists {len(listed)}",
                 remedy="Say --tasks all or --tasks FILE.",
             )
         make = from_listed if kind == "file" else from_recorded
@@ -167,13 +153,25 @@ def recorded_candidates(
         raise BadInput(error.what, position=position, remedy=error.remedy) from None
 
 
-def _require_same_states(language: Language, candidates: Candidates) -> None:
+def _require_same_pairs(language: Language, candidates: Candidates) -> None:
     """Raise `BadInput` where other states are reachable than those of a language for all pairs."""
-    recorded = language.provenance.tasks.get("states_sha256")
-    if recorded not in (None, states_sha256(candidates)):
-        raise BadInput(
+    count, states = (language.provenance.tasks.get(key) for key in ("count", "states_sha256"))
+    what = None
+    if candidates.count != count:
+        first, *more = candidates.loaded.problems
+        have = f"these {1 + len(more)} problems have" if more else f"{first.source.name} has"
+        what = (
+            f"the language records {count:,} tasks, but {have} {candidates.count:,} pairs of "
+            "reachable states"
+        )
+    elif states not in (None, states_sha256(candidates)):
+        what = (
             "the language serves all pairs of other states: as many are reachable here, but not "
-            "the same ones",
+            "the same ones"
+        )
+    if what is not None:
+        raise BadInput(
+            what,
             remedy="Give the problems that the language was built for, or say --tasks all to check "
             "these.",
         )
@@ -185,10 +183,8 @@ def with_recorded(language: Language, candidates: Candidates, position: Position
     On another map, where problems have other objects or static facts, the recorded tasks do not
     count.  Among all pairs of states no recorded tasks are added.
 
-    Raises
-    ------
-    BadInput
-        For a language for all pairs of states, where the candidate tasks are not, or are fewer.
+    Raises `BadInput` for a language for all pairs of states, where the candidate tasks are not, or
+    are fewer.
     """
     domain, problems = candidates.loaded.domain, list(candidates.loaded.problems)
     if not all(_is_of_world(language, domain, problem) for problem in problems):

@@ -83,27 +83,13 @@ def sentence_counts(
 
     Backward over the plan space, for all tasks at once: O(edges * sentences of a node).
 
-    Parameters
-    ----------
-    word
-        (nodes) The word number of each node.
-    start
-        Count from the nodes on plans from this one (default: from all nodes).
-    edges
-        (edges) A mask: count only plans over these edges (default: over all).
-    most_of_node, most_steps
-        The most sentences of one node, and the most additions in total.
+    ``word`` (nodes) is the word number of each node.  Counted are the plans from the nodes on plans
+    from ``start`` (default: from all nodes) over the ``edges`` of a mask (default: over all), with
+    at most ``most_of_node`` sentences of one node and ``most_steps`` additions in total.
 
-    Returns
-    -------
-    dict
-        For each node the sentences of the plans from it, the node's own word first, with the exact
-        numbers of these plans.
-
-    Raises
-    ------
-    OutOfMemory
-        If there are more sentences than one of the limits allows.
+    Returns for each node the sentences of the plans from it, the node's own word first, with the
+    exact numbers of these plans.  Raises `OutOfMemory` if there are more sentences than one of the
+    limits allows.
     """
     words: list[int] = word.tolist()
     nodes = np.arange(len(space))
@@ -123,15 +109,10 @@ def sentence_counts(
         for target in targets:
             steps += len(counts[target])
             for rest, number in counts[target].items():
-                total[_in_front(words[node], rest)] += number
+                total[rest if rest[0] == words[node] else (words[node], *rest)] += number
         _check_limits(len(total), most_of_node, steps, most_steps)
         counts[node] = total
     return counts
-
-
-def _in_front(word: int, rest: Sentence) -> Sentence:
-    """Return the sentence of a plan whose first state has ``word`` and whose rest says ``rest``."""
-    return rest if rest[0] == word else (word, *rest)
 
 
 def _check_limits(of_node: int, most_of_node: int | None, steps: int, most: int | None) -> None:

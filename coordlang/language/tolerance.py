@@ -16,16 +16,11 @@ _UNKNOWN = (
 class Tolerance:
     """What a language file claims in place of a coordination language for optimal plans.
 
-    Attributes
-    ----------
-    failure_mean, failure_worst
-        How often robots miscoordinate that are told a sentence and then choose by themselves
-        (`coordlang.required.failure`): over the tasks, and in the worst of them.  None: nothing
-        is claimed, because it is a coordination language.
-    slack
-        The joint steps by which plans may be longer than the least makespan; None: by none.
-    fails_unknown
-        Whether it is no coordination language, and nothing says how often robots fail.
+    ``failure_mean`` and ``failure_worst`` are how often robots miscoordinate that are told a
+    sentence and then choose by themselves (`coordlang.required.failure`): over the tasks, and in
+    the worst of them; None: nothing is claimed, because it is a coordination language.  ``slack``
+    are the joint steps by which plans may be longer than the least makespan; None: by none.
+    ``fails_unknown``: it is no coordination language, and nothing says how often robots fail.
     """
 
     failure_mean: float | None = None

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from os import PathLike, fspath
@@ -17,7 +17,6 @@ from coordlang.language.partition import Partition
 from coordlang.language.provenance import Guarantee, Provenance
 from coordlang.language.tolerance import Tolerance
 from planners.joint.model import JointModel
-from planners.joint.tables import Rows
 from planners.system.errors import BadInput
 from planners.system.messages import echoed
 from planners.system.notebook import counted, html_table
@@ -27,16 +26,8 @@ from planners.system.notebook import counted, html_table
 class Language:
     """A partition of states as text, and where it comes from.
 
-    Attributes
-    ----------
-    words
-        The words.
-    states
-        State key (`planners.joint.states.StateCodec.key`) -> word.
-    default
-        The word of every other state.
-    provenance
-        Model, tasks and method that it was made with.
+    ``states``: state key (`planners.joint.states.StateCodec.key`) -> word; ``default`` is the word
+    of every other state; ``provenance`` the model, tasks and method that it was made with.
     """
 
     words: tuple[str, ...]
@@ -121,24 +112,16 @@ class Language:
     def partition(self, model: JointModel) -> Partition:
         """Read the states' keys over a joint model.
 
-        Raises
-        ------
-        BadInput
-            A key that is not that of a state of the model.
+        Raises `BadInput` for a key that is not that of a state of the model.
         """
         number = {word: n for n, word in enumerate(self.words)}
         word = np.fromiter(
             map(number.__getitem__, self.states.values()), np.int64, len(self.states)
         )
-        rows = _rows(model, self.states)
+        rows, wrong = read_keys(model.codec, self.states)
+        if len(wrong):
+            _refuse(model, next(islice(self.states, int(wrong[0]), None)))
         return Partition.of_table(self.words, rows, word, number[self.default])
-
-
-def _rows(model: JointModel, keys: Iterable[str]) -> Rows:
-    rows, wrong = read_keys(model.codec, keys)
-    if len(wrong):
-        _refuse(model, next(islice(keys, int(wrong[0]), None)))
-    return rows
 
 
 def _refuse(model: JointModel, key: str) -> NoReturn:
