@@ -322,10 +322,3 @@ def test_remembered_actions_are_one_variable_a_robot() -> None:
     table = language.partition(candidates.model)
     names = {variable.name for variable in valuation(candidates.model, table.rows).variables}
     assert {"last(r1)", "last(r2)"} <= names
-
-
-def test_same_input_same_formulas() -> None:
-    candidates = all_tasks("grid", "gw2-2x3")
-    language = build_language(candidates, "greedy").language
-    backwards = language_of(dict(reversed([*language.states.items()])), language.words)
-    assert word_formulas(language, candidates.model) == word_formulas(backwards, candidates.model)

@@ -209,7 +209,7 @@ BY_HAND = {
 
 
 def test_by_hand(coordlang: Command, tmp_path: Path) -> None:
-    """Five keys are a language: where r2 is, for the running example."""
+    """Five keys are a language: where r2 is, for the running example; then changed to be none."""
     path = tmp_path / "mine.json"
     path.write_text(json.dumps(BY_HAND, indent=2))
     assert valid(BY_HAND)
@@ -221,25 +221,15 @@ def test_by_hand(coordlang: Command, tmp_path: Path) -> None:
     assert explained.code == 0
     assert "at(r2) = a" in explained.out
     assert "r1, r2" in explained.out
-    assert (
-        coordlang("explain", path, *RUNNING, "--task").code == 1
-    )  # it records no task, so it guarantees nothing
-
-
-def test_by_hand_only_a_default(coordlang: Command, tmp_path: Path) -> None:
-    path = tmp_path / "mine.json"
-    path.write_text(json.dumps(BY_HAND | {"words": ["a"], "states": {}}))
-    refuted = coordlang("verify", path, *RUNNING)
-    assert refuted.code == 1  # the running example needs more words
-    explained = coordlang("explain", path, *RUNNING)
-    assert "No state is mapped: the word is always a." in explained.out
-
-
-def test_by_hand_and_wrong(coordlang: Command, tmp_path: Path) -> None:
-    path = tmp_path / "mine.json"
+    # It records no task, so it guarantees nothing.
+    assert coordlang("explain", path, *RUNNING, "--task").code == 1
     swapped = BY_HAND["states"] | {"(at r1 a) (at r2 b)": "a", "(at r1 c) (at r2 a)": "b"}  # type: ignore[operator]
     path.write_text(json.dumps(BY_HAND | {"states": swapped}))
     assert coordlang("verify", path, *RUNNING, "--tasks", "all").code == 1
+    path.write_text(json.dumps(BY_HAND | {"words": ["a"], "states": {}}))
+    assert coordlang("verify", path, *RUNNING).code == 1  # the running example needs more words
+    explained = coordlang("explain", path, *RUNNING)
+    assert "No state is mapped: the word is always a." in explained.out
 
 
 @pytest.mark.parametrize(
@@ -270,14 +260,3 @@ def test_a_key_twice(old: str, new: str, key: str) -> None:
         with pytest.raises(BadInput, match="occurs twice") as refused:
             language_from_bytes(once.replace(old, new, 1).encode(), HERE)
         assert repr(key) in refused.value.what
-
-
-def test_escapes_in_keys_are_no_duplicates() -> None:
-    """Quotation marks and backslashes in keys, which the count of marks would get wrong."""
-    data = BY_HAND | {"states": {'(say "a")': "a", "(say \\)": "b", '(say \\")': "c", "(é)": "a"}}
-    language = language_from_bytes(json.dumps(data).encode(), HERE)
-    assert dict(language.states) == data["states"]
-    assert (
-        dict(language_from_bytes(json.dumps(data, ensure_ascii=False).encode(), HERE).states)
-        == data["states"]
-    )

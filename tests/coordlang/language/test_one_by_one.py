@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-import json
 import warnings
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +12,7 @@ import pytest
 from coordlang.language import reached
 from coordlang.language.candidates import Candidates, describe, from_listed
 from coordlang.language.listed import ListedTask, goal_text
-from coordlang.language.reached import explored_if_small, surely_unreachable
+from coordlang.language.reached import explored_if_small
 from planners.joint.model import JointModel, PlanningTask
 from planners.joint.tables import Rows
 from planners.pddl import parse_domain, parse_problem, read_domain, read_problem
@@ -26,7 +24,6 @@ from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, Note, ProvedImpossible
-from tests.support.command import Command
 from tests.support.domains import DOMAINS
 from tests.support.joint_twin import built
 from tests.support.random_pddl import random_model
@@ -144,19 +141,6 @@ def test_tasks_on_one_plan_share_its_search(large: None, searches: list[str]) ->
     assert [goal_text(found.model, goal) for goal in found.spaces[0].goals] == ["(at r1 c2-2)"] * 4
 
 
-def test_a_start_that_is_the_problems_own_needs_no_note(large: None, searches: list[str]) -> None:
-    domain, problems = grid()
-    own = tuple(
-        sorted(
-            f"({a.predicate} {' '.join(a.args)})" for a in problems[0].init if a.predicate == "at"
-        )
-    )
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        found = from_listed(domain, problems, [ListedTask(own, ("(at r1 c0-1)",))])
-    assert (found.count, searches) == (1, ["1"])
-
-
 @pytest.mark.parametrize(
     "init",
     [
@@ -172,18 +156,6 @@ def test_a_robot_that_is_nowhere_or_in_two_places_is_a_mistake(
     good = ListedTask(("(at r1 c0-0)", "(at r2 c1-1)"), ())
     with pytest.raises(BadInput, match=r"task 2: the state .* cannot be reached from the initial"):
         from_listed(domain, problems, [good, ListedTask(init, ())])
-
-
-def test_what_is_reachable_is_never_refused() -> None:
-    refused = 0
-    for seed in range(30):
-        world = built(random_model(seed, ("agent", "plain")[seed % 2]))
-        model, start = world.model, world.tasks[0].init
-        rows = explore(model, start[None, :]).rows
-        assert surely_unreachable(model, start[None, :], rows) == []
-        every = np.arange(2 ** len(model.codec.facts), dtype=np.uint64)[:, None]
-        refused += len(surely_unreachable(model, start[None, :], every))
-    assert refused >= 5
 
 
 def test_a_small_space_is_explored(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -216,16 +188,3 @@ def test_an_unsolvable_task_is_named_as_before(large: None) -> None:
     assert (kept.count, len(kept.skipped), kept.listed) == (1, 1, (good,))
     with pytest.raises(ProvedImpossible), pytest.warns(Note):
         from_listed(domain, problems, [bad], skip_unsolvable=True)
-
-
-def test_the_language_is_one(coordlang: Command, tmp_path: Path, large: None) -> None:
-    tasks = DOMAINS / "grid" / "gwb5-3x3.tasks.json"
-    problem = DOMAINS / "grid" / "gwb5-3x3.pddl"
-    few = {**json.loads(tasks.read_text())}
-    few["tasks"] = few["tasks"][::10]
-    (tmp_path / "tasks.json").write_text(json.dumps(few))
-    arguments = (GRID, problem, "--tasks", tmp_path / "tasks.json")
-    outcome = coordlang("build", *arguments, "-o", tmp_path / "l.json", "--jobs", 1)
-    assert outcome.code == 0
-    assert "is not checked" in outcome.err
-    assert coordlang("verify", tmp_path / "l.json", *arguments, "--jobs", 1).code == 0

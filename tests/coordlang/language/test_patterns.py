@@ -15,7 +15,7 @@ from coordlang.language.listed import ListedTask
 from coordlang.language.patterns import varied_tasks
 from coordlang.language.task_file import read_task_file
 from planners.loading import PlanningInstance, load
-from planners.system.errors import ProvedImpossible, UsageError
+from planners.system.errors import UsageError
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
 from tests.support.naive_joint_steps import Twin
@@ -103,14 +103,6 @@ def test_a_pattern_that_matches_nothing() -> None:
             UsageError, match=re.escape(f"no fluent of this problem matches {wrong}")
         ):
             varied_tasks(loaded, [], [wrong])
-
-
-def test_goals_that_cannot_be_together() -> None:
-    loaded = load(
-        DOMAINS / "three-cells" / "domain.pddl", [DOMAINS / "three-cells" / "problem.pddl"]
-    )
-    with pytest.raises(ProvedImpossible, match="there is no such task"):
-        varied_tasks(loaded, [], ["(at r1 a)", "(at r2 a)"])
 
 
 def test_the_command_writes_what_build_reads(coordlang: Command, tmp_path: Path) -> None:

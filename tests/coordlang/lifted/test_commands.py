@@ -51,18 +51,6 @@ def test_files_on_stdout(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["l.json"]
 
 
-def test_what_is_not_verified_says_so(coordlang: Command, lifted: Path, tmp_path: Path) -> None:
-    language = tmp_path / "language.json"
-    outcome = coordlang("ground", lifted, GRID, OPEN, "-o", language, "--unverified")
-    assert (outcome.code, outcome.err) == (
-        0,
-        "4 words (lifted; not verified here)\n",
-    )
-    explained = coordlang("explain", language, GRID, OPEN, "--task")
-    assert explained.code == 1
-    assert "guarantees nothing" in explained.err
-
-
 def test_where_the_memory_does_not_suffice(
     coordlang: Command, lifted: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -136,7 +124,8 @@ def test_a_limit_ends_the_search_for_fewer_words(
     coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The words that are verified already are written: exit code 3; 130 after an interrupt."""
-    for error, code in ((api.OutOfTime("the time limit is over"), 3), (KeyboardInterrupt(), 130)):
+    late = api.OutOfTime("the time limit is over")
+    for error, code in ((late, 3), (MemoryError(), 3), (KeyboardInterrupt(), 130)):
 
         def stop(*_: object, error: BaseException = error) -> None:
             raise error
@@ -151,16 +140,6 @@ def test_a_limit_ends_the_search_for_fewer_words(
         assert len(json.loads(path.read_text())["words"]) > 1
 
 
-def test_a_problem_given_twice(coordlang: Command, tmp_path: Path) -> None:
-    path = tmp_path / "l.json"
-    outcome = coordlang(
-        "lift", GRID, SMALL, SMALL, "--check", SMALL, "--tasks", "all", "--prefer", "features",
-        "-o", path, "--jobs", "1", "--json",
-    )  # fmt: skip
-    assert outcome.code == 0, outcome.err
-    assert len(json.loads(outcome.out)["verified"]) == 3
-
-
 def test_many_states_are_read_in_parts(
     coordlang: Command, lifted: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -169,21 +148,3 @@ def test_many_states_are_read_in_parts(
     monkeypatch.setattr("coordlang.lifted.language._ENTRIES", 100)
     assert coordlang("ground", lifted, GRID, LARGER, "-o", files[1], "--jobs", "1").code == 0
     assert files[0].read_bytes() == files[1].read_bytes()
-
-
-def test_memory_that_ends_without_a_word_leaves_the_verified_words(
-    coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The interpreter's own error says nothing."""
-
-    def merged(*_: object) -> None:
-        raise MemoryError
-
-    monkeypatch.setattr("coordlang.lifted.learning.merge_classes", merged)
-    path = tmp_path / "l.json"
-    outcome = coordlang(
-        "lift", GRID, *RINGS, "--tasks", "all", "--prefer", "features", "-o", path, "--jobs", "1"
-    )
-    assert outcome.code == 3
-    assert "out of memory; the best words so far are written" in outcome.err
-    assert len(json.loads(path.read_text())["words"]) == 4

@@ -229,19 +229,6 @@ def test_coordinates_of_a_file() -> None:
     assert States(World.loaded(loaded), rows).get(column).tolist() == [UNDEFINED]
 
 
-def test_coordinates_of_places_that_a_problem_does_not_have() -> None:
-    """One file may be of many maps: in each the places that it has count, from 0."""
-    world = states_of("grid", "gw2-2x3").world
-    loaded = load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "gw2-2x3.pddl"])
-    points = {f"c{y}-{x}": (float(x), float(y)) for y in range(2) for x in range(3)}
-    rows = states_of("grid", "gw2-2x3", 5).rows
-    for known in (points, {**points, "elsewhere": (-7.0, -7.5)}):
-        states = States(World.loaded(loaded, known), rows)
-        for axis in ("row", "column"):
-            one = feature(f"(mod ({axis} (at r1)) 4)")
-            assert states.get(one).tolist() == States(world, rows).get(one).tolist()
-
-
 def test_features_of_a_problem_without_what_they_name() -> None:
     """Other robots, other predicates: nothing is named, nothing is counted."""
     there = states_of("charger", "queue")

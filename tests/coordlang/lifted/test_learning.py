@@ -25,7 +25,6 @@ from coordlang.verification.by_definition import verify
 from planners.joint.tables import Ints
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.sexpr import Source
-from planners.system.errors import ProvedImpossible
 from tests.support.domains import DOMAINS, all_tasks
 
 
@@ -105,11 +104,6 @@ def test_what_is_held_back_is_learned_from_where_it_refutes() -> None:
     assert both.rounds > alone.rounds
 
 
-def test_features_that_are_too_weak() -> None:
-    with pytest.raises(ProvedImpossible, match="no feature up to complexity 3 tells states apart"):
-        learn([instance("grid", "gw2-2x3")], complexity=3)
-
-
 def test_values_that_nobody_has_seen_are_words_of_their_own() -> None:
     large = instance("grid", "gw3-2x4")
     learned = learn([instance("grid", "gw1-2x2"), instance("grid", "gw2-2x3")])
@@ -161,18 +155,6 @@ def partitions(count: int, size: int) -> Iterator[list[int]]:
             yield from grow([*words, word])
 
     return grow([])
-
-
-def test_merged_words_are_learned_from_what_was_held_back() -> None:
-    learned = learn(
-        [instance("grid", "gw1-2x2")],
-        [instance("t-map", "problem")],
-        complexity=6,
-        prefer="features",
-    )
-    assert learned.proved
-    for own in (instance("grid", "gw1-2x2"), instance("t-map", "problem")):
-        assert holds_by_words(own, words_in(own, learned))
 
 
 def test_words_may_come_first() -> None:

@@ -17,7 +17,6 @@ from coordlang.lifted.file import lifted_from_bytes, read_lifted, to_bytes
 from coordlang.lifted.language import LiftedLanguage
 from coordlang.required.miscoordination import Inseparable
 from planners.pddl import parse_problem, read_domain
-from planners.pddl.lifted import Problem
 from planners.pddl.sexpr import Source
 from planners.system.errors import BadInput, Note, Position, ProvedImpossible, Refuted, UsageError
 from tests.support.domains import DOMAINS
@@ -103,26 +102,6 @@ def test_a_lifted_language_is_used_as_it_is(rings: Lifted, plan: Path) -> None:
     assert explained.words.head.startswith("4 words for 1 task of r1, r2; lifted; verified here")
 
 
-def test_a_task_that_refutes_it_is_not_covered(rings: Lifted) -> None:
-    """A lifted language in a task of an open grid says a sentence, and guarantees nothing."""
-    problem = problem_text([("c0-0", "c0-1"), ("c0-1", "c0-0")], OPEN)
-    explained = coordlang.explain(rings.language, GRID, problem)
-    assert not explained.covered
-    assert "lifted; refuted here" in explained.words.head
-
-
-def problem_text(moves: list[tuple[str, str]], path: Path) -> Problem:
-    """A shipped problem with other starts and goals."""
-    text = path.read_text()
-    head = text[: text.index("(:init")]
-    links = [line for line in text.splitlines() if "(adjacent" in line]
-    links[-1] = links[-1].rstrip(")") + ")"
-    init = " ".join(f"(at r{k} {a})" for k, (a, _) in enumerate(moves, 1))
-    goal = " ".join(f"(at r{k} {b})" for k, (_, b) in enumerate(moves, 1))
-    whole = f"{head}(:init {init} {' '.join(links)})\n(:goal (and {goal})))"
-    return parse_problem(Source("changed", whole), read_domain(GRID))
-
-
 # What a sceptical user tries
 
 
@@ -140,20 +119,15 @@ def test_other_robots(rings: Lifted) -> None:
         coordlang.lift(GRID, RINGS[0], three, jobs=1)
 
 
-def test_model_options_that_contradict(rings: Lifted) -> None:
-    with pytest.raises(UsageError, match=r"--cost makespan\+actions contradicts"):
-        coordlang.ground(rings.language, GRID, LARGER, cost="makespan+actions")
-
-
-def test_robots_that_are_not_all(rings: Lifted) -> None:
-    """The lifted file does not name robots, so what is wrong is what the user said."""
-    with pytest.raises(UsageError, match=r"--robots r1 contradicts the domain"):
-        coordlang.ground(rings.language, GRID, LARGER, robots=["r1"])
-
-
-def test_a_lifted_language_is_not_repaired(rings: Lifted) -> None:
+def test_what_contradicts_what_was_learned(rings: Lifted) -> None:
     with pytest.raises(UsageError, match="is a lifted language"):
         coordlang.build(GRID, LARGER, start=rings.language)
+    with pytest.raises(UsageError, match="--check and --factored"):
+        coordlang.lift(factored=GRID.parent, check=[SMALL])
+    with pytest.raises(UsageError, match=r"--robots r1 contradicts the domain"):
+        coordlang.ground(rings.language, GRID, LARGER, robots=["r1"])
+    with pytest.raises(UsageError, match=r"--cost makespan\+actions contradicts"):
+        coordlang.ground(rings.language, GRID, LARGER, cost="makespan+actions")
 
 
 def test_a_problem_without_tasks(rings: Lifted, tmp_path: Path) -> None:
@@ -226,6 +200,10 @@ DAMAGED: dict[str, tuple[Change, str]] = {
     ),
     "values": (lambda d: d.update(values={"0": "w0"}), "are no values of 2 features"),
     "no number": (lambda d: d.update(values={"0 x": "w0"}), "are no values of 2 features"),
+    "beyond all bounds": (
+        lambda d: d.update(values={f"0 {10**25}": "w0"}),
+        "are no values of 2 features",
+    ),
     "spaces": (lambda d: d.update(values={"0  1": "w0"}), "are no values of 2 features"),
     "unknown word": (lambda d: d.update(values={"0 1": "w9"}), "which 'words' has not"),
     "no words": (lambda d: d.update(words=[]), "words must be different"),
@@ -302,19 +280,6 @@ def test_a_loaded_problem(tmp_path: Path) -> None:
     assert [known.problem for known in lifted.verified] == ["p"]
     language = coordlang.ground(lifted, domain, problem, jobs=1)
     assert language.guarantee.method == "lifted; verified here"
-
-
-def test_factored_files_are_one_problem(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="--check and --factored"):
-        coordlang.lift(factored=tmp_path, check=[SMALL])
-
-
-def test_values_beyond_all_bounds(rings: Lifted) -> None:
-    """No feature has them; as a number of the machine they would be an overflow."""
-    data = json.loads(to_bytes(rings.language))
-    data["values"][f"0 {10**25}"] = "w0"
-    with pytest.raises(BadInput, match="are no values of 2 features"):
-        lifted_of(data)
 
 
 INSEPARABLE = """(define (domain d) (:requirements :typing) (:types robot)

@@ -87,12 +87,6 @@ def test_jobs_give_what_the_whole_gives(robots: int, number: int) -> None:
 
 
 @pytest.mark.parametrize("robots", [2, 3])
-def test_the_tasks_are_counted_without_their_plans(robots: int) -> None:
-    for candidates in random_candidates(range(40), robots):
-        assert candidates.count == sum(len(space.starts) for space in candidates.spaces)
-
-
-@pytest.mark.parametrize("robots", [2, 3])
 def test_portions_are_the_plan_spaces_of_their_goals(robots: int) -> None:
     for candidates in random_candidates(range(16), robots):
         source = candidates.source

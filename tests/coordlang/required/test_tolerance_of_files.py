@@ -95,18 +95,6 @@ def test_a_refuted_language_is_refuted_when_time_is_over(
     assert "fail in an unknown share of all runs (the time limit of 1 s is over)" in found.out
 
 
-def test_a_verified_language_never_fails(coordlang: Command, tmp_path: Path) -> None:
-    path = tmp_path / "l.json"
-    built = json.loads(
-        coordlang(
-            "build", *SQUARE, "--tasks", "all", "--method", "greedy", "-o", path, "--json"
-        ).out
-    )
-    answer = json.loads(coordlang("verify", path, *SQUARE, "--json").out)
-    for figures in (built, answer):
-        assert figures["failure_mean"] == figures["failure_worst"] == 0
-
-
 @pytest.mark.parametrize(
     ("tolerance", "warning"),
     [
@@ -141,20 +129,6 @@ def test_commands_warn_of_words_that_are_too_few(
     assert library.load_language(path).may_fail
     if tolerance is None:
         assert coordlang("choices", path, *SQUARE, "w0").code == 1  # it miscoordinates
-
-
-def test_choices_under_wrong_words_within_slack_are_refuted(
-    coordlang: Command, tmp_path: Path
-) -> None:
-    """The file says that plans may be longer, and not that robots may fail."""
-    path = silent(tmp_path / "l.json", {"slack": 1})
-    data = json.loads(path.read_text())
-    del data["guarantee"]["coordination_language"]
-    data["guarantee"]["proved_minimal"] = True
-    path.write_text(json.dumps(data))
-    found = coordlang("choices", path, *SQUARE, "w0")
-    assert found.code == 1
-    assert "the language does not cover it" in found.err
 
 
 def test_choices_under_words_that_are_too_few_are_not_guaranteed(

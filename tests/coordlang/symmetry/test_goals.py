@@ -97,13 +97,6 @@ def test_shipped_maps(folder: str, stem: str) -> None:
     assert agree(all_tasks(folder, stem))
 
 
-@pytest.mark.parametrize(
-    ("folder", "stem"), [("handover", "two-doors"), ("push-box", "next-door"), ("tray", "serve")]
-)
-def test_other_domains(folder: str, stem: str) -> None:
-    agree(all_tasks(folder, stem))
-
-
 def test_the_orbits_of_goals() -> None:
     turn, swap = np.array([1, 2, 0, 3, 4, 5]), np.array([0, 1, 2, 4, 3, 5])
     goals = SymmetricGoals.of([turn, swap], 6)

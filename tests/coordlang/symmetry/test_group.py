@@ -11,8 +11,6 @@ import pytest
 
 from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
 from coordlang.language.listed import ListedTask
-from coordlang.symmetry.check import SymmetryCheck
-from coordlang.symmetry.graph import automorphism_generators
 from coordlang.symmetry.group import Symmetry, SymmetryGroup, generated, symmetry_group
 from planners.joint.states import split_atoms
 from planners.pddl import parse_domain, parse_problem, read_domain
@@ -207,19 +205,6 @@ def check_plans(candidates: Candidates, group: SymmetryGroup) -> None:
             frozenset(tuple(permutation[s] for s in states) for states in plans)
             for plans in plans_of_tasks
         }
-
-
-def test_without_room_for_tasks_the_check_decides() -> None:
-    """The graph of the model alone has symmetries that the one task of the problem has not."""
-    text = world(4, [(0, 1), (1, 2), (2, 3), (3, 0)], 2)
-    candidates = from_problems(GRID, [parse_problem(Source("p", text), GRID)])
-    whole = automorphism_generators(candidates)
-    check = SymmetryCheck(candidates)
-    assert whole
-    assert all(check.states_under(renaming) is not None for renaming in whole)
-    proposed = [r for n in range(20, 60) for r in automorphism_generators(candidates, largest=n)]
-    assert any(check.states_under(renaming) is None for renaming in proposed)
-    assert automorphism_generators(candidates, largest=5) == []
 
 
 def test_objects_that_nothing_reaches_cost_no_symmetries() -> None:

@@ -19,9 +19,8 @@ import pytest
 from coordlang.commands.building import build_language
 from coordlang.commands.built import Built
 from coordlang.commands.verify import verify
-from coordlang.language.candidates import all_pairs, from_listed, from_problems
+from coordlang.language.candidates import all_pairs, from_problems
 from coordlang.language.file import read_language
-from coordlang.language.task_file import read_task_file
 from coordlang.required.miscoordination import inseparable
 from coordlang.verification.certificate_clauses import core, encode
 from coordlang.verification.certificate_file import (
@@ -34,8 +33,7 @@ from coordlang.verification.certificate_file import (
 from coordlang.verification.check_certificate import Checked, check
 from coordlang.vocabulary.loop import Budget
 from coordlang.vocabulary.minimal import MinimalSearch, refuting_clauses
-from planners.pddl import read_domain, read_problem
-from planners.system.errors import BadInput, OutOfTime, ProvedImpossible, Refuted
+from planners.system.errors import OutOfTime, ProvedImpossible, Refuted
 from planners.system.limits import time_left
 from tests.support.candidates import states_of
 from tests.support.command import Command
@@ -224,20 +222,6 @@ def test_nothing_to_refute() -> None:
     assert not encode([frozenset({(0, 1)})], 2).refuted()
 
 
-def test_task_file_with_symmetries() -> None:
-    """Images under symmetries, robot swaps among them, become plans of other candidate tasks."""
-    domain = read_domain(DOMAINS / "grid" / "domain.pddl")
-    problem = read_problem(DOMAINS / "grid" / "gwb5-3x3.pddl", domain)
-    tasks = read_task_file(DOMAINS / "grid" / "gwb5-3x3.tasks.json")
-    built = build_language(from_listed(domain, [problem], tasks), "minimal")
-    assert built.figures["symmetries"] > 0
-    certificate = built.certificate()
-    assert check(certificate, built.job.candidates).lower_bound == 3
-    fewer = from_listed(domain, [problem], tasks[:5])
-    with pytest.raises(Refuted, match="is no candidate task"):
-        check(certificate, fewer)
-
-
 @pytest.mark.parametrize(("robots", "number"), [(2, 12), (3, 5)])
 def test_random_models(robots: int, number: int) -> None:
     """Every minimum of random models is proved by its certificate, and of none a larger one."""
@@ -295,25 +279,6 @@ def test_command_line(coordlang: Command, tmp_path: Path) -> None:
     weak = coordlang("verify", language, *files, "--certificate", proof)
     assert weak.code == 1
     assert "claims that 3 words are needed; the certificate proves 2 only" in weak.err
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "",
-        "{}",
-        '{"format": "coordlang/certificate", "version": 2}',
-        "[1]",
-        '{"format": "coordlang/certificate", "version": 1, "reasons": 3}',
-    ],
-)
-def test_what_is_no_certificate(text: str, tmp_path: Path) -> None:
-    path = tmp_path / "c.json"
-    path.write_text(text)
-    with pytest.raises(BadInput, match=r"c\.json"):
-        read_certificate(path)
-    with pytest.raises(BadInput, match="no such file"):
-        read_certificate(tmp_path / "none.json")
 
 
 # A search that is stopped proves a bound
