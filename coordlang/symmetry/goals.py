@@ -28,13 +28,9 @@ PAIRS_FOR_ACTION = 10
 class SymmetricGoals:
     """The goals "every state", of which some speak for all.
 
-    Attributes
-    ----------
-    generators
-        (states) where each state number goes; of a group of symmetries.
-    representative
-        (states) for each goal, by the number of its state, the least goal that a symmetry takes to
-        it.
+    ``generators`` (states) say where each state number goes, for a group of symmetries;
+    ``representative`` (states) is for each goal, by the number of its state, the least goal that a
+    symmetry takes to it.
     """
 
     generators: tuple[Ints, ...]
@@ -72,15 +68,15 @@ class SymmetricGoals:
 
     def images_of_rows(self, rows: Ints) -> Ints:
         """The images of rows (state, other states sorted, -1 to fill up), sorted, each once."""
-        known = new = _different(rows)
+        known, _ = unique_rows(rows.astype(np.uint64))
+        new = known.astype(np.int64)
         while len(new):
-            images = np.concatenate([rows[:0], *(self._image(new, to) for to in self.generators)])
-            together, number = unique_rows(np.concatenate((known, images)).astype(np.uint64))
+            images = np.concatenate([new[:0], *(self._image(new, to) for to in self.generators)])
+            together, number = unique_rows(np.concatenate((known, images.astype(np.uint64))))
             old = np.zeros(len(together), np.bool_)
             old[number[: len(known)]] = True
-            known = together.astype(np.int64)
-            new = known[~old]
-        return known
+            known, new = together, together[~old].astype(np.int64)
+        return known.astype(np.int64)
 
     @staticmethod
     def _image(rows: Ints, to: Ints) -> Ints:
@@ -88,11 +84,6 @@ class SymmetricGoals:
         image = np.append(to, most)[rows]  # -1 is the last entry: beyond all states
         image[:, 1:].sort(axis=1)
         return np.where(image == most, -1, image)
-
-
-def _different(rows: Ints) -> Ints:
-    different, _ = unique_rows(rows.astype(np.uint64))
-    return different.astype(np.int64)
 
 
 def symmetric_goals(

@@ -13,13 +13,13 @@ graph isomorphism II, 2014).
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence, Set
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence, Set
 
 import numpy as np
 
 from coordlang.language.candidates import Candidates
 from planners.joint.model import FullState, Goal, JointModel
-from planners.pddl.formula_tree import fold
+from planners.pddl.formula_tree import Compound, Leaf, fold
 from planners.pddl.lifted import Atom, Domain, Formula, Not, Problem, StepAtom
 from planners.pddl.robots import fluent_predicates, natural
 from planners.search.plan_space import PlanSpace
@@ -36,13 +36,8 @@ def automorphism_generators(
 ) -> list[Renaming]:
     """Generators of the automorphisms of the model's graph, as renamings of objects.
 
-    Parameters
-    ----------
-    largest
-        Vertices of the largest graph.  The tasks, or the actions, are left out of one that would
-        have more; some of the generators may then be no symmetries of the model.
-    with_tasks
-        Whether the tasks are part of the graph where they fit.
+    The tasks (if ``with_tasks``), or the actions, are left out of a graph that would have more than
+    ``largest`` vertices; some of the generators may then be no symmetries of the model.
     """
     model = candidates.model
     graph = _ModelGraph(candidates.loaded.domain, candidates.loaded.problems[0], model)
@@ -57,56 +52,34 @@ def automorphism_generators(
     return graph.renamings()
 
 
-class _ColouredGraph:
-    """An undirected graph whose vertices have colours."""
-
-    def __init__(self) -> None:
-        self._colours: dict[Hashable, set[int]] = {}
-        self._neighbours: list[list[int]] = []
-
-    def __len__(self) -> int:
-        return len(self._neighbours)
-
-    def vertex(self, colour: Hashable, neighbours: Iterable[int] = ()) -> int:
-        """Add a vertex with edges to others; its number."""
-        number = len(self._neighbours)
-        self._neighbours.append(list(neighbours))
-        self._colours.setdefault(colour, set()).add(number)
-        return number
-
-    def generators(self) -> list[list[int]]:
-        """Generators of the automorphism group: where each vertex goes."""
-        import pynauty
-
-        graph = pynauty.Graph(
-            len(self),
-            adjacency_dict=dict(enumerate(self._neighbours)),
-            vertex_coloring=list(self._colours.values()),
-        )
-        found: list[list[int]] = pynauty.autgrp(graph)[0]
-        return found
-
-
 class _ModelGraph:
     """The graph of a model with its facts; actions and tasks are added on demand."""
 
     def __init__(self, domain: Domain, problem: Problem, model: JointModel) -> None:
         self._model = model
-        self._graph = _ColouredGraph()
+        self._colours: dict[Hashable, set[int]] = {}
+        self._neighbours: list[list[int]] = []
         used = _used(model)
         self._objects = {
-            name: self._graph.vertex(self._look(name, domain, types))
+            name: self._vertex(self._look(name, domain, types))
             for name, types in problem.objects.items()
             if name in used
         }
         self._arguments: dict[tuple[str, int], int] = {}
-        self._formulas: dict[Goal, int] = {}
+        self._goals: dict[Goal, int] = {}
         for atom in _static_facts(domain, problem, used):
             self._instance(("static", atom.predicate), atom.args)
         self._facts = [self._instance(("fact", a.predicate), a.args) for a in model.codec.facts]
 
     def __len__(self) -> int:
-        return len(self._graph)
+        return len(self._neighbours)
+
+    def _vertex(self, colour: Hashable, neighbours: Iterable[int] = ()) -> int:
+        """Add a vertex with edges to others; its number."""
+        number = len(self._neighbours)
+        self._neighbours.append(list(neighbours))
+        self._colours.setdefault(colour, set()).add(number)
+        return number
 
     def _look(self, name: str, domain: Domain, types: Iterable[str]) -> Hashable:
         """The colour of an object: its types, and what kind of a robot it is, if it is one."""
@@ -123,11 +96,11 @@ class _ModelGraph:
         """A vertex for a predicate or an action schema with its arguments."""
         unused = tuple((n, arg) for n, arg in enumerate(args) if arg not in self._objects)
         used = [self._argument(arg, n) for n, arg in enumerate(args) if arg in self._objects]
-        return self._graph.vertex((*colour, len(args), unused), used)
+        return self._vertex((*colour, len(args), unused), used)
 
     def _argument(self, name: str, position: int) -> int:
         if (name, position) not in self._arguments:
-            vertex = self._graph.vertex(("argument", position), [self._objects[name]])
+            vertex = self._vertex(("argument", position), [self._objects[name]])
             self._arguments[name, position] = vertex
         return self._arguments[name, position]
 
@@ -150,36 +123,37 @@ class _ModelGraph:
         for state in sorted(goals_of):
             true = self._model.codec.true_facts(spaces[0].rows[state])
             facts = [self._facts[fact] for fact in true]
-            self._graph.vertex("initial state", [*facts, *sorted(goals_of[state])])
+            self._vertex("initial state", [*facts, *sorted(goals_of[state])])
 
     def _goal(self, goal: Goal) -> int:
-        if goal not in self._formulas:
+        if goal not in self._goals:
             if isinstance(goal, FullState):
-                true = [self._facts[fact] for fact in goal.facts]
-                vertex = self._graph.vertex("full state", true)
+                vertex = self._vertex("full state", [self._facts[fact] for fact in goal.facts])
             else:
-                vertex = self._graph.vertex("goal", [self._formula(goal)])
-            self._formulas[goal] = vertex
-        return self._formulas[goal]
+                vertex = self._vertex("goal", [fold(goal, self._leaf, self._compound)])
+            self._goals[goal] = vertex
+        return self._goals[goal]
 
-    def _formula(self, formula: Formula) -> int:
-        return fold(
-            formula,
-            lambda leaf: (
-                self._instance(("atom", leaf.predicate), leaf.args)
-                if isinstance(leaf, Atom)
-                else self._graph.vertex(leaf)
-            ),
-            lambda kind, parts: self._graph.vertex(
-                "not" if isinstance(kind, Not) else type(kind).__name__, [*parts]
-            ),
-        )
+    def _leaf(self, leaf: Leaf) -> int:
+        if isinstance(leaf, Atom):
+            return self._instance(("atom", leaf.predicate), leaf.args)
+        return self._vertex(leaf)
+
+    def _compound(self, kind: Compound, parts: Iterator[int]) -> int:
+        return self._vertex("not" if isinstance(kind, Not) else type(kind).__name__, [*parts])
 
     def renamings(self) -> list[Renaming]:
         """Generators of the automorphism group, as renamings of objects; none is the identity."""
+        import pynauty
+
+        graph = pynauty.Graph(
+            len(self),
+            adjacency_dict=dict(enumerate(self._neighbours)),
+            vertex_coloring=list(self._colours.values()),
+        )
         names = {vertex: name for name, vertex in self._objects.items()}
         found: list[Renaming] = []
-        for generator in self._graph.generators():
+        for generator in pynauty.autgrp(graph)[0]:  # where each vertex goes
             renaming = {name: names[generator[vertex]] for vertex, name in names.items()}
             if any(name != to for name, to in renaming.items()):
                 found.append(renaming)

@@ -37,12 +37,8 @@ LARGEST_GROUP = 64
 class Symmetry:
     """A renaming of objects that maps the model and its candidate tasks onto themselves.
 
-    Attributes
-    ----------
-    renaming
-        Where each object goes; objects that are not named stay.
-    states
-        (states) where each state number goes.
+    ``renaming`` says where each object goes, objects that are not named stay; ``states`` (states)
+    where each state number goes.
     """
 
     renaming: Renaming
@@ -75,13 +71,9 @@ class Symmetry:
 class SymmetryGroup:
     """A group of symmetries of a model and its candidate tasks.
 
-    Attributes
-    ----------
-    symmetries
-        The elements without the identity, in the order of where they take the objects (those of
-        `joined_order`, one after another).
-    dropped
-        Automorphisms of the graph that failed the check on the model itself.
+    ``symmetries`` are the elements without the identity, in the order of where they take the
+    objects (those of `joined_order`, one after another); ``dropped`` counts automorphisms of the
+    graph that failed the check on the model itself.
     """
 
     symmetries: tuple[Symmetry, ...]
@@ -101,20 +93,11 @@ class SymmetryGroup:
 def symmetry_group(
     candidates: Candidates, largest: int = LARGEST_GROUP, largest_graph: int = LARGEST_GRAPH
 ) -> SymmetryGroup:
-    """The symmetries of the candidates' model: all of them, or a subgroup.
+    """The symmetries of the candidates' model: of more than ``largest`` elements a subgroup.
 
-    Parameters
-    ----------
-    largest
-        Of a group with more elements, the identity among them, a subgroup is taken.
-    largest_graph
-        Vertices of the graph of the model (`automorphism_generators`).
-
-    Returns
-    -------
-    SymmetryGroup
-        The identity alone under ``--remember-actions`` and where states say what is left of the
-        slack: symmetries only save work.
+    The identity counts among them.  It is alone under ``--remember-actions`` and where states say
+    what is left of the slack: symmetries only save work.  ``largest_graph`` bounds the vertices of
+    the graph of the model (`automorphism_generators`).
     """
     if candidates.model.remembers or candidates.model.slack_facts:
         return SymmetryGroup(())

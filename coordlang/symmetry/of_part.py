@@ -23,21 +23,10 @@ def symmetries_of_part(
 ) -> SymmetryGroup:
     """The group of those proposed renamings that map a part of a plan space onto itself.
 
-    Parameters
-    ----------
-    space
-        The part.
-    end
-        (goals) the state that each goal is; -1 for a goal of the whole that the part does not have.
-    proposed
-        Renamings of objects, each with the same names.
-    largest
-        Of a group with more elements, the identity among them, a subgroup is taken.
-
-    Returns
-    -------
-    SymmetryGroup
-        States outside the part stay.
+    ``end`` (goals) is the state that each goal is, -1 for a goal of the whole that the part does
+    not have.  The ``proposed`` renamings have the same names.  Of a group with more than
+    ``largest`` elements, the identity among them, a subgroup is taken.  States outside the part
+    stay.
     """
     part = _Part(space, end)
     checked = (part.symmetry(renaming) for renaming in proposed)

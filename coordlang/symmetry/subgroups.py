@@ -34,10 +34,8 @@ class WordAction:
 class GroupTable:
     """A group of permutations of states, by the numbers of its elements.
 
-    Attributes
-    ----------
-    elements
-        Where each takes every state number; closed under products, the identity is number 0.
+    ``elements`` say where each takes every state number; they are closed under products, and the
+    identity is number 0.
     """
 
     elements: Sequence[Ints]
