@@ -192,6 +192,11 @@ class FixedPlans(Questions):
         Per robot how many labels there are.
     effort
         The solver's conflicts that may be spent.
+
+    Attributes
+    ----------
+    first
+        As the parameter, in the variables of this formula.
     """
 
     def __init__(self, clauses: array[int], first: Ints, sizes: Sequence[int], effort: int) -> None:
@@ -199,10 +204,19 @@ class FixedPlans(Questions):
         runs = np.tile(sizes, self.steps)
         super().__init__(effort, int(runs.sum()))
         labels = ranges(first.reshape(-1), runs)
-        #: Per step and robot the variable of its first label.
-        self._first: Ints = 1 + (np.cumsum(runs) - runs).reshape(first.shape)
+        self.first: Ints = 1 + (np.cumsum(runs) - runs).reshape(first.shape)
+        self._take(clauses, labels)
+
+    def simplify(self) -> None:
+        """Eliminate what can be, now that more is required; other variables are forgotten."""
+        self.close()
+        known, self.clauses = self.clauses, array("i")
+        self._solver = sat_solver(SOLVER)
+        self._take(known, np.arange(1, int(self.first[-1, -1]) + self._sizes[-1]))
+
+    def _take(self, clauses: array[int], labels: Ints) -> None:
+        """Clauses, simplified: variables of labels come first, others that occur after them."""
         found = simplified(clauses, labels.tolist())
-        # The labels' variables come first, and others that occur after them.
         lengths = np.fromiter(map(len, found), np.int64, len(found))
         literals = np.fromiter(chain.from_iterable(found), np.int64, int(lengths.sum()))
         variables = np.abs(literals)
@@ -222,8 +236,8 @@ class FixedPlans(Questions):
 
     def label(self, step: int, robot: int, label: int) -> int:
         """The variable of a robot's label in a step, from 0."""
-        return int(self._first[step, robot]) + label
+        return int(self.first[step, robot]) + label
 
     def labels_chosen(self) -> Plan:
         """The robots' labels in the plan that the last answer found."""
-        return self.chosen(self._first, self._sizes)
+        return self.chosen(self.first, self._sizes)

@@ -19,6 +19,7 @@ from planners.search.cheapest import label_costs, least_cost
 from planners.search.dominated_labels import dominated_pairs
 from planners.search.exact_bound import ExactBound, exact_bound
 from planners.search.mutexes import mutexes
+from planners.search.optimal_states import OptimalStates
 from planners.search.plan_formula import PlanFormula, TooManyClauses
 from planners.search.questions import OutOfEffort
 from planners.search.reachable import PIECES
@@ -61,6 +62,20 @@ def bound_of(model: JointModel, task: PlanningTask) -> ExactBound | None:
     return exact_bound(model, task, variables, 0, PIECES)
 
 
+def beginnings(model: JointModel, task: PlanningTask, depth: int) -> np.ndarray:
+    """Ways of so many joint steps from the start, at most `_MANY` of them."""
+    found: list[Labels] = [()]
+    rows = task.init[None, :]
+    for _ in range(depth):
+        steps = model.successors(rows)
+        found = [
+            (*found[k], tuple(labels))
+            for k, labels in zip(steps.source.tolist(), steps.labels.tolist(), strict=True)
+        ]
+        found, rows = found[:_MANY], steps.result[:_MANY]
+    return np.array(found, np.int32).reshape(len(found), depth, len(model.robots))
+
+
 def compared(seeds: range) -> Counter[str]:
     met: Counter[str] = Counter()
     for seed in seeds:
@@ -72,23 +87,31 @@ def compared(seeds: range) -> Counter[str]:
         bound = bound_of(model, task)
         if bound is None:  # a condition with too many clauses
             continue
-        assert bound.makespan == len(expected[0])
-        for step, robot in product(range(bound.makespan), range(len(model.robots))):
-            labels = np.flatnonzero(bound.used[step][robot]).tolist()
-            assert labels == sorted({plan[step][robot] for plan in expected})
-            met["labels"] += len(labels)
-            met["others"] += len(model.labels[robot]) - len(labels)
+        with closing(bound.plans):
+            assert bound.makespan == len(expected[0])
+            for step, robot in product(range(bound.makespan), range(len(model.robots))):
+                labels = np.flatnonzero(bound.used[step][robot]).tolist()
+                assert labels == sorted({plan[step][robot] for plan in expected})
+                met["labels"] += len(labels)
+            states = OptimalStates(bound.plans, PIECES.question)
+            for depth in range(1, min(2, bound.makespan) + 1):
+                ways = beginnings(model, task, depth)
+                known = {plan[:depth] for plan in expected}
+                right = [tuple(map(tuple, way)) in known for way in ways.tolist()]
+                assert states.may_pass(ways).tolist() == right
+                met["beginnings"] += sum(right)
+                met["others"] += len(right) - sum(right)
         met["tasks"] += 1
     return met
 
 
-def test_labels_are_those_of_optimal_plans() -> None:
+def test_labels_and_beginnings_are_those_of_optimal_plans() -> None:
     met = compared(range(80))
     assert min(met.values()) >= 10
 
 
 @pytest.mark.slow
-def test_labels_are_those_of_optimal_plans_of_many_models() -> None:
+def test_labels_and_beginnings_are_those_of_optimal_plans_of_many_models() -> None:
     met = compared(range(5_000, 6_500))
     print(dict(met))
     assert met["tasks"] >= 200
