@@ -3,19 +3,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
-from planners.pddl.lifted import Domain, Signatures
-from planners.pddl.names import Names, group, read_objects, token, typed_list
+from planners.pddl.formulas import read_effects, read_formula
+from planners.pddl.lifted import TRUE, Domain, Formula, Part, Schema, Signatures
+from planners.pddl.names import Names, Sections, is_token, read_header, read_objects, typed_list
 from planners.pddl.network import read_network
-from planners.pddl.schemas import action_name, arity_of, check_parts, read_schema
-from planners.pddl.sections import Sections, read_header
-from planners.pddl.sexpr import Document, Expression, Group, Source, Token, parse, read_source
+from planners.pddl.sexpr import (
+    SUBACTION,
+    Document,
+    Expression,
+    Group,
+    Source,
+    Token,
+    parse,
+    read_source,
+)
+from planners.system.files import require_seen
 from planners.system.limits import reaching
 from planners.system.messages import echoed
+
+#: What an action looks like.
+_FORM = "As in (:action move :parameters (?r - robot ?to - place) :precondition .. :effect ..)."
+_AGENT_FORM = "As in (:action move :agent ?r - robot :parameters (?to - place) ..)."
+_PART = re.compile(
+    r"subaction\b\s*(?P<robot>[^\s()]+)(?:\s+idle|\s*\(\s*(?P<subaction>[^()]+?)\s*\))\s*$"
+)
+
+
+_FIELDS = (":agent", ":parameters", ":precondition", ":effect")
 
 
 def read_domain(path: str | Path) -> Domain:
@@ -111,31 +131,29 @@ def _read_predicates(
 ) -> Signatures:
     """The types of arguments; ``object`` for those without a declared type."""
     signatures: Signatures = {}
-
-    def declare(items: Sequence[Expression]) -> None:
-        for item in items:
-            if isinstance(item, Group) and item.head == ":private":
-                # "(:private ?agent - position (p ..) ..)" or, factored, "(:private (p ..) ..)".
-                declare([part for part in item.items[1:] if isinstance(part, Group)])
-                continue
-            entry = group(document, item, "a predicate in parentheses")
-            if len(entry) == 0:
-                raise document.fail(
-                    "expected a predicate, found '()'",
-                    entry,
-                    remedy="As in (at ?r - robot ?x - place).",
-                )
-            name = token(document, entry.items[0], "the name of a predicate").text
-            if name == "=":  # some domains declare it; it stays the equality of objects
-                continue
-            entries = typed_list(document, entry.items[1:], "a variable")
-            own = [frozenset(t if t in types else "object" for t in one.types) for one in entries]
-            known = signatures.get((name, len(own)), own)
-            signatures[name, len(own)] = tuple(a | b for a, b in zip(known, own, strict=True))
-
-    for section in sections.get(":predicates", ()):
-        declare(section.items[1:])
+    listed = [item for section in sections.get(":predicates", ()) for item in section.items[1:]]
+    for item in _without_privacy(listed):
+        entry = document.group(item, "a predicate in parentheses")
+        if len(entry) == 0:
+            remedy = "As in (at ?r - robot ?x - place)."
+            raise document.fail("expected a predicate, found '()'", entry, remedy)
+        name = document.token(entry.items[0], "the name of a predicate").text
+        if name == "=":  # some domains declare it; it stays the equality of objects
+            continue
+        entries = typed_list(document, entry.items[1:], "a variable")
+        own = [frozenset(t if t in types else "object" for t in one.types) for one in entries]
+        known = signatures.get((name, len(own)), own)
+        signatures[name, len(own)] = tuple(a | b for a, b in zip(known, own, strict=True))
     return signatures
+
+
+def _without_privacy(items: Iterable[Expression]) -> Iterator[Expression]:
+    """Predicates, also those in ``(:private ?agent - position (p ..) ..)``, agent or none."""
+    for item in items:
+        if isinstance(item, Group) and item.head == ":private":
+            yield from _without_privacy(part for part in item.items[1:] if isinstance(part, Group))
+        else:
+            yield item
 
 
 def _read_functions(document: Document, sections: Sections) -> dict[str, frozenset[int]]:
@@ -144,9 +162,7 @@ def _read_functions(document: Document, sections: Sections) -> dict[str, frozens
         for item in section.items[1:]:
             if isinstance(item, Token):  # "- number" behind a function
                 continue
-            name = (
-                token(document, item.items[0], "the name of a function").text if len(item) else ""
-            )
+            name = document.token(item.items[0], "the name of a function").text if len(item) else ""
             found.append((name, len(typed_list(document, item.items[1:], "a variable"))))
     return _arities(found)
 
@@ -168,3 +184,160 @@ def _read_actions(document: Document, sections: Sections) -> dict[str, Group]:
             what = f"action {echoed(name.text)} is declared twice"
             raise document.fail(what, name, "Rename or remove one of them.")
     return actions
+
+
+def action_name(document: Document, item: Group) -> Token:
+    """The name of an action section; raises `BadInput` if it has none."""
+    if len(item) < 2:
+        raise document.fail("expected the name of the action", item, remedy=_FORM)
+    return document.token(item.items[1], "the name of the action")
+
+
+def _fields(document: Document, item: Group) -> dict[str, tuple[Expression, ...]]:
+    """The parts of an action by keyword, in any order."""
+    fields: dict[str, tuple[Expression, ...]] = {}
+    key = ""
+    for part in item.items[2:]:
+        if isinstance(part, Token) and part.text.startswith(":"):
+            key = part.text
+            if key not in _FIELDS:
+                remedy = "Known here: " + ", ".join(_FIELDS) + "."
+                raise document.fail(f"unknown keyword {echoed(key)} in an action", part, remedy)
+            if key in fields:
+                remedy = "Join the two by (and ..), or remove one."
+                raise document.fail(f"{key} occurs twice in one action", part, remedy)
+            fields[key] = ()
+        elif not key:
+            raise document.fail("expected a keyword such as ':parameters'", part, _FORM)
+        else:
+            fields[key] = (*fields[key], part)
+    for key in (":parameters", ":precondition", ":effect"):
+        if len(fields.get(key, ())) > 1:
+            what = f"expected one expression after {key}, found {len(fields[key])}"
+            remedy = "Join several conditions or effects by (and ..)."
+            raise document.fail(what, fields[key][1], remedy)
+    return fields
+
+
+def _parameter_items(
+    document: Document, fields: dict[str, tuple[Expression, ...]]
+) -> tuple[tuple[Expression, ...], str | None]:
+    """The full typed list of parameters, and the agent's name.
+
+    The agent comes first unless it stands among the parameters.
+    """
+    listed: tuple[Expression, ...] = ()
+    if fields.get(":parameters"):
+        listed = document.group(fields[":parameters"][0], "a list of parameters").items
+    for number, item in enumerate(listed):
+        if is_token(item, ":agent"):
+            before, behind = listed[:number], listed[number + 1 :]
+            if not behind or not isinstance(behind[0], Token):
+                raise document.fail("expected a variable after ':agent'", item, remedy=_AGENT_FORM)
+            return before + behind, behind[0].text
+    if ":agent" not in fields:
+        return listed, None
+    variable, declaration = _agent(document, fields[":agent"])
+    if any(is_token(item, variable.text) for item in listed):
+        return listed, variable.text
+    if not declaration:  # an untyped agent must not take the type of the parameters behind it
+        at = variable.offset
+        declaration = (Token("-", at), Token("object", at))
+    if not is_token(declaration[0], "-"):
+        raise document.fail(
+            "expected '- TYPE' or nothing after the agent's variable",
+            declaration[0],
+            remedy=_AGENT_FORM,
+        )
+    return (variable, *declaration, *listed), variable.text
+
+
+def _agent(
+    document: Document, items: tuple[Expression, ...]
+) -> tuple[Token, tuple[Expression, ...]]:
+    """What stands behind ``:agent``: a variable, and what declares its type."""
+    if len(items) == 1 and isinstance(items[0], Group):  # ":agent (?a - robot)"
+        items = items[0].items
+    if not items or not isinstance(items[0], Token):
+        raise document.fail("expected a variable after ':agent'", document.root, remedy=_AGENT_FORM)
+    return items[0], items[1:]
+
+
+def arity_of(names: Names, item: Group) -> int:
+    """The number of arguments of an action, with the agent."""
+    items, _ = _parameter_items(names.document, _fields(names.document, item))
+    return len(typed_list(names.document, items, "a variable"))
+
+
+def read_schema(names: Names, item: Group) -> Schema:
+    """Read an action section; raises `BadInput` or `Unsupported` with the position."""
+    document = names.document
+    name = action_name(document, item)
+    fields = _fields(document, item)
+    items, agent_name = _parameter_items(document, fields)
+    parameters = names.variables_of(items)
+    agent = next((i for i, v in enumerate(parameters) if v.name == agent_name), None)
+    if agent_name is not None and agent is None:
+        raise document.fail(
+            f"expected a variable after ':agent', found {echoed(agent_name)}",
+            item,
+            remedy=_AGENT_FORM,
+        )
+    inner = names.with_variables(parameters)
+    precondition: Formula = TRUE
+    if fields.get(":precondition"):
+        precondition = read_formula(inner, fields[":precondition"][0])
+    effects, cost = (
+        read_effects(inner, fields[":effect"][0]) if fields.get(":effect") else ((), None)
+    )
+    return Schema(
+        name.text,
+        parameters,
+        agent,
+        precondition,
+        effects,
+        _read_parts(inner, item),
+        cost,
+        item.offset,
+    )
+
+
+def _read_parts(names: Names, item: Group) -> tuple[Part, ...]:
+    """The ``; subaction ROBOT (name args)`` comments inside an action."""
+    parts: dict[str, Part] = {}
+    for comment in names.document.comments:
+        if item.offset < comment.offset < item.end and comment.text.split()[:1] == [SUBACTION]:
+            part = _read_part(names, comment)
+            if parts.setdefault(part.robot, part) is not part:
+                what = f"robot {echoed(part.robot)} has two subactions in one action"
+                raise names.document.fail(what, comment, "Remove one of the two comments.")
+    return tuple(parts.values())
+
+
+def _read_part(names: Names, comment: Token) -> Part:
+    require_seen(comment.text, names.document.source.position(comment.offset), "comment")
+    found = _PART.match(comment.text)
+    if not found:
+        what = "this subaction comment cannot be read"
+        remedy = "Expected '; subaction ROBOT (name args)' or '; subaction ROBOT idle'."
+        raise names.document.fail(what, comment, remedy)
+    if found["subaction"] is None:
+        return Part(found["robot"], None)
+    template = tuple(found["subaction"].split())
+    for term in template[1:]:
+        names.term(Token(term, comment.offset))
+    return Part(found["robot"], template)
+
+
+def check_parts(document: Document, schemas: tuple[Schema, ...], actions: dict[str, Group]) -> None:
+    """Raise `BadInput` where some schemas have subaction comments and others have none."""
+    for schema in schemas if any(schema.parts for schema in schemas) else ():
+        what = f"action {echoed(schema.name)}"
+        if not schema.parts:
+            what += " has no '; subaction' comment, but others in this domain have"
+            remedy = "In joint-action PDDL every action says what each robot does in it."
+            raise document.fail(what, actions[schema.name], remedy)
+        if schema.agent is not None:
+            what += " has both ':agent' and subaction comments"
+            remedy = "Remove ':agent', or the comments: a joint action says what every robot does."
+            raise document.fail(what, actions[schema.name], remedy)

@@ -127,6 +127,11 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
                     "actions different names.",
                 )
             schemas[schema.name] = _with_agent_of(known, own)
+    constraints = (
+        replace(c, offsets=tuple(source.offset(domain.source, at) for at in c.offsets))
+        for domain in domains
+        for c in domain.constraints
+    )
     return replace(
         first,
         source=source,
@@ -135,17 +140,10 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
         predicates=_merged((domain.predicates for domain in domains), or_),
         functions=_merged((domain.functions for domain in domains), or_),
         schemas=tuple(schemas.values()),
-        constraints=tuple(
-            dict.fromkeys(
-                replace(c, offsets=tuple(source.offset(domain.source, at) for at in c.offsets))
-                for domain in domains
-                for c in domain.constraints
-            )
-        ),
+        constraints=tuple(dict.fromkeys(constraints)),
         dependences=tuple(dict.fromkeys(d for domain in domains for d in domain.dependences)),
         signatures=_merged(
-            (domain.signatures for domain in domains),
-            lambda one, other: tuple(map(or_, one, other)),
+            (domain.signatures for domain in domains), lambda a, b: tuple(map(or_, a, b))
         ),
     )
 

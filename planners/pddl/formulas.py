@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import count
 
@@ -22,7 +22,7 @@ from planners.pddl.lifted import (
     StepAtom,
     Variable,
 )
-from planners.pddl.names import Names, group, is_token, known, token
+from planners.pddl.names import Names, is_token, known
 from planners.pddl.sexpr import Expression, Group, Token
 from planners.system.errors import BadInput, Unsupported
 from planners.system.messages import echoed
@@ -44,40 +44,41 @@ def read_formula(names: Names, item: Expression) -> Formula:
     ``(name ..)`` is an atom when ``name`` is a declared predicate, else a literal about the same
     joint step when it is an action.  Raises `BadInput` or `Unsupported` with the place.
     """
-    item = group(names.document, item, "a formula in parentheses")
+    item = names.document.group(item, "a formula in parentheses")
     if len(item) == 0:
         return TRUE
-    head = token(names.document, item.items[0], "a predicate, 'and', 'or', 'not', ..").text
+    head = names.document.token(item.items[0], "a predicate, 'and', 'or', 'not', ..").text
     if head in names.predicates:
         return _atom(names, item)
-    if head in _CONNECTIVES:
-        return _CONNECTIVES[head](names, item)
+    match head:
+        case "and":
+            return And(_parts(names, item))
+        case "or":
+            return Or(_parts(names, item))
+        case "not":
+            return Not(*_parts(names, item, 1))
+        case "imply":
+            condition, conclusion = _parts(names, item, 2)
+            return Or((Not(condition), conclusion))
+        case "forall" | "exists":
+            return _quantified(names, item)
+        case "=":
+            return _equal(names, item)
     if head in names.actions:
         return StepAtom(head, names.arguments(item, [names.actions[head]], "action"))
     raise _no_formula(names, item, head)
 
 
-def _connected(names: Names, item: Group) -> Formula:
-    parts = tuple(read_formula(names, part) for part in item.items[1:])
-    return And(parts) if item.head == "and" else Or(parts)
-
-
-def _not(names: Names, item: Group) -> Formula:
-    _expect(names, item, 1)
-    return Not(read_formula(names, item.items[1]))
-
-
-def _imply(names: Names, item: Group) -> Formula:
-    _expect(names, item, 2)
-    condition, conclusion = (read_formula(names, part) for part in item.items[1:])
-    return Or((Not(condition), conclusion))
+def _parts(names: Names, item: Group, number: int | None = None) -> tuple[Formula, ...]:
+    if number is not None:
+        _expect(names, item, number)
+    return tuple(read_formula(names, part) for part in item.items[1:])
 
 
 def _quantified(names: Names, item: Group) -> Formula:
     _expect(names, item, 2)
-    listed, inner = item.items[1:]
-    variables = names.read_variables(group(names.document, listed, "a list of variables").items)
-    part = read_formula(names.with_variables(variables), inner)
+    variables = names.read_variables(item.items[1])
+    part = read_formula(names.with_variables(variables), item.items[2])
     return Forall(variables, part) if item.head == "forall" else Exists(variables, part)
 
 
@@ -88,17 +89,6 @@ def _equal(names: Names, item: Group) -> Formula:
         if isinstance(side, Group) or (NUMBER.match(side.text) and side.text not in names.objects):
             raise names.document.unsupported("numeric condition '(= ..)' is", item)
     return Equal(names.term(left), names.term(right))
-
-
-_CONNECTIVES: dict[str, Callable[[Names, Group], Formula]] = {
-    "and": _connected,
-    "or": _connected,
-    "not": _not,
-    "imply": _imply,
-    "forall": _quantified,
-    "exists": _quantified,
-    "=": _equal,
-}
 
 
 def _no_formula(names: Names, item: Group, head: str) -> BadInput | Unsupported:
@@ -139,71 +129,66 @@ class _Scope:
 
 def _effects(scope: _Scope, item: Expression) -> Iterator[Effect | int | Atom]:
     """The literals of an effect, and the terms that it adds to the cost."""
-    names = scope.names
-    item = group(names.document, item, "an effect in parentheses")
+    names, document = scope.names, scope.names.document
+    item = document.group(item, "an effect in parentheses")
     if len(item) == 0:
         return
-    head = token(names.document, item.items[0], "a predicate, 'and', 'not', 'when', ..").text
+    head = document.token(item.items[0], "a predicate, 'and', 'not', 'when', ..").text
     if head in names.predicates:
         yield scope.effect(item, True)
-    elif head in _EFFECTS:
-        yield from _EFFECTS[head](scope, item)
-    elif head in _NUMERIC_EFFECTS:
-        conditional = bool(scope.variables) or scope.condition != TRUE
-        yield _cost(names, item, conditional=conditional)
-    elif head in ("oneof", "probabilistic", "unknown"):
-        what = f"non-deterministic effect '({head} ..)' is"
-        raise names.document.unsupported(what, item)
-    else:
-        what = f"unknown predicate {echoed(head)} in an effect"
-        raise names.document.fail(what, item, known(names.predicates, head, "predicate"))
+        return
+    match head:
+        case "and":
+            for part in item.items[1:]:
+                yield from _effects(scope, part)
+        case "not":
+            yield _deleted(scope, item)
+        case "when":
+            _expect(names, item, 2)
+            condition = read_formula(names, item.items[1])
+            if scope.condition != TRUE:
+                condition = And((scope.condition, condition))
+            yield from _effects(replace(scope, condition=condition), item.items[2])
+        case "forall":
+            yield from _forall(scope, item)
+        case _:
+            yield _changed_number(scope, item, head)
 
 
-def _all(scope: _Scope, item: Group) -> Iterator[Effect | int | Atom]:
-    for part in item.items[1:]:
-        yield from _effects(scope, part)
-
-
-def _deleted(scope: _Scope, item: Group) -> Iterator[Effect]:
+def _deleted(scope: _Scope, item: Group) -> Effect:
     names = scope.names
     _expect(names, item, 1)
-    part = group(names.document, item.items[1], "an atom in parentheses")
+    part = names.document.group(item.items[1], "an atom in parentheses")
     if part.head not in names.predicates:
         what = f"only atoms can be deleted, found '({part.head} ..)'"
         raise names.document.fail(what, part, known(names.predicates, part.head, "predicate"))
-    yield scope.effect(part, False)
-
-
-def _when(scope: _Scope, item: Group) -> Iterator[Effect | int | Atom]:
-    _expect(scope.names, item, 2)
-    condition = read_formula(scope.names, item.items[1])
-    if scope.condition != TRUE:
-        condition = And((scope.condition, condition))
-    return _effects(replace(scope, condition=condition), item.items[2])
+    return scope.effect(part, False)
 
 
 def _forall(scope: _Scope, item: Group) -> Iterator[Effect | int | Atom]:
     names = scope.names
     _expect(names, item, 2)
-    listed = group(names.document, item.items[1], "a list of variables")
-    variables = names.read_variables(listed.items)
+    variables = names.read_variables(item.items[1])
     # An inner variable may shadow an outer one: give it a name of its own.
     taken = {v.name for v in scope.variables} | set(names.variables)
     clash = next((v.name for v in variables if v.name in taken), None)
     if clash:
-        return _effects(scope, _rename(item, clash, _fresh(clash, taken)))
-    inner = replace(
-        scope, names=names.with_variables(variables), variables=scope.variables + variables
-    )
-    return _effects(inner, item.items[2])
+        fresh = next(new for n in count(1) if (new := f"{clash}.{n}") not in taken)
+        return _effects(scope, _rename(item, clash, fresh))
+    names = names.with_variables(variables)
+    return _effects(_Scope(names, scope.variables + variables, scope.condition), item.items[2])
 
 
-_EFFECTS: dict[str, Callable[[_Scope, Group], Iterator[Effect | int | Atom]]] = {
-    "and": _all,
-    "not": _deleted,
-    "when": _when,
-    "forall": _forall,
-}
+def _changed_number(scope: _Scope, item: Group, head: str) -> int | Atom:
+    """The cost of an action; all other effects on numbers, and what is none, are refused."""
+    names, document = scope.names, scope.names.document
+    if head in _NUMERIC_EFFECTS:
+        conditional = bool(scope.variables) or scope.condition != TRUE
+        return _cost(names, item, conditional=conditional)
+    if head in ("oneof", "probabilistic", "unknown"):
+        raise document.unsupported(f"non-deterministic effect '({head} ..)' is", item)
+    remedy = known(names.predicates, head, "predicate")
+    raise document.fail(f"unknown predicate {echoed(head)} in an effect", item, remedy)
 
 
 def _cost(names: Names, item: Group, *, conditional: bool) -> int | Atom:
@@ -251,10 +236,6 @@ def _expect(names: Names, item: Group, count: int) -> None:
             item,
             "As in (not (p a)), (= ?x ?y), (when (p a) (q a)), (forall (?x - t) (p ?x)).",
         )
-
-
-def _fresh(name: str, taken: Collection[str]) -> str:
-    return next(new for n in count(1) if (new := f"{name}.{n}") not in taken)
 
 
 def _rename(item: Group, old: str, new: str) -> Group:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Typed lists and the names that a text may use, with helpful errors for the ones it may not."""
+"""The sections, typed lists and names of a text, with helpful errors for what it may not use."""
 
 from __future__ import annotations
 
@@ -32,29 +32,9 @@ def known(names: Iterable[str], wrong: str, what: str) -> str:
     return f"Declared {what}s: {listed}."
 
 
-def token(document: Document, item: Expression, what: str) -> Token:
-    """``item`` as a single token, or an error that says what was expected there."""
-    if isinstance(item, Token):
-        return item
-    raise document.fail(
-        f"expected {what}, found a list", item, f"Write {what} here, without parentheses."
-    )
-
-
 def is_token(item: Expression, *texts: str) -> bool:
     """Whether ``item`` is a token with one of these texts."""
     return isinstance(item, Token) and item.text in texts
-
-
-def group(document: Document, item: Expression, what: str) -> Group:
-    """``item`` as a list, or an error that says what was expected there."""
-    if isinstance(item, Group):
-        return item
-    raise document.fail(
-        f"expected {what}, found {echoed(item.text)}",
-        item,
-        "Put it in parentheses with all that belongs to it.",
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +55,7 @@ def typed_list(document: Document, items: Sequence[Expression], what: str) -> li
     waiting: list[Token] = []
     at = 0
     while at < len(items):
-        item = token(document, items[at], what)
+        item = document.token(items[at], what)
         if item.text != "-":
             waiting.append(item)
             at += 1
@@ -108,7 +88,7 @@ def _types(document: Document, item: Expression) -> tuple[str, ...]:
             item,
             "One type is a name, several are (either name name).",
         )
-    return tuple(token(document, part, "a type").text for part in item.items[1:])
+    return tuple(document.token(part, "a type").text for part in item.items[1:])
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,35 +120,34 @@ class Names:
         more = {variable.name: variable.types for variable in variables}
         return replace(self, variables={**self.variables, **more})
 
-    def read_variables(self, items: Sequence[Expression]) -> tuple[Variable, ...]:
-        """A typed list of variables; their types must be declared."""
+    def read_variables(self, listed: Expression) -> tuple[Variable, ...]:
+        """The variables of a typed list in parentheses."""
+        return self.variables_of(self.document.group(listed, "a list of variables").items)
+
+    def variables_of(self, items: Sequence[Expression]) -> tuple[Variable, ...]:
+        """The variables of a typed list; their types must be declared."""
         variables: list[Variable] = []
         for entry in typed_list(self.document, items, "a variable"):
-            if not entry.token.text.startswith("?"):
-                raise self.document.fail(
-                    f"expected a variable, found {echoed(entry.token.text)}",
-                    entry.token,
-                    f"Variables start with '?': ?{entry.token.text}.",
+            name = entry.token.text
+            if not name.startswith("?"):
+                what, remedy = (
+                    f"expected a variable, found {echoed(name)}",
+                    f"Variables start with '?': ?{name}.",
                 )
+                raise self.document.fail(what, entry.token, remedy)
             self.check_types(entry)
-            if any(v.name == entry.token.text for v in variables):
-                raise self.document.fail(
-                    f"variable {entry.token.text} is declared twice",
-                    entry.token,
-                    "Give one of the two another name.",
-                )
-            variables.append(Variable(entry.token.text, entry.types))
+            if any(variable.name == name for variable in variables):
+                what = f"variable {name} is declared twice"
+                raise self.document.fail(what, entry.token, "Give one of the two another name.")
+            variables.append(Variable(name, entry.types))
         return tuple(variables)
 
     def check_types(self, entry: Typed) -> None:
         """Raise `BadInput` if a type of the entry is not declared."""
         for name in entry.types:
             if name not in self.types and name != "object":
-                raise self.document.fail(
-                    f"type {echoed(name)} of {echoed(entry.token.text)} is not declared",
-                    entry.token,
-                    known(self.types, name, "type"),
-                )
+                what = f"type {echoed(name)} of {echoed(entry.token.text)} is not declared"
+                raise self.document.fail(what, entry.token, known(self.types, name, "type"))
 
     def term(self, item: Expression) -> str:
         """A variable in scope or a declared object."""
@@ -185,11 +164,8 @@ class Names:
             )
         if item.text.startswith("?"):
             if item.text not in self.variables:
-                raise self.document.fail(
-                    f"variable {item.text} is not declared here",
-                    item,
-                    known(self.variables, item.text, "variable"),
-                )
+                remedy = known(self.variables, item.text, "variable")
+                raise self.document.fail(f"variable {item.text} is not declared here", item, remedy)
         elif item.text not in self.objects:
             remedy = known(self.objects, item.text, "object")
             title = self.document.root.items[1:2]
@@ -226,24 +202,14 @@ class Names:
 
     def arguments(self, item: Group, arities: Iterable[int], what: str) -> tuple[str, ...]:
         """The arguments of an atom, action or function; `BadInput` where their number is wrong."""
-        self._require_arity(item, arities, what)
+        found = len(item) - 1
+        if found not in arities:
+            numbers, name = sorted(arities), visible(item.head[:_SHOWN])
+            wanted = " or ".join(map(str, numbers)) + f" argument{'s' * (numbers != [1])}"
+            forms = " or ".join(f"({' '.join((name, *_LETTERS[:n]))})" for n in numbers)
+            said = f"{what} {echoed(item.head)} takes {wanted}, found {found}"
+            raise self.document.fail(said, item, f"Write {forms}, or declare it with {found}.")
         return tuple(self.term(term) for term in item.items[1:])
-
-    def _require_arity(self, item: Group, arities: Iterable[int], what: str) -> None:
-        name, found = item.head, len(item) - 1
-        if found in arities:
-            return
-        numbers = sorted(arities)
-        wanted = " or ".join(str(n) for n in numbers)
-        plural = "" if numbers == [1] else "s"
-        forms = " or ".join(
-            f"({' '.join((visible(name[:_SHOWN]), *_LETTERS[:n]))})" for n in numbers
-        )
-        raise self.document.fail(
-            f"{what} {echoed(name)} takes {wanted} argument{plural}, found {found}",
-            item,
-            f"Write {forms}, or declare it with {found}.",
-        )
 
 
 def read_objects(
@@ -281,3 +247,71 @@ def _without_owner(section: Group, declared: Set[str]) -> Sequence[Expression]:
     owner = inner[0].text
     repeated = any(is_token(item, owner) for item in inner[1:])
     return inner[1:] if repeated or owner in declared else inner
+
+
+#: Keyword -> the sections that it begins, in the order of the file.
+Sections = dict[str, list[Group]]
+
+_UNSUPPORTED = {
+    ":durative-action": "durative actions",
+    ":derived": "derived predicates (axioms)",
+    ":constraints": "trajectory constraints",
+    ":process": "processes (PDDL+)",
+    ":event": "events (PDDL+)",
+}
+
+
+_SECTIONS = {
+    "domain": {
+        *(":requirements", ":types", ":constants", ":predicates", ":functions", ":action"),
+        *(":concurrency-constraint", ":positive-dependence"),
+    },
+    "problem": {
+        *(":domain", ":requirements", ":objects", ":init", ":goal", ":metric", ":length"),
+    },
+}
+
+
+def read_header(document: Document, kind: str) -> tuple[str, Sections]:
+    """The name in ``(define (kind name) ..)`` and the sections behind it, by keyword.
+
+    Raises `Unsupported` for a section that coordlang cannot read and `BadInput` for one that PDDL
+    does not have.
+    """
+    root = document.root
+    if root.head != "define":
+        raise document.fail(
+            f"expected '(define ({kind} ..) ..)'",
+            root,
+            remedy=f"A {kind} file is one '(define ({kind} NAME) ..)'; give "
+            f"DOMAIN first, then PROBLEM.",
+        )
+    title = root.items[1] if len(root) > 1 else root
+    if not isinstance(title, Group) or title.head != kind or len(title) != 2:
+        other = title.head if isinstance(title, Group) else ""
+        raise document.fail(
+            f"expected '({kind} NAME)' after 'define'",
+            title,
+            f"This is a {other} file: the order is DOMAIN PROBLEM."
+            if {kind, other} == {"domain", "problem"}
+            else f"As in (define ({kind} NAME) ..).",
+        )
+    sections: Sections = {}
+    for item in root.items[2:]:
+        section = document.group(item, "a section such as '(:action ..)'")
+        _require_known(document, section, kind)
+        sections.setdefault(section.head, []).append(section)
+    return document.token(title.items[1], f"the name of the {kind}").text, sections
+
+
+def _require_known(document: Document, section: Group, kind: str) -> None:
+    head = section.head
+    if head in _UNSUPPORTED:
+        remedy = "coordlang reads classical PDDL with instantaneous actions."
+        raise document.unsupported(f"{_UNSUPPORTED[head]} ({head}) are", section, remedy)
+    if head not in _SECTIONS[kind]:
+        raise document.fail(
+            f"unknown section {echoed(head)} in a {kind}",
+            section,
+            "Known here: " + ", ".join(sorted(_SECTIONS[kind])) + ".",
+        )

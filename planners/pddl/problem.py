@@ -8,8 +8,7 @@ from pathlib import Path
 
 from planners.pddl.formulas import NUMBER, read_formula
 from planners.pddl.lifted import Atom, Domain, Formula, Problem
-from planners.pddl.names import Names, group, read_objects, token
-from planners.pddl.sections import Sections, read_header
+from planners.pddl.names import Names, Sections, read_header, read_objects
 from planners.pddl.sexpr import Document, Group, Source, Token, parse, read_source
 from planners.system.limits import reaching
 from planners.system.messages import echoed
@@ -31,7 +30,7 @@ def parse_problem(source: Source, domain: Domain) -> Problem:
     name, sections = read_header(document, "problem")
     for section in sections.get(":domain", ()):
         given = section.items[1:2]
-        other = token(document, given[0], "the name of the domain").text if given else ""
+        other = document.token(given[0], "the name of the domain").text if given else ""
         if other != domain.name:
             raise document.fail(
                 f"this is a problem for domain {echoed(other)}, not for {echoed(domain.name)}",
@@ -47,7 +46,7 @@ def parse_problem(source: Source, domain: Domain) -> Problem:
     values: dict[Atom, float] = {}
     for section in sections.get(":init", ()):
         for item in section.items[1:]:
-            _read_init(names, group(document, item, "an atom in parentheses"), init, values)
+            _read_init(names, document.group(item, "an atom in parentheses"), init, values)
     return Problem(
         name, source, objects, frozenset(init), _read_goal(names, document, sections), values
     )
@@ -72,7 +71,7 @@ def _read_init(names: Names, item: Group, init: set[Atom], values: dict[Atom, fl
     document = names.document
     if item.head == "and":
         for part in item.items[1:]:
-            _read_init(names, group(document, part, "an atom in parentheses"), init, values)
+            _read_init(names, document.group(part, "an atom in parentheses"), init, values)
     elif item.head == "not" and len(item) == 2:
         read_formula(names, item.items[1])  # closed world: checked, and nothing to add
     elif item.head == "=" and len(item) == 3 and isinstance(item.items[1], Group):
@@ -103,7 +102,7 @@ def _refuse_other_states(document: Document, item: Group) -> None:
 
 def _read_value(names: Names, item: Group, values: dict[Atom, float]) -> None:
     document = names.document
-    function = group(document, item.items[1], "a function in parentheses")
+    function = document.group(item.items[1], "a function in parentheses")
     number = item.items[2]
     if function.head not in names.functions and function.head != "total-cost":
         raise names.unknown("function", function, names.functions)

@@ -149,6 +149,8 @@ class Group:
 
 
 Expression = Token | Group
+#: A list that is not closed yet: where it opens, and what stands in it so far.
+_Open = tuple[int, list[Expression]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,6 +164,20 @@ class Document:
     def fail(self, what: str, at: Expression, remedy: str | None = None) -> BadInput:
         """An error that points at an expression (the caller raises it)."""
         return self.source.fail(what, at.offset, remedy or _COMPARE)
+
+    def token(self, item: Expression, what: str) -> Token:
+        """``item`` as a single token; `BadInput` says what was expected there."""
+        if isinstance(item, Token):
+            return item
+        remedy = f"Write {what} here, without parentheses."
+        raise self.fail(f"expected {what}, found a list", item, remedy)
+
+    def group(self, item: Expression, what: str) -> Group:
+        """``item`` as a list; `BadInput` says what was expected there."""
+        if isinstance(item, Group):
+            return item
+        remedy = "Put it in parentheses with all that belongs to it."
+        raise self.fail(f"expected {what}, found {echoed(item.text)}", item, remedy)
 
     def unsupported(self, feature: str, at: Expression, remedy: str = _CLASSICAL) -> Unsupported:
         """The error for what PDDL has and coordlang has not (the caller raises it)."""
@@ -210,11 +226,33 @@ def parse(source: Source) -> Document:
     missing), text outside of parentheses, nesting beyond `MAX_DEPTH`, names with characters of
     `planners.system.messages.UNSEEN`, or two names that Unicode makes one.
     """
-    reader = _Reader(source)
     _require_plain_names(source)
+    comments: list[Token] = []
+    top: list[Group] = []
+    lists: list[_Open] = []
     for match in _TOKEN.finditer(source.text):
-        reader.take(match.group(), match.start())
-    return reader.document()
+        text, offset = match[0], match.start()
+        if text[0] == ";":
+            comments.append(Token(text.lstrip(";").strip().lower(), offset))
+            continue
+        _require_place(source, text, offset, lists, bool(top))
+        if text == "(":
+            lists.append((offset, []))
+        elif text == ")":
+            start, items = lists.pop()
+            group = Group(tuple(items), start, offset)
+            if lists:
+                lists[-1][1].append(group)
+            else:
+                top.append(group)
+        else:
+            lists[-1][1].append(Token(text.lower(), offset))
+    if lists:
+        raise _unclosed(source, lists)
+    if not top:
+        what = "expected '(define ...', found an empty file"
+        raise BadInput(what, position=Position(source.name), remedy=_NO_PDDL)
+    return Document(source, top[0], tuple(comments))
 
 
 def _require_plain_names(source: Source) -> None:
@@ -236,74 +274,42 @@ def _require_plain_names(source: Source) -> None:
             raise source.fail(what, offset, "Give one of them another name.")
 
 
-class _Reader:
-    """Expressions as their tokens come, one after the other."""
-
-    def __init__(self, source: Source) -> None:
-        self._source = source
-        self._comments: list[Token] = []
-        self._open: list[tuple[int, list[Expression]]] = []
-        self._root: Group | None = None
-
-    def take(self, text: str, offset: int) -> None:
-        fail = self._source.fail
-        if text[0] == ";":
-            self._comments.append(Token(text.lstrip(";").strip().lower(), offset))
-        elif self._root is not None:
-            remedy = "Expected the end of the file: a parenthesis too many before this position?"
-            raise fail(
-                f"unexpected {echoed(text[:40])} after the end of the definition", offset, remedy
-            )
-        elif text == "(":
-            if len(self._open) >= MAX_DEPTH:
-                remedy = "Is a ')' missing? No domain needs such nesting."
-                raise fail(f"nested more than {MAX_DEPTH} deep", offset, remedy)
-            self._open.append((offset, []))
-        elif text == ")":
-            self._close(offset)
-        elif not self._open:
-            raise fail(f"expected '(define ...', found {echoed(text[:40])}", offset, _NO_PDDL)
-        else:
-            self._require_place(text.lower())
-            self._open[-1][1].append(Token(text.lower(), offset))
-
-    def _require_place(self, text: str) -> None:
-        """Raise `BadInput` if a section begins within another one."""
-        if text in _SECTIONS and len(self._open) > 2 and not self._open[-1][1]:
-            outer, items = self._open[1]
-            raise self._source.fail(
-                f"{text!r} begins inside of another list: a ')' is missing before it",
-                self._open[-1][0],
-                f"'({_first(items)}' opens at {self._source.position(outer)} and is not closed: "
-                f"add {len(self._open) - 2} ')' before this position.",
-            )
-
-    def _close(self, offset: int) -> None:
-        if not self._open:
+def _require_place(
+    source: Source, text: str, offset: int, lists: Sequence[_Open], is_over: bool
+) -> None:
+    """Raise `BadInput` for a token that cannot stand in the lists that are open."""
+    if is_over:
+        remedy = "Expected the end of the file: a parenthesis too many before this position?"
+        what = f"unexpected {echoed(text[:40])} after the end of the definition"
+        raise source.fail(what, offset, remedy)
+    if text == "(":
+        if len(lists) >= MAX_DEPTH:
+            remedy = "Is a ')' missing? No domain needs such nesting."
+            raise source.fail(f"nested more than {MAX_DEPTH} deep", offset, remedy)
+    elif not lists:
+        if text == ")":
             remedy = "Remove it, or add the '(' that is missing before it."
-            raise self._source.fail("')' without a '('", offset, remedy)
-        start, items = self._open.pop()
-        group = Group(tuple(items), start, offset)
-        if self._open:
-            self._open[-1][1].append(group)
-        else:
-            self._root = group
+            raise source.fail("')' without a '('", offset, remedy)
+        raise source.fail(f"expected '(define ...', found {echoed(text[:40])}", offset, _NO_PDDL)
+    elif text.lower() in _SECTIONS and len(lists) > 2 and not lists[-1][1]:
+        outer, items = lists[1]
+        raise source.fail(
+            f"{text.lower()!r} begins inside of another list: a ')' is missing before it",
+            lists[-1][0],
+            f"'({_first(items)}' opens at {source.position(outer)} and is not closed: "
+            f"add {len(lists) - 2} ')' before this position.",
+        )
 
-    def document(self) -> Document:
-        """The whole, when there is no more text."""
-        if self._open:
-            start, items = self._open[-1]
-            inner = items[-1] if items and isinstance(items[-1], Group) else None
-            last = f", after {self._source.position(inner.offset)}" if inner else ""
-            raise self._source.fail(
-                f"the '({_first(items)}' that opens here is never closed",
-                start,
-                f"Expected {len(self._open)} more ')' before the end of the file{last}.",
-            )
-        if self._root is None:
-            what = "expected '(define ...', found an empty file"
-            raise BadInput(what, position=Position(self._source.name), remedy=_NO_PDDL)
-        return Document(self._source, self._root, tuple(self._comments))
+
+def _unclosed(source: Source, lists: Sequence[_Open]) -> BadInput:
+    start, items = lists[-1]
+    inner = items[-1] if items and isinstance(items[-1], Group) else None
+    last = f", after {source.position(inner.offset)}" if inner else ""
+    return source.fail(
+        f"the '({_first(items)}' that opens here is never closed",
+        start,
+        f"Expected {len(lists)} more ')' before the end of the file{last}.",
+    )
 
 
 def _first(items: Sequence[Expression]) -> str:
