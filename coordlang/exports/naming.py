@@ -16,8 +16,7 @@ from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.cover import Conjunction
 from coordlang.explanation.variables import truth
 from coordlang.exports.membership import Membership
-from planners.classical import ClassicalAction, ClassicalTask
-from planners.classical.task import Condition
+from planners.classical import ClassicalAction, ClassicalTask, Condition
 from planners.joint.model import show
 from planners.pddl.lifted import Atom
 

@@ -21,11 +21,19 @@ from __future__ import annotations
 from contextlib import suppress
 
 from planners.classical.explicit import TooManyError, explicit
-from planners.classical.pddl import action_names, to_pddl
-from planners.classical.positive import with_positive_conditions, with_positive_goal
 from planners.classical.selection import select_then_apply
 from planners.classical.selectors import Selectors, selectors_of
-from planners.classical.task import LONGEST, ClassicalAction, ClassicalTask, Condition, Form
+from planners.classical.task import (
+    LONGEST,
+    ClassicalAction,
+    ClassicalTask,
+    Condition,
+    Form,
+    action_names,
+    to_pddl,
+    with_positive_conditions,
+    with_positive_goal,
+)
 from planners.classical.writer import Writer
 from planners.joint.model import Goal, JointModel, PlanningTask, show
 

@@ -144,16 +144,19 @@ def _directory(classical: ClassicalTask) -> Iterator[Path]:
     """A directory with the task, and for all that Fast Downward writes."""
     try:
         directory = tempfile.TemporaryDirectory(prefix="coordlang-")
-    except OSError as error:
-        raise _unwritten(error) from None
-    with directory as name:
-        place = Path(name)
         try:
             for file, text in zip(("domain", "problem"), to_pddl(classical), strict=True):
-                (place / f"{file}.pddl").write_text(text)
-        except OSError as error:
-            raise _unwritten(error) from None
-        yield place
+                Path(directory.name, f"{file}.pddl").write_text(text)
+        except OSError:
+            directory.cleanup()
+            raise
+    except OSError as error:
+        raise FastDownwardFailed(
+            f"the task for Fast Downward cannot be written: {error.strerror}",
+            remedy="Set TMPDIR to a folder with free space that you may write to.",
+        ) from None
+    with directory as name:
+        yield Path(name)
 
 
 def _started(directory: Path) -> subprocess.Popen[bytes]:
@@ -221,13 +224,6 @@ def answered(classical: ClassicalTask, directory: Path, code: int) -> int | None
             f"Fast Downward wrote {len(lines)} actions that are no plan of its task", remedy=_FULL
         )
     return total
-
-
-def _unwritten(error: OSError) -> FastDownwardFailed:
-    return FastDownwardFailed(
-        f"the task for Fast Downward cannot be written: {error.strerror}",
-        remedy="Set TMPDIR to a folder with free space that you may write to.",
-    )
 
 
 def _crash(code: int, said: str) -> CoordlangError:

@@ -9,7 +9,6 @@ left*, in stages: all check; all undo (rarely); all apply.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence, Set
-from dataclasses import dataclass, field
 from itertools import pairwise
 
 from planners.classical.selectors import Selectors
@@ -99,25 +98,6 @@ class _Stages:
         return [stage for stage in STAGES if (stage, robot) in self._phases]
 
 
-@dataclass(frozen=True, slots=True)
-class _Choice:
-    """What one robot selects, whoever has selected before.
-
-    ``first`` is the first owner of what is selected: robots that wait for another selection of this
-    one forbid it.  ``known``, ``adds`` and ``deletes`` are its own, without those of the turn;
-    ``leaves_work`` says whether something of it is left for later stages.
-    """
-
-    robot: int
-    label: str
-    first: int
-    known: Known = field(default_factory=dict)
-    adds: Set[Atom] = frozenset()
-    deletes: Set[Atom] = frozenset()
-    cost: int = 0
-    leaves_work: bool = False
-
-
 class _SelectThenApply:
     """Writes the actions of the form, robot by robot."""
 
@@ -153,7 +133,7 @@ class _SelectThenApply:
         """Everything that one robot does in a step."""
         for work_left in (False, True) if robot >= self._first_late else (False,):
             if (idling := self._team.idling[robot]) is not None:
-                self._choose(_Choice(robot, _IDLE, robot, cost=idling), work_left=work_left)
+                self._choose(robot, _IDLE, robot, {}, cost=idling, work_left=work_left)
             for action in self._actions:
                 if action.literals is None:
                     continue
@@ -203,8 +183,11 @@ class _SelectThenApply:
         # What is over was true: to say so spares readers a conditional effect.
         known |= dict.fromkeys(over, True)
         cost = team.seconds[action.number]
-        choice = _Choice(robot, action.label, robot, known, adds, deletes | over, cost, late)
-        self._choose(choice, work_left=work_left)
+        self._choose(
+            *(robot, action.label, robot, known, adds, deletes | over, cost),
+            work_left=work_left,
+            leaves_work=late,
+        )
 
     def _not_ruled_out(self, action: StagedAction, *, work_left: bool) -> dict[Atom, bool]:
         """That no earlier robot has selected what cannot share a step with the action."""
@@ -221,23 +204,39 @@ class _SelectThenApply:
 
     def _join(self, robot: int, action: StagedAction) -> None:
         """Another owner selects an action that its first owner has selected, and carries out."""
-        deletes = {self._waits(action.robot, robot)}
-        known = {action.selected: True}
-        choice = _Choice(robot, action.label, action.robot, known, deletes=deletes)
-        self._choose(choice, work_left=True)
+        self._choose(
+            *(robot, action.label, action.robot, {action.selected: True}),
+            deletes={self._waits(action.robot, robot)},
+            work_left=True,
+        )
 
-    def _choose(self, choice: _Choice, *, work_left: bool) -> None:
-        """One robot's turn to select; only the one of robot 0 pays for the step."""
-        robot = choice.robot
-        known = dict(choice.known)
+    def _choose(
+        self,
+        robot: int,
+        label: str,
+        first: int,
+        known: Known,
+        adds: Set[Atom] = frozenset(),
+        deletes: Set[Atom] = frozenset(),
+        cost: int = 0,
+        *,
+        work_left: bool,
+        leaves_work: bool = False,
+    ) -> None:
+        """One robot's turn to select; only the one of robot 0 pays for the step.
+
+        ``first`` is the first owner of what is selected: robots that wait for another selection of
+        this one forbid it.  ``leaves_work``: something of it is left for later stages.
+        """
+        known = dict(known)
         if work_left:  # else no robot waits for a partner, for a shared action leaves work
             for caller in self._callers(robot):
-                known[self._waits(caller, robot)] = caller == choice.first
+                known[self._waits(caller, robot)] = caller == first
         here = self._stages.choosing(robot, work_left=work_left)
-        after = self._stages.choosing(robot + 1, work_left=work_left or choice.leaves_work)
-        cost = choice.cost + (self._step_cost if robot == 0 else 0)
-        name = f"choose {self._team.names[robot]} {choice.label}"
-        self._lead(name, known, here, after, choice.adds, choice.deletes, cost)
+        after = self._stages.choosing(robot + 1, work_left=work_left or leaves_work)
+        cost += self._step_cost if robot == 0 else 0
+        name = f"choose {self._team.names[robot]} {label}"
+        self._lead(name, known, here, after, adds, deletes, cost)
 
     def _waits(self, caller: int, robot: int) -> Atom:
         """The caller has selected an action that this robot has to select too."""

@@ -18,23 +18,11 @@ from planners.pddl.lifted import And, Atom, Equal, Formula, Not, Or, StepAtom, T
 class Selectors:
     """Who selects what: each robot its subactions; in joint-action PDDL the team, joint actions.
 
-    Attributes
-    ----------
-    names
-        The names of the robots, or of the team.
-    idling
-        The second cost of idling for each of them; None for a team that always acts.
-    actions
-        The ground actions.
-    owners
-        For each action the numbers of those who select it together.
-    seconds
-        The second cost of each action.
-    clashes
-        For each action those of others that cannot share a step with it.
-    covered_by
-        In joint-action PDDL, the cheaper (or earlier) actions with the same parts.  Where one of
-        them is applicable too, both are one joint action, and it stands for both.
+    ``idling`` is the second cost of idling for each of them, None for a team that always acts;
+    ``owners``, ``seconds`` (second costs) and ``clashes`` (those of others that cannot share a step
+    with it) are by action.  ``covered_by``: in joint-action PDDL, the cheaper (or earlier) actions
+    with the same parts.  Where one of them is applicable too, both are one joint action, and it
+    stands for both.
     """
 
     names: tuple[str, ...]
@@ -62,29 +50,15 @@ class Selectors:
 
 def selectors_of(model: JointModel) -> Selectors:
     """Who selects what in a joint model, at what second cost."""
-    actions = model.actions
+    actions, number = model.actions, len(model.actions)
     seconds = tuple(second_cost(model, action) for action in actions)
     if model.is_joint_action:
-        nothing = (frozenset[int](),) * len(actions)
-        return Selectors(
-            ("team",),
-            (None,),
-            actions,
-            ((0,),) * len(actions),
-            seconds,
-            nothing,
-            _covered_by(actions, seconds),
-        )
-    owners = tuple(action.owners for action in actions)
-    return Selectors(
-        model.robots,
-        model.idling_costs,
-        actions,
-        owners,
-        seconds,
-        clashes(actions),
-        ((),) * len(actions),
-    )
+        owners, nothing = ((0,),) * number, (frozenset[int](),) * number
+        covered = _covered_by(actions, seconds)
+        return Selectors(("team",), (None,), actions, owners, seconds, nothing, covered)
+    by = tuple(action.owners for action in actions)
+    idling = tuple(model.idling_costs)
+    return Selectors(model.robots, idling, actions, by, seconds, clashes(actions), ((),) * number)
 
 
 def _covered_by(

@@ -92,11 +92,6 @@ class StagedAction:
         return self.checks != TRUE or bool(self.groups)
 
     @property
-    def written(self) -> set[Atom]:
-        """The atoms of its unconditional effects."""
-        return self.adds | self.deletes
-
-    @property
     def may_add(self) -> set[Atom]:
         """The atoms that it adds in some step."""
         return self.adds.union(*(adds for _, (adds, _) in self.groups))
@@ -167,7 +162,9 @@ class Immediate:
             and not action.has("check")
             and not action.has("undo")
             and action.selected not in late
-            and not any(self._is_seen(action, atom, late, needed) for atom in action.written)
+            and not any(
+                self._is_seen(action, atom, late, needed) for atom in action.adds | action.deletes
+            )
         }
         self._mark: dict[int, Atom] = {}
         classes: dict[tuple[int, frozenset[int]], Atom] = {}
@@ -201,14 +198,9 @@ class Immediate:
         needed: Mapping[Atom, Set[StagedAction]],
     ) -> bool:
         """Whether an action beside this one reads the atom after this one has written it."""
-        beside = self._team.clashes[action.number]
-        return any(
-            other.robot != action.robot and other.number not in beside
-            for other in late.get(atom, ())
-        ) or any(
-            other.robot > action.robot and other.number not in beside
-            for other in needed.get(atom, ())
-        )
+        readers = [other for other in late.get(atom, ()) if other.robot != action.robot]
+        readers += [other for other in needed.get(atom, ()) if other.robot > action.robot]
+        return any(other.number not in self._team.clashes[action.number] for other in readers)
 
 
 def _readers(

@@ -221,7 +221,7 @@ def test_the_pddl_says_the_same(name: str, form: str) -> None:
 
 
 def test_equal_names_after_cleaning_stay_apart() -> None:
-    names = plain_module.pddl._safe_names(
+    names = plain_module.task._safe_names(
         ["(at r_1 a)", "(at r 1_a)", "(at r 1 a)", "and", "9", "(#)"]
     )
     assert len(set(names)) == len(names)
