@@ -237,55 +237,28 @@ def _quotient(
     """The layers in classes, the goal's first, and the class of the start.
 
     Nodes are one class if they agree on ``truth`` and lead by the same own labels to the same
-    classes.
-
-    Merging them changes no set of own continuations (a bisimulation), and makes subsets small.
+    classes.  Merging them changes no set of own continuations (a bisimulation), and makes subsets
+    small.
     """
     layers: list[_Layer] = []
     class_of = np.zeros(len(space), np.int64)  # of each node, within its layer
     for number, span in enumerate(space.layers):
         edges = space.layer_edges(number)
         own = space.robot_labels(robot, edges.edges)
-        pairs = _own_moves(edges.source - span.start, own, class_of[edges.target], span)
-        layer, class_of[span] = _classes(pairs, space.state[span].tolist(), truth)
-        layers.append(layer)
+        table = np.column_stack((edges.source - span.start, own, class_of[edges.target]))
+        table, _ = unique_tuples(table, [int(column.max(initial=0)) + 1 for column in table.T])
+        moves: list[dict[int, list[int]]] = [{} for _ in range(span.stop - span.start)]
+        for node, label, to in table.tolist():  # sorted
+            moves[node].setdefault(label, []).append(to)
+        classes: dict[tuple[int, tuple[tuple[int, tuple[int, ...]], ...]], int] = {}
+        numbers = []
+        for state, move in zip(space.state[span].tolist(), moves, strict=True):
+            after = tuple((label, tuple(to)) for label, to in move.items())
+            key = truth[state] if truth is not None else 0, after
+            numbers.append(classes.setdefault(key, len(classes)))
+        class_of[span] = numbers
+        layers.append(_Layer([dict(after) for _, after in classes], [true for true, _ in classes]))
     return layers, int(class_of[space.starts[0]])
-
-
-def _own_moves(source: Ints, label: Ints, target: Ints, nodes: slice) -> list[Ints]:
-    """For each node of a layer the different pairs (own label, class led to), sorted."""
-    table = np.column_stack((source, label, target))
-    bounds = [int(column.max(initial=0)) + 1 for column in table.T]
-    table, _ = unique_tuples(table, bounds)
-    ends = np.searchsorted(table[:, 0], np.arange(nodes.stop - nodes.start + 1)).tolist()
-    moves = np.ascontiguousarray(table[:, 1:])
-    return [moves[a:b] for a, b in pairwise(ends)]
-
-
-def _classes(
-    pairs: Sequence[Ints], states: Sequence[int], truth: Mapping[int, int] | None
-) -> tuple[_Layer, list[int]]:
-    """The classes of one layer, and the number of each node's class."""
-    classes: dict[tuple[int, bytes], int] = {}
-    layer = _Layer([], [])
-    number = []
-    for state, own in zip(states, pairs, strict=True):
-        facts = truth[state] if truth is not None else 0
-        key = (facts, own.tobytes())
-        if key not in classes:
-            classes[key] = len(classes)
-            layer.moves.append(_grouped(own.tolist()))
-            layer.truth.append(facts)
-        number.append(classes[key])
-    return layer, number
-
-
-def _grouped(pairs: list[list[int]]) -> dict[int, tuple[int, ...]]:
-    """Sorted pairs (label, class) as label -> sorted classes."""
-    found: dict[int, list[int]] = {}
-    for own, to in pairs:
-        found.setdefault(own, []).append(to)
-    return {own: tuple(classes) for own, classes in found.items()}
 
 
 def _after(layer: _Layer, subset: tuple[int, ...]) -> dict[int, tuple[int, ...]]:

@@ -50,18 +50,6 @@ class Mixtures:
         return self.witness is None
 
 
-@dataclass(frozen=True, slots=True)
-class _JointMoves:
-    """The joint moves out of one layer.
-
-    ``step`` has them as edges of the unfolded plan space; ``labels`` (moves, robots) are the
-    robots' labels.
-    """
-
-    step: UnfoldingStep
-    labels: Labels
-
-
 def walk_mixtures(
     task_language: TaskLanguage,
     fits: PlanSpace,
@@ -96,7 +84,8 @@ def walk_mixtures(
     robots = len(automata)
     table = np.array([[0] * robots + [task_language.start]])
     layers = [table[:, robots]]
-    steps: list[_JointMoves] = []
+    steps: list[UnfoldingStep] = []
+    taken: list[Labels] = []
     walked, held = 1, 0
     for step in range(automata[0].steps):
         _check(space.model, automata, table, step, held, most)
@@ -105,16 +94,16 @@ def walk_mixtures(
         broken = np.flatnonzero(edge < 0)
         if len(broken):
             last = int(source[broken[0]]), tuple(labels[broken[0]].tolist())
-            paths = _breaking_plans(fits, steps, *last)
+            paths = _breaking_plans(fits, steps, taken, *last)
             return Mixtures(None, _witness(task_language, paths, words), walked)
         reached = np.column_stack((after, space.targets(edge)))
         table, number = unique_tuples(reached, [*(len(a) for a in automata), len(space)])
-        steps.append(_JointMoves(UnfoldingStep(source, edge, number), labels))
+        steps.append(UnfoldingStep(source, edge, number))
+        taken.append(labels)
         layers.append(table[:, robots])
         walked += len(table)
         held += 40 * len(edge) + table.nbytes
-    unfolding = [moves.step for moves in steps]
-    found = PlanSpace.from_layers(space, layers, unfolding, task_language.task)
+    found = PlanSpace.from_layers(space, layers, steps, task_language.task)
     return Mixtures(found, None, walked)
 
 
@@ -146,21 +135,29 @@ def _edges(index: EdgeIndex, node: Ints, labels: Labels) -> Ints:
 
 
 def _breaking_plans(
-    fits: PlanSpace, steps: Sequence[_JointMoves], node: int, labels: tuple[int, ...]
+    fits: PlanSpace,
+    steps: Sequence[UnfoldingStep],
+    taken: Sequence[Labels],
+    node: int,
+    labels: tuple[int, ...],
 ) -> list[list[tuple[int, ...]]]:
     """For each robot a plan with the sentence, as labels; their mixture breaks.
 
-    ``node`` of the last layer walked is where it does, ``labels`` is the joint step that is none.
+    It does so at ``node`` of the last layer walked, by the joint step ``labels``.  ``taken`` has
+    the labels of each step's joint moves.
     """
     done = [labels]
-    for moves in reversed(steps):
-        arrival = int(np.flatnonzero(moves.step.target == node)[0])
-        done.append(tuple(moves.labels[arrival].tolist()))
-        node = int(moves.step.source[arrival])
-    done.reverse()
-    return [
-        _with_beginning(fits, robot, [step[robot] for step in done]) for robot in range(len(labels))
-    ]
+    for step, of_step in zip(reversed(steps), reversed(taken), strict=True):
+        arrival = int(np.flatnonzero(step.target == node)[0])
+        done.append(tuple(of_step[arrival].tolist()))
+        node = int(step.source[arrival])
+    start, plans = int(fits.starts[0]), []
+    for robot in range(len(labels)):
+        own = [[step[robot]] for step in reversed(done)]
+        path = fits.path_of_robots(start, [robot], own)
+        assert path is not None, "the robot's automaton accepts its subplans only"
+        plans.append([fits.labels_of(edge) for edge in path])
+    return plans
 
 
 def _witness(
@@ -172,13 +169,6 @@ def _witness(
     edges = tuple(zip(*(path for path in paths if path is not None), strict=True))
     names = tuple(task_language.partition.words[w] for w in words)
     return describe_failure(space, Trail(start, edges), names)
-
-
-def _with_beginning(fits: PlanSpace, robot: int, subplan: Sequence[int]) -> list[tuple[int, ...]]:
-    """A plan, as labels, in which a robot begins with these labels of its own."""
-    path = fits.path_of_robots(int(fits.starts[0]), [robot], [[label] for label in subplan])
-    assert path is not None, "the robot's automaton accepts its subplans only"
-    return [fits.labels_of(edge) for edge in path]
 
 
 def _check(

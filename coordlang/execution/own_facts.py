@@ -6,7 +6,7 @@ The robot knows their values without regard to what the others do.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from coordlang.execution.automaton import Automaton, Knowledge, minimised
@@ -46,18 +46,14 @@ class OwnFacts:
         A fact is own if no action without this robot changes it, no conditional effect does, and
         two (joint) actions with the same own part change it in the same way.
         """
-        variants, others = _variants(model, robot)
+        certain, others = _certain(model, robot)
         mask = ((1 << len(model.codec.facts)) - 1) & ~others
-        labels = range(len(model.labels[robot]))
-        first = [variants[label][0] if label in variants else {} for label in labels]
-        return cls(
-            mask=mask,
-            others=others,
-            adds=tuple(_bits(fact for fact, adds in own.items() if adds) & mask for own in first),
-            deletes=tuple(
-                _bits(fact for fact, adds in own.items() if not adds) & mask for own in first
-            ),
+        of_labels = [certain.get(label, {}) for label in range(len(model.labels[robot]))]
+        adds, deletes = (
+            tuple(_bits(f for f, added in own.items() if added == sign) & mask for own in of_labels)
+            for sign in (True, False)
         )
+        return cls(mask, others, adds, deletes)
 
 
 def with_own_facts(automaton: Automaton, own: OwnFacts, start: int) -> Automaton:
@@ -90,22 +86,21 @@ def with_own_facts(automaton: Automaton, own: OwnFacts, start: int) -> Automaton
     return minimised(moves, known)
 
 
-def _variants(model: JointModel, robot: int) -> tuple[dict[int, list[Changes]], int]:
-    """What the actions of each label certainly do, and the facts that are not own."""
+def _certain(model: JointModel, robot: int) -> tuple[dict[int, Changes], int]:
+    """What each label of the robot certainly does, and the facts that are not own."""
     others = _bits(model.slack_facts)  # they change by themselves
-    variants: dict[int, list[Changes]] = {}
+    of_label: dict[int, Changes] = {}
     for action in model.actions:
         certain, uncertain = _changes(model, action)
         others |= uncertain
-        if robot in action.owners:
-            label = model.label_number(robot, action.part_of(robot))
-            assert label is not None, action.label
-            variants.setdefault(label, []).append(certain)
-        else:
+        if robot not in action.owners:
             others |= _bits(certain)
-    for changes in variants.values():
-        others |= _bits(_ambiguous(changes))
-    return variants, others
+            continue
+        label = model.label_number(robot, action.part_of(robot))
+        assert label is not None, action.label
+        first = of_label.setdefault(label, certain)
+        others |= _bits(f for f in {*first, *certain} if first.get(f) != certain.get(f))
+    return of_label, others
 
 
 def _changes(model: JointModel, action: GroundAction) -> tuple[Changes, int]:
@@ -121,13 +116,6 @@ def _changes(model: JointModel, action: GroundAction) -> tuple[Changes, int]:
         elif effect.adds or fact not in certain:  # what is both deleted and added counts as added
             certain[fact] = effect.adds
     return certain, uncertain
-
-
-def _ambiguous(variants: Sequence[Changes]) -> Iterator[int]:
-    """The facts that variants of one label change in different ways."""
-    first = variants[0]
-    for other in variants[1:]:
-        yield from (fact for fact in {*first, *other} if first.get(fact) != other.get(fact))
 
 
 def _bits(facts: Iterable[int]) -> int:

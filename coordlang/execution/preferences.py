@@ -156,14 +156,14 @@ def _facts_of(task_language: TaskLanguage, texts: Sequence[str]) -> tuple[list[i
 
     Left out is what is always true.  Raises `UsageError` for what is no atom of the problem.
     """
-    model, declared = task_language.model, task_language.declared
+    model = task_language.model
     facts, never = [], []
     for text in texts:
         predicate, *args = text[1:-1].split(" ")
         number = model.codec.facts.number_of(text)
         if number is not None:
             facts.append(number)
-        elif declared is not None and declared.has(predicate, args):
+        elif _is_declared(task_language, predicate, args):
             if Atom(predicate, tuple(args)) not in model.statics:
                 never.append(text)
         else:
@@ -173,3 +173,11 @@ def _facts_of(task_language: TaskLanguage, texts: Sequence[str]) -> tuple[list[i
                 f"{next(iter(model.codec.facts.texts), '(at r1 c1-1)')}.",
             )
     return facts, never
+
+
+def _is_declared(task_language: TaskLanguage, predicate: str, args: Sequence[str]) -> bool:
+    """Whether this is an atom over declared names, be it possible or not."""
+    if task_language.declared is None:
+        return False
+    domain, problem = task_language.declared
+    return len(args) in domain.predicates.get(predicate, ()) and problem.objects.keys() >= {*args}

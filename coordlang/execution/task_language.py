@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -26,19 +26,6 @@ from planners.search.kept_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import BadInput, OutOfMemory, Position, note
 from planners.system.messages import echoed
-
-
-@dataclass(frozen=True, slots=True)
-class Declared:
-    """What a domain and a problem declare: predicates, with their numbers of arguments, objects."""
-
-    predicates: Mapping[str, frozenset[int]]
-    objects: Collection[str]
-
-    def has(self, predicate: str, args: Sequence[str]) -> bool:
-        """Whether this is an atom over declared names, be it possible or not."""
-        known = len(args) in self.predicates.get(predicate, ())
-        return known and all(name in self.objects for name in args)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +52,7 @@ class TaskLanguage:
     verdict
         What the verification said; None where there was none, or it did not fit into the memory.
     declared
-        The names of domain and problem; None where there is only a model.
+        Domain and problem; None where there is only a model.
     """
 
     language: Language
@@ -74,7 +61,7 @@ class TaskLanguage:
     task: int
     word: Ints
     covered: bool
-    declared: Declared | None = None
+    declared: tuple[Domain, Problem] | None = None
     holds: bool = True
     verdict: Verdict | None = None
 
@@ -171,8 +158,8 @@ def language_in_task(
     holds = verdict is not None and verdict.holds
     covered &= holds or language.may_fail
     word = partition.word_of(space.rows)[space.state]
-    declared = Declared(domain.predicates, problem.objects)
-    return TaskLanguage(language, partition, space, 0, word, covered, declared, holds, verdict)
+    read = domain, problem
+    return TaskLanguage(language, partition, space, 0, word, covered, read, holds, verdict)
 
 
 def _verdict(partition: Partition, space: PlanSpace) -> Verdict | None:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,8 +14,10 @@ from coordlang.explanation.variables import truth
 from coordlang.explanation.words import word_formulas
 from planners.joint.model import JointModel
 from planners.joint.tables import Bools, Ints, Rows, unique_rows
-from planners.pddl.lifted import Atom
 from planners.system.errors import UsageError
+
+#: In which states of a table a term holds, (states).
+Where = Callable[[Conjunction], Bools]
 
 #: For more states than this no short formulas are looked for.
 _STATES = 20_000
@@ -53,47 +55,37 @@ def membership(
     formulas = word_formulas(task_language.language, task_language.model, rows)
     terms = [formulas[word].conjunctions() for word in task_language.partition.words]
     if apart:
-        values = AtomValues.of(task_language.model, rows)
-        terms = [disjoint(values, of_word) for of_word in terms]
+        where = states_where(task_language.model, rows)
+        terms = [disjoint(where, of_word) for of_word in terms]
     return Membership(tuple(map(tuple, terms)))
 
 
-@dataclass(frozen=True, slots=True)
-class AtomValues:
-    """The values of all atoms in a table of states.
+def states_where(model: JointModel, rows: Rows) -> Where:
+    """A function that says in which of some states a term holds."""
+    atoms, holds = truth(model, rows)
+    number = {atom: column for column, atom in enumerate(atoms)}
 
-    ``number`` is the column of each atom in ``holds`` (states, atoms).
-    """
-
-    number: dict[Atom, int]
-    holds: Bools
-
-    @classmethod
-    def of(cls, model: JointModel, rows: Rows) -> AtomValues:
-        """The values of a model's atoms in some states."""
-        atoms, holds = truth(model, rows)
-        return cls({atom: number for number, atom in enumerate(atoms)}, holds)
-
-    def where(self, term: Conjunction) -> Bools:
-        """The states in which a term holds."""
-        columns = [self.number[atom] for atom in term]
-        same: Bools = (self.holds[:, columns] == list(term.values())).all(axis=1)
+    def where(term: Conjunction) -> Bools:
+        columns = [number[atom] for atom in term]
+        same: Bools = (holds[:, columns] == list(term.values())).all(axis=1)
         return same
 
+    return where
 
-def disjoint(values: AtomValues, terms: Sequence[Conjunction]) -> list[Conjunction]:
+
+def disjoint(where: Where, terms: Sequence[Conjunction]) -> list[Conjunction]:
     """Terms that hold in the same states, no two in the same state.
 
     Larger ones first, of others only what is left; parts in which there is no state are dropped.
     """
     found: list[tuple[Conjunction, Bools]] = []
-    for term in sorted(terms, key=lambda t: -int(values.where(t).sum())):
-        parts = [(term, values.where(term))]
+    for term in sorted(terms, key=lambda t: -int(where(t).sum())):
+        parts = [(term, where(term))]
         for earlier, taken in found:
             left = []
             for part, states in parts:
                 if (states & taken).any():
-                    left += _without(values, part, earlier)
+                    left += _without(where, part, earlier)
                 else:
                     left.append((part, states))
             parts = left
@@ -102,7 +94,7 @@ def disjoint(values: AtomValues, terms: Sequence[Conjunction]) -> list[Conjuncti
 
 
 def _without(
-    values: AtomValues, term: Conjunction, other: Conjunction
+    where: Where, term: Conjunction, other: Conjunction
 ) -> list[tuple[Conjunction, Bools]]:
     """The part of a term outside another one, as terms that exclude each other, with their states.
 
@@ -114,7 +106,7 @@ def _without(
     for atom, value in other.items():
         if atom not in inside:
             outside = {**inside, atom: not value}
-            states = values.where(outside)
+            states = where(outside)
             if states.any():
                 found.append((outside, states))
             inside[atom] = value

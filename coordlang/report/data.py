@@ -19,8 +19,7 @@ from coordlang.explanation.lifted_words import LiftedWords
 from coordlang.explanation.text import term_text
 from coordlang.explanation.words import WordDescriptions, all_covers, describe_words, mapped_states
 from coordlang.language.words import Language
-from coordlang.report.layout import graph_layout, spread
-from coordlang.report.places import place_layout
+from coordlang.report.layout import graph_layout, place_layout, spread
 from coordlang.report.shown import Selection
 from coordlang.report.task import Tables, TaskPage, task_data, task_summary
 from coordlang.sites.coordinates import Point

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.report.places import place_layout
+from coordlang.report.layout import place_layout
 from coordlang.sites.coordinates import Point
 from coordlang.sites.world import World, find_world
 from planners.search.plans import Plans

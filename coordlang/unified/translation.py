@@ -17,12 +17,12 @@ from unified_planning.model import InstantaneousAction, OperatorKind, Problem, V
 from unified_planning.model.multi_agent import MultiAgentProblem
 from unified_planning.model.problem_kind import FEATURES as ALL_FEATURES
 
-from coordlang.unified.names import PddlNames
+from coordlang.unified.names import AGENT, ProblemNames, is_read, listed, refused
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain
 from planners.pddl.lifted import Problem as PddlProblem
 from planners.pddl.sexpr import Source
-from planners.system.errors import BadInput, Unsupported, UsageError
+from planners.system.errors import BadInput, UsageError
 
 #: Action -> robot -> its part, as in joint-action PDDL: ``{"swap": {"r1": "(move ?a ?b)", "r2":
 #: "(move ?b ?a)"}}``.
@@ -51,7 +51,6 @@ FEATURES = frozenset(
 _METRIC_GROUPS = ("QUALITY_METRICS", "ACTIONS_COST_KIND", "OVERSUBSCRIPTION_KIND")
 _METRICS = {feature for group in _METRIC_GROUPS for feature in ALL_FEATURES[group]}
 
-_AGENT = "?agent"
 #: Kinds of unified-planning's expressions -> their PDDL operators.
 _OPERATORS = {
     OperatorKind.AND: "and",
@@ -116,23 +115,15 @@ def translate(
     )
 
 
-def _refused(what: str) -> Unsupported:
-    return Unsupported(
-        what,
-        remedy="coordlang reads Boolean and object fluents over objects, and instantaneous "
-        "actions; docs/unified-planning.md has the list.",
-    )
-
-
 def _check_problem(problem: Any) -> None:
     """Raise `Unsupported` for a class of problems, or a feature, that is not read."""
     if type(problem) not in (Problem, MultiAgentProblem):
-        raise _refused(f"a {type(problem).__name__} is not supported")
+        raise refused(f"a {type(problem).__name__} is not supported")
     if type(problem) is MultiAgentProblem and not problem.agents:
         raise BadInput("the problem has no agent", remedy="Add one: problem.add_agent(..).")
     others = problem.kind.features - FEATURES - _METRICS
     if others:
-        raise _refused(f"not supported: {', '.join(sorted(others))}")
+        raise refused(f"not supported: {', '.join(sorted(others))}")
 
 
 def _check_parameters(problem: Any, subactions: Subactions, concurrency: Concurrency) -> None:
@@ -169,36 +160,17 @@ class _Bound:
     atom: str
 
 
-class _Writer:
+class _Writer(ProblemNames):
+    """The text, with the names of everything in it."""
+
     def __init__(self, problem: Any, concurrency: Concurrency) -> None:
-        self.problem, self.concurrency = problem, concurrency
-        self.values = 0
-        self.agents: tuple[Any, ...] = tuple(getattr(problem, "agents", ()))
-        self.types, self.predicates, self.actions, self.objects = (
-            PddlNames(),
-            PddlNames(),
-            PddlNames(),
-            PddlNames(),
-        )
-        self.variable_names = PddlNames()
-        self.variable_names.keep(None, _AGENT[1:])
-        roots = {[*t.ancestors][-1].name for t in problem.user_types}
-        if len(roots) == 1 and min(roots).lower() == "object":  # as its PDDL reader makes it
-            self.types.keep(min(roots), "object")
-        # PddlNames of the problem come first, so that they are kept where possible.
-        for t in problem.user_types:
-            self.type_name(t)
-        for o in problem.all_objects:
-            self.object_name(o)
-        for agent in self.agents:
-            self.agent_name(agent)
-        self.declared: dict[str, str] = {}
-        self.apart = False
+        super().__init__(problem)
+        self.concurrency = concurrency
 
     def write(self, subactions: Subactions) -> tuple[str, str, Schemas]:
         """Domain, problem, and what the schemas stand for."""
         shared = self.problem.ma_environment if self.agents else self.problem
-        for fluent in filter(_is_read, shared.fluents):
+        for fluent in filter(is_read, shared.fluents):
             self.predicate(fluent, None)
         if self.agents:
             actions, schemas = self.agent_actions()
@@ -256,16 +228,14 @@ class _Writer:
             name = self.actions.of(key, key[0])
             types = list(dict.fromkeys(self.own_type(by_name[str(member)]) for member in members))
             whose = f"(either {' '.join(types)})" if len(types) > 1 else types[0]
-            actions.append(
-                "\n".join([f"(:action {name}", f"  :agent {_AGENT} - {whose}", *key[1:]])
-            )
+            actions.append("\n".join([f"(:action {name}", f"  :agent {AGENT} - {whose}", *key[1:]]))
             schemas[name] = members
         return actions, schemas
 
     def body(self, action: Any, agent: Any) -> list[str]:
         """Parameters, precondition and effect."""
         if type(action) is not InstantaneousAction or action.simulated_effect is not None:
-            raise _refused(
+            raise refused(
                 f"{type(action).__name__} {action.name!r} is not instantaneous, or its effects are "
                 "simulated"
             )
@@ -285,21 +255,21 @@ class _Writer:
     def effect(self, effect: Any, agent: Any) -> Iterator[str]:
         """An assignment: what it makes true and what false, each under its condition."""
         if not effect.is_assignment():
-            raise _refused(f"the effect {effect} is no assignment")
+            raise refused(f"the effect {effect} is no assignment")
         fluent, value, bound = effect.fluent.fluent(), effect.value, list[_Bound]()
         when = [] if effect.condition.is_true() else [self.text(effect.condition, agent, True)]
         parts = self.parts(effect.fluent, agent, bound, True)
         cases: list[tuple[str, list[str], list[_Bound]]]
         if fluent.type.is_user_type():
             new, old = self.term(value, agent, bound, True), self.fresh()
-            former = _Bound(f"{old} - {self.type_name(fluent.type)}", _list(*parts, old))
-            cases = [(_list(*parts, new), [], bound)]
+            former = _Bound(f"{old} - {self.type_name(fluent.type)}", listed(*parts, old))
+            cases = [(listed(*parts, new), [], bound)]
             cases += [(f"(not {former.atom})", [f"(not (= {old} {new}))"], [*bound, former])]
         elif value.is_bool_constant():
-            atom = _list(*parts)
+            atom = listed(*parts)
             cases = [(atom if value.is_true() else f"(not {atom})", [], bound)]
         else:
-            atom, holds = _list(*parts), self.text(value, agent, True)
+            atom, holds = listed(*parts), self.text(value, agent, True)
             cases = [(atom, [holds], bound), (f"(not {atom})", [f"(not {holds})"], bound)]
         for literal, own, variables in cases:
             conditions = [*(b.atom for b in variables), *when, *own]
@@ -318,7 +288,7 @@ class _Writer:
                 found.append(self.text(fluent, agent))
             elif value.is_object_exp():
                 parts = self.parts(fluent, agent, [], False)
-                found.append(_list(*parts, self.object_name(value.object())))
+                found.append(listed(*parts, self.object_name(value.object())))
         return sorted(found)
 
     def text(self, node: Any, agent: Any, inside: bool = False) -> str:
@@ -331,22 +301,22 @@ class _Writer:
         if node.is_fluent_exp():
             bound: list[_Bound] = []
             parts = self.parts(node, agent, bound, inside)
-            return _with(_list(*parts), bound)
+            return _with(listed(*parts), bound)
         if node.is_dot():
             return self.text(node.arg(0), self.problem.agent(node.agent()))
         if node.is_equals():
             bound = []
             sides = [self.term(arg, agent, bound, inside) for arg in node.args]
-            return _with(_list("=", *sides), bound)
+            return _with(listed("=", *sides), bound)
         parts = [self.text(arg, agent, inside) for arg in node.args]
         if node.is_iff():
             return f"(and (imply {parts[0]} {parts[1]}) (imply {parts[1]} {parts[0]}))"
         operator = _OPERATORS.get(node.node_type)
         if operator is None:
-            raise _refused(f"the expression {node}")
+            raise refused(f"the expression {node}")
         if node.is_exists() or node.is_forall():
             parts = [f"({self.variables(node.variables())})", *parts]
-        return _list(operator, *parts)
+        return listed(operator, *parts)
 
     def parts(self, node: Any, agent: Any, bound: list[_Bound], inside: bool) -> list[str]:
         """The predicate of a fluent and its arguments, without the value of an object fluent.
@@ -357,7 +327,7 @@ class _Writer:
         own = agent if agent is not None and fluent in agent.fluents else None
         args = [self.term(arg, agent, bound, inside) for arg in node.args]
         if own is not None:
-            args.insert(0, _AGENT if inside else self.agent_name(own))
+            args.insert(0, AGENT if inside else self.agent_name(own))
         return [self.predicate(fluent, own), *args]
 
     def term(self, node: Any, agent: Any, bound: list[_Bound], inside: bool) -> str:
@@ -374,76 +344,13 @@ class _Writer:
             parts = self.parts(node, agent, bound, inside)
             value = self.fresh()
             kind = self.type_name(node.fluent().type)
-            bound.append(_Bound(f"{value} - {kind}", _list(*parts, value)))
+            bound.append(_Bound(f"{value} - {kind}", listed(*parts, value)))
             return value
-        raise _refused(f"the term {node}")
-
-    def fresh(self) -> str:
-        """A variable of its own."""
-        self.values += 1
-        return f"?{self.variable_names.of(self.values, f'value-{self.values}')}"
-
-    def variables(self, variables: Sequence[Any]) -> str:
-        return " ".join(f"{self.variable(v)} - {self.type_name(v.type)}" for v in variables)
-
-    def parameter(self, parameter: Any) -> str:
-        return f"?{self.variable_names.of(parameter.name, parameter.name)}"
-
-    def variable(self, variable: Any) -> str:
-        return f"?{self.variable_names.of((variable.name,), f'any-{variable.name}')}"
-
-    def predicate(self, fluent: Any, owner: Any) -> str:
-        """The predicate of a fluent; own fluents of agents with one signature share one."""
-        if not _is_read(fluent):
-            raise _refused(f"fluent {fluent.name!r} of type {fluent.type}")
-        types = tuple(self.type_name(p.type) for p in fluent.signature)
-        if fluent.type.is_user_type():
-            types = (*types, self.type_name(fluent.type))
-        key = (fluent.name, types, owner is not None)
-        name = self.predicates.of(key, fluent.name)
-        if name not in self.declared:
-            whose = [f"?a - {self.agent_type()}"] if owner is not None else []
-            args = [f"?x{n} - {t}" for n, t in enumerate(types)]
-            self.declared[name] = _list(name, *whose, *args)
-        return name
-
-    def type_name(self, kind: Any) -> str:
-        if not kind.is_user_type():
-            raise _refused(f"parameters of type {kind}")
-        return self.types.of(kind.name, kind.name)
-
-    def agent_type(self) -> str:
-        return self.types.of(("agents",), "agent")
-
-    def own_type(self, agent: Any) -> str:
-        """A type for one agent alone, if some action is not for all of them."""
-        if not self.apart:
-            return self.agent_type()
-        return self.types.of(("agent", agent.name), f"agent-{agent.name}")
-
-    def object_name(self, thing: Any) -> str:
-        return self.objects.of(thing.name, thing.name)
-
-    def agent_name(self, agent: Any) -> str:
-        return self.objects.of(("agent", agent.name), agent.name)
-
-    def type_lines(self) -> list[str]:
-        kinds = [
-            (self.type_name(t), self.type_name(t.father) if t.father else "object")
-            for t in self.problem.user_types
-        ]
-        kinds += [(self.own_type(agent), self.agent_type()) for agent in self.agents if self.apart]
-        if self.agents:
-            kinds.append((self.agent_type(), "object"))
-        return [f"{name} - {father}" for name, father in kinds if name != "object"]
+        raise refused(f"the term {node}")
 
 
 def _section(begin: str, lines: Iterable[str]) -> str:
     return "\n".join([begin, *(f"  {line}" for line in lines), ")"])
-
-
-def _list(*words: str) -> str:
-    return f"({' '.join(words)})"
 
 
 def _with(text: str, bound: Sequence[_Bound]) -> str:
@@ -478,8 +385,3 @@ def _clashes(action: Any) -> Iterator[Any]:
             clash = new.And(one.condition, when, values)
             variables = (*one.forall, *others)
             yield new.Not(new.Exists(clash, *variables) if variables else clash)
-
-
-def _is_read(fluent: Any) -> bool:
-    """Whether a fluent has a truth value or an object; another one must not be used."""
-    return bool(fluent.type.is_bool_type() or fluent.type.is_user_type())

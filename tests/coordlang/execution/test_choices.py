@@ -37,7 +37,7 @@ from tests.support.random_choices import (
     with_twins,
 )
 from tests.support.random_chores import DOMAIN
-from tests.support.task_languages import shipped, task_languages
+from tests.support.task_languages import shipped
 
 
 def moves(automaton: Automaton) -> list[dict[int, int]]:
@@ -253,17 +253,6 @@ def test_own_atoms_of_shipped_domains(name: str) -> None:
             assert own.atoms == "own"
             check_own_atoms(task_language, own, twin, seen)
     assert seen["unknown"] >= 4, seen
-
-
-def test_tasks_of_the_t_map() -> None:
-    """Every sentence of every third of all 132 tasks, with the smallest language."""
-    every = task_languages("t-map", "problem")
-    assert (len(every), len(every[0].language.words)) == (132, 3)
-    for task_language in every[::3]:
-        for words, twin in listed(task_language, 1000, 1000):
-            found = choices(task_language, words)
-            check_automata(found, twin)
-            check_combinations(found, twin)
 
 
 @pytest.mark.parametrize("robots", [2, 3])

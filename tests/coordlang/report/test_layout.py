@@ -12,8 +12,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.report.layout import graph_layout, layer_orders, spread
-from coordlang.report.places import place_layout
+from coordlang.report.layout import graph_layout, layer_orders, place_layout, spread
 from coordlang.sites.coordinates import from_names, read_coordinates
 from planners.system.errors import BadInput
 

@@ -419,7 +419,7 @@ def shortest(problem: Any) -> tuple[int, int] | None:
 
 
 #: Seeds with quick answers of each kind.
-SOME = (0, 1, 6, 7, 10, 11, 12, 13, 14, 15, 16, 17, 18, 26, 27)
+SOME = (0, 1, 6, 7, 10, 11, 12, 13)
 
 
 @pytest.mark.parametrize(
@@ -561,7 +561,7 @@ def test_a_sentence_leaves_exactly_its_plans() -> None:
 def test_a_language_for_plans_within_slack_is_refused(coordlang: Command, tmp_path: Path) -> None:
     """The engine's plans are optimal ones."""
     file = tmp_path / "language.json"
-    files = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "corners-3x3.pddl"
+    files = [DOMAINS / "three-cells" / f"{name}.pddl" for name in ("domain", "problem")]
     made = coordlang("build", *files, "--slack", "1", "--words-see-slack", "-o", file)
     assert made.code == 0
     with pytest.raises(UPUsageError, match="plans within slack"):
