@@ -9,7 +9,6 @@ from heapq import heapify, heappop, heappush
 
 from coordlang.execution.preferences import Memory, PlanPreference, Preference
 from coordlang.execution.task_language import TaskLanguage
-from planners.search.plan_space import PlanSpace
 from planners.system.errors import OutOfMemory
 from planners.system.limits import memory_left, more_memory
 
@@ -268,25 +267,12 @@ def _points(
         after: dict[int, int] = {}
         for edge in space.out_edges(node):
             target = space.target_of(edge)
-            there = target, _remembered(space, automata, memories, edge, target)
+            labels, state = space.labels_of(edge) if automata else (), int(space.state[target])
+            steps = zip(automata, memories, strict=True)
+            there = target, tuple(one.step(memory, labels, state) for one, memory in steps)
             if there not in number:
                 number[there] = len(points)
                 points.append(there)
             after[number[there]] = after.get(number[there], 0) + 1
         following.append(sorted(after.items()))
     return following, [node for node, _ in points], [memories for _, memories in points]
-
-
-def _remembered(
-    space: PlanSpace,
-    automata: Sequence[PlanPreference],
-    memories: tuple[Memory, ...],
-    edge: int,
-    target: int,
-) -> tuple[Memory, ...]:
-    """What the preferences remember after an edge."""
-    if not automata:
-        return ()
-    labels, state = space.labels_of(edge), int(space.state[target])
-    steps = zip(automata, memories, strict=True)
-    return tuple(one.step(memory, labels, state) for one, memory in steps)

@@ -12,7 +12,7 @@ tree has no way back.  Its own nodes are those that BehaviorTree.CPP brings: ``S
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
@@ -152,7 +152,7 @@ def _models(model: JointModel, choices: SentenceChoices) -> ET.Element:
         found.append(_leaf_model(kind, name, [port]))
     ports: dict[str, int] = {}
     for own in choices.robots:
-        for _, label, _ in _edges(own):
+        for label in sorted(set(own.automaton.label.tolist())):
             if (text := model.label_text(own.robot, label)) is not None:
                 name, *arguments = text.strip("()").split()
                 ports[name] = max(ports.get(name, 0), len(arguments))
@@ -160,12 +160,6 @@ def _models(model: JointModel, choices: SentenceChoices) -> ET.Element:
         own_ports = ["subaction", *(f"arg{n}" for n in range(number))]
         found.append(_leaf_model("Action", name, own_ports))
     return found
-
-
-def _edges(own: RobotChoices) -> Iterable[tuple[int, int, int]]:
-    for state in range(len(own.automaton)):
-        for label, target in own.automaton.moves(state):
-            yield state, label, target
 
 
 def _leaf_model(kind: str, name: str, ports: Sequence[str]) -> ET.Element:

@@ -58,6 +58,9 @@ def test_robots_are_drawn_where_they_are() -> None:
 def test_films_have_the_frames_that_are_drawn() -> None:
     found = record()
     (run,) = found.runs
+    assert "nobody moves any more" in {event_text(event) for event in run.events}
+    poses, human = {name: own[:12] for name, own in run.poses.items()}, run.human[:12]
+    run = msgspec.structs.replace(run, poses=poses, human=human)
     drawn = list(frames(found, run))
     assert len({image.shape for image in drawn}) == 1
     gif, film, sheet = (
@@ -69,7 +72,6 @@ def test_films_have_the_frames_that_are_drawn() -> None:
     assert np.abs(film[0].astype(int) - drawn[0]).mean() < 6
     assert sheet.shape[1] > drawn[0].shape[1]
     assert recorded(found, run, ".png") == recorded(found, run, ".png")
-    assert "nobody moves any more" in {event_text(event) for event in run.events}
 
 
 def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
