@@ -52,6 +52,11 @@ class Settings:
 
     def __post_init__(self) -> None:
         """Raise `UsageError` for what no robot can be built with."""
+        if self.step not in PACES:
+            raise UsageError(
+                f"--step {self.step}: there is no such way to keep step",
+                remedy=f"Say {', '.join(PACES[:-1])} or {PACES[-1]}.",
+            )
         for name in ("cell", "radius", "speed", "turn", "tick"):
             value = getattr(self, name)
             if not 0 < value < math.inf:
@@ -59,32 +64,22 @@ class Settings:
                     f"{name} {value:g}: expected a length, speed or time above 0",
                     remedy="Leave it out for the usual value.",
                 )
-        step = self.speed * self.tick
-        for holds, wrong, remedy in (
-            (
-                self.step in PACES,
-                f"--step {self.step}: there is no such way to keep step",
-                f"Say {', '.join(PACES[:-1])} or {PACES[-1]}.",
-            ),
-            (
-                self.radius >= step,
+        if self.radius < self.speed * self.tick:
+            raise UsageError(
                 f"robots with a radius of {self.radius:g} m are too small: in a tick they drive "
-                f"{step:g} m, so that two could pass through each other unseen",
-                "Use a larger --radius, and a larger --cell where it does not fit.",
-            ),
-            (
-                0 <= self.noise <= 1,
+                f"{self.speed * self.tick:g} m, so that two could pass through each other unseen",
+                remedy="Use a larger --radius, and a larger --cell where it does not fit.",
+            )
+        if not 0 <= self.noise <= 1:
+            raise UsageError(
                 f"--noise {self.noise:g}: expected a share from 0 to 1",
-                "Say 0 for wheels that do what they are told.",
-            ),
-            (
-                self.human is None or self.lidar,
-                "--human: without a lidar no robot sees a human",
-                "Leave out --no-lidar.",
-            ),
-        ):
-            if not holds:
-                raise UsageError(wrong, remedy=remedy)
+                remedy="Say 0 for wheels that do what they are told.",
+            )
+
+        if self.human is not None and not self.lidar:
+            raise UsageError(
+                "--human: without a lidar no robot sees a human", remedy="Leave out --no-lidar."
+            )
 
     @property
     def drive(self) -> Drive:
