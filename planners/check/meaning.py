@@ -98,28 +98,18 @@ class Meaning:
 
     def required(
         self, formula: Formula, binding: Binding, positive: bool, acting: tuple[int, ...]
-    ) -> frozenset[Literal] | None:
-        """The literals left after statics, equalities and types are simplified.
-
-        None if that makes it false.
+    ) -> frozenset[Literal] | bool:
+        """The literals left after statics, equalities and types are simplified; or what it is then.
 
         A formula that this makes true requires nothing, whatever stands inside.
         """
-        found = self._simplified(formula, binding, positive, acting)
-        if isinstance(found, bool):
-            return frozenset() if found else None
-        return found
-
-    def _simplified(
-        self, formula: Formula, binding: Binding, positive: bool, acting: tuple[int, ...]
-    ) -> frozenset[Literal] | bool:
         formula, positive = _unsigned(formula, positive)
         branches = self._branches(formula, binding)
         if branches is None:
             fixed = self._fixed(formula, binding, positive, acting)
             return frozenset({(_ground(formula, binding), positive)}) if fixed is None else fixed
         neutral = _is_conjunction(formula, positive)
-        left = [self._simplified(part, inner, positive, acting) for part, inner in branches]
+        left = [self.required(part, inner, positive, acting) for part, inner in branches]
         if (not neutral) in left:
             return not neutral
         literals = [part for part in left if not isinstance(part, bool)]

@@ -10,7 +10,7 @@ with them, only the lifted nouns and the robots.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import product
 
 from planners.check.meaning import (
@@ -70,34 +70,15 @@ class Touched:
     deletes: frozenset[Atom]
 
 
-@dataclass(frozen=True, slots=True)
 class Rules:
     """The rules of joint steps for one problem and its team."""
 
-    domain: Domain
-    problem: Problem
-    team: Team
-    meaning: Meaning
-    schemas: dict[str, Schema]
-    is_joint_action: bool
-    _instances: dict[str, Instance | str] = field(default_factory=dict)
-    _touched: dict[tuple[StepAtom, StepAtom | None], Touched] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, domain: Domain, problem: Problem, team: Team) -> Rules:
-        """The rules of a problem's joint steps."""
-        schemas = {schema.name: schema for schema in domain.schemas}
-        return cls(
-            domain,
-            problem,
-            team,
-            Meaning(domain, problem, team),
-            schemas,
-            domain.is_joint_action,
-        )
-
-    # -- joint steps
-    # -----------------------------------------------------------------------------------------
+    def __init__(self, domain: Domain, problem: Problem, team: Team) -> None:
+        self.domain, self.problem, self.team = domain, problem, team
+        self.meaning = Meaning(domain, problem, team)
+        self._schemas = {schema.name: schema for schema in domain.schemas}
+        self._instances: dict[str, Instance | str] = {}
+        self._touched: dict[tuple[StepAtom, StepAtom | None], Touched] = {}
 
     def broken_rule(self, state: State, labels: Labels) -> str | None:
         """The first rule that the step breaks, in words; None for a legal step.
@@ -107,7 +88,7 @@ class Rules:
         """
         if len(labels) != len(self.team.robots):
             return f"the step has {len(labels)} entries for {len(self.team.robots)} robots"
-        if self.is_joint_action:
+        if self.domain.is_joint_action:
             return self._joint_action(state, labels)[0]
         chosen: list[Instance | None] = []
         for robot, label in enumerate(labels):
@@ -125,7 +106,7 @@ class Rules:
 
     def result(self, state: State, labels: Labels) -> State:
         """The state after a joint step without a `broken_rule`."""
-        if self.is_joint_action:
+        if self.domain.is_joint_action:
             return self._joint_action(state, labels)[1]
         chosen = _together([self._known(label) if label is not None else None for label in labels])
         return self._after(state, chosen)
@@ -149,7 +130,7 @@ class Rules:
 
     def _read(self, label: str) -> Instance | str:
         name, *args = _tokens(label) or [""]
-        schema = self.schemas.get(name)
+        schema = self._schemas.get(name)
         if schema is None:
             return f"{label} is no action of the domain"
         if len(args) != len(schema.parameters):
@@ -222,10 +203,8 @@ class Rules:
         mine, theirs = self.touched(one, other), self.touched(other, one)
         if both := mine.deletes & theirs.adds:
             return f"{one.text} deletes {_first(both)}, which {other.text} adds"
-        if self._names(one, other) or self._names(other, one):
-            return None  # linked by a positive action formula: meant to be done together
-        if self._joined(one, other):
-            return None
+        if self._names(one, other) or self._names(other, one) or self._joined(one, other):
+            return None  # linked: meant to be done together
         if both := mine.deletes & {atom for atom, positive in theirs.needs if positive}:
             return f"{one.text} deletes {_first(both)}, which {other.text} requires"
         if both := mine.adds & {atom for atom, positive in theirs.needs if not positive}:
@@ -291,17 +270,17 @@ class Rules:
         if key in self._touched:
             return self._touched[key]
         pair = frozenset((action.name, other.name)) if other else None
-        needs = set(
-            self.meaning.required(action.schema.precondition, action.binding, True, action.owners)
-            or ()
-        )
+        needs: set[Literal] = set()
+        own = self.meaning.required(action.schema.precondition, action.binding, True, action.owners)
+        if not isinstance(own, bool):
+            needs |= own
         changes: dict[bool, set[Atom]] = {True: set(), False: set()}
         for effect in action.schema.effects:
             for binding in self.meaning.bindings(effect.variables, action.binding):
                 required = self.meaning.required(effect.condition, binding, True, ())
                 fires = self.meaning.holds(effect.condition, binding, True, Moment(None, pair))
-                if required is not None and fires:
-                    needs |= required
+                if required is not False and fires:
+                    needs |= required if required is not True else frozenset()
                     changes[effect.adds].add(ground_atom(effect.atom, binding))
         touched = Touched(
             frozenset(needs), frozenset(changes[True]), frozenset(changes[False] - changes[True])
@@ -320,9 +299,6 @@ class Rules:
                     if self.meaning.holds(effect.condition, binding, True, moment):
                         changes[effect.adds].add(ground_atom(effect.atom, binding))
         return (state - changes[False]) | changes[True]
-
-    # -- joint-action PDDL
-    # -----------------------------------------------------------------------------------
 
     def _joint_action(self, state: State, labels: Labels) -> tuple[str | None, State]:
         """What is wrong with these subactions, or None and the state after them."""

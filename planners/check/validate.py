@@ -56,7 +56,7 @@ def validate(
     Raises `BadInput` where two applicable joint actions with the same subactions have different
     results.
     """
-    rules = Rules.of(domain, problem, team)
+    rules = Rules(domain, problem, team)
     state = rules.meaning.fluents_of(problem.init if init is None else init)
     for number, labels in enumerate(plan):
         reason = rules.broken_rule(state, labels)

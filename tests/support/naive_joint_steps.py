@@ -51,7 +51,7 @@ class Twin:
         budget: int = 1_000_000,
     ) -> None:
         self._budget = budget
-        self.rules = Rules.of(domain, problem, team)
+        self.rules = Rules(domain, problem, team)
         self.init = self.rules.meaning.fluents_of(problem.init)
         self.labels = [self._labels(robot) for robot in range(len(team.robots))]
         self._steps: dict[State, frozenset[Step]] = {}
@@ -91,7 +91,7 @@ class Twin:
 
     def _worth_a_try(self, state: State, label: str, robot: int) -> bool:
         """Drop what cannot be part of any step here: a product of everything would take hours."""
-        if self.rules.is_joint_action:
+        if self.rules.domain.is_joint_action:
             return True
         found = self.rules.instance(label)
         assert not isinstance(found, str), found
@@ -112,7 +112,7 @@ class Twin:
 
     def actions(self, labels: Labels) -> int:
         """The second component of ``makespan+actions``: chosen subactions, shared ones once."""
-        if self.rules.is_joint_action:
+        if self.rules.domain.is_joint_action:
             return sum(label is not None for label in labels)
         return len({label for label in labels if label is not None})
 

@@ -28,14 +28,14 @@ def world(domain: str, problem: str, unowned: Unowned = "error") -> World:
 
 def one_step(setting: World, *labels: str | None) -> str | None:
     """What is wrong with a joint step from the initial state."""
-    return Rules.of(*setting).broken_rule(setting[1].init, labels)
+    return Rules(*setting).broken_rule(setting[1].init, labels)
 
 
 def after(setting: World, *labels: str | None) -> set[str]:
     """The true fluents after a joint step from the initial state."""
     domain, problem, team = setting
     init = frozenset(a for a in problem.init if a.predicate != "static")
-    rules = Rules.of(domain, problem, team)
+    rules = Rules(domain, problem, team)
     assert rules.broken_rule(init, labels) is None
     state = rules.result(init, labels)
     return {" ".join((a.predicate, *a.args)) for a in state}
@@ -319,110 +319,78 @@ def clash(first: str, second: str, init: str = "(p) (s)") -> str | None:
 
 DELETES_P = ":effect (not (p))"
 ADDS_Q = ":effect (q)"
+NEEDS_P = ":precondition (p) :effect (n)"
+NO_Q = ":precondition (not (q)) :effect (n)"
+#: An atom both deleted and added counts as added.
+BOTH = ":effect (and (not (p)) (p))"
 
 
-def test_deleting_what_another_requires() -> None:
-    assert (
-        clash(DELETES_P, ":precondition (p) :effect (n)")
-        == "(one r1) deletes (p), which (two r2) requires"
-    )
+def needing(formula: str) -> str:
+    return f":precondition {formula} :effect (n)"
 
 
-def test_deleting_what_another_adds() -> None:
-    assert clash(DELETES_P, ":effect (p)") == "(one r1) deletes (p), which (two r2) adds"
-
-
-def test_adding_what_another_requires_to_be_false() -> None:
-    assert clash(ADDS_Q, ":precondition (not (q)) :effect (n)") == (
-        "(one r1) adds (q), which (two r2) requires to be false"
-    )
+@pytest.mark.parametrize(
+    ("first", "second", "reason"),
+    [
+        (DELETES_P, NEEDS_P, "(one r1) deletes (p), which (two r2) requires"),
+        (DELETES_P, ":effect (p)", "(one r1) deletes (p), which (two r2) adds"),
+        (ADDS_Q, NO_Q, "(one r1) adds (q), which (two r2) requires to be false"),
+        (DELETES_P, BOTH, "(one r1) deletes (p), which (two r2) adds"),
+        (":effect (and (not (q)) (q))", NO_Q, "adds (q)"),
+        # Conditional effects count as if they fired, and their conditions as required.
+        (":effect (when (and (q) (n)) (not (p)))", ":precondition (p) :effect (q)", "deletes (p)"),
+        (DELETES_P, ":effect (when (p) (n))", "requires"),
+        (ADDS_Q, ":effect (when (not (q)) (n))", "requires to be false"),
+        # A negative formula of the acting robot is left in the condition of an effect: there it may
+        # be false, so that the other literals of the disjunction count; in a precondition it is true.
+        (DELETES_P, ":effect (when (or (not (two ?r)) (p)) (n))", "requires"),
+        # Every literal of a disjunction counts, and only statics, equalities and types are decided.
+        (DELETES_P, needing("(or (p) (q))"), "deletes (p)"),
+        (DELETES_P, needing("(or (q) (not (not (p))))"), "deletes (p)"),
+        (DELETES_P, needing("(imply (not (p)) (q))"), "deletes (p)"),
+        (ADDS_Q, needing("(or (p) (not (q)))"), "adds (q)"),
+        (DELETES_P, needing("(or (z) (p))"), "deletes (p)"),
+        (DELETES_P, needing("(and (s) (p))"), "deletes (p)"),
+        (DELETES_P, needing("(or (p) (not (= ?r ?r)))"), "deletes (p)"),
+        (DELETES_P, needing("(or (p) (not (p)))"), "deletes (p)"),
+    ],
+)
+def test_interference(first: str, second: str, reason: str) -> None:
+    assert reason in str(clash(first, second))
 
 
 @pytest.mark.parametrize(
     ("first", "second"),
     [
-        (DELETES_P, ":effect (not (p))"),
-        (ADDS_Q, ":effect (q)"),
-        (DELETES_P, ":precondition (not (q)) :effect (n)"),
-        (":precondition (p) :effect (q)", ":precondition (p) :effect (n)"),
+        (DELETES_P, DELETES_P),
+        (ADDS_Q, ADDS_Q),
+        (DELETES_P, NO_Q),
+        (":precondition (p) :effect (q)", NEEDS_P),
         # It requires what it deletes, but that is its own affair.
         (":precondition (p) :effect (not (p))", ":effect (n)"),
         # Adding what the other requires, deleting what it requires to be false.
-        (":effect (p)", ":precondition (p) :effect (n)"),
-        (":effect (not (q))", ":precondition (not (q)) :effect (n)"),
+        (":effect (p)", NEEDS_P),
+        (":effect (not (q))", NO_Q),
+        (BOTH, NEEDS_P),
+        (BOTH, ":effect (p)"),
+        # Counted as adding p, although q is false and p goes.
+        (":effect (and (not (p)) (when (q) (p)))", NEEDS_P),
+        (DELETES_P, needing("(or (not (two ?r)) (p))")),
+        # An effect that can never fire touches nothing.
+        (DELETES_P, ":effect (and (n) (when (and (p) (z)) (n)) (when (z) (p)))"),
+        # What statics, equalities and types decide requires nothing.
+        (DELETES_P, needing("(or (s) (p))")),
+        (DELETES_P, needing("(or (p) (not (z)))")),
+        (DELETES_P, needing("(or (p) (= ?r ?r))")),
+        (DELETES_P, needing("(imply (z) (p))")),
+        (DELETES_P, needing("(forall (?t - (either robot thing)) (or (p) (not (z))))")),
+        (DELETES_P, needing("(or (s) (and (p) (q)))")),
+        # Nothing is both a robot and a thing: no such subaction, so the negative formula is true.
+        (DELETES_P, needing("(or (p) (not (other ?r ?r)))")),
     ],
 )
 def test_no_interference(first: str, second: str) -> None:
     assert clash(first, second) is None
-
-
-def test_an_atom_both_deleted_and_added_counts_as_added() -> None:
-    both = ":effect (and (not (p)) (p))"
-    assert clash(both, ":precondition (p) :effect (n)") is None
-    assert clash(both, ":effect (p)") is None
-    assert "deletes (p)" in str(clash(DELETES_P, both))
-    assert "adds (q)" in str(
-        clash(":effect (and (not (q)) (q))", ":precondition (not (q)) :effect (n)")
-    )
-
-
-def test_conditional_effects_count_as_if_they_fired() -> None:
-    never = ":effect (when (and (q) (n)) (not (p)))"
-    assert "deletes (p)" in str(clash(never, ":precondition (p) :effect (q)"))
-
-
-def test_conditional_adds_win_over_deletes_in_the_footprint() -> None:
-    """``(not (p))`` with ``(when (q) (p))``: counted as adding p, although q is false and p goes."""
-    assert clash(":effect (and (not (p)) (when (q) (p)))", ":precondition (p) :effect (n)") is None
-
-
-def test_the_condition_of_an_effect_counts_as_required() -> None:
-    assert "requires" in str(clash(DELETES_P, ":effect (when (p) (n))"))
-    assert "requires to be false" in str(clash(ADDS_Q, ":effect (when (not (q)) (n))"))
-
-
-def test_a_negative_formula_of_the_acting_robot_is_left_in_the_condition_of_an_effect() -> None:
-    """There it may be false, so that the other literals of the disjunction count; in a precondition
-    it is true.
-    """
-    assert "requires" in str(clash(DELETES_P, ":effect (when (or (not (two ?r)) (p)) (n))"))
-    assert clash(DELETES_P, ":precondition (or (not (two ?r)) (p)) :effect (n)") is None
-
-
-def test_an_effect_that_can_never_fire_touches_nothing() -> None:
-    assert clash(DELETES_P, ":effect (and (n) (when (and (p) (z)) (n)) (when (z) (p)))") is None
-
-
-@pytest.mark.parametrize(
-    "formula", ["(or (p) (q))", "(or (q) (not (not (p))))", "(imply (not (p)) (q))"]
-)
-def test_every_literal_of_a_disjunction_counts(formula: str) -> None:
-    assert "deletes (p)" in str(clash(DELETES_P, f":precondition {formula} :effect (n)"))
-    assert "adds (q)" in str(clash(ADDS_Q, ":precondition (or (p) (not (q))) :effect (n)"))
-
-
-@pytest.mark.parametrize(
-    "formula",
-    [
-        "(or (s) (p))",
-        "(or (p) (not (z)))",
-        "(or (p) (= ?r ?r))",
-        "(imply (z) (p))",
-        "(forall (?t - (either robot thing)) (or (p) (not (z))))",
-        "(or (s) (and (p) (q)))",
-        # Nothing is both a robot and a thing: no such subaction, so the negative formula is true.
-        "(or (p) (not (other ?r ?r)))",
-    ],
-)
-def test_what_statics_equalities_and_types_decide_requires_nothing(formula: str) -> None:
-    assert clash(DELETES_P, f":precondition {formula} :effect (n)") is None
-
-
-@pytest.mark.parametrize(
-    "formula", ["(or (z) (p))", "(and (s) (p))", "(or (p) (not (= ?r ?r)))", "(or (p) (not (p)))"]
-)
-def test_only_statics_equalities_and_types_are_simplified(formula: str) -> None:
-    assert "deletes (p)" in str(clash(DELETES_P, f":precondition {formula} :effect (n)"))
 
 
 def test_quantified_literals_count_for_every_object_of_the_type() -> None:
@@ -498,46 +466,36 @@ def things(init: str) -> World:
     )
 
 
-def test_conditions_are_read_in_the_state_before() -> None:
-    assert after(things("(p)"), "(swap r1)", None) == {"q"}
-    assert after(things("(p) (q)"), "(swap r1)", None) == {"p", "q"}
-
-
-def test_adding_wins_over_deleting_within_one_action() -> None:
-    assert after(things(""), "(keep r1)", None) == {"p"}
-
-
-def test_nested_effects_and_hidden_variables() -> None:
-    """clear's inner ``?t`` ranges over boxes and has nothing to do with its argument."""
-    start = "(on r2) (on t) (on b) (on c)"
-    assert after(things(start), "(clear r1 t)", None) == {"on r2", "on t", "on b", "on c"}
-    # big is static here, and only the boxes are asked.
-    assert after(things(start + " (big t)"), "(clear r1 t)", None) >= {"on r2", "on b", "big t"}
-    assert after(things(start + " (big c)"), "(clear r1 t)", None) == {"on t", "big c"}
-
-
-def test_a_condition_speaks_of_the_variables_around_it() -> None:
-    """wipe: if anything at all is big, every box is cleared."""
-    assert after(things("(on t) (on b) (big t)"), "(wipe r1)", None) == {"on t", "big t"}
-    assert after(things("(on t) (on b)"), "(wipe r1)", None) == {"on t", "on b"}
-
-
-def test_a_hidden_variable_in_a_condition() -> None:
-    assert after(things(""), "(put r1 t)", None) == {"on t", "q"}
-    assert after(things("(on t)"), "(put r1 t)", None) == {"on t", "q"}
-    assert after(things("(on b)"), "(put r1 t)", None) == {"on t", "on b"}
+@pytest.mark.parametrize(
+    ("init", "label", "result"),
+    [
+        # Conditions are read in the state before.
+        ("(p)", "(swap r1)", "(q)"),
+        ("(p) (q)", "(swap r1)", "(p) (q)"),
+        # Adding wins over deleting within one action.
+        ("", "(keep r1)", "(p)"),
+        # The inner ?t of clear ranges over boxes and has nothing to do with its argument; big is
+        # static here, and only the boxes are asked.
+        ("(on r2) (on t) (on b) (on c)", "(clear r1 t)", "(on r2) (on t) (on b) (on c)"),
+        ("(on r2) (on t) (on b) (big t)", "(clear r1 t)", "(on r2) (on t) (on b) (big t)"),
+        ("(on r2) (on t) (on b) (on c) (big c)", "(clear r1 t)", "(on t) (big c)"),
+        # If anything at all is big, wipe clears every box.
+        ("(on t) (on b) (big t)", "(wipe r1)", "(on t) (big t)"),
+        ("(on t) (on b)", "(wipe r1)", "(on t) (on b)"),
+        # A hidden variable in a condition.
+        ("", "(put r1 t)", "(on t) (q)"),
+        ("(on t)", "(put r1 t)", "(on t) (q)"),
+        ("(on b)", "(put r1 t)", "(on t) (on b)"),
+    ],
+)
+def test_effects(init: str, label: str, result: str) -> None:
+    assert after(things(init), label, None) == {*result[1:-1].split(") (")}
 
 
 def test_effects_of_all_robots_happen_together() -> None:
-    setting = rooms()
-    assert after(setting, "(move r1 a b)", "(move r2 b c)") == {"at r1 b", "at r2 c"}
-    assert after(setting, None, None) == {"at r1 a", "at r2 b"}
-
-
-def test_a_robot_moves_from_where_it_is() -> None:
-    reason = one_step(rooms(), "(move r1 b a)", None)
-    assert reason is not None
-    assert "(at r1 b) is false" in reason
+    assert after(rooms(), "(move r1 a b)", "(move r2 b c)") == {"at r1 b", "at r2 c"}
+    assert after(rooms(), None, None) == {"at r1 a", "at r2 b"}
+    assert "(at r1 b) is false" in str(one_step(rooms(), "(move r1 b a)", None))
 
 
 # -- joint-action PDDL

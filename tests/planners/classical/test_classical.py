@@ -13,11 +13,7 @@ from hypothesis import strategies as st
 from planners import classical as plain_module
 from planners.classical import ClassicalTask, compile_classical, to_pddl
 from planners.joint.model import JointModel, PlanningTask
-from planners.loading import build
-from planners.pddl.domain import parse_domain
 from planners.pddl.model_options import Cost, ModelOptions
-from planners.pddl.problem import parse_problem
-from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, ProvedImpossible
@@ -40,6 +36,7 @@ from tests.support.classical_models import (
 )
 from tests.support.naive_classical import holds, successors
 from tests.support.random_pddl import KINDS, Kind, random_model
+from tests.support.texts import model_of, parsed
 
 
 def ours(model: JointModel, task: PlanningTask) -> tuple[int, int] | None:
@@ -143,9 +140,7 @@ def test_an_unsolvable_task_stays_unsolvable(goal: str, form: str) -> None:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_remembered_actions_change_no_cost(form: str) -> None:
-    domain = parse_domain(Source("domain.pddl", CORRIDOR))
-    problem = parse_problem(Source("problem.pddl", CORRIDOR_TASK), domain)
-    loaded = build(domain, [problem], ModelOptions(remember_actions=True))
+    loaded = model_of(CORRIDOR, CORRIDOR_TASK, ModelOptions(remember_actions=True))
     assert solved(compile_classical(loaded.model, loaded.tasks[0], FORMS[form])) == (6, 0)
 
 
@@ -206,8 +201,7 @@ def test_the_pddl_says_the_same(name: str, form: str) -> None:
     loaded = read(*MODELS[name])
     plain = compile_classical(loaded.model, loaded.tasks[0], FORMS[form])
     domain_text, problem_text = to_pddl(plain)
-    domain = parse_domain(Source("plain.pddl", domain_text))
-    problem = parse_problem(Source("plain-task.pddl", problem_text), domain)
+    domain, problem = parsed(domain_text, problem_text)
     assert len(domain.predicates) == len(plain.facts)
     assert len(domain.schemas) == len(plain.actions)
     assert len(problem.init) == len(plain.init)

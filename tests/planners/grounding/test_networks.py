@@ -12,13 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planners.check.rules import Rules
-from planners.loading import PlanningInstance, build
-from planners.pddl import parse_domain, parse_problem
+from planners.loading import PlanningInstance
+from planners.pddl import parse_domain
 from planners.pddl.lifted import Atom, Domain
 from planners.pddl.sexpr import Source
 from planners.system.errors import BadInput
 from tests.support.joint_twin import check_model
 from tests.support.random_pddl import RandomModel, random_model
+from tests.support.texts import model_of
 
 ROWING = """(define (domain rowing) (:types robot boat place)
   (:predicates (on ?r - robot ?b - boat) (moored ?b - boat ?p - place) (lit))
@@ -32,8 +33,7 @@ CREW = """(define (problem crew) (:domain rowing)
 
 
 def rowing(network: str) -> PlanningInstance:
-    domain = parse_domain(Source("rowing", ROWING.replace("NETWORK", network)))
-    return build(domain, [parse_problem(Source("crew", CREW), domain)])
+    return model_of(ROWING.replace("NETWORK", network), CREW)
 
 
 def crews(network: str) -> set[tuple[str, ...]]:
@@ -79,24 +79,14 @@ def test_bounds(bounds: str, numbers: set[int]) -> None:
 )
 def test_types_that_some_object_may_share(parameter: str) -> None:
     network = constraint("v", "(2 2)", "row").replace("?b - boat", parameter)
-    text = ROWING.replace("robot boat place", "robot place tub - boat boat - vessel").replace(
-        "NETWORK", network
-    )
-    domain = parse_domain(Source("rowing", text))
-    build(domain, [parse_problem(Source("crew", CREW), domain)])
+    types = "robot place tub - boat boat - vessel"
+    assert model_of(ROWING.replace("robot boat place", types).replace("NETWORK", network), CREW)
 
 
 def test_an_object_of_two_types_matches() -> None:
     network = constraint("v", "(2 2)", "row").replace("?b - boat", "?b - place")
-    domain = parse_domain(Source("rowing", ROWING.replace("NETWORK", network)))
-    build(
-        domain,
-        [
-            parse_problem(
-                Source("crew", CREW.replace("b - boat", "b - (either boat place)")), domain
-            )
-        ],
-    )
+    crew = CREW.replace("b - boat", "b - (either boat place)")
+    assert model_of(ROWING.replace("NETWORK", network), crew)
 
 
 def test_without_a_network_anybody_rows() -> None:
@@ -144,7 +134,7 @@ def test_dependence_is_needed_by_the_second_only() -> None:
     ],
 )
 def test_a_wrong_network(network: str, message: str) -> None:
-    with pytest.raises(BadInput, match=r"rowing:6:\d+") as error:
+    with pytest.raises(BadInput, match=r"domain.pddl:6:\d+") as error:
         rowing(network)
     assert message in str(error.value)
 
@@ -197,23 +187,18 @@ def test_an_action_that_satisfies_both_itself_is_still_linked() -> None:
     """(v, w) dependent and `a` in both: it needs nobody, but it is meant to be done together with
     the others in v.
     """
-    domain = parse_domain(
-        Source(
-            "d",
-            """(define (domain d) (:types robot) (:predicates (p) (q) (n))
+    loaded = model_of(
+        """(define (domain d) (:types robot) (:predicates (p) (q) (n))
       (:action a :agent ?r - robot :parameters () :effect (and (not (p)) (q)))
       (:action b :agent ?r - robot :parameters () :precondition (p) :effect (n))
       (:concurrency-constraint v :parameters () :bounds (1 inf) :actions ((a) (b)))
       (:concurrency-constraint w :parameters () :bounds (1 inf) :actions ((a)))
       (:positive-dependence v w))""",
-        )
+        "(define (problem p) (:domain d) (:objects r1 r2 - robot) (:init (p)) (:goal (q)))",
     )
-    text = "(define (problem p) (:domain d) (:objects r1 r2 - robot) (:init (p)) (:goal (q)))"
-    problem = parse_problem(Source("p", text), domain)
-    loaded = build(domain, [problem])
     steps = loaded.model.successors(loaded.tasks[0].init[None, :])
     found = {loaded.model.texts(row) for row in steps.labels}
-    rules = Rules.of(domain, problem, loaded.team)
+    rules = Rules(loaded.domain, loaded.problems[0], loaded.team)
     assert ("(a r1)", "(b r2)") in found
     assert rules.broken_rule(frozenset({Atom("p", ())}), ("(a r1)", "(b r2)")) is None
 

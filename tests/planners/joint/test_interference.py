@@ -61,7 +61,7 @@ def judged(loaded: PlanningInstance, first: str, second: str) -> bool:
     labels = {i: model.label_number(i, first), j: model.label_number(j, second)}
     assert own[labels[min(i, j)], labels[max(i, j)]] == allowed
     assert (b not in clashes(model.actions)[a]) == allowed
-    rules = Rules.of(loaded.domain, loaded.problems[0], loaded.team)
+    rules = Rules(loaded.domain, loaded.problems[0], loaded.team)
     one, other = rules.instance(first), rules.instance(second)
     assert not isinstance(one, str)
     assert not isinstance(other, str)

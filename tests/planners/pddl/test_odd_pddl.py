@@ -9,6 +9,7 @@ way.
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -376,10 +377,7 @@ CASES = {
         change(COSTLY_PROBLEM, (" 3)", " 3.5)")),
         ("--cost", "makespan+cost"),
     ),
-}
-
-#: Cases that are wrong today.  Strict: whoever mends one moves it up to CASES.
-ONCE_WRONG = {
+    # once wrong
     "untyped agent before typed parameters": Case(2, domain((":agent ?r - robot", ":agent ?r"))),
     "= among the predicates": Case(
         2, change(where("(= ?r ?r)"), ("(door ?x ?y - room)", "(door ?x ?y - room) (= ?x ?y)"))
@@ -436,27 +434,18 @@ ONCE_WRONG = {
 }
 
 
-def _run(case: Case, command: Command, folder: Path) -> None:
-    d, p = folder / "d.pddl", folder / "p.pddl"
+@pytest.mark.parametrize("name", CASES)
+def test_odd(name: str, coordlang: Command, tmp_path: Path) -> None:
+    case, d, p = CASES[name], tmp_path / "d.pddl", tmp_path / "p.pddl"
     d.write_bytes(case.domain.encode())
     p.write_bytes(case.problem.encode())
-    outcome = command("plans", d, p, "--count", *case.options)
+    outcome = coordlang("plans", d, p, "--count", *case.options)
     if isinstance(case.expected, int):
         assert (outcome.code, outcome.out) == (0, f"{case.expected}\n"), outcome.err
     else:
         code, message = case.expected
         assert outcome.code == code, outcome
         assert message in outcome.err
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_odd(name: str, coordlang: Command, tmp_path: Path) -> None:
-    _run(CASES[name], coordlang, tmp_path)
-
-
-@pytest.mark.parametrize("name", ONCE_WRONG)
-def test_once_wrong(name: str, coordlang: Command, tmp_path: Path) -> None:
-    _run(ONCE_WRONG[name], coordlang, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -473,10 +462,7 @@ def test_once_wrong(name: str, coordlang: Command, tmp_path: Path) -> None:
 )
 def test_names_that_are_one_name_to_unicode(one: str, other: str, is_refused: bool) -> None:
     text = PROBLEM.replace("r1", one).replace("r2", other)
-    if is_refused:
-        with pytest.raises(BadInput, match="are one name to Unicode"):
-            parse(Source("problem.pddl", text))
-    else:
+    with pytest.raises(BadInput, match="are one name to Unicode") if is_refused else nullcontext():
         parse(Source("problem.pddl", text))
 
 
