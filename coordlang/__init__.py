@@ -63,24 +63,15 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
+#: Functions that are commands, too: each in the module of its name.
+_COMMANDS = (
+    *("inspect", "plans", "check", "coordination", "build", "verify", "lift", "ground", "say"),
+    *("understand", "plan", "choices", "simulate", "explain", "export"),
+)
 #: Module -> the public names that it defines.
 _DEFINED_IN = {
+    **{f"coordlang.commands.{name}": (name,) for name in _COMMANDS},
     "coordlang.commands.inputs": ("load", "load_language"),
-    "coordlang.commands.inspect": ("inspect",),
-    "coordlang.commands.plans": ("plans",),
-    "coordlang.commands.check": ("check",),
-    "coordlang.commands.coordination": ("coordination",),
-    "coordlang.commands.build": ("build",),
-    "coordlang.commands.verify": ("verify",),
-    "coordlang.commands.lift": ("lift",),
-    "coordlang.commands.ground": ("ground",),
-    "coordlang.commands.say": ("say",),
-    "coordlang.commands.understand": ("understand",),
-    "coordlang.commands.plan": ("plan",),
-    "coordlang.commands.choices": ("choices",),
-    "coordlang.commands.simulate": ("simulate",),
-    "coordlang.commands.explain": ("explain",),
-    "coordlang.commands.export": ("export",),
     "coordlang.language.words": ("Language",),
     "coordlang.execution.monitor": ("Monitor", "MonitorError", "NotAllowed", "NotPossible"),
     "coordlang.execution.fitting_plans": ("NoPlanFits",),
@@ -100,44 +91,7 @@ _DEFINED_IN = {
 }
 _MODULE_OF = {name: module for module, names in _DEFINED_IN.items() for name in names}
 
-__all__ = [
-    "BadInput",
-    "CoordlangError",
-    "Inseparable",
-    "Language",
-    "Monitor",
-    "MonitorError",
-    "NoPlanFits",
-    "NotAPlan",
-    "NotAllowed",
-    "NotOptimal",
-    "NotPossible",
-    "OutOfMemory",
-    "OutOfTime",
-    "ProvedImpossible",
-    "Refuted",
-    "Unsupported",
-    "UsageError",
-    "__version__",
-    "build",
-    "check",
-    "choices",
-    "coordination",
-    "explain",
-    "export",
-    "ground",
-    "inspect",
-    "lift",
-    "load",
-    "load_language",
-    "plan",
-    "plans",
-    "say",
-    "simulate",
-    "time_limit",
-    "understand",
-    "verify",
-]
+__all__ = [*_MODULE_OF, "__version__"]
 
 
 def why_not_here() -> str | None:

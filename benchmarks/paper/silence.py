@@ -16,8 +16,7 @@ from benchmarks.frame import markdown
 from benchmarks.paper.plots import MARKERS, Lines, Series, lines
 from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
 from benchmarks.paper.suite import CORRIDOR, OTHERS, ROWS, World
-from coordlang.commands.building import build_language
-from coordlang.commands.tolerating import job_of
+from coordlang.commands.building import Making, build_language, job_for_few_words
 from coordlang.language.candidates import Candidates
 from coordlang.language.sentences import sentence_counts
 from coordlang.language.tolerance import percent
@@ -28,7 +27,6 @@ from coordlang.vocabulary.few_words import few_words
 from coordlang.vocabulary.flexibility_bound import bits_bounds
 from coordlang.vocabulary.job import Assignment
 from planners.joint.tables import Ints
-from planners.parallel.workers import Workers
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 
@@ -77,7 +75,7 @@ def _points(
     candidates: Candidates, spaces: Sequence[PlanSpace], seed: int, most: int
 ) -> Iterator[Result]:
     """One number of words after the other; the last is that of a coordination language."""
-    job = job_of(candidates, Workers(), seed=seed)
+    job = job_for_few_words(Making(candidates), seed)
     language, size = _language(candidates, job.states, seed)
     job = replace(job, incumbent=language)
     start: Assignment | None = None

@@ -10,8 +10,7 @@ from pathlib import Path
 from benchmarks.frame import DOMAINS
 from benchmarks.paper.recipe import Record
 from benchmarks.paper.reported import TABLE_1
-from coordlang.commands.building import build_language
-from coordlang.commands.tolerating import build_few_words
+from coordlang.commands.building import build_few_words, build_language
 from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
 from coordlang.language.listed import ListedTask
 from coordlang.language.task_file import read_task_file

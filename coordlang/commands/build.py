@@ -7,36 +7,21 @@ import json
 import os
 import sys
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from importlib.metadata import version
 from os import PathLike, fspath
 from time import monotonic, perf_counter
 from typing import Any
 
 import coordlang
-from coordlang.commands.build_text import built_text
-from coordlang.commands.building import EFFORT, MethodOptions, build_language
-from coordlang.commands.built import Built
-from coordlang.commands.command import command_of
+from coordlang.commands.building import build_few_words, build_language
+from coordlang.commands.built import Built, built_text
 from coordlang.commands.failure import UNPROVED, code_of_interrupt, why_stopped
-from coordlang.commands.inputs import PlanningInput, read_plain_language, read_planning
-from coordlang.commands.keywords import with_options
-from coordlang.commands.options import (
-    DomainSource,
-    Jobs,
-    LanguageSource,
-    ProblemSource,
-    Progress,
-    Source,
-    TasksSource,
-    Unsolvable,
-    json_option,
-    output_option,
-)
+from coordlang.commands.inputs import Arguments, PlanningInput, public, read_language, say_size
+from coordlang.commands.options import EFFORT, LanguageSource
+from coordlang.commands.records import BuildOptions
 from coordlang.commands.repairing import repair_language
 from coordlang.commands.terminal import echo, line_width, note_single_robot, working
-from coordlang.commands.tolerating import build_few_words
-from coordlang.commands.workers import opened_workers, say_size
 from coordlang.language.candidates import Candidates
 from coordlang.language.file import to_bytes, write_language
 from coordlang.language.recorded import check_domain, with_recorded
@@ -48,89 +33,14 @@ from planners.system.errors import OutOfTime, ProvedImpossible, UsageError
 from planners.system.limits import run_until_stopped, start_clock, stop_clock, time_left
 from planners.system.messages import visible
 from planners.system.notebook import counted
-from planners.system.options import group, option
 from planners.system.writing import is_device, remove_file
 
 #: Share of the time that a search leaves for its certificate.
 _FOR_CERTIFICATE = 0.25
 
 
-@dataclass(frozen=True, slots=True)
-class BuildOptions:
-    """What `build` can be asked for: a method, or a number of words, or a language to repair."""
-
-    tasks: TasksSource | None = option(
-        None,
-        "Candidate tasks: every pair of reachable states, or a task file (default: the problems' "
-        "own).",
-        "all|FILE",
-    )
-    way: MethodOptions = group(MethodOptions)
-    words: int | None = option(
-        None,
-        "At most K words, in place of a method: those under which robots that choose by themselves "
-        "fail least often.  1: silence.",
-        "K",
-        least=1,
-    )
-    worst: bool = option(
-        False, "With --words: minimise how often they fail in the worst task, not on average."
-    )
-    start: LanguageSource | None = option(
-        None,
-        "Repair this language in place of building one: as few states as possible change their "
-        "word.",
-        "LANGUAGE",
-    )
-    unsolvable: Unsolvable = option(
-        "fail",
-        "What to do about candidate tasks without plans: stop (exit 11), or name and leave them "
-        "out.",
-    )
-    output: str = output_option(
-        "The language file; .json or .json.gz, - for stdout.", "LANGUAGE", required=True
-    )
-    certificate: str | None = option(
-        None,
-        "Also write why fewer words do not suffice, for verify --certificate.",
-        "FILE",
-        only="cli",
-        is_output=True,
-    )
-    as_json: bool = json_option("Print the figures as one JSON object.")
-    reserve: float = option(
-        0.0,
-        "The share of a time limit's rest that a search, once there is a language, leaves for its "
-        "certificate.",
-        only="python",
-    )
-    progress: Progress | None = option(
-        None, "Called with a line of text when a phase begins.", only="python"
-    )
-    work: Jobs = group(Jobs)
-    source: Source = group(Source)
-    given: frozenset[str] = frozenset()
-
-    def __post_init__(self) -> None:
-        if self.words is None and self.worst:
-            raise UsageError("--worst belongs to --words", remedy="Add --words K.")
-        ways = self.given & {"method", "alpha_only", "prefer"}
-        if self.words is not None and (ways or self.certificate or self.start is not None):
-            raise UsageError(
-                "--words finds the words in its own way: without --method or --certificate",
-                remedy="Leave out --method, --alpha-only, --prefer, --start and --certificate.",
-            )
-        if self.start is not None and ways:
-            raise UsageError(
-                "--start changes the words of a language, and no method makes new ones",
-                remedy="Leave out --method, --alpha-only and --prefer, or --start.",
-            )
-
-
-@with_options(BuildOptions)
-def build(
-    domain: DomainSource | None = None, *problems: ProblemSource, options: BuildOptions
-) -> Built:
+@public(BuildOptions)
+def build(arguments: Arguments, options: BuildOptions) -> Built:
     """Build a coordination language for candidate tasks, and verify it by definition.
 
     Where ``words`` are too few for one, the result is none, and says so (``failures``).  A language
@@ -147,9 +57,9 @@ def build(
         If a limit was hit before there was any verified language; later the language so far is
         returned, with ``stopped`` set.
     """
-    start, seed, say = options.start, options.way.seed, options.progress or _silent
+    start = options.start
     begin, deadline = perf_counter(), monotonic() + time_left()
-    files = read_planning(domain, problems, options.source)
+    files = arguments.read()
     if start is None:
         candidates = _candidates(files, options, files.source.model)
     else:
@@ -157,29 +67,23 @@ def build(
     seconds = {"space": perf_counter() - begin}
     say_size(candidates, options.work.note or options.progress)
     fewest = requiring(candidates.spaces) if candidates.kind != "all" else None
-    with opened_workers(options.work) as workers:
+    with options.work.opened() as workers:
+        how: dict[str, Any] = {"workers": workers, "seed": options.way.seed}
+        if options.progress is not None:
+            how["progress"] = options.progress
         if options.words is not None:
-            built = build_few_words(
-                candidates,
-                options.words,
-                worst=options.worst,
-                seed=seed,
-                progress=say,
-                workers=workers,
-            )
+            built = build_few_words(candidates, options.words, worst=options.worst, **how)
         elif start is not None:
-            built = repair_language(candidates, old, seed=seed, progress=say, workers=workers)
+            built = repair_language(candidates, old, **how)
         else:
             reserve = _FOR_CERTIFICATE if options.certificate else options.reserve
-            built = build_language(
-                candidates, **asdict(options.way), reserve=reserve, progress=say, workers=workers
-            )
+            built = build_language(candidates, reserve=reserve, **asdict(options.way) | how)
     seconds |= built.seconds
     producer = {
         "program": "coordlang",
         "version": coordlang.__version__,
         "arguments": _arguments(options),
-        "seed": seed,
+        "seed": options.way.seed,
         "solver": f"python-sat {version('python-sat')}",
         "seconds": {name: round(value, 3) for name, value in seconds.items()},
     }
@@ -201,7 +105,12 @@ def _to_repair(
     start: LanguageSource, files: PlanningInput, options: BuildOptions
 ) -> tuple[Language, Candidates]:
     """Return the language and the tasks that it is to serve."""
-    language, position = read_plain_language(start)
+    language, position = read_language(start)
+    if not isinstance(language, Language):
+        raise UsageError(
+            f"{position} is a lifted language",
+            remedy="`coordlang ground` makes it an ordinary one, of one problem.",
+        )
     check_domain(language, files.domain, position)
     if files.source.model.slack or (language.tolerance is not None and language.tolerance.slack):
         raise UsageError(
@@ -227,19 +136,8 @@ def _with_producer(language: Language, producer: Mapping[str, Any]) -> Language:
     return replace(language, provenance=replace(language.provenance, producer=producer))
 
 
-def _silent(_: str) -> None:
-    """Report nothing."""
-
-
-@command_of(build, "DOMAIN PROBLEMS...", doing="finding all optimal plans")
-def command(built: Built, options: BuildOptions) -> int:
-    """Build a coordination language and verify it before it is written.
-
-    With --words K: words that may be too few for that, and how often robots then fail.
-
-    Exit 0: written, with the proof that the method promises.  3: written without it (a limit was
-    hit).
-    """
+def show(built: Built, options: BuildOptions) -> int:
+    """Write the language and its certificate, and say what was found."""
     output, certificate = options.output, options.certificate
     for name in built.skipped:
         echo(f"coordlang: left out, it has no plan: {name}", err=True)

@@ -4,85 +4,127 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
+from functools import partial
+from time import perf_counter
 
-from coordlang.commands.built import Built, Clock, Verified, language_of
+from coordlang.commands.built import Built, language_of
+from coordlang.commands.options import BuildPreference, MethodOptions
 from coordlang.explanation.simple import simple
 from coordlang.language.candidates import Candidates, require_solvable
+from coordlang.language.partition import Partition
 from coordlang.required.all_differences import differences
-from coordlang.vocabulary import EXACT, METHODS, Job, Outcome
+from coordlang.required.divergences import FirstDifferences, states_on_plans, without_divergences
+from coordlang.required.failures import Failures
+from coordlang.required.miscoordination import Inseparable
+from coordlang.verification.by_definition import Verdict
+from coordlang.verification.candidates import verify_candidates
+from coordlang.vocabulary import METHODS, Job, Outcome
+from coordlang.vocabulary.few_words import few_words
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.greedy import first_language
 from coordlang.vocabulary.hidden_slack import hidden_differences
+from coordlang.vocabulary.job import Assignment
 from planners.parallel.workers import Workers
 from planners.search.portions import require_room
 from planners.system.errors import OutOfMemory, UsageError
 from planners.system.limits import little_time_after, run_until_stopped, start_clock, time_left
-from planners.system.options import option, record_from
+from planners.system.options import record_from
 
-#: Effort of ``--method best`` that takes a second or two on small tasks.
-EFFORT = 10
-#: How words are found: a key of `coordlang.vocabulary.METHODS`.
-Method = Literal["best", "greedy", "separating", "minimal", "exhaustive"]
-#: What the language should be like, of those with the fewest words, by the value of ``--prefer``.
-BuildPreference = Literal["flexible", "simple"]
 PREFERENCES: Mapping[BuildPreference, Callable[[Job, Outcome], Outcome]] = {
     "flexible": flexible,
     "simple": simple,
 }
+#: What a file says of how a limited number of words was found.
+FEW_WORDS = "few-words"
 
 
-@dataclass(frozen=True, slots=True)
-class MethodOptions:
-    """How the words of a language are found.
+class Making:
+    """Candidate tasks on their way to a language: who works, the time by phase, what is verified.
 
-    Raises `UsageError` for a value that the method does not support.
+    Attributes
+    ----------
+    candidates, workers, progress
+        The tasks, who does jobs, and what is called with a line of text now and then.
+    seconds
+        By phase.
+    partition_of
+        Makes a partition of what a method finds.
+    last
+        The partition that was verified last; None before there is one.
+
+    Raises
+    ------
+    ProvedImpossible
+        There is no candidate task.
     """
 
-    method: Method = option(
-        "best",
-        "best: few words within some effort, and how many are needed at least.  greedy: fast.  "
-        "separating: fewest words that part plans where they differ first or last.  minimal: "
-        "fewest words at all, with proof.  exhaustive: brute force.",
-    )
-    effort: int = option(
-        EFFORT,
-        "best: what the search for fewer words may spend, in thousands of conflicts of its solver.",
-        "N",
-        least=0,
-    )
-    seed: int = option(0, "Seed of all random choices.", least=0)
-    alpha_only: bool = option(
-        False, "separating: part plans where they differ first, never where last."
-    )
-    prefer: BuildPreference | None = option(
-        None,
-        "Of the languages with the fewest words that were found one whose ..  "
-        "flexible: sentences leave many plans open.  simple: words have short formulas.",
-    )
+    def __init__(
+        self,
+        candidates: Candidates,
+        workers: Workers | None = None,
+        progress: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        require_solvable(candidates)
+        self.candidates, self.workers, self.progress = candidates, workers or Workers(), progress
+        self.seconds: dict[str, float] = {}
+        self.partition_of: Callable[[Assignment], Partition] = partial(
+            Partition.of_states, candidates.rows
+        )
+        self.last: Assignment | None = None
+        self._known: list[tuple[Assignment, Partition, Verdict]] = []
+        self._since = perf_counter()
 
-    def __post_init__(self) -> None:
-        if self.alpha_only and self.method != "separating":
-            raise UsageError(
-                "--alpha-only belongs to --method separating",
-                remedy="Add --method separating, or leave out --alpha-only.",
-            )
-        if self.effort != EFFORT and self.method != "best":
-            raise UsageError(
-                "--effort belongs to --method best",
-                remedy="Leave out --effort, or --method.",
-            )
-        if self.prefer and self.method in ("greedy", "separating"):
-            raise UsageError(
-                f"--prefer {self.prefer} belongs to --method best, minimal or exhaustive",
-                remedy=f"Leave out --method {self.method}, or --prefer.",
-            )
+    def note(self, phase: str) -> None:
+        """Say that a phase has ended."""
+        now = perf_counter()
+        self.seconds[phase] = now - self._since
+        self._since = now
 
-    @property
-    def is_exact(self) -> bool:
-        """Whether the method finds the least number of words."""
-        return self.method in EXACT
+    def differences(self) -> FirstDifferences:
+        """Where coordination is required, and how plans then part.
+
+        Raises `Inseparable` if there is no language over states.
+        """
+        find = hidden_differences if self.candidates.model.hides_slack else differences
+        return find(self.candidates, self.workers, self.progress)
+
+    def job(self, found: FirstDifferences, options: MethodOptions) -> Job:
+        """What words are to be found, for plans that part like that."""
+        return Job(
+            self.candidates,
+            tuple(found.states.tolist()),
+            found,
+            seed=options.seed,
+            alpha_only=options.alpha_only,
+            effort=options.effort,
+            progress=self.progress,
+            check=self.check,
+            workers=self.workers,
+        )
+
+    def verdict(self, partition: Partition) -> Verdict:
+        """Whether a partition is a coordination language, by definition."""
+        return verify_candidates(partition, self.candidates, self.workers, self.progress)
+
+    def check(self, words: Assignment) -> None:
+        """Verify what a method found; `AssertionError` if it is no language: it has erred."""
+        partition = self.partition_of(words)
+        verdict = self.verdict(partition)
+        if not verdict.holds:
+            raise AssertionError(
+                f"a method returned what is no coordination language: {verdict.witness}"
+            )
+        self._known.append((words, partition, verdict))
+        self.last = words
+
+    def knows(self, words: Assignment) -> bool:
+        """Whether this very partition was verified."""
+        return any(known is words for known, _, _ in self._known)
+
+    def verified(self, words: Assignment) -> tuple[Partition, Verdict]:
+        """A partition that was verified, and the verdict."""
+        return next((partition, v) for known, partition, v in self._known if known is words)
 
 
 def build_language(
@@ -122,53 +164,128 @@ def build_language(
         The options contradict each other.
     """
     options = record_from(MethodOptions, {"method": method, **way}, "build_language")
-    require_solvable(candidates)
-    workers = workers or Workers()
-    clock = Clock()
-    hidden = candidates.model.hides_slack
-    if hidden and method in ("greedy", "separating"):
+    making = Making(candidates, workers, progress)
+    if candidates.model.hides_slack and method in ("greedy", "separating"):
         raise UsageError(
             f"--method {method} parts plans where their states first differ, and with slack they "
             "may differ in where they wait",
             remedy="Add --words-see-slack, by which states say how much is left, or --method "
             "minimal.",
         )
-    found = (hidden_differences if hidden else differences)(candidates, workers, progress)
-    clock.note("coordination")
-    states = tuple(found.states.tolist())
-    verified = Verified(candidates, workers, progress)
-    job = Job(
-        candidates,
-        states,
-        found,
-        seed=options.seed,
-        alpha_only=options.alpha_only,
-        effort=options.effort,
-        progress=progress,
-        check=verified.check,
-        workers=workers,
-    )
+    found = making.differences()
+    making.note("coordination")
+    job = making.job(found, options)
     if method != "greedy":
-        job = _with_incumbent(_within_room(job, options.method))
-        clock.note("incumbent")
+        job = _within_room(job, method)
+        # It is verified now, for there is no time when an anytime method is stopped.
+        job = replace(job, incumbent=first_language(job))
+        making.check(job.incumbent or {})
+        making.note("incumbent")
         if reserve:
             start_clock((1 - reserve) * time_left())
     progress(f"building words ({method})")
-    outcome = _outcome(job, options, verified, clock)
-    partition, verdict = verified.of(outcome.partition)
-    clock.note("verify")
+    outcome = _outcome(job, options, making)
+    partition, verdict = making.verified(outcome.partition)
+    making.note("verify")
     return Built(
         language_of(partition, job, method, outcome.lower_bound),
         job,
         verdict,
         outcome.figures,
-        clock.seconds,
+        making.seconds,
         outcome.stopped,
         outcome.refuting,
     )
 
 
-def _within_room(job: Job, method: Method) -> Job:
+def build_few_words(
+    candidates: Candidates,
+    words: int,
+    *,
+    worst: bool = False,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
+    workers: Workers | None = None,
+) -> Built:
+    """Find words, at most so many, under which robots that choose by themselves fail least often.
+
+    Where they never do, the words are verified by definition, as every coordination language.
+
+    Parameters
+    ----------
+    candidates
+        The tasks that they are for.  Plans of them may be inseparable.
+    words
+        The most words; 1 is silence.
+    worst
+        Minimise how often robots fail in the worst task, not over all tasks.
+    seed
+        Of all random choices.
+    progress, workers
+        As for `build_language`.
+
+    Raises
+    ------
+    ProvedImpossible
+        There is no candidate task.
+    TooManyToCount
+        Not even how often robots fail in silence can be counted.
+    """
+    making = Making(candidates, workers, progress)
+    require_room(candidates.source)
+    job = job_for_few_words(making, seed)
+    making.note("coordination")
+    found = few_words(job, words, worst=worst)
+    making.note("vocabulary")
+    partition = making.partition_of(found.partition)
+    verdict = Verdict(False, candidates.count, 0, None)
+    stopped = found.stopped
+    if not found.failures.worst:
+        with little_time_after(stopped):
+            making.check(found.partition)
+        partition, verdict = making.verified(found.partition)
+        if not isinstance(stopped, KeyboardInterrupt):
+            stopped = None  # no search was left where nothing fails
+    making.note("verify")
+    failures = Failures(found.failures.mean, found.failures.worst)
+    figures = {
+        "silence_mean": float(found.silence.mean),
+        "silence_worst": float(found.silence.worst),
+        "partitions_measured": found.measured,
+        "partitions_recounted": found.recounted,
+        "least_of_all_partitions": found.is_best,
+    }
+    return Built(
+        language_of(
+            partition, job, FEW_WORDS, job.lower_bound, holds=verdict.holds, failures=failures
+        ),
+        job,
+        verdict,
+        figures,
+        making.seconds,
+        stopped,
+        failures=failures,
+        few_words=found,
+    )
+
+
+def job_for_few_words(making: Making, seed: int = 0) -> Job:
+    """What words are looked for, with a language as the incumbent if there is one.
+
+    Where plans are inseparable there is none, and divergences are not defined; nor are they where
+    states hide slack.
+    """
+    spaces = making.candidates.spaces
+    try:
+        found = making.differences()
+    except Inseparable:
+        job = making.job(without_divergences(spaces), MethodOptions(seed=seed))
+        return replace(job, states=tuple(states_on_plans(spaces).tolist()))
+    job = making.job(found, MethodOptions(seed=seed))
+    return replace(job, incumbent=first_language(job))
+
+
+def _within_room(job: Job, method: str) -> Job:
     """Without effort if the plans of all tasks do not fit; other methods raise `OutOfMemory`."""
     try:
         require_room(job.candidates.source)
@@ -179,28 +296,17 @@ def _within_room(job: Job, method: Method) -> Job:
     return job
 
 
-def _with_incumbent(job: Job) -> Job:
-    """Verify a greedy partition, which is what is left when an anytime method is stopped.
-
-    It is verified now because there is no time then.  Where states hide slack it has a word for
-    each state: no plans are inseparable.
-    """
-    first = first_language(job)
-    job.check(first)
-    return replace(job, incumbent=first)
-
-
-def _outcome(job: Job, options: MethodOptions, verified: Verified, clock: Clock) -> Outcome:
+def _outcome(job: Job, options: MethodOptions, making: Making) -> Outcome:
     """What the method finds; if it is stopped early, the last partition that was verified."""
     found: list[Outcome] = []
 
     def run() -> None:
         outcome = METHODS[options.method](job)
-        clock.note("vocabulary")
+        making.note("vocabulary")
         if options.prefer and outcome.stopped is None:
             outcome = PREFERENCES[options.prefer](job, outcome)
-            clock.note(options.prefer)
-        if not verified.knows(outcome.partition):
+            making.note(options.prefer)
+        if not making.knows(outcome.partition):
             job.progress("verifying by definition")
             with little_time_after(outcome.stopped):
                 job.check(outcome.partition)
@@ -209,6 +315,6 @@ def _outcome(job: Job, options: MethodOptions, verified: Verified, clock: Clock)
     stopped = run_until_stopped(run)
     if stopped is None:
         return found[0]
-    if verified.last is None:
+    if making.last is None:
         raise stopped
-    return Outcome(verified.last, job.lower_bound, stopped=stopped)
+    return Outcome(making.last, job.lower_bound, stopped=stopped)

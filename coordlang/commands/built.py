@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A language that was made: what is known of it, and how it was verified on the way."""
+"""A language that was made: what is known of it, as data and in lines for a person."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import inf
-from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from coordlang.language.candidates import Candidates
@@ -18,16 +17,14 @@ from coordlang.language.words import Language
 from coordlang.required.divergences import FirstDifferences
 from coordlang.required.failures import NONE, Failures
 from coordlang.verification.by_definition import Verdict
-from coordlang.verification.candidates import verify_candidates
 from coordlang.verification.certificate_file import Certificate
 from coordlang.verification.check_certificate import check as check_certificate
 from coordlang.verification.make_certificate import certify
 from coordlang.vocabulary import EXACT, Job
-from coordlang.vocabulary.job import Assignment, Evidence
+from coordlang.vocabulary.job import Evidence
 from coordlang.vocabulary.minimal import refuting_clauses
-from planners.parallel.workers import Workers
 from planners.system.errors import Refuted
-from planners.system.notebook import Presented
+from planners.system.notebook import Presented, counted
 
 if TYPE_CHECKING:
     from coordlang.commands.repairing import Repaired
@@ -192,53 +189,88 @@ def language_of(
     return Language.of(partition, job.candidates.model, provenance)
 
 
-class Verified:
-    """Verifies partitions of candidate tasks' states by definition, and knows those that hold."""
-
-    def __init__(
-        self,
-        candidates: Candidates,
-        workers: Workers,
-        progress: Callable[[str], None],
-        made: Callable[[Assignment], Partition] | None = None,
-    ) -> None:
-        self._candidates, self._workers, self._progress = candidates, workers, progress
-        self._made = made or (lambda words: Partition.of_states(candidates.rows, words))
-        self._known: list[tuple[Assignment, Partition, Verdict]] = []
-
-    @property
-    def last(self) -> Assignment | None:
-        """The one that was verified last; None before there is one."""
-        return self._known[-1][0] if self._known else None
-
-    def check(self, words: Assignment) -> None:
-        """Verify a partition; `AssertionError` if it is no language: a method has erred."""
-        partition = self._made(words)
-        verdict = verify_candidates(partition, self._candidates, self._workers, self._progress)
-        if not verdict.holds:
-            raise AssertionError(
-                f"a method returned what is no coordination language: {verdict.witness}"
-            )
-        self._known.append((words, partition, verdict))
-
-    def knows(self, words: Assignment) -> bool:
-        """Whether this very partition was verified."""
-        return any(known is words for known, _, _ in self._known)
-
-    def of(self, words: Assignment) -> tuple[Partition, Verdict]:
-        """A partition that was verified, and the verdict."""
-        return next((partition, v) for known, partition, v in self._known if known is words)
+def built_text(built: Built, width: int) -> str:
+    """The figures of the making in whole lines of at most ``width`` characters."""
+    figures = built.data()
+    total = sum(figures["seconds"].values())
+    proof = f"at least {figures['lower_bound']} needed, "
+    if figures["proved_minimal"]:
+        proof = "proved minimal, "
+    words, tasks = counted(figures["words"], "word"), counted(figures["tasks"], "task")
+    verified = "verified"
+    if built.few_words is not None and not figures["verified"]:
+        proof, verified = "", "no coordination language"
+    repaired = "" if built.repaired is None else f"{built.repaired.text(width)}\n"
+    return (
+        f"{words} ({figures['method']}, {proof}{verified}) for {tasks}, "
+        f"{figures['tasks_requiring_coordination']:,} of which require coordination\n"
+        f"{figures['states_on_plans']:,} states on {built.candidates.model.kept_plans}, "
+        f"{figures['divergences']:,} divergences, "
+        f"{figures['walk_nodes']:,} nodes of plans, {total:.2f} s\n"
+        f"{_more_effort(built)}{_fewest(figures)}"
+        f"{_failures(built)}{_flexibility(figures)}{_readability(figures)}"
+        f"{repaired}"
+    )
 
 
-class Clock:
-    """Seconds by phase."""
+def _more_effort(built: Built) -> str:
+    """What more effort might bring; a whole line."""
+    guarantee, effort = built.guarantee, built.job.effort
+    if guarantee.method != "best" or guarantee.proved_minimal:
+        return ""
+    larger = "larger limit" if built.stopped else f"larger --effort than {effort}"
+    return (
+        f"between {guarantee.lower_bound} and {guarantee.size} words are needed: a {larger} "
+        "may find fewer or prove that there are none\n"
+    )
 
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self._since = perf_counter()
 
-    def note(self, phase: str) -> None:
-        """Say that a phase has ended."""
-        now = perf_counter()
-        self.seconds[phase] = now - self._since
-        self._since = now
+def _fewest(figures: dict[str, Any]) -> str:
+    """What another cost would change; a whole line."""
+    fewest = figures.get("tasks_requiring_coordination_with_fewest_actions")
+    if fewest is None:
+        return ""
+    does = figures["tasks_requiring_coordination"]
+    less = ": one word would do" if fewest == 0 else ""
+    would = f"{counted(fewest, 'task')} would require coordination"
+    return f"with --cost makespan+actions {would}, not {does:,}{less}\n"
+
+
+def _failures(built: Built) -> str:
+    """How often robots fail under as many words as were asked for; whole lines."""
+    found = built.few_words
+    if found is None:
+        return ""
+    line = f"robots that choose by themselves {built.failures.text()}"
+    if built.verdict.holds:
+        line = "no robot fails: this is a coordination language"
+    elif found.is_best and len(built.language.words) > 1:
+        line += " (the least of all partitions)"
+    silence = Failures(found.silence.mean, found.silence.worst)
+    return f"{line}\nin silence they {silence.text()}\n"
+
+
+def _readability(figures: dict[str, Any]) -> str:
+    """How short formulas are, where that was optimised; whole lines."""
+    if "terms" not in figures:
+        return ""
+    terms, limits = figures["terms"], figures["limits"]
+    proved = (terms, limits) == (figures["terms_lower_bound"], figures["limits_lower_bound"])
+    proof = "proved the shortest" if proved else f"at least {figures['terms_lower_bound']}"
+    before = f"{counted(figures['terms_before'], 'term')}, {figures['limits_before']} limits"
+    return (
+        f"formulas of {counted(terms, 'term')} with {counted(limits, 'limit')} on variables "
+        f"({before} before; {proof})\n"
+    )
+
+
+def _flexibility(figures: dict[str, Any]) -> str:
+    """How many plans the sentences leave open, where that was optimised; whole lines."""
+    if "flexibility" not in figures:
+        return ""
+    return (
+        f"a sentence leaves {figures['flexibility']:,.2f} plans open on average ("
+        f"{figures['flexibility_before']:,.2f} before, "
+        f"{figures['flexibility_bound']:,.2f} at most), "
+        f"communication saving {100 * figures['communication_saving']:.1f} %\n"
+    )

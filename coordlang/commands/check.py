@@ -7,17 +7,14 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
-from coordlang.commands.command import command_of
 from coordlang.commands.failure import IMPOSSIBLE, REFUTED
-from coordlang.commands.inputs import read_instance
-from coordlang.commands.keywords import with_options
-from coordlang.commands.options import NO_SLACK, DomainSource, ProblemSource, Source, json_option
+from coordlang.commands.inputs import Arguments, public
+from coordlang.commands.records import CheckOptions
 from coordlang.commands.terminal import echo
 from planners.classical.fast_downward import optimal_cost
 from planners.search.optimal_plans import search
 from planners.system.errors import ProvedImpossible
 from planners.system.notebook import Presented
-from planners.system.options import group
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -44,30 +41,12 @@ class CrossCheck(Presented):
 
     def data(self) -> dict[str, Any]:
         """The comparison as JSON data."""
-        return {
-            "coordlang": self.cost,
-            "fast_downward": self.fast_downward,
-            "agree": self.agree,
-            "form": self.form,
-            "actions": self.actions,
-        }
+        own = {name: getattr(self, name) for name in ("fast_downward", "agree", "form", "actions")}
+        return {"coordlang": self.cost, **own}
 
 
-@dataclass(frozen=True, slots=True)
-class CheckOptions:
-    """What `check` can be asked for."""
-
-    as_json: bool = json_option()
-    source: Source = group(Source, without=NO_SLACK)
-
-
-@with_options(CheckOptions)
-def check(
-    domain: DomainSource | None = None,
-    problem: ProblemSource | None = None,
-    *,
-    options: CheckOptions,
-) -> CrossCheck:
+@public(CheckOptions)
+def check(files: Arguments, options: CheckOptions) -> CrossCheck:
     """Compare our optimal cost with Fast Downward's.
 
     Raises
@@ -75,7 +54,7 @@ def check(
     CoordlangError
         If Fast Downward gives no answer.
     """
-    loaded = read_instance(domain, problem, options.source)
+    loaded = files.instance()
     task = loaded.tasks[0]
     try:
         ours: tuple[int, int] | None = search(loaded.model.without_slack, task).cost_of(0)
@@ -85,12 +64,8 @@ def check(
     return CrossCheck(ours, answer.cost, answer.form, answer.actions)
 
 
-@command_of(check, "DOMAIN PROBLEM", doing="solving the task twice", keeps_plans=False)
-def command(found: CrossCheck, options: CheckOptions) -> int:
-    """Compare our optimal cost with Fast Downward's.
-
-    Exit 0: equal.  1: they differ.  11: both prove that there is no plan.
-    """
+def show(found: CrossCheck, options: CheckOptions) -> int:
+    """Print the two costs; 1 if they differ."""
     if options.as_json:
         echo(json.dumps(found.data()))
     else:

@@ -9,28 +9,16 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import prod
 from os import fspath
-from typing import Any, Literal
+from typing import Any
 
 import click
 
 from coordlang.commands.choices_text import choices_text
-from coordlang.commands.command import command_of
 from coordlang.commands.failure import REFUTED
 from coordlang.commands.files import write
-from coordlang.commands.inputs import given_sentence, read_task
-from coordlang.commands.keywords import with_options
-from coordlang.commands.listing import form_of
-from coordlang.commands.options import (
-    NO_SLACK,
-    DomainSource,
-    File,
-    LanguageSource,
-    ProblemSource,
-    SentenceSource,
-    Source,
-    json_option,
-    output_option,
-)
+from coordlang.commands.inputs import Arguments, InTask, public
+from coordlang.commands.options import File
+from coordlang.commands.records import ChoicesOptions
 from coordlang.commands.terminal import covered_code, echo, line_width, note
 from coordlang.commands.witness import witness_text
 from coordlang.execution.choices import MOST, SentenceChoices
@@ -38,15 +26,15 @@ from coordlang.execution.choices import choices as choices_under
 from coordlang.execution.choices_file import monitor, to_bytes, to_data
 from coordlang.execution.drawing import choices_dot
 from coordlang.execution.monitor import Answer, Monitor, MonitorError, NotAllowed
-from coordlang.language.tolerance import Tolerance, percent
+from coordlang.execution.task_language import TaskLanguage
+from coordlang.language.tolerance import percent
 from coordlang.required.failure import TooManyToCount, failure_of_sentence
 from coordlang.required.miscoordination import Miscoordination
 from planners.pddl.model_options import names_in
 from planners.search.plan_file import json_count
 from planners.search.plans import Plans
 from planners.system.errors import Refuted, UsageError
-from planners.system.notebook import Presented, counted, html_table
-from planners.system.options import group, option
+from planners.system.notebook import counted, html_table
 from planners.system.writing import write_atomically
 
 #: Additions that are made to count how often choices fail, some seconds of work.
@@ -54,7 +42,7 @@ _ADDITIONS = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class RobotsChoices(Presented):
+class RobotsChoices(InTask):
     """The subplans that each robot may follow under a sentence, whatever the others choose.
 
     ``chosen`` are the numbers of the robots that are shown and saved.
@@ -65,25 +53,19 @@ class RobotsChoices(Presented):
     shown = ("sentence", "subplans", "guaranteed", "covered")
 
     @property
+    def used(self) -> TaskLanguage:  # type: ignore[override]
+        """The language in the task."""
+        return self.found.task_language
+
+    @property
     def robots(self) -> tuple[str, ...]:
         """The robots that are shown and saved."""
-        names = self.found.task_language.model.robots
-        return tuple(names[number] for number in self.chosen)
+        return tuple(self.used.model.robots[number] for number in self.chosen)
 
     @property
     def sentence(self) -> str:
         """The sentence."""
-        return self.found.task_language.text(self.found.words)
-
-    @property
-    def covered(self) -> bool:
-        """Whether the task is one that the language guarantees."""
-        return self.found.task_language.covered
-
-    @property
-    def tolerance(self) -> Tolerance | None:
-        """What may go wrong, or be longer, under the language; None: nothing."""
-        return self.found.task_language.tolerance
+        return self.used.text(self.found.words)
 
     @property
     def guaranteed(self) -> bool:
@@ -99,9 +81,10 @@ class RobotsChoices(Presented):
         """
         if self.guaranteed:
             return Fraction(0)
-        used = self.found.task_language
         try:
-            return failure_of_sentence(used.space, used.start, self.found.fits, _ADDITIONS)
+            return failure_of_sentence(
+                self.used.space, self.used.start, self.found.fits, _ADDITIONS
+            )
         except TooManyToCount:
             return None
 
@@ -139,8 +122,8 @@ class RobotsChoices(Presented):
         UsageError
             For a robot that there is none of.
         """
-        (number,) = _numbers(self.found.task_language.model.robots, robot)
-        return monitor(self.found, self.found.task_language.model.robots[number])
+        (number,) = _numbers(self.used.model.robots, robot)
+        return monitor(self.found, self.used.model.robots[number])
 
     def data(self) -> dict[str, Any]:
         """The data of a choices file (docs/formats.md)."""
@@ -163,53 +146,8 @@ class RobotsChoices(Presented):
         return html_table(("robot", "subplans"), rows, f'under "{self.sentence}"')
 
 
-@dataclass(frozen=True, slots=True)
-class ChoicesOptions:
-    """What `choices` can be asked for."""
-
-    robot: str | Sequence[str] = option((), "Whose choices; may be repeated (default: all).", "R")
-    check: bool = option(
-        False, "Walk every combination of all robots' choices: is each an optimal plan?"
-    )
-    history: tuple[str, ...] = option(
-        (), "What the robot did so far, one step each; or idle.", "SUBACTION", only="cli"
-    )
-    visit: tuple[str, ...] = option(
-        (), "A detour: this becomes true, now or later.", "ATOM", only="cli"
-    )
-    avoid: tuple[str, ...] = option((), "A detour: this is false from now on.", "ATOM", only="cli")
-    do: tuple[str, ...] = option(
-        (), "A detour: it does this at least once; * is any text.", "PATTERN", only="cli"
-    )
-    never: tuple[str, ...] = option(
-        (), "A detour: it never does this any more.", "PATTERN", only="cli"
-    )
-    form: Literal["text", "json", "dot"] = option(
-        "text", "How they are shown.", names=("--format",), only="cli"
-    )
-    as_json: bool = json_option("Short for --format json.")
-    output: str | None = output_option()
-    source: Source = group(Source, without=NO_SLACK)
-    given: frozenset[str] = frozenset()
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "form", form_of(self.form, self.as_json, self.given))
-
-    @property
-    def detours(self) -> dict[str, tuple[str, ...]]:
-        """What the robot is asked for, by kind."""
-        return {"visit": self.visit, "avoid": self.avoid, "do": self.do, "never": self.never}
-
-
-@with_options(ChoicesOptions)
-def choices(
-    language: LanguageSource,
-    domain: DomainSource | None = None,
-    problem: ProblemSource | None = None,
-    sentence: SentenceSource | None = None,
-    *,
-    options: ChoicesOptions,
-) -> RobotsChoices:
+@public(ChoicesOptions)
+def choices(files: Arguments, options: ChoicesOptions) -> RobotsChoices:
     """Find the subplans that each robot may follow under a sentence, whatever the others choose.
 
     Raises
@@ -221,8 +159,8 @@ def choices(
     OutOfMemory
         If the automata, or with ``check`` the combinations, do not fit into the memory.
     """
-    said = given_sentence(sentence)
-    used = read_task(language, domain, problem, options.source).used
+    said = files.sentence
+    used = files.task().used
     chosen = _numbers(used.model.robots, options.robot) or tuple(range(len(used.model.robots)))
     found = choices_under(used, used.words_of(said), most=None if options.check else MOST)
     return RobotsChoices(found, chosen)
@@ -238,17 +176,10 @@ def _numbers(known: tuple[str, ...], whose: str | Sequence[str]) -> tuple[int, .
     return tuple(dict.fromkeys(known.index(name) for name in names))
 
 
-@command_of(choices, "LANGUAGE DOMAIN PROBLEM SENTENCE", doing="finding the robots' choices")
-def command(found: RobotsChoices, options: ChoicesOptions) -> int:
-    """Show which subplans each robot may follow under SENTENCE ("w1 w0").
-
-    Whatever the others choose from theirs, together they follow an optimal plan.
-
-    With --history and the detours: what one robot may do next, and whether the detours are still
-    possible, all at once.
-    """
+def show(found: RobotsChoices, options: ChoicesOptions) -> int:
+    """Print or write the choices, or what one robot may do next."""
     form, code = options.form, 0
-    if options.history or any(options.detours.values()):
+    if options.history or any(_detours(options).values()):
         if len(found.robots) != 1 or form == "dot":
             raise click.UsageError(
                 "--history, --visit, --avoid, --do and --never ask about one --robot, "
@@ -286,13 +217,19 @@ def _guarantee_code(found: RobotsChoices, check: bool) -> int:
     return covered_code(found.covered, found.tolerance)
 
 
+def _detours(options: ChoicesOptions) -> dict[str, tuple[str, ...]]:
+    """What the robot is asked for, by kind."""
+    return {name: getattr(options, name) for name in ("visit", "avoid", "do", "never")}
+
+
 def _followed(found: RobotsChoices, options: ChoicesOptions) -> tuple[Monitor, Answer | None]:
     """A monitor that followed what the robot did, and its answer to the detours, if any."""
     try:
         at = found.monitor(found.robots[0])
         for subaction in options.history:
             at.did(subaction)
-        return at, at.can(**options.detours) if any(options.detours.values()) else None
+        detours = _detours(options)
+        return at, at.can(**detours) if any(detours.values()) else None
     except NotAllowed as error:
         raise Refuted(str(error), remedy="After that nothing is guaranteed any more.") from None
     except MonitorError as error:

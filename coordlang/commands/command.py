@@ -1,34 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A command of the command line: a Python function, its options record, and how to show its result.
+"""A command of the command line, made from its options record.
 
-A command calls the Python function of its name; nothing else is computed here.
+A command calls the Python function of its name and shows the result; nothing else is computed here.
 """
 
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
 import click
 
 from coordlang.commands.files import FILE, FOLDER, OutputFile, beside, check_outputs, never_stdout
+from coordlang.commands.options import CommandOptions, Kept, Limits
 from coordlang.commands.terminal import echo, line_width, note, working
 from planners.system.errors import CoordlangError, OutOfTime
-from planners.system.limits import (
-    default_memory_limit,
-    limited_memory,
-    require_memory,
-    time_limit,
-)
-from planners.system.options import Given, option, options_of, record_from
-
-#: Shows a result: gets it and the options, writes, and returns the exit code, None for 0.
-Show = Callable[[Any, Any], int | None]
+from planners.system.limits import default_memory_limit, limited_memory, require_memory, time_limit
+from planners.system.options import Given, options_of, record_from
 
 #: Arguments that --factored stands for.
 _PDDL = ("DOMAIN", "PROBLEM", "PROBLEMS...")
@@ -36,148 +28,65 @@ _PDDL = ("DOMAIN", "PROBLEM", "PROBLEMS...")
 _FILES = ("FILE", "LANGUAGE", "PROBLEM", "RECORD", "RUN.json")
 
 
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """What bounds the work of a command."""
-
-    time_limit: float | None = option(None, "Stop after this long (exit 23).", "SECONDS")
-    memory_limit: str | None = option(
-        None,
-        "Stop before using more, e.g. 4G (exit 22); none: no limit.  Default: 80 % of what is "
-        "free.",
-        "SIZE",
-    )
-    debug: bool = option(False, "Show tracebacks.")
-
-    @property
-    def bytes(self) -> int | None:
-        """The most memory, None for no limit; `click.BadParameter` for what is no size."""
-        if self.memory_limit is None:
-            return default_memory_limit()
-        text = self.memory_limit.strip().lower()
-        if text == "none":
-            return None
-        match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([kmgt]?)i?b?", text)
-        if not match:
-            raise click.BadParameter(
-                "expected a size such as 500M or 4G, or none", param_hint="'--memory-limit'"
-            )
-        return int(float(match[1]) * 1024 ** " kmgt".index(match[2] or " "))
-
-
-@dataclass(frozen=True, slots=True)
-class Kept:
-    """Whether plans that were found before are read from the user's cache."""
-
-    no_cache: bool = option(False, "Search anew: read no plans that were found before.")
-
-
-@contextmanager
-def limited(limits: Limits) -> Iterator[None]:
-    """Run a block under limits."""
-    if limits.time_limit is not None and not limits.time_limit > 0:
-        raise click.UsageError("--time-limit: expected a number of seconds above 0")
-    most = limits.bytes
-    if limits.memory_limit is not None and most is not None:
-        require_memory(most)
-    with limited_memory(most), time_limit(limits.time_limit):
-        yield
-
-
-@contextmanager
-def keeping(kept: Kept) -> Iterator[None]:
-    """Run a block that searches no task again that it finds in the user's cache."""
-    if kept.no_cache:
-        yield
-        return
-    from planners.search.kept_plans import default_folder, keeping_plans, plan_store
-
-    place = default_folder()
-    with keeping_plans(None if place is None else plan_store(place)):
-        yield
-
-
 def command_of(
-    function: Callable[..., Any],
-    takes: str,
-    *,
-    doing: str,
-    keeps_plans: bool = True,
-    alone: str | None = None,
-) -> Callable[[Show], click.Command]:
-    """Make a command of a Python function and of what shows its result, which this decorates.
+    name: str, record: type[CommandOptions], loaded: Callable[[str], Any] = import_module
+) -> click.Command:
+    """Make a command whose help is the docstring of its record.
 
-    Its help is the docstring of what shows the result.  A record whose files depend on several of
-    its options has a method ``outputs``, which says what is written.
-
-    Parameters
-    ----------
-    function
-        Made by `coordlang.commands.keywords.with_options`; its name is the command's.
-    takes
-        The arguments, as the usage line shows them, in the order of the function's parameters:
-        ``LANGUAGE DOMAIN PROBLEM [SENTENCE]``, ``DOMAIN PROBLEMS...``.
-    doing
-        What a terminal shows while the function works.
-    keeps_plans
-        Whether it searches no task again that was searched before, unless ``--no-cache`` is given.
-    alone
-        The option in whose presence there are no arguments.
+    Its module is loaded when it is called: there are the function of its name, made by
+    `coordlang.commands.inputs.public`, and ``show``, which gets the result and the options, writes,
+    and returns the exit code, None for 0.
     """
-    name = function.__name__
-    record = function.record  # type: ignore[attr-defined]
-    records = [record, Kept, Limits] if keeps_plans else [record, Limits]
+    takes, alone = record.takes, record.alone
+    records = [record, Kept, Limits] if record.keeps_plans else [record, Limits]
     named = {each.name: each for kind in records for each in options_of(kind)}
     on_cli = [each for each in named.values() if each.option.only != "python"]
 
-    def decorate(show: Show) -> click.Command:
-        def called(arguments: tuple[str, ...], **values: object) -> int | None:
-            given = {key: value for key, value in values.items() if _was_given(key)}
-            factored = given.get("factored")
-            if alone is None or alone not in given:
-                read = positional(takes, arguments, is_factored=factored is not None)
-            elif arguments or factored is not None:
-                instead = f"{named[alone].spelling} {named[alone].option.metavar} alone"
-                raise click.UsageError(f"expected {instead}, without {takes}")
-            else:
-                read = []
-            files = _read_files(arguments, factored)
-            _check_outputs(on_cli, given, files)
-            own, kept, limits = (
-                {each.name: given[each.name] for each in options_of(kind) if each.name in given}
-                for kind in (record, Kept, Limits)
-            )
-            cache = keeping(record_from(Kept, kept, name)) if keeps_plans else nullcontext()
-            with limited(record_from(Limits, limits, name)), cache, _said(own.get("resume")):
-                with working(doing) as progress:
-                    own |= {
-                        key: value
-                        for key, value in (("progress", progress), ("note", note))
-                        if key in named and named[key].kind == Callable[[str], None]
-                    }
-                    options = record_from(record, own, name, on_cli=True)
-                    if hasattr(options, "outputs"):
-                        check_outputs(options.outputs(), files)
-                    result = function.with_record(*read, options=options)  # type: ignore[attr-defined]
-                return show(result, options)
-
-        argument = click.Argument(["arguments"], nargs=-1, type=FILE, metavar=takes)
-        parameters = [argument] if takes else []
-        return click.Command(
-            name,
-            params=[*parameters, *map(_click_option, on_cli)],
-            callback=called if takes else lambda **values: called((), **values),
-            help=show.__doc__,
+    def called(arguments: tuple[str, ...], **values: object) -> int | None:
+        given = {key: value for key, value in values.items() if _was_given(key)}
+        factored = given.get("factored")
+        read: dict[str, object] = {}
+        if alone is None or alone not in given:
+            read = positional(takes, arguments, is_factored=factored is not None)
+        elif arguments or factored is not None:
+            instead = f"{named[alone].spelling} {named[alone].option.metavar} alone"
+            raise click.UsageError(f"expected {instead}, without {takes}")
+        files = _read_files(arguments, factored)
+        _check_outputs(on_cli, given, files)
+        own, kept, limits = (
+            {each.name: given[each.name] for each in options_of(kind) if each.name in given}
+            for kind in (record, Kept, Limits)
         )
+        module = loaded(f"coordlang.commands.{name}")
+        is_kept = record.keeps_plans and not record_from(Kept, kept, name).no_cache
+        cache = _keeping() if is_kept else nullcontext()
+        with limited(record_from(Limits, limits, name)), cache, _said(own.get("resume")):
+            with working(record.doing) as progress:
+                own |= {
+                    key: value
+                    for key, value in (("progress", progress), ("note", note))
+                    if key in named and named[key].kind == Callable[[str], None]
+                }
+                options = record_from(record, own, name, on_cli=True)
+                check_outputs(options.outputs(), files)
+                result = getattr(module, name).with_record(options, **read)
+            shown: int | None = module.show(result, options)
+            return shown
 
-    return decorate
+    argument = click.Argument(["arguments"], nargs=-1, type=FILE, metavar=takes)
+    return click.Command(
+        name,
+        params=[*([argument] if takes else []), *map(_click_option, on_cli)],
+        callback=called if takes else lambda **values: called((), **values),
+        help=record.__doc__,
+    )
 
 
-def positional(takes: str, given: tuple[str, ...], *, is_factored: bool) -> list[str | None]:
-    """The arguments in the order of the function's parameters; None for those that are not given.
+def positional(takes: str, given: tuple[str, ...], *, is_factored: bool) -> dict[str, object]:
+    """The arguments that are given, by what usage calls them; those of ``PROBLEMS...`` as a tuple.
 
-    One in brackets may be left out, and ``PROBLEMS...`` are any number.  ``--factored`` stands for
-    DOMAIN and PROBLEM.  Raises `click.UsageError` for too few or too many.
+    One in brackets may be left out.  ``--factored`` stands for DOMAIN and PROBLEM.  Raises
+    `click.UsageError` for too few or too many.
     """
     names = takes.split()
     asked = [name for name in names if not (is_factored and name in _PDDL)]
@@ -189,9 +98,32 @@ def positional(takes: str, given: tuple[str, ...], *, is_factored: bool) -> list
             without = "them" if all(name in _PDDL for name in names) else "DOMAIN PROBLEM"
             instead = f", or --factored DIR without {without}"
         raise click.UsageError(f"expected {takes}{instead}")
-    rest = iter(given)
-    values = [next(rest, None) if name in asked else None for name in names]
-    return [*values, *rest]
+    read: dict[str, object] = dict(zip(asked, given, strict=False))
+    if is_open:
+        read["PROBLEMS..."] = given[len(asked) - 1 :]
+    return {name.strip("[]"): value for name, value in read.items()}
+
+
+@contextmanager
+def limited(limits: Limits) -> Iterator[None]:
+    """Run a block under limits."""
+    most = limits.bytes
+    if limits.memory_limit is None:
+        most = default_memory_limit()
+    elif most is not None:
+        require_memory(most)
+    with limited_memory(most), time_limit(limits.time_limit):
+        yield
+
+
+@contextmanager
+def _keeping() -> Iterator[None]:
+    """Run a block that searches no task again that it finds in the user's cache."""
+    from planners.search.kept_plans import default_folder, keeping_plans, plan_store
+
+    place = default_folder()
+    with keeping_plans(None if place is None else plan_store(place)):
+        yield
 
 
 def _was_given(name: str) -> bool:
@@ -263,10 +195,8 @@ def _click_option(given: Given) -> click.Option:
         keywords |= {"is_flag": True, "default": given.default, "flag_value": not given.default}
     elif given.values:
         keywords["type"] = click.Choice(given.values)
-    elif given.kind is int:
-        keywords["type"] = int  # the record checks its range
-    elif given.kind is float:
-        keywords["type"] = float
+    elif given.kind in (int, float):
+        keywords["type"] = given.kind  # the record checks the range
     elif get_origin(given.kind) is tuple and Ellipsis not in get_args(given.kind):
         keywords["nargs"] = len(get_args(given.kind))
     elif described.metavar == "DIR":

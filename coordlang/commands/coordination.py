@@ -9,14 +9,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from coordlang.commands.command import command_of
-from coordlang.commands.inputs import read_planning
-from coordlang.commands.keywords import with_options
+from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.layout import WIDTH
-from coordlang.commands.options import DomainSource, Jobs, ProblemSource, Source, json_option
+from coordlang.commands.records import CoordinationOptions
 from coordlang.commands.terminal import echo, line_width, note_single_robot
 from coordlang.commands.witness import witness_data, witness_text
-from coordlang.commands.workers import opened_workers
 from coordlang.language.tolerance import percent
 from coordlang.required.failure import mean
 from coordlang.required.failures import FailureEstimate, Failures
@@ -24,7 +21,6 @@ from coordlang.required.miscoordination import Miscoordination
 from coordlang.required.task_answers import FewestActions, answers
 from planners.search.plan_file import json_count
 from planners.system.notebook import Presented, counted, html_table
-from planners.system.options import group
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -64,7 +60,7 @@ class TaskCoordination(Presented):
             "plans": json_count(self.plans),
             "requires_coordination": self.required,
             "miscoordination": witness_data(self.witness),
-            "failure": None if self.failure is None else float(self.failure),
+            "failure": _number(self.failure),
             **({"failure_estimate": self.estimate.data()} if self.estimate else {}),
             **({"slack": self.slack} if self.slack else {}),
             **({"fewest_actions": self.fewest.data()} if self.fewest else {}),
@@ -126,14 +122,16 @@ class Coordination(Presented):
     @property
     def failure_mean(self) -> Fraction | None:
         """How often robots fail without a word, over all tasks; None where it is not counted."""
-        counted = [task.failure for task in self.tasks if task.failure is not None]
-        return mean(counted) if len(counted) == len(self.tasks) else None
+        return None if (found := self._failures()) is None else mean(found)
 
     @property
     def failure_worst(self) -> Fraction | None:
         """The same in the worst task."""
-        counted = [task.failure for task in self.tasks if task.failure is not None]
-        return max(counted) if len(counted) == len(self.tasks) else None
+        return None if (found := self._failures()) is None else max(found)
+
+    def _failures(self) -> list[Fraction] | None:
+        found = [task.failure for task in self.tasks if task.failure is not None]
+        return found if len(found) == len(self.tasks) else None
 
     def __bool__(self) -> bool:
         return self.required
@@ -149,10 +147,10 @@ class Coordination(Presented):
 
     def data(self) -> dict[str, Any]:
         """The answers as JSON data."""
-        means = {"failure_mean": self.failure_mean, "failure_worst": self.failure_worst}
         return {
             "tasks": [task.data() for task in self.tasks],
-            **{key: None if value is None else float(value) for key, value in means.items()},
+            "failure_mean": _number(self.failure_mean),
+            "failure_worst": _number(self.failure_worst),
         }
 
     def __str__(self) -> str:
@@ -175,19 +173,8 @@ class Coordination(Presented):
         return html_table(head, rows)
 
 
-@dataclass(frozen=True, slots=True)
-class CoordinationOptions:
-    """What `coordination` can be asked for."""
-
-    as_json: bool = json_option()
-    work: Jobs = group(Jobs)
-    source: Source = group(Source, without=("words_see_slack",))
-
-
-@with_options(CoordinationOptions)
-def coordination(
-    domain: DomainSource | None = None, *problems: ProblemSource, options: CoordinationOptions
-) -> Coordination:
+@public(CoordinationOptions)
+def coordination(files: Arguments, options: CoordinationOptions) -> Coordination:
     """Decide which tasks require coordination, and show how robots then miscoordinate.
 
     A task requires coordination (RC) if some mixture of its optimal plans is no optimal plan.
@@ -197,9 +184,9 @@ def coordination(
     ProvedImpossible
         For a task without a plan.
     """
-    files = read_planning(domain, problems, options.source)
-    loaded = files.instance()
-    with opened_workers(options.work) as workers:
+    read = files.read()
+    loaded = read.instance()
+    with options.work.opened() as workers:
         found = answers(loaded, workers)
     tasks = tuple(
         TaskCoordination(
@@ -212,17 +199,16 @@ def coordination(
             loaded.model.slack,
             answer.fewest,
         )
-        for problem, answer in zip(files.problems, found, strict=True)
+        for problem, answer in zip(read.problems, found, strict=True)
     )
     return Coordination(loaded.model.robots, tasks)
 
 
-@command_of(coordination, "DOMAIN PROBLEMS...", doing="finding all optimal plans")
-def command(found: Coordination, options: CoordinationOptions) -> None:
-    """Decide which tasks require coordination.
+def _number(share: Fraction | None) -> float | None:
+    return None if share is None else float(share)
 
-    Show how robots that follow different optimal plans miscoordinate; with --slack B plans that
-    take at most B steps more.
-    """
+
+def show(found: Coordination, options: CoordinationOptions) -> None:
+    """Print the answers."""
     note_single_robot(found.robots)
     echo(json.dumps(found.data()) if options.as_json else found.text(line_width()))

@@ -5,51 +5,33 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass
 from pathlib import Path
 
-from coordlang.commands.command import command_of
 from coordlang.commands.files import OutputFile, check_outputs
-from coordlang.commands.keywords import with_options
-from coordlang.commands.options import json_option
+from coordlang.commands.inputs import Arguments, public
+from coordlang.commands.records import DomainsOptions
 from coordlang.commands.terminal import echo
 from coordlang.sites.movingai import planning_files
 from coordlang.sites.shipped import about, domain_names, shipped_domains
 from planners.system.errors import UsageError
 from planners.system.messages import echoed, visible
 from planners.system.notebook import counted
-from planners.system.options import option
 from planners.system.writing import copy_folders, write_texts
 
 ALL = "all"
 
 
-@dataclass(frozen=True, slots=True)
-class DomainsOptions:
-    """What `domains` can be asked for: a list, a copy, or a map as a problem."""
-
-    copy: tuple[str, str] | None = option(
-        None,
-        "Copy this domain, or all of them, with problems and README into DIR/NAME.",
-        "NAME|all DIR",
-    )
-    map: str | None = option(
-        None, "A map of movingai.com, to be written as a problem of the grid domain.", "FILE.map"
-    )
-    scen: str | None = option(None, "The scenario: where robots start and go.", "FILE.scen")
-    agents: int | None = option(None, "The first K robots of the scenario.", "K")
-    output: str | None = option(
-        None, "The folder for a map's domain and problem.", "DIR", names=("-o",)
-    )
-    as_json: bool = json_option()
-
-
-@with_options(DomainsOptions)
-def domains(*, options: DomainsOptions) -> list[str]:
+@public(DomainsOptions)
+def domains(_: Arguments, options: DomainsOptions) -> list[str]:
     """The names of the domains that are listed or were copied, or of the files of a map."""
-    copy, parts = options.copy, (options.map, options.scen, options.agents, options.output)
+    copy, shipped = options.copy, shipped_domains()
+    parts = map_file, scen, agents, output = (
+        options.map,
+        options.scen,
+        options.agents,
+        options.output,
+    )
     if any(part is not None for part in parts):
-        map_file, scen, agents, output = parts
         if copy or map_file is None or scen is None or agents is None or output is None:
             raise UsageError(
                 "a map needs --map FILE.map, --scen FILE.scen, --agents K and -o DIR, "
@@ -57,7 +39,6 @@ def domains(*, options: DomainsOptions) -> list[str]:
                 remedy="Give all four of them.",
             )
         return _write_map(map_file, scen, agents, output)
-    shipped = shipped_domains()
     names = domain_names(shipped)
     if copy is not None:
         names = _chosen(copy[0], names)
@@ -65,9 +46,8 @@ def domains(*, options: DomainsOptions) -> list[str]:
     return names
 
 
-@command_of(domains, "", doing="copying", keeps_plans=False)
-def command(names: list[str], options: DomainsOptions) -> None:
-    """List the domains that come with coordlang, one a line, copy them, or write a map as PDDL."""
+def show(names: list[str], options: DomainsOptions) -> None:
+    """Print the names, or what was written."""
     shipped = shipped_domains()
     if options.output is not None and options.agents is not None:
         if options.as_json:

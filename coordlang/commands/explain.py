@@ -9,19 +9,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from coordlang.commands.command import command_of
-from coordlang.commands.inputs import InTask, read_coordinates_of, read_task
-from coordlang.commands.keywords import with_options
+from coordlang.commands.inputs import Arguments, InTask, public, read_coordinates_of
 from coordlang.commands.layout import fitted
-from coordlang.commands.options import (
-    NO_SLACK,
-    DomainSource,
-    LanguageSource,
-    ProblemSource,
-    SentenceSource,
-    Source,
-    json_option,
-)
+from coordlang.commands.records import ExplainOptions
 from coordlang.commands.terminal import covered_code, echo, line_width, warn_of_failures, working
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.cover import Cover
@@ -49,9 +39,8 @@ from coordlang.language.sentences import TaskSentence, task_sentences
 from coordlang.language.tolerance import tolerance_data
 from planners.search.plan_file import json_count
 from planners.search.plans import Plans
-from planners.system.errors import OutOfMemory, UsageError
+from planners.system.errors import OutOfMemory
 from planners.system.notebook import Presented, counted, html_table
-from planners.system.options import group, option
 
 #: Sentences of a task that the text lists.
 SENTENCES_SHOWN = 10
@@ -252,33 +241,8 @@ class Explanation(InTask):
         return "\n".join(lines)
 
 
-@dataclass(frozen=True, slots=True)
-class ExplainOptions:
-    """What `explain` can be asked for."""
-
-    task: bool = option(False, "What each sentence of PROBLEM's task asks of each robot.")
-    sentence: SentenceSource | None = option(
-        None, 'With --task: this sentence only, as in "w1 w0".', "WORDS"
-    )
-    formula_per_word: bool = option(
-        False, "A formula of its own for every word, also where less would say the same."
-    )
-    as_json: bool = json_option()
-    source: Source = group(Source, without=NO_SLACK)
-
-    def __post_init__(self) -> None:
-        if self.sentence is not None and not self.task:
-            raise UsageError("--sentence: only with --task", remedy="Add --task.")
-
-
-@with_options(ExplainOptions)
-def explain(
-    language: LanguageSource,
-    domain: DomainSource | None = None,
-    problem: ProblemSource | None = None,
-    *,
-    options: ExplainOptions,
-) -> Explanation:
+@public(ExplainOptions)
+def explain(files: Arguments, options: ExplainOptions) -> Explanation:
     """Explain a language: each word as a short formula, and the sentences of a task.
 
     Raises
@@ -288,7 +252,7 @@ def explain(
     NoPlanFits
         If no optimal plan has the sentence.
     """
-    task = read_task(language, domain, problem, options.source)
+    task = files.task()
     used, first = task.used, task.files.problems[0]
     only = None if options.sentence is None else used.words_of(options.sentence)
     if only is not None:
@@ -312,12 +276,8 @@ def _sentence_data(sentence: TaskSentence) -> dict[str, Any]:
     }
 
 
-@command_of(explain, "LANGUAGE DOMAIN PROBLEM", doing="finding formulas of the words")
-def command(found: Explanation, options: ExplainOptions) -> int:
-    """Show what the sentences of a task leave open, and each word as a short formula.
-
-    With --task also show what the sentences demand of each robot.
-    """
+def show(found: Explanation, options: ExplainOptions) -> int:
+    """Print the sentences of the task, and the words."""
     if options.as_json:
         with working("listing the sentences of the task"):
             data = found.data()

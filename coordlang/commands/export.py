@@ -8,23 +8,12 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from os import fspath
-from typing import Any, Literal
+from typing import Any
 
-from coordlang.commands.command import command_of
-from coordlang.commands.files import OutputFile, write
-from coordlang.commands.inputs import InTask, given_sentence, read_task
-from coordlang.commands.keywords import with_options
-from coordlang.commands.options import (
-    NO_SLACK,
-    DomainSource,
-    File,
-    LanguageSource,
-    ProblemSource,
-    SentenceSource,
-    Source,
-    json_option,
-)
+from coordlang.commands.files import write
+from coordlang.commands.inputs import Arguments, InTask, public
 from coordlang.commands.plans import PlanSteps
+from coordlang.commands.records import WRITTEN, ExportOptions
 from coordlang.commands.terminal import covered_code, echo
 from coordlang.commands.understand import SentencePlans
 from coordlang.execution.choices import choices as choices_under
@@ -36,21 +25,11 @@ from coordlang.exports.pddl import PddlExport, export_pddl, plan_names
 from coordlang.language.tolerance import tolerance_data
 from planners.joint.model import JointModel
 from planners.search.plan_file import json_count, only_one_plan
-from planners.system.errors import BadInput, Position, Refuted, UsageError
+from planners.system.errors import BadInput, Position, Refuted
 from planners.system.files import read_text
 from planners.system.messages import visible
 from planners.system.notebook import counted
-from planners.system.options import group, option
 from planners.system.writing import write_texts
-
-#: Beyond this many joint actions robots choose one after another in the exported PDDL.
-MAX_ACTIONS = 2000
-#: The files of an exported task.
-WRITTEN = ("domain.pddl", "problem.pddl")
-
-Target = Literal["pddl", "ltlf", "bt"]
-#: Planners whose PDDL differs: what Fast Downward and K* read, or STRIPS alone.
-Reader = Literal["fd", "kstar", "pyperplan"]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -95,7 +74,7 @@ class ExportedTask(InTask):
         """The number of terms that tell which word a state belongs to."""
         return self.exported.terms
 
-    def save(self, folder: File) -> None:
+    def save(self, folder: str | os.PathLike[str]) -> None:
         """Write ``domain.pddl`` and ``problem.pddl`` into a folder, which is made if it is missing.
 
         Raises
@@ -209,77 +188,8 @@ class ExportedTrees(InTask):
         }
 
 
-@dataclass(frozen=True, slots=True)
-class ExportOptions:
-    """What `export` can be asked for."""
-
-    to: Target = option(
-        "pddl",
-        "pddl: a planning problem.  ltlf: a temporal formula over plans.  bt: each robot's "
-        "choices as a behaviour tree.",
-    )
-    output: str | None = option(
-        None,
-        "pddl: a folder for domain.pddl and problem.pddl; ltlf, bt: a file.",
-        "PATH",
-        names=("-o", "--output"),
-        only="cli",
-    )
-    max_actions: int = option(
-        MAX_ACTIONS,
-        "Beyond N joint actions robots choose one after another in the PDDL.",
-        "N",
-        least=0,
-    )
-    for_planner: Reader = option(
-        "fd",
-        "Who reads the PDDL: fd (Fast Downward) and kstar the same, pyperplan STRIPS only.",
-        names=("--for",),
-    )
-    translate_plan: str | None = option(
-        None,
-        "Do not export: translate a plan of the exported problem into a plan file (FILE).",
-        "FILE",
-        only="cli",
-    )
-    as_json: bool = json_option()
-    source: Source = group(Source, without=NO_SLACK)
-    given: frozenset[str] = frozenset()
-
-    def __post_init__(self) -> None:
-        pddl_only = {"max_actions": "--max-actions", "for_planner": "--for"}
-        pddl_only["translate_plan"] = "--translate-plan"
-        for name, spelling in pddl_only.items():
-            if self.to != "pddl" and name in self.given:
-                raise UsageError(
-                    f"{spelling} belongs to --to pddl",
-                    remedy=f"Leave out {spelling}, or --to {self.to}.",
-                )
-
-    @property
-    def writes_folder(self) -> bool:
-        """Whether ``output`` is a folder for two files."""
-        is_text = self.as_json or self.translate_plan is not None or self.output in (None, "-")
-        return self.to == "pddl" and not is_text
-
-    def outputs(self) -> list[OutputFile]:
-        """The files that are written."""
-        if not self.writes_folder:
-            return [OutputFile("-o", self.output)]
-        folder = self.output
-        paths = [os.path.join(folder, name) if folder else "" for name in WRITTEN]
-        return [OutputFile("-o", path, makes_folder=True) for path in paths]
-
-
-@with_options(ExportOptions)
-def export(
-    language: LanguageSource,
-    domain: DomainSource | None = None,
-    problem: ProblemSource | None = None,
-    sentence: SentenceSource | None = None,
-    *,
-    options: ExportOptions,
-) -> Any:
+@public(ExportOptions)
+def export(files: Arguments, options: ExportOptions) -> Any:
     """Write a task under a sentence for other programs.
 
     Returns
@@ -298,8 +208,8 @@ def export(
     NoPlanFits
         If no optimal plan has the sentence.
     """
-    said = given_sentence(sentence)
-    used = read_task(language, domain, problem, options.source).used
+    said = files.sentence
+    used = files.task().used
     words = used.words_of(said)
     if options.to == "pddl":
         strips_only = options.for_planner == "pyperplan"
@@ -317,16 +227,8 @@ def _label_text(model: JointModel, robot: int, label: int) -> str | None:
     return model.labels[robot][label] if label else None
 
 
-@command_of(export, "LANGUAGE DOMAIN PROBLEM SENTENCE", doing="compiling the task")
-def command(found: ExportedTask | ExportedFormula | ExportedTrees, options: ExportOptions) -> int:
-    """Write the task under SENTENCE ("w1 w0") for other programs.
-
-    The optimal plans of the exported PDDL are exactly the plans that fit, one to one; a plan
-    satisfies the LTLf formula exactly if it has the sentence; each robot's behaviour tree
-    (BehaviorTree.CPP 4) does exactly its choices.
-
-    Exit 1: no plan fits, or the language does not cover the task and guarantees nothing for it.
-    """
+def show(found: ExportedTask | ExportedFormula | ExportedTrees, options: ExportOptions) -> int:
+    """Write the export, or the translated plan."""
     output, as_json = options.output, options.as_json
     if isinstance(found, ExportedTask) and options.translate_plan is not None:
         path = options.translate_plan

@@ -6,27 +6,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from os import fspath
+from typing import Any
 
 import coordlang
-from coordlang.commands.command import command_of
 from coordlang.commands.failure import UNPROVED
-from coordlang.commands.inputs import PlanningInput, read_coordinates_of, read_planning
-from coordlang.commands.keywords import with_options
-from coordlang.commands.options import (
-    NO_SLACK,
-    DomainSource,
-    Jobs,
-    LiftedSource,
-    LiftedWork,
-    ProblemSource,
-    Progress,
-    Source,
-    TasksSource,
-    no_progress,
-    output_option,
+from coordlang.commands.inputs import (
+    Arguments,
+    PlanningInput,
+    public,
+    read_coordinates_of,
 )
+from coordlang.commands.options import Jobs, Progress, TasksSource
+from coordlang.commands.records import GroundOptions
 from coordlang.commands.terminal import echo
-from coordlang.commands.workers import opened_workers
 from coordlang.language.candidates import Candidates, require_solvable
 from coordlang.language.file import to_bytes
 from coordlang.language.partition import Partition
@@ -42,7 +34,6 @@ from planners.parallel.workers import Workers
 from planners.system.errors import OutOfMemory, Position, Refuted, note
 from planners.system.limits import stop_clock
 from planners.system.notebook import counted
-from planners.system.options import group, option
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +53,7 @@ def ground_in(
     is_verified: bool,
     points: Mapping[str, Point],
     workers: Workers,
-    progress: Progress,
+    progress: Progress = lambda _: None,
     every_word: bool = False,
 ) -> Grounded:
     """The words of a problem's states, verified there unless that is not wanted or does not fit.
@@ -103,33 +94,8 @@ def _known(
     return "verified" if verdict.holds else "refuted"
 
 
-@dataclass(frozen=True, slots=True)
-class GroundOptions:
-    """What `ground` can be asked for."""
-
-    tasks: TasksSource | None = option(
-        "all",
-        "Candidate tasks: every pair of reachable states, a task file, or the problem's own task.",
-        "all|FILE|own",
-    )
-    verified: bool = option(
-        True, "Do not verify it here; the file says so.", names=("--unverified",)
-    )
-    work: LiftedWork = group(LiftedWork)
-    output: str = output_option(
-        "The language file; .json or .json.gz, - for stdout.", "LANGUAGE", required=True
-    )
-    source: Source = group(Source, without=NO_SLACK)
-
-
-@with_options(GroundOptions)
-def ground(
-    lifted: LiftedSource,
-    domain: DomainSource | None = None,
-    problem: ProblemSource | None = None,
-    *,
-    options: GroundOptions,
-) -> Language:
+@public(GroundOptions)
+def ground(arguments: Arguments, options: GroundOptions) -> Language:
     """The language of one problem, an ordinary one, from a lifted language of its domain.
 
     If it is not verified here, or if the memory does not suffice, the language covers no task, and
@@ -142,13 +108,13 @@ def ground(
     BadInput
         If the lifted language belongs to another domain or other robots.
     """
+    lifted: Any = arguments.language
     if isinstance(lifted, LiftedLanguage):
         own, position = lifted, Position("the lifted language")
     else:
         own, position = read_lifted(fspath(lifted)), Position(fspath(lifted))
-    files = read_planning(domain, [problem], options.source, most=1)
-    work = options.work
-    with opened_workers(Jobs(work.jobs)) as workers:
+    files, work = arguments.read(), options.work
+    with Jobs(work.jobs).opened() as workers:
         found = ground_in(
             own,
             files,
@@ -157,7 +123,7 @@ def ground(
             is_verified=options.verified,
             points=read_coordinates_of(work.coordinates, files.problems[0]),
             workers=workers,
-            progress=work.progress or no_progress,
+            progress=work.progress or (lambda _: None),
         )
     if found.known == "refuted":
         known = ", ".join(v.problem for v in own.verified)
@@ -171,13 +137,8 @@ def ground(
     return found.language
 
 
-@command_of(ground, "LIFTED DOMAIN PROBLEM", doing="finding all optimal plans")
-def command(found: Language, options: GroundOptions) -> int:
-    """Write the language of one problem, an ordinary language file, from LIFTED.
-
-    Exit 0: written, and verified by definition unless --unverified.  1: refuted for this problem;
-    nothing is written.  3: written, but not verified, for the memory did not suffice.
-    """
+def show(found: Language, options: GroundOptions) -> int:
+    """Write the language."""
     stop_clock()  # the work is done; from here on it is saved
     if options.output == "-":
         echo(to_bytes(found).decode(), nl=False)

@@ -3,24 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import functools
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from os import PathLike, fspath
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-from coordlang.commands.keywords import with_options
-from coordlang.commands.options import (
-    CoordinatesSource,
-    DomainSource,
-    File,
-    LanguageSource,
-    ProblemSource,
-    SentenceSource,
-    Source,
-    TasksSource,
-    no_progress,
-)
+from coordlang.commands import options as given
+from coordlang.commands.options import Source, TasksSource
 from coordlang.sites.coordinates import Point, checked, read_coordinates
 from planners.loading import PlanningInstance, build
 from planners.pddl import read_domain, read_problem
@@ -31,6 +23,7 @@ from planners.search.doubled import note_doubled
 from planners.system.errors import Position, UsageError
 from planners.system.files import names_format, read_bytes
 from planners.system.notebook import Presented
+from planners.system.options import options_of, record_from
 
 if TYPE_CHECKING:
     from coordlang.execution.task_language import TaskLanguage
@@ -40,8 +33,153 @@ if TYPE_CHECKING:
     from coordlang.language.words import Language
     from coordlang.lifted.language import LiftedLanguage
 
+Result = TypeVar("Result")
+
 #: Options that are fixed in a loaded domain.
 _FIXED = frozenset({"cost", "unowned", "remember_actions", "slack", "words_see_slack"})
+#: Argument of a command -> the parameter of its function, and the parameter's type.
+_PARAMETERS = {
+    "LANGUAGE": ("language", "LanguageSource"),
+    "LIFTED": ("lifted", "LanguageSource"),
+    "DOMAIN": ("domain", "DomainSource | None"),
+    "PROBLEM": ("problem", "ProblemSource | None"),
+    "PROBLEMS...": ("problems", "ProblemSource"),
+    "SENTENCE": ("sentence", "SentenceSource | None"),
+    "PLAN": ("plan", "PlanSource | None"),
+}
+
+
+def public(
+    record: type[Any], takes: str | None = None
+) -> Callable[[Callable[[Arguments, Any], Result]], Callable[..., Result]]:
+    """Make a function of `Arguments` and a record one with positional arguments and keywords.
+
+    Its parameters are those that the record ``takes``, then, by keyword, the options of the record.
+    ``with_record`` of the result gets the record, and arguments by the names in ``takes``.
+    """
+    words = [word.strip("[]") for word in (record.takes if takes is None else takes).split()]
+    # What a command can do without its function can, too.
+    is_needed = words[:1] != ["DOMAIN"] and getattr(record, "alone", None) is None
+    parameters = [_parameter(w, is_needed=is_needed and w == words[0]) for w in words]
+    own = inspect.Signature(parameters)
+    word_of = {_PARAMETERS[word][0]: word for word in words}
+    keyword_only = [
+        inspect.Parameter(each.name, inspect.Parameter.KEYWORD_ONLY, default=each.default)
+        for each in options_of(record)
+        if each.option.only != "cli"
+    ]
+
+    def decorate(function: Callable[[Arguments, Any], Result]) -> Callable[..., Result]:
+        def with_record(options: Any, **read: Any) -> Result:
+            source = getattr(options, "source", options)
+            return function(Arguments(source, takes=tuple(words), values=read), options)
+
+        @functools.wraps(function)
+        def called(*arguments: object, **keywords: Any) -> Result:
+            named = {name: keywords.pop(name) for name in [*keywords] if name in word_of}
+            options = record_from(record, keywords, function.__name__)
+            read = own.bind(*arguments, **named).arguments
+            return with_record(options, **{word_of[name]: value for name, value in read.items()})
+
+        called.__signature__ = inspect.Signature([*parameters, *keyword_only])  # type: ignore[attr-defined]
+        called.with_record = with_record  # type: ignore[attr-defined]
+        return called
+
+    return decorate
+
+
+def _parameter(word: str, *, is_needed: bool) -> inspect.Parameter:
+    """The parameter of a function that stands for an argument of its command."""
+    name, kind = _PARAMETERS[word]
+    if word == "PROBLEMS...":
+        return inspect.Parameter(name, inspect.Parameter.VAR_POSITIONAL, annotation=kind)
+    default = inspect.Parameter.empty if is_needed else None
+    either = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    return inspect.Parameter(name, either, default=default, annotation=kind)
+
+
+@dataclass(frozen=True, slots=True)
+class Arguments:
+    """What a function is given: paths or objects read before, and how to read them.
+
+    ``takes`` are the arguments that there are, ``values`` those that were given.
+    """
+
+    source: Source
+    takes: tuple[str, ...] = ()
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def domain(self) -> given.DomainSource | None:
+        """The domain, or what was loaded; None if it is not given."""
+        return self.values.get("DOMAIN")
+
+    @property
+    def problems(self) -> list[given.ProblemSource]:
+        """The problems that are given."""
+        found = [*self.values.get("PROBLEMS...", ()), self.values.get("PROBLEM")]
+        return [problem for problem in found if problem is not None]
+
+    @property
+    def language(self) -> given.LanguageSource:
+        """The language; `UsageError` if none is given."""
+        found = self.values.get("LIFTED", self.values.get("LANGUAGE"))
+        if found is None:
+            raise UsageError("expected a language", remedy="Give a language file, or a language.")
+        return cast("given.LanguageSource", found)
+
+    @property
+    def sentence(self) -> given.SentenceSource:
+        """The sentence; `UsageError` if none is given."""
+        found = self.values.get("SENTENCE")
+        if found is None:
+            raise UsageError("expected a sentence", remedy='Give its words, as in "w1 w0".')
+        return cast("given.SentenceSource", found)
+
+    def read(self) -> PlanningInput:
+        """Read domain and problems, or the files of ``source.factored`` in their place.
+
+        Raises
+        ------
+        UsageError
+            For too few or too many of them.
+        """
+        domain, problems = self.domain, self.problems
+        is_single = "PROBLEMS..." not in self.takes
+        if self.source.factored is not None:
+            if domain is not None or problems:
+                raise UsageError(
+                    "--factored names all files", remedy="Leave out domain and problem."
+                )
+            factored, problem = read_factored(fspath(self.source.factored))
+            return PlanningInput(factored, [problem], self.source)
+        if isinstance(domain, PlanningInstance):
+            return _from_instance(domain, problems, self.source, is_single)
+        if domain is None or not problems or (is_single and len(problems) > 1):
+            wanted = "a problem" if is_single else "problems"
+            raise UsageError(
+                f"expected a domain and {wanted}, or --factored without them",
+                remedy="Give both as files or parsed objects, or factored=DIR.",
+            )
+        lifted = domain if isinstance(domain, Domain) else read_domain(fspath(domain))
+        return PlanningInput(lifted, [_problem(p, lifted) for p in problems], self.source)
+
+    def instance(self) -> PlanningInstance:
+        """Read the joint model and the task of one problem."""
+        loaded = self.domain
+        if isinstance(loaded, PlanningInstance) and self.source == Source() and not self.problems:
+            return loaded
+        return self.read().instance()
+
+    def task(self, coordinates: given.CoordinatesSource | None = None) -> ReadTask:
+        """Read a language and put it into the task of a problem."""
+        from coordlang.execution.task_language import language_in_task
+
+        language, files = self.language, self.read()
+        read, position = language_for(language, files, coordinates=coordinates)
+        options = files.options_of(read)
+        used = language_in_task(read, files.domain, files.problems[0], options, position)
+        return ReadTask(files, used, position)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,184 +220,13 @@ class PlanningInput:
         return found
 
 
-def read_planning(
-    domain: DomainSource | None,
-    problems: Sequence[ProblemSource | None],
-    source: Source,
-    *,
-    most: int | None = None,
-) -> PlanningInput:
-    """Read domain and problems, or the files of ``source.factored`` in their place.
+@dataclass(frozen=True, slots=True)
+class ReadTask:
+    """The files of one problem, and a language in its task."""
 
-    Parameters
-    ----------
-    domain, problems
-        Paths or parsed objects; None is not given.
-    source
-        The model options, and in place of the files a folder of ``domain-ROBOT.pddl`` and
-        ``problem-ROBOT.pddl`` files.
-    most
-        The greatest number of problems; None: any number.
-
-    Raises
-    ------
-    UsageError
-        For too few or too many of them.
-    """
-    found = [problem for problem in problems if problem is not None]
-    if source.factored is not None:
-        if domain is not None or found:
-            raise UsageError("--factored names all files", remedy="Leave out domain and problem.")
-        domain, problem = read_factored(fspath(source.factored))
-        return PlanningInput(domain, [problem], source)
-    if isinstance(domain, PlanningInstance):
-        return _from_instance(domain, found, source, most)
-    if domain is None or not found or (most is not None and len(found) > most):
-        wanted = "a problem" if most == 1 else "problems"
-        raise UsageError(
-            f"expected a domain and {wanted}, or --factored without them",
-            remedy="Give both as files or parsed objects, or factored=DIR.",
-        )
-    lifted = domain if isinstance(domain, Domain) else read_domain(fspath(domain))
-    return PlanningInput(lifted, [_problem(p, lifted) for p in found], source)
-
-
-@with_options(Source)
-def load(
-    domain: DomainSource | None = None, *problems: ProblemSource, options: Source
-) -> PlanningInstance:
-    """Read a domain and problems, and build their joint model.
-
-    The result stands for the domain and its problems in every other function, which then read and
-    ground nothing again where they can help it.  Problems of one model have the same objects and
-    static facts.
-
-    Raises
-    ------
-    BadInput, Unsupported
-        With file, line and column.
-    UsageError
-        For options that contradict each other or the files.
-    """
-    return read_planning(domain, problems, options).instance()
-
-
-def load_language(path: File) -> Language:
-    """Read a language file (docs/formats.md).
-
-    Raises
-    ------
-    BadInput
-        For a file that is missing, cut off, no language, or of another version.
-    """
-    from coordlang.language.file import read_language as read_language_file
-
-    return read_language_file(fspath(path))
-
-
-def read_instance(
-    domain: DomainSource | None, problem: ProblemSource | None, source: Source
-) -> PlanningInstance:
-    """Read the joint model and the task of one problem."""
-    if isinstance(domain, PlanningInstance) and source == Source() and problem is None:
-        return domain
-    return read_planning(domain, [problem], source, most=1).instance()
-
-
-def read_tasks(tasks: TasksSource) -> tuple[tuple[ListedTask, ...], Position]:
-    """Read a task list, with what messages call it."""
-    from coordlang.language.listed import ListedTask
-    from coordlang.language.task_file import TASKS, read_task_file, tasks_from_data
-
-    if isinstance(tasks, str | PathLike):
-        return read_task_file(fspath(tasks)), Position(fspath(tasks))
-    position = Position("the tasks")
-    if isinstance(tasks, Mapping):
-        return tasks_from_data(dict(tasks), position), position
-    entries = [
-        {"init": list(task.init), "goal": list(task.goal)}
-        if isinstance(task, ListedTask)
-        else dict(task)
-        for task in tasks
-    ]
-    data = {"format": TASKS.format, "version": TASKS.version, "tasks": entries}
-    return tasks_from_data(data, position), position
-
-
-def read_language(language: LanguageSource) -> tuple[Language | LiftedLanguage, Position]:
-    """Read a language or a lifted language, with what messages call it."""
-    from coordlang.language.file import language_from_bytes
-    from coordlang.language.words import Language
-
-    if isinstance(language, Language):
-        return language, Position("the language")
-    if not isinstance(language, str | PathLike):
-        return language, Position("the lifted language")
-    data, position = read_bytes(fspath(language)), Position(fspath(language))
-    if names_format(data, "coordlang/lifted"):
-        from coordlang.lifted.file import lifted_from_bytes
-
-        return lifted_from_bytes(data, position), position
-    return language_from_bytes(data, position), position
-
-
-def read_plain_language(language: LanguageSource) -> tuple[Language, Position]:
-    """Read a language, with what messages call it; `UsageError` for a lifted one."""
-    from coordlang.language.words import Language
-
-    read, position = read_language(language)
-    if not isinstance(read, Language):
-        raise UsageError(
-            f"{position} is a lifted language",
-            remedy="`coordlang ground` makes it an ordinary one, of one problem.",
-        )
-    return read, position
-
-
-def read_coordinates_of(given: CoordinatesSource | None, problem: Problem) -> Mapping[str, Point]:
-    """Coordinates of places: those given, else those of a file beside the problem, else none."""
-    if isinstance(given, str | PathLike):
-        return read_coordinates(fspath(given))
-    if given is not None:
-        return checked(given, Position("the coordinates"))
-    file = Path(problem.source.name)
-    beside = (file if file.is_dir() else file.parent) / "coordinates.json"
-    return read_coordinates(beside) if file.exists() and beside.is_file() else {}
-
-
-def language_for(
-    language: LanguageSource,
-    files: PlanningInput,
-    tasks: TasksSource | None = None,
-    *,
-    is_verified: bool = True,
-    coordinates: CoordinatesSource | None = None,
-) -> tuple[Language, Position]:
-    """Read a language; a lifted one is put into the problems, and verified there for tasks.
-
-    Without ``tasks`` for the problems' own ones.  One that is to be used, and verified for that,
-    keeps the words that no state here has, so that words look the same in all problems.
-    """
-    from coordlang.language.words import Language
-
-    read, position = read_language(language)
-    if isinstance(read, Language):
-        return read, position
-    from coordlang.commands.ground import ground_in
-    from planners.parallel.workers import Workers
-
-    found = ground_in(
-        read,
-        files,
-        position,
-        tasks=tasks,
-        is_verified=is_verified,
-        points=read_coordinates_of(coordinates, files.problems[0]),
-        workers=Workers(),
-        progress=no_progress,
-        every_word=is_verified,
-    )
-    return found.language, position
+    files: PlanningInput
+    used: TaskLanguage
+    position: Position
 
 
 class InTask(Presented):
@@ -282,41 +249,134 @@ class InTask(Presented):
         return self.used.tolerance
 
 
-@dataclass(frozen=True, slots=True)
-class ReadTask:
-    """The files of one problem, and a language in its task."""
+@public(Source, "DOMAIN PROBLEMS...")
+def load(files: Arguments, options: Source) -> PlanningInstance:
+    """Read a domain and problems, and build their joint model.
 
-    files: PlanningInput
-    used: TaskLanguage
-    position: Position
+    The result stands for the domain and its problems in every other function, which then read and
+    ground nothing again where they can help it.  Problems of one model have the same objects and
+    static facts.
 
-
-def read_task(
-    language: LanguageSource,
-    domain: DomainSource | None,
-    problem: ProblemSource | None,
-    source: Source,
-    coordinates: CoordinatesSource | None = None,
-) -> ReadTask:
-    """Read a language and put it into the task of a problem."""
-    from coordlang.execution.task_language import language_in_task
-
-    files = read_planning(domain, [problem], source, most=1)
-    read, position = language_for(language, files, coordinates=coordinates)
-    options = files.options_of(read)
-    used = language_in_task(read, files.domain, files.problems[0], options, position)
-    return ReadTask(files, used, position)
+    Raises
+    ------
+    BadInput, Unsupported
+        With file, line and column.
+    UsageError
+        For options that contradict each other or the files.
+    """
+    return files.read().instance()
 
 
-def given_sentence(sentence: SentenceSource | None) -> SentenceSource:
-    """Return the sentence; `UsageError` where none is given."""
-    if sentence is None:
-        raise UsageError("expected a sentence", remedy='Give its words, as in "w1 w0".')
-    return sentence
+def load_language(path: given.File) -> Language:
+    """Read a language file (docs/formats.md).
+
+    Raises
+    ------
+    BadInput
+        For a file that is missing, cut off, no language, or of another version.
+    """
+    from coordlang.language.file import read_language as read_language_file
+
+    return read_language_file(fspath(path))
+
+
+def read_tasks(tasks: TasksSource) -> tuple[tuple[ListedTask, ...], Position]:
+    """Read a task list, with what messages call it."""
+    from coordlang.language.listed import ListedTask
+    from coordlang.language.task_file import TASKS, read_task_file, tasks_from_data
+
+    if isinstance(tasks, str | PathLike):
+        return read_task_file(fspath(tasks)), Position(fspath(tasks))
+    position = Position("the tasks")
+    if isinstance(tasks, Mapping):
+        return tasks_from_data(dict(tasks), position), position
+    entries = [
+        {"init": list(task.init), "goal": list(task.goal)}
+        if isinstance(task, ListedTask)
+        else dict(task)
+        for task in tasks
+    ]
+    data = {"format": TASKS.format, "version": TASKS.version, "tasks": entries}
+    return tasks_from_data(data, position), position
+
+
+def read_language(
+    language: given.LanguageSource,
+) -> tuple[Language | LiftedLanguage, Position]:
+    """Read a language or a lifted language, with what messages call it."""
+    from coordlang.language.file import language_from_bytes
+    from coordlang.language.words import Language
+
+    if isinstance(language, Language):
+        return language, Position("the language")
+    if not isinstance(language, str | PathLike):
+        return language, Position("the lifted language")
+    data, position = read_bytes(fspath(language)), Position(fspath(language))
+    if names_format(data, "coordlang/lifted"):
+        from coordlang.lifted.file import lifted_from_bytes
+
+        return lifted_from_bytes(data, position), position
+    return language_from_bytes(data, position), position
+
+
+def language_for(
+    language: given.LanguageSource,
+    files: PlanningInput,
+    tasks: TasksSource | None = None,
+    *,
+    is_verified: bool = True,
+    coordinates: given.CoordinatesSource | None = None,
+) -> tuple[Language, Position]:
+    """Read a language; a lifted one is put into the problems, and verified there for tasks.
+
+    Without ``tasks`` for the problems' own ones.  One that is to be used, and verified for that,
+    keeps the words that no state here has, so that words look the same in all problems.
+    """
+    from coordlang.language.words import Language
+
+    read, position = read_language(language)
+    if isinstance(read, Language):
+        return read, position
+    from coordlang.commands.ground import ground_in
+    from planners.parallel.workers import Workers
+
+    found = ground_in(
+        read,
+        files,
+        position,
+        tasks=tasks,
+        is_verified=is_verified,
+        points=read_coordinates_of(coordinates, files.problems[0]),
+        workers=Workers(),
+        every_word=is_verified,
+    )
+    return found.language, position
+
+
+def read_coordinates_of(
+    given: given.CoordinatesSource | None, problem: Problem
+) -> Mapping[str, Point]:
+    """Coordinates of places: those given, else those of a file beside the problem, else none."""
+    if isinstance(given, str | PathLike):
+        return read_coordinates(fspath(given))
+    if given is not None:
+        return checked(given, Position("the coordinates"))
+    file = Path(problem.source.name)
+    beside = (file if file.is_dir() else file.parent) / "coordinates.json"
+    return read_coordinates(beside) if file.exists() and beside.is_file() else {}
+
+
+def say_size(candidates: Candidates, say: Callable[[str], None] | None) -> None:
+    """Say how much there is to do, where a person will wait for it."""
+    from planners.search.portions import estimate
+
+    found = estimate(candidates.source)
+    if say is not None and found.is_large:
+        say(str(found))
 
 
 def _from_instance(
-    loaded: PlanningInstance, problems: list[ProblemSource], source: Source, most: int | None
+    loaded: PlanningInstance, problems: list[given.ProblemSource], source: Source, is_single: bool
 ) -> PlanningInput:
     """Return the files of an instance, and the options that it was loaded with."""
     if source.given:
@@ -325,15 +385,15 @@ def _from_instance(
             remedy="Give them to coordlang.load.",
         )
     read = [_problem(p, loaded.domain) for p in problems] or list(loaded.problems)
-    if most is not None and len(read) > most:
+    if is_single and len(read) > 1:
         raise UsageError(
             f"expected one problem, and {len(read)} are loaded",
             remedy="Give the problem that is meant as the second argument.",
         )
     # A language must have been built with the same options; its robots may be named there alone.
-    given = _FIXED | ({"robots"} if loaded.options.names else set())
-    return PlanningInput(loaded.domain, read, Source(None, loaded.options, given))
+    fixed = _FIXED | ({"robots"} if loaded.options.names else set())
+    return PlanningInput(loaded.domain, read, Source(None, loaded.options, fixed))
 
 
-def _problem(problem: ProblemSource, domain: Domain) -> Problem:
+def _problem(problem: given.ProblemSource, domain: Domain) -> Problem:
     return problem if isinstance(problem, Problem) else read_problem(fspath(problem), domain)

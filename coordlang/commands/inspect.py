@@ -8,28 +8,16 @@ from dataclasses import asdict, dataclass
 from os import fspath
 from typing import TYPE_CHECKING, Any
 
-from coordlang.commands.command import command_of
-from coordlang.commands.inputs import read_instance
-from coordlang.commands.keywords import with_options
+from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.layout import WIDTH, wrapped
-from coordlang.commands.options import (
-    NO_SLACK,
-    DomainSource,
-    File,
-    ProblemSource,
-    Source,
-    json_option,
-)
+from coordlang.commands.records import WRITTEN, InspectOptions
 from coordlang.commands.terminal import echo, line_width, note, note_single_robot
 from planners.search.search_estimate import SearchEstimate
 from planners.system.notebook import Presented, counted, html_table
-from planners.system.options import group, option
 
 if TYPE_CHECKING:
     from planners.inspection import Inspection
 
-#: The files that --write makes.
-WRITTEN = ("domain.pddl", "problem.pddl")
 #: The most columns of the names on the left.
 _WIDEST_NAME = 30
 #: States, and joint steps out of one layer, beyond which a search is not likely to end.
@@ -147,37 +135,15 @@ class Inspected(Presented):
         return ", none of them possible in one state near the start" if found.interfering else ""
 
 
-@dataclass(frozen=True, slots=True)
-class InspectOptions:
-    """What `inspect` can be asked for."""
-
-    states: bool = option(False, "Also count the reachable joint states and steps.")
-    write: File | None = option(
-        None,
-        "Also write what was read as domain.pddl and problem.pddl in this folder: factored files "
-        "as one domain and one problem.",
-        "DIR",
-        is_output=True,
-        files=WRITTEN,
-    )
-    as_json: bool = json_option()
-    source: Source = group(Source, without=NO_SLACK)
-
-
-@with_options(InspectOptions)
-def inspect(
-    domain: DomainSource | None = None,
-    problem: ProblemSource | None = None,
-    *,
-    options: InspectOptions,
-) -> Inspected:
+@public(InspectOptions)
+def inspect(files: Arguments, options: InspectOptions) -> Inspected:
     """Show what was understood of a domain and problem."""
     from planners.inspection import inspect as inspect_instance
     from planners.pddl.pddl_text import domain_text, problem_text
     from planners.search.reachable import count as count_reachable
     from planners.system.writing import write_texts
 
-    loaded = read_instance(domain, problem, options.source)
+    loaded = files.instance()
     size = None
     if options.states:
         size = ReachableSize(*count_reachable(loaded.model, loaded.tasks[0].init[None, :]))
@@ -189,12 +155,8 @@ def inspect(
     return found
 
 
-@command_of(inspect, "DOMAIN PROBLEM", doing="reading and grounding", keeps_plans=False)
-def command(found: Inspected, options: InspectOptions) -> None:
-    """Show what was understood of DOMAIN and PROBLEM: a domain that was misread shows it here.
-
-    With --factored and --write: the files of all robots as one domain and one problem.
-    """
+def show(found: Inspected, options: InspectOptions) -> None:
+    """Print what was understood."""
     if options.write is not None:
         note(f"written to {fspath(options.write)}: {', '.join(WRITTEN)}")
     note_single_robot(found.robots)

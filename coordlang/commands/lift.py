@@ -4,29 +4,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from os import fspath
-from typing import Any, Literal
+from typing import Any
 
 import coordlang
-from coordlang.commands.command import command_of
-from coordlang.commands.inputs import read_coordinates_of, read_planning
-from coordlang.commands.keywords import with_options
-from coordlang.commands.options import (
-    NO_SLACK,
-    DomainSource,
-    File,
-    Jobs,
-    LiftedWork,
-    ProblemSource,
-    Source,
-    json_option,
-    no_progress,
-    output_option,
-)
+from coordlang.commands.inputs import Arguments, public, read_coordinates_of
+from coordlang.commands.options import File, Jobs, ProblemSource
+from coordlang.commands.records import LiftOptions
 from coordlang.commands.terminal import echo, ended_early
-from coordlang.commands.workers import opened_workers
 from coordlang.language.candidates import require_solvable
 from coordlang.language.provenance import Guarantee, provenance_of, world_sha256
 from coordlang.lifted.file import to_bytes, write_lifted
@@ -38,10 +24,6 @@ from planners.loading import PlanningInstance
 from planners.system.errors import BadInput, Position, ProvedImpossible, UsageError
 from planners.system.limits import stop_clock
 from planners.system.notebook import Presented, counted
-from planners.system.options import group, option
-
-#: What a lifted language should have few of first, features or words.
-LiftPreference = Literal["features", "words"]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -101,52 +83,8 @@ class Lifted(Presented):
         return "\n".join(lines)
 
 
-@dataclass(frozen=True, slots=True)
-class LiftOptions:
-    """What `lift` can be asked for."""
-
-    tasks: Literal["all"] | None = option(
-        None,
-        "Candidate tasks: every pair of reachable states of each problem (default: the problems' "
-        "own).",
-    )
-    check: Sequence[ProblemSource] = option(
-        (),
-        "Verify on this problem, too; learn from it if it refutes what was learned.",
-        "PROBLEM",
-    )
-    complexity: int = option(8, "Leave out features that are more complex.", least=1)
-    prefer: LiftPreference | None = option(
-        None,
-        "Few words, where states with different features may share one: for the simplest "
-        "features, or for those that do with fewest words (default: a word for each combination).",
-    )
-    work: LiftedWork = group(LiftedWork)
-    output: str = output_option(
-        "The lifted file; .json or .json.gz, - for stdout.", "LIFTED", required=True
-    )
-    seed: int = option(0, "Seed of all random choices.", least=0)
-    as_json: bool = json_option("Print the figures as one JSON object.")
-    source: Source = group(Source, without=NO_SLACK)
-
-    def __post_init__(self) -> None:
-        if self.source.model.slack:
-            raise UsageError(
-                "--slack: words over features are learned from optimal plans",
-                remedy="Build a language of this problem: `coordlang build --slack`.",
-            )
-        if self.source.factored is not None and self.check:
-            raise UsageError(
-                "--check and --factored: a folder of factored files holds one problem",
-                remedy="Leave out --check, or make a file of each folder: "
-                "`coordlang inspect --write`.",
-            )
-
-
-@with_options(LiftOptions)
-def lift(
-    domain: DomainSource | None = None, *problems: ProblemSource, options: LiftOptions
-) -> Lifted:
+@public(LiftOptions)
+def lift(files: Arguments, options: LiftOptions) -> Lifted:
     """Learn words as functions of features, for all these problems at once.
 
     The problems need not have the same objects, but the same robots.
@@ -156,26 +94,24 @@ def lift(
     ProvedImpossible
         If no features up to this complexity suffice.
     """
-    check, seed, factored = options.check, options.seed, options.source.factored is not None
-    if isinstance(domain, PlanningInstance):
-        problems = problems or domain.problems
-    every = [
-        _instance(domain, problem, options)
-        for problem in ([None] if factored else [*problems, *check])
-    ]
+    check, seed, problems = options.check, options.seed, files.problems
+    if isinstance(files.domain, PlanningInstance):
+        problems = problems or [*files.domain.problems]
+    given: list[Any] = [*problems, *check] if options.source.factored is None else [None]
+    every = [_instance(files, problem, options) for problem in given]
     if not every:
         raise UsageError("there is no problem to learn from", remedy="Name one or more.")
     known = len(every) - len(check)
     for other in every[1:]:
         _require_alike(every[0], other)
-    with opened_workers(Jobs(options.work.jobs)) as workers:
+    with Jobs(options.work.jobs).opened() as workers:
         learned = learn(
             every[:known],
             every[known:],
             complexity=options.complexity,
             prefer=options.prefer,
             seed=seed,
-            progress=options.work.progress or no_progress,
+            progress=options.work.progress or (lambda _: None),
             workers=workers,
         )
     words = learned.words
@@ -197,12 +133,13 @@ def lift(
 
 
 def _instance(
-    domain: DomainSource | None, problem: ProblemSource | None, options: LiftOptions
+    arguments: Arguments, problem: ProblemSource | None, options: LiftOptions
 ) -> Instance:
     """A problem; that of a factored folder where none is given."""
-    files = read_planning(domain, [problem], options.source, most=1)
-    say = options.work.progress or no_progress
-    say(f"finding all optimal plans of {files.problems[0].name}")
+    given = {"DOMAIN": arguments.domain, "PROBLEM": problem}
+    files = Arguments(options.source, (*given,), given).read()
+    if options.work.progress is not None:
+        options.work.progress(f"finding all optimal plans of {files.problems[0].name}")
     points = read_coordinates_of(options.work.coordinates, files.problems[0])
     try:
         candidates = files.candidates(options.tasks, files.source.model)
@@ -231,16 +168,8 @@ def _verified(own: Instance, sizes: tuple[int, int, int]) -> Verified:
     )
 
 
-@command_of(lift, "DOMAIN PROBLEMS...", doing="finding all optimal plans")
-def command(found: Lifted, options: LiftOptions) -> int:
-    """Learn words as functions of features of states, for all PROBLEMS at once.
-
-    The problems have the same robots, and may have other objects: maps of other sizes.  The words
-    are verified by definition on every problem, and on those to --check.
-
-    Exit 0: written.  3: a limit ended the search for fewer words (--prefer); the best ones so far
-    are written.  11: no features suffice.
-    """
+def show(found: Lifted, options: LiftOptions) -> int:
+    """Write the lifted language, and print the figures."""
     stop_clock()  # the work is done; from here on it is saved
     to_stdout = options.output == "-"
     if to_stdout:

@@ -6,7 +6,6 @@ Data goes to stdout, logs and progress to stderr.  Exit codes are an interface (
 
 from __future__ import annotations
 
-import importlib
 import os
 import sys
 import traceback
@@ -25,7 +24,7 @@ from planners.system.messages import visible
 from planners.system.signals import Interruptions
 
 #: Command -> one line about it, so that ``--help`` need not import them all.  A command is the
-#: module of this name in `coordlang.commands`, imported when it is called.
+#: record of this name in `coordlang.commands.records` and the module in `coordlang.commands`.
 COMMANDS = {
     "inspect": "Show what was understood of a domain: robots, subactions, constraints.",
     "plans": "Count, list or sample all optimal plans of a task.",
@@ -50,7 +49,7 @@ COMMANDS = {
 
 
 class _LazyGroup(click.Group):
-    """Imports a command's module only when the command is called or its help is asked for."""
+    """Makes a command from its record; its module is imported when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)
@@ -58,9 +57,14 @@ class _LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        module = importlib.import_module(f"coordlang.commands.{cmd_name}")
-        command: click.Command = module.command
-        return command
+        if cmd_name == "schema":
+            from coordlang.commands.schema import command
+
+            return command
+        from coordlang.commands.command import command_of
+        from coordlang.commands.records import record_of
+
+        return command_of(cmd_name, record_of(cmd_name))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):

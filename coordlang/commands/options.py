@@ -1,16 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What several functions and commands take: files or parsed objects, and options.
+"""Options that several commands and functions take, and the types of what they read.
 
 Nothing heavy is imported here: ``--help`` needs the records.
 """
 
 from __future__ import annotations
 
+import re
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any, Literal, Union
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Union
 
+import click
+
+from coordlang.commands.files import OutputFile
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import UsageError
 from planners.system.options import group, option
@@ -19,7 +25,9 @@ if TYPE_CHECKING:
     from coordlang.language.listed import ListedTask
     from coordlang.language.words import Language
     from coordlang.lifted.language import LiftedLanguage
+    from coordlang.verification.certificate_file import Certificate
     from planners.loading import PlanningInstance
+    from planners.parallel.workers import Workers
     from planners.pddl.lifted import Domain, Problem
 
 File = str | PathLike[str]
@@ -29,25 +37,57 @@ ProblemSource = Union[File, "Problem"]
 #: ``"all"``, a task file, its data, or tasks: each with ``init`` and ``goal``, lists of PDDL texts.
 TasksSource = Union[File, Mapping[str, Any], "Sequence[ListedTask | Mapping[str, Any]]"]
 LanguageSource = Union[File, "Language", "LiftedLanguage"]
-LiftedSource = Union[File, "LiftedLanguage"]
+CertificateSource = Union[File, "Certificate"]
 #: A file of coordinates, or place -> (x, y).
 CoordinatesSource = File | Mapping[str, tuple[float, float]]
 #: A sentence: ``"w1 w0"``, its words ``("w1", "w0")``, or one of `explain`.
 SentenceSource = str | Iterable[str]
+#: A plan file, or the steps of one plan, each with one text or None for every robot.
+PlanSource = File | Sequence[tuple[str | None, ...]]
 
-#: What to do about a candidate task without a plan.
-Unsolvable = Literal["fail", "skip"]
 #: Called with what is being done, now and then.
 Progress = Callable[[str], None]
 
-
 #: What the command line has not where plans take no slack, or a language file says how much.
 NO_SLACK = ("slack", "words_see_slack")
+#: Plans that are listed where no number is given.
+DEFAULT_MAX = 10
+
+
+class CommandOptions:
+    """What a command can be asked for; the docstring of each record is the command's ``--help``.
+
+    Attributes
+    ----------
+    takes
+        The arguments, as the usage line shows them: ``LANGUAGE DOMAIN PROBLEM [SENTENCE]``.
+    doing
+        What a terminal shows while the function works.
+    keeps_plans
+        Whether it searches no task again that was searched before, unless ``--no-cache`` is given.
+    alone
+        The option in whose presence there are no arguments.
+    """
+
+    __slots__ = ()
+    takes: ClassVar[str] = ""
+    doing: ClassVar[str] = "reading and grounding"
+    keeps_plans: ClassVar[bool] = True
+    alone: ClassVar[str | None] = None
+
+    def outputs(self) -> list[OutputFile]:
+        """Files that are written, where that depends on several options."""
+        return []
 
 
 def json_option(help: str = "One JSON object.") -> Any:
     """The field of an options record for ``--json``."""
     return option(False, help, names=("--json",), only="cli")
+
+
+def form_option(default: str, help: str) -> Any:
+    """The field of an options record for ``--format``."""
+    return option(default, help, names=("--format",), only="cli")
 
 
 def output_option(
@@ -71,6 +111,18 @@ def coordinates_option() -> Any:
         "Where places lie (default: coordinates.json beside PROBLEM, else what names say).",
         "FILE",
     )
+
+
+def progress_option(help: str = "Called with a line of text when a phase begins.") -> Any:
+    """The field ``progress`` of an options record."""
+    return option(None, help, only="python")
+
+
+def form_of(form: str, as_json: bool, given: frozenset[str]) -> str:
+    """``--format``, for which ``--json`` may stand; ``given`` are the options that were."""
+    if as_json and form != "json" and "form" in given:
+        raise click.UsageError(f"--json is short for --format json: leave out --format {form}")
+    return "json" if as_json else form
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +172,18 @@ class Jobs:
         if self.scheduler is not None:
             object.__setattr__(self, "scheduler", fspath(self.scheduler))
 
+    def opened(self) -> AbstractContextManager[Workers]:
+        """Who does jobs, for a block."""
+        from planners.parallel.workers import workers
+
+        scheduler = None if self.scheduler is None else fspath(self.scheduler)
+        packages = ("planners", "coordlang")  # whose code does jobs
+        return workers(self.jobs, scheduler, self.resume, packages, self.note or _warn)
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, RuntimeWarning, stacklevel=2)
+
 
 @dataclass(frozen=True, slots=True)
 class LiftedWork:
@@ -127,10 +191,132 @@ class LiftedWork:
 
     coordinates: CoordinatesSource | None = coordinates_option()
     jobs: int | None = option(None, "Processes that verify (default: the cores).", "N", least=1)
-    progress: Progress | None = option(
-        None, "Called with a line of text now and then.", only="python"
+    progress: Progress | None = progress_option("Called with a line of text now and then.")
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """Which plans are listed: the first ``most`` ones, or ``sample`` drawn ones."""
+
+    only_count: bool = option(
+        False, "Print the exact number of plans only.", names=("--count",), only="cli"
+    )
+    most: int | None = option(
+        None,
+        f"List at most so many plans (default: {DEFAULT_MAX}).",
+        "N",
+        names=("--max",),
+        least=0,
+        only="cli",
+    )
+    sample: int | None = option(
+        None, "Draw N plans uniformly instead of the first ones.", "N", least=1, only="cli"
+    )
+    seed: int = option(0, "Seed of --sample.", only="cli")
+    given: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        if self.only_count and (self.most is not None or self.sample is not None):
+            raise click.UsageError("--count prints a number only: leave out --max and --sample")
+        if self.most is not None and self.sample is not None:
+            raise click.UsageError("--sample N draws N plans: leave out --max")
+        if self.sample is None and "seed" in self.given:
+            raise click.UsageError("--seed belongs to --sample")
+
+    @property
+    def is_default(self) -> bool:
+        """Whether no option says which plans are listed."""
+        return not self.only_count and self.most is None and self.sample is None
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """Whether plans that were found before are read from the user's cache."""
+
+    no_cache: bool = option(False, "Search anew: read no plans that were found before.")
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What bounds the work of a command."""
+
+    time_limit: float | None = option(None, "Stop after this long (exit 23).", "SECONDS")
+    memory_limit: str | None = option(
+        None,
+        "Stop before using more, e.g. 4G (exit 22); none: no limit.  Default: 80 % of what is "
+        "free.",
+        "SIZE",
+    )
+    debug: bool = option(False, "Show tracebacks.")
+
+    def __post_init__(self) -> None:
+        if self.time_limit is not None and not self.time_limit > 0:
+            raise click.UsageError("--time-limit: expected a number of seconds above 0")
+
+    @property
+    def bytes(self) -> int | None:
+        """The most memory that was given, None for no limit; `click.BadParameter` for no size."""
+        text = (self.memory_limit or "none").strip().lower()
+        if text == "none":
+            return None
+        match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([kmgt]?)i?b?", text)
+        if not match:
+            raise click.BadParameter(
+                "expected a size such as 500M or 4G, or none", param_hint="'--memory-limit'"
+            )
+        return int(float(match[1]) * 1024 ** " kmgt".index(match[2] or " "))
+
+
+#: How words are found: a key of `coordlang.vocabulary.METHODS`.
+Method = Literal["best", "greedy", "separating", "minimal", "exhaustive"]
+#: What the language should be like, of those with the fewest words, by the value of ``--prefer``.
+BuildPreference = Literal["flexible", "simple"]
+#: Effort of ``--method best`` that takes a second or two on small tasks.
+EFFORT = 10
+
+
+@dataclass(frozen=True, slots=True)
+class MethodOptions:
+    """How the words of a language are found.
+
+    Raises `UsageError` for a value that the method does not support.
+    """
+
+    method: Method = option(
+        "best",
+        "best: few words within some effort, and how many are needed at least.  greedy: fast.  "
+        "separating: fewest words that part plans where they differ first or last.  minimal: "
+        "fewest words at all, with proof.  exhaustive: brute force.",
+    )
+    effort: int = option(
+        EFFORT,
+        "best: what the search for fewer words may spend, in thousands of conflicts of its solver.",
+        "N",
+        least=0,
+    )
+    seed: int = option(0, "Seed of all random choices.", least=0)
+    alpha_only: bool = option(
+        False, "separating: part plans where they differ first, never where last."
+    )
+    prefer: BuildPreference | None = option(
+        None,
+        "Of the languages with the fewest words that were found one whose ..  "
+        "flexible: sentences leave many plans open.  simple: words have short formulas.",
     )
 
-
-def no_progress(_: str) -> None:
-    """Report nothing."""
+    def __post_init__(self) -> None:
+        if self.alpha_only and self.method != "separating":
+            raise UsageError(
+                "--alpha-only belongs to --method separating",
+                remedy="Add --method separating, or leave out --alpha-only.",
+            )
+        if self.effort != EFFORT and self.method != "best":
+            raise UsageError(
+                "--effort belongs to --method best",
+                remedy="Leave out --effort, or --method.",
+            )
+        if self.prefer and self.method in ("greedy", "separating"):
+            raise UsageError(
+                f"--prefer {self.prefer} belongs to --method best, minimal or exhaustive",
+                remedy=f"Leave out --method {self.method}, or --prefer.",
+            )

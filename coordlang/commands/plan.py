@@ -6,22 +6,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
-from coordlang.commands.command import command_of
-from coordlang.commands.inputs import InTask, read_task
-from coordlang.commands.keywords import with_options
-from coordlang.commands.listing import form_of
-from coordlang.commands.options import (
-    NO_SLACK,
-    DomainSource,
-    LanguageSource,
-    ProblemSource,
-    SentenceSource,
-    Source,
-    json_option,
-)
+from coordlang.commands.inputs import Arguments, InTask, public
 from coordlang.commands.plans import PlanSteps
+from coordlang.commands.records import PlanOptions
 from coordlang.commands.terminal import covered_code, echo
 from coordlang.commands.understand import SentencePlans
 from coordlang.execution.best_sentence import BestSentence, best_sentence
@@ -33,7 +22,6 @@ from planners.search.heuristics import HeuristicName
 from planners.search.plan_file import Texts, json_count
 from planners.system.errors import UsageError
 from planners.system.notebook import counted
-from planners.system.options import group, option
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,39 +126,8 @@ class PlanUnderSentence(InTask):
         return data
 
 
-@dataclass(frozen=True, slots=True)
-class PlanOptions:
-    """What `plan` can be asked for."""
-
-    prefer: str | Sequence[str] = option(
-        (),
-        'In place of SENTENCE: shortest, most-plans, first:ROBOT or avoid:"(ATOM)"; '
-        "a second one decides among equals.",
-        "PREFERENCE",
-    )
-    heuristic: HeuristicName = option("relaxed", "The lower bound of A*.")
-    form: Literal["ipc", "json", "plansys2"] = option(
-        "ipc", "How the plan is written.", names=("--format",), only="cli"
-    )
-    as_json: bool = json_option("Short for --format json.")
-    source: Source = group(Source, without=NO_SLACK)
-    given: frozenset[str] = frozenset()
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "form", form_of(self.form, self.as_json, self.given))
-        if isinstance(self.prefer, str):
-            object.__setattr__(self, "prefer", (self.prefer,))
-
-
-@with_options(PlanOptions)
-def plan(
-    language: LanguageSource,
-    domain: DomainSource | None = None,
-    problem: ProblemSource | None = None,
-    sentence: SentenceSource | None = None,
-    *,
-    options: PlanOptions,
-) -> PlanUnderSentence:
+@public(PlanOptions)
+def plan(files: Arguments, options: PlanOptions) -> PlanUnderSentence:
     """Find one optimal plan that has a sentence, by A* that prunes what does not fit.
 
     Raises
@@ -180,12 +137,13 @@ def plan(
     UsageError
         For an unknown preference, and for both or neither of sentence and ``prefer``.
     """
+    sentence = files.values.get("SENTENCE")
     if (sentence is None) == (not options.prefer):
         raise UsageError(
             "expected a SENTENCE or --prefer, one of the two",
             remedy="--prefer shortest finds the sentence with the fewest words.",
         )
-    used = read_task(language, domain, problem, options.source).used
+    used = files.task().used
     preferences = [read_preference(used, text) for text in options.prefer]
     best = best_sentence(used, preferences) if preferences else None
     words = best.words if best else used.words_of(sentence or ())
@@ -218,13 +176,8 @@ def _work(search: GuidedPlan) -> dict[str, int]:
     return {"expanded": search.expanded, "generated": search.generated, "states": search.states}
 
 
-@command_of(plan, "LANGUAGE DOMAIN PROBLEM [SENTENCE]", doing="searching for a plan")
-def command(found: PlanUnderSentence, options: PlanOptions) -> int:
-    """Find one optimal plan that has SENTENCE ("w1 w0"), by A* that prunes what does not fit.
-
-    With --prefer the best sentence of the task is found first.  The nodes expanded with and without
-    the sentence go to stderr.
-    """
+def show(found: PlanUnderSentence, options: PlanOptions) -> int:
+    """Print the plan, and the work of the search."""
     if options.form == "json":
         echo(json.dumps(found.data()))
         return covered_code(found.covered, found.tolerance)

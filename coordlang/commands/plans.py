@@ -4,24 +4,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
-from coordlang.commands.command import command_of
-from coordlang.commands.inputs import read_instance
-from coordlang.commands.keywords import with_options
-from coordlang.commands.listing import Listing, form_of
-from coordlang.commands.options import DomainSource, ProblemSource, Source, json_option
+from coordlang.commands.files import write
+from coordlang.commands.inputs import Arguments, public
+from coordlang.commands.options import DEFAULT_MAX
+from coordlang.commands.records import PlansOptions, UnderstandOptions
 from coordlang.commands.terminal import echo, note_single_robot
-from planners.search.heuristics import SearchHeuristic
 from planners.search.kept_plans import search
 from planners.search.optimal_plans import search as bounded_search
 from planners.search.plan_file import Texts, texts, to_ipc, to_json, to_plansys2
 from planners.search.plans import Plan, Plans
 from planners.system.notebook import Presented, html_table
-from planners.system.options import group, option
 
 #: One plan: for each joint step, each robot's subaction as text, None where it idles.
 PlanSteps = tuple[Texts, ...]
@@ -139,32 +135,8 @@ class OptimalPlans(Presented):
         return numbers
 
 
-@dataclass(frozen=True, slots=True)
-class PlansOptions:
-    """What `plans` can be asked for."""
-
-    heuristic: SearchHeuristic = option(
-        "auto", "What the search is bounded by; the plans are the same."
-    )
-    form: Literal["ipc", "json"] = option(
-        "ipc", "How plans are written.", names=("--format",), only="cli"
-    )
-    as_json: bool = json_option("Short for --format json.")
-    listing: Listing = group(Listing)
-    source: Source = group(Source, without=("words_see_slack",))
-    given: frozenset[str] = frozenset()
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "form", form_of(self.form, self.as_json, self.given))
-
-
-@with_options(PlansOptions)
-def plans(
-    domain: DomainSource | None = None,
-    problem: ProblemSource | None = None,
-    *,
-    options: PlansOptions,
-) -> OptimalPlans:
+@public(PlansOptions)
+def plans(files: Arguments, options: PlansOptions) -> OptimalPlans:
     """Find all optimal plans of a task.
 
     With another heuristic than ``auto`` plans that are kept are not used.
@@ -176,30 +148,50 @@ def plans(
     OutOfMemory
         Before the reachable part of the joint model uses up the memory.
     """
-    loaded = read_instance(domain, problem, options.source)
+    loaded = files.instance()
     if options.heuristic == "auto":
         return OptimalPlans(Plans.of(search(loaded.model, loaded.tasks[0])))
     space = bounded_search(loaded.model, loaded.tasks[0], heuristic=options.heuristic)
     return OptimalPlans(Plans.of(space))
 
 
-@command_of(plans, "DOMAIN PROBLEM", doing="finding all optimal plans")
-def command(found: OptimalPlans, options: PlansOptions) -> None:
-    """Count, list or sample all optimal plans of a task.
-
-    A plan is a sequence of joint actions; plans are listed in a stable order.  With --slack B those
-    that take at most B steps more, too; a rest at the end of a plan is left out.
-    """
+def show(found: OptimalPlans, options: PlansOptions) -> None:
+    """Print the plans, or their number."""
     note_single_robot(found.robots)
+    show_listed(found, options, found.data, "plans" if found.slack else "optimal plans")
+
+
+def show_listed(
+    found: OptimalPlans,
+    options: PlansOptions | UnderstandOptions,
+    data_of: Callable[[list[PlanSteps]], dict[str, Any]],
+    what: str,
+    output: str | None = None,
+) -> None:
+    """Write the plans that the options list, as JSON or text, or their number."""
     listing = options.listing
-    listed = listing.chosen(found)
+    listed: list[PlanSteps] = []
+    if listing.sample:
+        listed = found.sample(listing.sample, listing.seed)
+    elif not listing.only_count:
+        listed = found.first(DEFAULT_MAX if listing.most is None else listing.most)
     if options.form == "json":
-        data = found.data(listed)
+        data = data_of(listed)
         if listing.sample:
             data["complete"] = False
-        echo(json.dumps(data))
+        write(json.dumps(data) + "\n", output)
     elif listing.only_count:
-        echo(found.count)
+        write(f"{found.count}\n", output)
     else:
-        echo(listing.text(found, listed), nl=False)
-        listing.note_more(found, listed, "plans" if found.slack else "optimal plans")
+        write(_text(found, listed, is_sample=bool(listing.sample)), output)
+        if not listing.sample and len(listed) < found.count:
+            echo(f"{len(listed)} of {found.count} {what} listed; --max N lists more", err=True)
+
+
+def _text(found: OptimalPlans, listed: Sequence[PlanSteps], *, is_sample: bool) -> str:
+    """The plans as IPC text, each with its number."""
+    parts = []
+    for number, plan in enumerate(listed, 1):
+        title = f"sampled plan {number}" if is_sample else f"plan {number} of {found.count}"
+        parts.append(f"; {title}\n{found.ipc(plan)}\n")
+    return "".join(parts)

@@ -3,25 +3,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import count
 from typing import Any
 
 import numpy as np
 
-from coordlang.commands.built import Built, Clock, Verified, language_of
+from coordlang.commands.building import Making
+from coordlang.commands.built import Built, language_of
 from coordlang.commands.layout import WIDTH, wrapped
+from coordlang.commands.options import MethodOptions
 from coordlang.commands.witness import witness_data, witness_text
-from coordlang.language.candidates import Candidates, require_solvable
+from coordlang.language.candidates import Candidates
 from coordlang.language.keys import keys_of, read_keys
 from coordlang.language.partition import Partition
 from coordlang.language.words import Language
-from coordlang.required.all_differences import differences
 from coordlang.required.miscoordination import Miscoordination
-from coordlang.verification.by_definition import Verdict
-from coordlang.verification.candidates import verify_candidates
-from coordlang.vocabulary.job import Assignment, Job
+from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.repair import Repair, repair
 from planners.joint.model import NO_FACT
 from planners.joint.tables import Ints, Rows, find_rows
@@ -154,66 +153,45 @@ def repair_language(
         The language; states that the tasks' problem cannot have are left out.
     seed
         Recorded.
-    progress
-        Called with a line of text now and then.
-    workers
-        Who does jobs; None: this process.
+    progress, workers
+        As for `coordlang.commands.building.build_language`.
 
     Raises
     ------
     Inseparable, ProvedImpossible, OutOfMemory
         As `coordlang.commands.building.build_language` does.
     """
-    require_solvable(candidates)
-    workers = workers or Workers()
-    clock = Clock()
-    found = differences(candidates, workers, progress)
-    clock.note("coordination")
-    states = tuple(found.states.tolist())
+    making = Making(candidates, workers, progress)
+    found = making.differences()
+    making.note("coordination")
+    job = making.job(found, MethodOptions(seed=seed))
     old = _Old.of(start, candidates)
-    new_states = len(states) - len(old.words_of(states))
+    words = old.words_of(job.states)
     progress("verifying the old language")
-    verdict = verify_candidates(old.partition, candidates, workers, progress)
-    clock.note("verify")
-    job = Job(candidates, states, found, seed=seed)
-    if verdict.holds:
-        kept = Repaired(None, new_states=new_states, gone=old.gone)
-        return _built(old.partition, job, verdict, clock, kept)
-    verified = Verified(candidates, workers, progress, old.repaired)
-    job = replace(job, progress=progress, check=verified.check)
-    result = repair(job, old.words_of(states), len(old.partition.words), old.partition.default)
-    clock.note("repair")
-    partition, after = verified.of(result.partition)
-    repaired = Repaired(
-        verdict.witness,
-        old.changes(result, partition),
-        result.changes_bound,
-        tuple(word for word in partition.words if word not in old.partition.words),
-        result.new_words_bound,
-        new_states,
-        old.gone,
-    )
-    return _built(partition, job, after, clock, repaired, result)
-
-
-def _built(
-    partition: Partition,
-    job: Job,
-    verdict: Verdict,
-    clock: Clock,
-    repaired: Repaired,
-    result: Repair | None = None,
-) -> Built:
-    """The language of a partition; what its old file claims of fewer words is not believed."""
-    return Built(
-        language_of(partition, job, METHOD, job.lower_bound),
-        job,
-        verdict,
-        result.figures if result else {},
-        clock.seconds,
-        result.stopped if result else None,
-        repaired=repaired,
-    )
+    partition = old.partition
+    verdict = making.verdict(partition)
+    making.note("verify")
+    repaired = Repaired(None, new_states=len(job.states) - len(words), gone=old.gone)
+    figures: Mapping[str, float] = {}
+    stopped = None
+    if not verdict.holds:
+        making.partition_of = old.repaired
+        result = repair(job, words, len(partition.words), partition.default)
+        making.note("repair")
+        witness = verdict.witness
+        partition, verdict = making.verified(result.partition)
+        repaired = replace(
+            repaired,
+            witness=witness,
+            changed=old.changes(result, partition),
+            changes_bound=result.changes_bound,
+            new_words=tuple(w for w in partition.words if w not in old.partition.words),
+            new_words_bound=result.new_words_bound,
+        )
+        figures, stopped = result.figures, result.stopped
+    # What the old file claims of fewer words is not believed.
+    language = language_of(partition, job, METHOD, job.lower_bound)
+    return Built(language, job, verdict, figures, making.seconds, stopped, repaired=repaired)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,28 +9,15 @@ from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import Any
 
-from coordlang.commands.command import command_of
-from coordlang.commands.inputs import InTask, read_task
-from coordlang.commands.keywords import with_options
-from coordlang.commands.options import (
-    NO_SLACK,
-    DomainSource,
-    File,
-    LanguageSource,
-    ProblemSource,
-    Source,
-    json_option,
-)
+from coordlang.commands.inputs import Arguments, InTask, public
+from coordlang.commands.options import PlanSource
+from coordlang.commands.records import SayOptions
 from coordlang.commands.terminal import covered_code, echo
 from coordlang.execution.plan_sentence import read_plan_file, sentence_of_plan
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.tolerance import tolerance_data
 from planners.search.plan_file import Texts
 from planners.system.errors import CoordlangError, UsageError
-from planners.system.options import group
-
-#: A plan file, or the steps of one plan, each with one text or None for every robot.
-PlanSource = File | Sequence[Texts]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -63,23 +50,8 @@ class Said(InTask):
         }
 
 
-@dataclass(frozen=True, slots=True)
-class SayOptions:
-    """What `say` can be asked for."""
-
-    as_json: bool = json_option()
-    source: Source = group(Source, without=NO_SLACK)
-
-
-@with_options(SayOptions)
-def say(
-    language: LanguageSource,
-    domain: DomainSource | None = None,
-    problem: ProblemSource | None = None,
-    plan: PlanSource | None = None,
-    *,
-    options: SayOptions,
-) -> Said:
+@public(SayOptions)
+def say(files: Arguments, options: SayOptions) -> Said:
     """Say optimal plans: the sentence of a plan is the sequence of words that it passes through.
 
     ``plan`` is a plan file (which may hold several plans), or the steps of one plan.
@@ -89,9 +61,10 @@ def say(
     NotAPlan, NotOptimal
         With the first step that breaks: only optimal plans have a sentence.
     """
+    plan = files.values.get("PLAN")
     if plan is None:
         raise UsageError("expected a plan", remedy="Give a plan file or the steps of one plan.")
-    used = read_task(language, domain, problem, options.source).used
+    used = files.task().used
     plans = _plans(plan, used)
     sentences = []
     for number, steps in enumerate(plans, 1):
@@ -115,12 +88,7 @@ def _plans(plan: PlanSource, used: TaskLanguage) -> Sequence[Sequence[Texts]]:
     return [plan]
 
 
-@command_of(say, "LANGUAGE DOMAIN PROBLEM PLAN", doing="finding all optimal plans")
-def command(found: Said, options: SayOptions) -> int:
-    """Print the sentence of an optimal plan, the words on one line.
-
-    PLAN is a plan file, IPC text or JSON, or - for stdin; a JSON file with several plans gives one
-    sentence a line.
-    """
+def show(found: Said, options: SayOptions) -> int:
+    """Print the sentences."""
     echo(json.dumps(found.data()) if options.as_json else str(found))
     return covered_code(found.covered, found.tolerance)

@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``coordlang schema``: the JSON Schemas of the file formats."""
+"""``coordlang schema``: the JSON Schemas of the file formats, and that of errors."""
 
 from __future__ import annotations
 
 import json
 from importlib import import_module
+from typing import Annotated, Any
 
 import click
+import msgspec
+from msgspec import Meta
 
 from coordlang.commands.terminal import echo
+from planners.system.files import FileFormat
 
 #: The modules whose ``json_schema`` describes a file format.
 SCHEMAS = {
@@ -20,8 +24,39 @@ SCHEMAS = {
     "simulation": "coordlang.simulation.record",
     "plans": "planners.search.plan_file",
     "coordinates": "coordlang.sites.coordinates",
-    "error": "coordlang.commands.error_object",
+    "error": "coordlang.commands.schema",
 }
+
+
+class ErrorPosition(msgspec.Struct, frozen=True):
+    """Where, in a file; lines and columns are counted from 1."""
+
+    file: Annotated[str, Meta(description="The file, as it was given.")]
+    line: Annotated[int | None, Meta(description="Null where it is the whole file.")]
+    column: Annotated[int | None, Meta(description="Null where the line is.")]
+
+
+class ErrorEntry(msgspec.Struct, frozen=True):
+    """What is wrong."""
+
+    message: Annotated[str, Meta(description="What is wrong, in one sentence.")]
+    position: ErrorPosition | None
+    remedy: Annotated[str | None, Meta(description="What to do about it.")]
+    exit_code: Annotated[int, Meta(description="What the process ends with (docs/cli.md).")]
+    reached: Annotated[str | None, Meta(description="How far the work got that a limit ended.")] = (
+        None
+    )
+
+
+class ErrorObject(msgspec.Struct, frozen=True):
+    """An error in place of an answer.  Keys that are not listed here are ignored by readers."""
+
+    error: ErrorEntry
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of error objects."""
+    return FileFormat("error", "JSON error object", ErrorObject).json_schema()
 
 
 @click.command(name="schema")

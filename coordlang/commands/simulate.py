@@ -3,30 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from os import fspath
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import msgspec
 
-from coordlang.commands.command import command_of
-from coordlang.commands.inputs import read_coordinates_of, read_task
-from coordlang.commands.keywords import with_options
-from coordlang.commands.options import (
-    NO_SLACK,
-    CoordinatesSource,
-    DomainSource,
-    File,
-    LanguageSource,
-    ProblemSource,
-    SentenceSource,
-    Source,
-    coordinates_option,
-    json_option,
-)
+from coordlang.commands.inputs import Arguments, public, read_coordinates_of
+from coordlang.commands.options import File
+from coordlang.commands.records import SimulateOptions
 from coordlang.commands.terminal import covered_code, echo, ended_early, note, working
 from coordlang.execution.best_sentence import best_sentence
 from coordlang.execution.task_language import TaskLanguage
@@ -48,11 +36,7 @@ from planners.system.errors import UsageError
 from planners.system.limits import reaching, run_until_stopped
 from planners.system.messages import echoed
 from planners.system.notebook import Presented, counted
-from planners.system.options import group, option
 from planners.system.writing import write_atomically
-
-#: Called with the number of runs done, and of all.
-RunProgress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, repr=False)
@@ -146,100 +130,8 @@ def written(record: SimulationRecord, path: str, seed: int | None = None) -> byt
     return recorded(record, found[0], kind)
 
 
-@dataclass(frozen=True, slots=True)
-class SimulateOptions:
-    """What `simulate` can be asked for."""
-
-    sentence: SentenceSource | None = option(
-        None,
-        'What the robots have agreed on, "w1 w0" (default: what leaves most plans open).',
-        "SENTENCE",
-    )
-    without: bool = option(False, "Without a sentence: each follows an optimal plan of its own.")
-    plan: bool = option(False, "In place of a sentence all follow one whole plan.")
-    runs: int = option(1, "How many runs.", "N", least=1)
-    seed: int = option(0, "Of the first run; the next ones follow.", least=0)
-    step: Literal["clock", "barrier", "word"] = option(
-        "clock",
-        "How robots keep step: a common clock, a barrier before each step, or before each word.",
-    )
-    cell: float = option(1.0, "How far apart neighbouring cells are.", "METRES")
-    radius: float | None = option(
-        None, "The radius of a robot (default: a fifth of --cell).", "METRES"
-    )
-    noise: float = option(
-        0.1,
-        "The standard deviation of what wheels do, as a share of what they are told.",
-        "SHARE",
-    )
-    lidar: bool = option(
-        True, "Robots do not stop before what is ahead of them.", names=("--no-lidar",)
-    )
-    human: str | None = option(
-        None,
-        "A human whom only lidars see: in a place, in one drawn for each run, or walking about.",
-        "PLACE|random|walking",
-    )
-    visit: Sequence[str] = option(
-        (),
-        "This robot comes to want to visit a place when it has done so many steps.",
-        "ROBOT:STEP:PLACE",
-    )
-    coordinates: CoordinatesSource | None = coordinates_option()
-    progress: RunProgress | None = option(
-        None, "Called with the number of runs done, and of all.", only="python"
-    )
-    output: tuple[str, ...] = option(
-        (),
-        "Write the record (.json), or a recording of one run (.gif, .mp4, a sheet as .png).",
-        "FILE",
-        names=("-o", "--output"),
-        only="cli",
-        is_output=True,
-    )
-    shown: int | None = option(
-        None, "The run that is recorded (default: the first).", "SEED", only="cli"
-    )
-    replay: str | None = option(
-        None,
-        "Simulate nothing: record a run of this .json file; without LANGUAGE DOMAIN PROBLEM.",
-        "RECORD",
-        only="cli",
-    )
-    as_json: bool = json_option("Print the record as one JSON object.")
-    source: Source = group(Source, without=NO_SLACK)
-
-    def __post_init__(self) -> None:
-        if (self.sentence is not None) + self.without + self.plan > 1:
-            raise UsageError(
-                "--sentence, --without and --plan exclude each other",
-                remedy="Say what the robots have agreed on: a sentence, nothing, or a whole plan.",
-            )
-        for path in self.output:
-            kind_of(path)
-
-    @property
-    def agreement(self) -> Agreement:
-        """What the robots have agreed on."""
-        return "nothing" if self.without else "plan" if self.plan else "sentence"
-
-    @property
-    def settings(self) -> Settings:
-        """How robots are built and keep step; `UsageError` for what they cannot be built with."""
-        radius = self.cell / 5 if self.radius is None else self.radius
-        return Settings(
-            self.step, self.cell, radius, noise=self.noise, lidar=self.lidar, human=self.human
-        )
-
-
-@with_options(SimulateOptions)
-def simulate(
-    language: LanguageSource | None = None,
-    domain: DomainSource | None = None,
-    problem: ProblemSource | None = None,
-    *,
-    options: SimulateOptions,
-) -> Simulated:
+@public(SimulateOptions)
+def simulate(files: Arguments, options: SimulateOptions) -> Simulated:
     """Let simulated robots with wheels do a task, each by its own logic.
 
     Every robot knows the task, the language, the sentence, and so its own choices, and draws one of
@@ -256,11 +148,10 @@ def simulate(
     """
     if options.replay is not None:
         return Simulated(read_simulation(options.replay))
-    if language is None:
-        raise UsageError("expected a language", remedy="Give a language file, or a language.")
-    settings, runs = options.settings, options.runs
+    _ = files.language
+    settings, runs = _settings(options), options.runs
     require_simulator()
-    task = read_task(language, domain, problem, options.source, options.coordinates)
+    task = files.task(options.coordinates)
     prepared = _prepared(task.used, options)
     points = read_coordinates_of(options.coordinates, task.files.problems[0])
     floor = floor_of(prepared.world, points, options.cell)
@@ -294,20 +185,29 @@ def _wish(prepared: Mission, text: str) -> WishRecord:
 
 def _prepared(used: TaskLanguage, options: SimulateOptions) -> Mission:
     words: Sequence[int] = ()
+    agreement: Agreement = "nothing" if options.without else "plan" if options.plan else "sentence"
     if options.sentence is not None:
         words = used.words_of(options.sentence)
-    elif options.agreement == "sentence":
+    elif agreement == "sentence":
         words = best_sentence(used, ["most-plans"]).words
-    return mission(used, options.agreement, words)
+    return mission(used, agreement, words)
 
 
-@command_of(simulate, "LANGUAGE DOMAIN PROBLEM", doing="simulating", alone="replay")
-def command(found: Simulated, options: SimulateOptions) -> int:
-    """Let robots with wheels do the task of PROBLEM in a simulator.
+def _settings(options: SimulateOptions) -> Settings:
+    """How robots are built and keep step; `UsageError` for what they cannot be built with."""
+    radius = options.cell / 5 if options.radius is None else options.radius
+    return Settings(
+        options.step,
+        options.cell,
+        radius,
+        noise=options.noise,
+        lidar=options.lidar,
+        human=options.human,
+    )
 
-    Each robot draws its own choices under a sentence of LANGUAGE.  What comes of it is counted:
-    collisions, deadlocks, late arrivals, messages.  Needs `pip install 'coordlang[sim]'`.
-    """
+
+def show(found: Simulated, options: SimulateOptions) -> int:
+    """Write the recordings, and print what came of the runs."""
     with working("drawing") as say:
         for path in options.output:
             say(f"writing {path}")

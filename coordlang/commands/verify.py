@@ -9,26 +9,11 @@ from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import Any
 
-from coordlang.commands.command import command_of
 from coordlang.commands.failure import REFUTED
-from coordlang.commands.inputs import language_for, read_planning
-from coordlang.commands.keywords import with_options
-from coordlang.commands.options import (
-    NO_SLACK,
-    DomainSource,
-    File,
-    Jobs,
-    LanguageSource,
-    ProblemSource,
-    Progress,
-    Source,
-    TasksSource,
-    json_option,
-    no_progress,
-)
+from coordlang.commands.inputs import Arguments, language_for, public, say_size
+from coordlang.commands.records import VerifyOptions
 from coordlang.commands.terminal import echo, line_width
 from coordlang.commands.witness import witness_data, witness_text
-from coordlang.commands.workers import opened_workers, say_size
 from coordlang.language.candidates import require_solvable
 from coordlang.language.recorded import check_source, recorded_candidates
 from coordlang.language.tolerance import Tolerance, tolerance_data
@@ -36,13 +21,12 @@ from coordlang.required.failure import TooManyToCount
 from coordlang.required.failures import NONE, Failures, failures_under
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.verification.candidates import verify_candidates
-from coordlang.verification.certificate_file import Certificate, read_certificate
+from coordlang.verification.certificate_file import read_certificate
 from coordlang.verification.check_certificate import Checked
 from coordlang.verification.check_certificate import check as check_certificate
 from planners.pddl.model_options import ModelOptions
-from planners.system.errors import Refuted, UsageError
+from planners.system.errors import Refuted
 from planners.system.notebook import Presented, counted
-from planners.system.options import group, option
 from planners.system.writing import write_atomically
 
 
@@ -160,42 +144,8 @@ class Verification(Presented):
         return f"verified: {words}, {tasks}: {mixing} ({self.nodes:,} walk nodes)"
 
 
-@dataclass(frozen=True, slots=True)
-class VerifyOptions:
-    """What `verify` can be asked for."""
-
-    tasks: TasksSource | None = option(
-        None, "Check these tasks (default: those that the language file records).", "all|FILE"
-    )
-    certificate: File | Certificate | None = option(
-        None, "Also check why fewer words do not suffice (a file of `build --certificate`).", "FILE"
-    )
-    dimacs: str | None = option(
-        None,
-        "With --certificate: write the formula that was refuted, for any SAT solver.",
-        "FILE",
-        only="cli",
-        is_output=True,
-    )
-    as_json: bool = json_option()
-    progress: Progress | None = option(
-        None, "Called with a line of text when a phase begins.", only="python"
-    )
-    work: Jobs = group(Jobs)
-    source: Source = group(Source, without=NO_SLACK)
-
-    def __post_init__(self) -> None:
-        if self.dimacs is not None and self.certificate is None:
-            raise UsageError("--dimacs belongs to --certificate", remedy="Add --certificate FILE.")
-
-
-@with_options(VerifyOptions)
-def verify(
-    language: LanguageSource,
-    domain: DomainSource | None = None,
-    *problems: ProblemSource,
-    options: VerifyOptions,
-) -> Verification:
+@public(VerifyOptions)
+def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
     """Check by definition that a language is a coordination language.
 
     All plans of one sentence then mix freely.  A lifted language is checked for ``tasks``, or the
@@ -210,12 +160,12 @@ def verify(
     Refuted
         If a reason of the certificate is none.
     """
-    tasks, progress = options.tasks, options.progress or no_progress
+    tasks, progress = options.tasks, options.progress or (lambda _: None)
     proof = options.certificate
     if isinstance(proof, str | PathLike):
         proof = read_certificate(fspath(proof))
-    files = read_planning(domain, problems, options.source)
-    read, position = language_for(language, files, tasks, is_verified=False)
+    files = arguments.read()
+    read, position = language_for(arguments.language, files, tasks, is_verified=False)
     check_source(read, files.domain, files.problems, position)
     model = files.options_of(read)
     if tasks is None:
@@ -225,7 +175,7 @@ def verify(
     require_solvable(candidates)
     partition = read.partition(candidates.model)
     say_size(candidates, options.work.note or options.progress)
-    with opened_workers(options.work) as workers:
+    with options.work.opened() as workers:
         verdict = verify_candidates(partition, candidates, workers, progress)
         found = NONE
         if not verdict.holds:
@@ -260,15 +210,8 @@ def verify(
     )
 
 
-@command_of(verify, "LANGUAGE DOMAIN PROBLEMS...", doing="verifying by definition")
-def command(found: Verification, options: VerifyOptions) -> int:
-    """Check by definition that LANGUAGE is a coordination language.
-
-    All plans of one sentence then mix freely.
-
-    Exit 0: it is, or robots fail as rarely as its file claims.  1: neither, and two plans that
-    miscoordinate are shown.
-    """
+def show(found: Verification, options: VerifyOptions) -> int:
+    """Print the verdict, and what the certificate proves."""
     echo(json.dumps(found.data()) if options.as_json else found.text(line_width()))
     if found.unchecked and not options.as_json:
         echo(found.unchecked)

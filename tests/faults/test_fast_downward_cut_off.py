@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from coordlang.commands.inputs import read_instance
-from coordlang.commands.options import Source
+from coordlang.commands.inputs import load
 from planners.classical import LONGEST, ClassicalTask, compile_classical, fast_downward, to_pddl
 from planners.classical.fast_downward import SEARCH, FastDownwardFailed, answered, total_cost
 from tests.support.domains import DOMAINS
@@ -23,7 +22,7 @@ CELLS = [DOMAINS / "three-cells" / name for name in ("domain.pddl", "problem.pdd
 @pytest.fixture(scope="module")
 def task() -> ClassicalTask:
     domain, problem = CELLS
-    loaded = read_instance(domain, problem, Source())
+    loaded = load(domain, problem)
     return compile_classical(loaded.model, loaded.tasks[0], 2000, LONGEST)
 
 

@@ -10,8 +10,8 @@ from typing import Any
 import jsonschema
 import pytest
 
-from coordlang.commands.error_object import json_schema
 from coordlang.commands.failure import wants_json
+from coordlang.commands.schema import json_schema
 from planners.system.errors import OutOfTime
 from tests.support.command import Command, Outcome
 
@@ -78,21 +78,21 @@ def test_a_limit(
         ended.reached = "reading 3 lines"
         raise ended
 
-    monkeypatch.setattr("coordlang.commands.inspect.read_instance", late)
+    monkeypatch.setattr("coordlang.commands.inputs.Arguments.instance", late)
     found = error(coordlang("inspect", *t_map, "--json"))
     assert (found["exit_code"], found["reached"]) == (23, "reading 3 lines")
 
     def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("here")
 
-    monkeypatch.setattr("coordlang.commands.inspect.read_instance", broken)
+    monkeypatch.setattr("coordlang.commands.inputs.Arguments.instance", broken)
     found = error(coordlang("inspect", *t_map, "--json"))
     assert found["message"] == "internal error: ZeroDivisionError: here"
 
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("coordlang.commands.inspect.read_instance", interrupted)
+    monkeypatch.setattr("coordlang.commands.inputs.Arguments.instance", interrupted)
     assert error(coordlang("inspect", *t_map, "--json"))["exit_code"] == 130
 
 

@@ -11,7 +11,8 @@ import pytest
 from click.testing import CliRunner
 
 from coordlang.commands.command import command_of
-from coordlang.commands.keywords import with_options
+from coordlang.commands.inputs import Arguments, public
+from coordlang.commands.options import CommandOptions
 from planners.search import portions
 from planners.search.portions import estimate, require_room
 from planners.system.errors import OutOfMemory
@@ -24,21 +25,27 @@ FREE = resource.RLIM_INFINITY
 
 
 @dataclass(frozen=True)
-class Nothing:
+class Nothing(CommandOptions):
     """No options."""
 
-
-@with_options(Nothing)
-def soft_limit(*, options: Nothing) -> int:
-    return resource.getrlimit(resource.RLIMIT_AS)[0]
+    keeps_plans = False
 
 
-@command_of(soft_limit, "", doing="looking", keeps_plans=False)
-def probe(found: int, options: Nothing) -> None:
-    print(found)
+class Probe:
+    """A command that prints the soft limit."""
+
+    @staticmethod
+    @public(Nothing)
+    def probe(_: Arguments, __: Nothing) -> int:
+        return resource.getrlimit(resource.RLIMIT_AS)[0]
+
+    @staticmethod
+    def show(found: int, _: Nothing) -> None:
+        print(found)
 
 
 def limit_of(*arguments: str) -> int:
+    probe = command_of("probe", Nothing, lambda _: Probe)
     done = CliRunner().invoke(probe, arguments, standalone_mode=False)
     assert done.exception is None, done.exception
     return int(done.output)

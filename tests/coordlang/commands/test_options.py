@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import inspect
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -13,15 +14,17 @@ import pytest
 from click.testing import CliRunner
 
 from coordlang.commands.command import command_of, positional
-from coordlang.commands.keywords import with_options
-from coordlang.commands.options import NO_SLACK, Source
+from coordlang.commands.inputs import Arguments, public
+from coordlang.commands.options import NO_SLACK, CommandOptions, Source
 from planners.system.errors import UsageError
 from planners.system.options import group, option
 
 
 @dataclass(frozen=True, slots=True)
-class Greeting:
-    """What is said."""
+class Greeting(CommandOptions):
+    """Greet."""
+
+    takes = "DOMAIN PROBLEM"
 
     tone: Literal["warm", "cold"] = option("warm", "How it sounds.")
     times: int = option(1, "How often.", "N", least=1)
@@ -37,23 +40,22 @@ class Greeting:
             raise UsageError("--shout contradicts --tone cold")
 
 
-@with_options(Greeting)
-def greet(
-    domain: str | None = None, problem: str | None = None, *, options: Greeting
-) -> tuple[str | None, str | None, Greeting]:
+@public(Greeting)
+def greet(files: Arguments, options: Greeting) -> tuple[Any, Any, Greeting]:
     """Greet."""
-    return domain, problem, options
+    return files.domain, files.values.get("PROBLEM"), options
 
 
-@command_of(greet, "DOMAIN PROBLEM", doing="greeting")
-def cli(result: tuple[str, str, Greeting], options: Greeting) -> int:
-    """Greet."""
+def show(result: tuple[str, str, Greeting], options: Greeting) -> int:
     domain, problem, greeting = result
     assert greeting is options
     model = greeting.source.model
     click.echo(f"{domain} {problem} {greeting.tone} {greeting.times} {greeting.names}")
     click.echo(f"{model.cost} {model.robots} {sorted(greeting.source.given)}")
     return 3 if greeting.shout else 0
+
+
+cli = command_of("greet", Greeting, lambda _: sys.modules[__name__])
 
 
 def run(*arguments: str) -> tuple[int, str]:
@@ -118,15 +120,19 @@ def test_too_few_and_too_many_arguments(arguments: tuple[str, ...]) -> None:
 @pytest.mark.parametrize(
     ("takes", "given", "is_factored", "read"),
     [
-        ("LANGUAGE DOMAIN PROBLEMS...", "l d p q", False, ["l", "d", "p", "q"]),
-        ("LANGUAGE DOMAIN PROBLEMS...", "l", True, ["l", None, None]),
-        ("LANGUAGE DOMAIN PROBLEM [SENTENCE]", "l w1", True, ["l", None, None, "w1"]),
-        ("LANGUAGE DOMAIN PROBLEM [SENTENCE]", "l d p", False, ["l", "d", "p", None]),
-        ("LANGUAGE DOMAIN PROBLEM PLAN", "l p", True, ["l", None, None, "p"]),
-        ("[NAME]", "", False, [None]),
+        (
+            "LANGUAGE DOMAIN PROBLEMS...",
+            "l d p q",
+            False,
+            {"LANGUAGE": "l", "DOMAIN": "d", "PROBLEMS...": ("p", "q")},
+        ),
+        ("LANGUAGE DOMAIN PROBLEMS...", "l", True, {"LANGUAGE": "l"}),
+        ("LANGUAGE DOMAIN PROBLEM [SENTENCE]", "l w1", True, {"LANGUAGE": "l", "SENTENCE": "w1"}),
+        ("DOMAIN PROBLEM [SENTENCE]", "d p", False, {"DOMAIN": "d", "PROBLEM": "p"}),
+        ("[NAME]", "", False, {}),
     ],
 )
-def test_positional(takes: str, given: str, is_factored: bool, read: list[str | None]) -> None:
+def test_positional(takes: str, given: str, is_factored: bool, read: dict[str, object]) -> None:
     assert positional(takes, tuple(given.split()), is_factored=is_factored) == read
 
 

@@ -22,8 +22,7 @@ import numpy as np
 import pytest
 
 from coordlang.commands.build import build
-from coordlang.commands.inputs import read_task
-from coordlang.commands.options import Source
+from coordlang.commands.explain import explain
 from coordlang.execution.fitting_plans import NoPlanFits
 from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
 from coordlang.explanation.cover import Conjunction
@@ -502,7 +501,8 @@ def within_slack(folder: str, slack: int, **given: Any) -> TaskLanguage:
     """Three words for the plans within slack of a shipped problem; they may be inseparable."""
     domain, problem = (DOMAINS / folder / f"{name}.pddl" for name in ("domain", "problem"))
     built = build(domain, problem, slack=slack, words=3, seed=1, **given)
-    return read_task(built.language, domain, problem, Source()).used
+    used: TaskLanguage = explain(built.language, domain, problem).used
+    return used
 
 
 def every_plan(task: ClassicalTask) -> Iterator[tuple[int, ...]]:

@@ -10,8 +10,7 @@ from functools import cache
 
 import pytest
 
-from coordlang.commands.building import build_language
-from coordlang.commands.built import Verified
+from coordlang.commands.building import Making, build_language
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.required.miscoordination import inseparable
 from coordlang.vocabulary import METHODS, Job, Outcome
@@ -89,16 +88,16 @@ def test_stopped_while_it_checks(
 ) -> None:
     """A limit while a better partition is verified: the one before it is left."""
     candidates = all_tasks("grid", "gw1-2x2")
-    check = Verified.check
+    check = Making.check
     checked: list[Assignment] = []
 
-    def late(verified: Verified, partition: Assignment) -> None:
+    def late(verified: Making, partition: Assignment) -> None:
         if checked:
             raise error
         checked.append(partition)
         check(verified, partition)
 
-    monkeypatch.setattr(Verified, "check", late)
+    monkeypatch.setattr(Making, "check", late)
     built = build_language(candidates, method)
     assert built.verdict.holds
     assert len(built.language.words) == len(set(checked[0].values()))

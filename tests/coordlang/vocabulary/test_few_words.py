@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 
 import coordlang as library
-from coordlang.commands.building import build_language
-from coordlang.commands.tolerating import job_of
+from coordlang.commands.building import Making, build_language, job_for_few_words
 from coordlang.language.candidates import Candidates
 from coordlang.language.flexibility import flexibility
 from coordlang.required.choices import Choices
@@ -24,7 +23,6 @@ from coordlang.required.failure import failure_probability
 from coordlang.required.plan_table import plan_table
 from coordlang.vocabulary import few_words as module
 from coordlang.vocabulary.few_words import canonical, few_words, partitions
-from planners.parallel.workers import Workers
 from planners.system.errors import OutOfTime
 from tests.support import naive
 from tests.support.candidates import on_graph
@@ -122,7 +120,7 @@ def test_two_words_are_the_best_of_all_partitions(folder: str, stem: str, mean: 
     assert least["mean"] == mean
     assert tried == partitions(len(states), 2, 10_000) == 2_048
     for worst in (False, True):
-        found = few_words(job_of(candidates, Workers(), seed=3), 2, worst=worst)
+        found = few_words(job_for_few_words(Making(candidates), seed=3), 2, worst=worst)
         assert found.is_best
         assert found.measured == tried
         assert found.failures.worst == least["worst"] if worst else found.failures.mean == mean
@@ -140,7 +138,8 @@ def test_the_worst_task_may_want_other_words_than_the_mean() -> None:
     least, _ = by_hand(candidates, 2)
     assert least == {"mean": Fraction(1, 60), "worst": Fraction(1, 3)}
     mean, worst = (
-        few_words(job_of(candidates, Workers()), 2, worst=worst).failures for worst in (False, True)
+        few_words(job_for_few_words(Making(candidates)), 2, worst=worst).failures
+        for worst in (False, True)
     )
     assert (mean.mean, mean.worst) == (Fraction(1, 60), Fraction(1, 2))
     assert (worst.mean, worst.worst) == (Fraction(1, 45), Fraction(1, 3))
@@ -149,7 +148,7 @@ def test_the_worst_task_may_want_other_words_than_the_mean() -> None:
 def test_annealing_finds_the_best_two_words(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_ALL", 1)
     candidates = all_tasks("grid", "gw1-2x2")
-    found = few_words(job_of(candidates, Workers(), seed=1), 2)
+    found = few_words(job_for_few_words(Making(candidates), seed=1), 2)
     assert not found.is_best
     assert found.failures.mean == Fraction(5, 132)
     assert found.measured > 400
@@ -158,7 +157,7 @@ def test_annealing_finds_the_best_two_words(monkeypatch: pytest.MonkeyPatch) -> 
 def test_words_that_are_enough_are_a_language(monkeypatch: pytest.MonkeyPatch) -> None:
     """The loop is asked first: a task with 252 plans, of which none has to be measured."""
     candidates = own_task("grid", "corners-4x4")
-    found = few_words(job_of(candidates, Workers()), 4)
+    found = few_words(job_for_few_words(Making(candidates)), 4)
     assert found.failures.worst == found.measured == 0
     assert found.is_best
     assert found.silence.mean > 0
@@ -187,7 +186,9 @@ def test_a_limit_leaves_the_best_so_far() -> None:
         if text.startswith("annealing") and " 0 of" not in text:
             raise KeyboardInterrupt
 
-    job = replace(job_of(all_tasks("grid", "gw2-2x3"), Workers(), seed=1), progress=interrupt)
+    job = replace(
+        job_for_few_words(Making(all_tasks("grid", "gw2-2x3")), seed=1), progress=interrupt
+    )
     found = few_words(job, 3)
     assert isinstance(found.stopped, KeyboardInterrupt)
     assert found.measured > 5
