@@ -1,59 +1,49 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bad input is normal input: the documented exit code, the place, and what to do about it."""
+"""Bad input is normal input: the documented exit code, the place, and what to do about it.
+
+With --json it is one JSON object on stdout, too.
+"""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
+import jsonschema
 import pytest
 
-from tests.support.command import Command, Outcome
+import coordlang as door
+from coordlang.commands.failure import wants_json
+from coordlang.commands.schema import json_schema
+from planners.pddl.model_options import ModelOptions
+from planners.system.errors import OutOfTime
+from tests.coordlang.commands.conftest import FILES, Shell
+from tests.support.command import Outcome
 from tests.support.hall import DOMAIN, PROBLEM, factored
 
 
-class Files:
-    def __init__(self, folder: Path) -> None:
-        self.domain, self.problem = folder / "d.pddl", folder / "p.pddl"
-        self.write()
-
-    def write(self, domain: str = DOMAIN, problem: str = PROBLEM) -> tuple[Path, Path]:
-        self.domain.write_text(domain)
-        self.problem.write_text(problem)
-        return self.domain, self.problem
+def write(domain: str = DOMAIN, problem: str = PROBLEM) -> None:
+    """The files ``d.pddl`` and ``p.pddl``."""
+    Path("d.pddl").write_text(domain)
+    Path("p.pddl").write_text(problem)
 
 
-@pytest.fixture(name="coordlang")
-def with_remedies(coordlang: Command) -> Command:
-    """The command line, whose every error says on the line below what to do."""
-
-    def call(*arguments: object) -> Outcome:
-        outcome = coordlang(*arguments)
-        lines = [x for x in outcome.err.splitlines() if not x.startswith("coordlang: note:")]
-        if outcome.code in (1, 11, 22, 23, 31, 32, 34) and lines and ": warning:" not in lines[0]:
-            assert lines[0].startswith("coordlang: ")
-            assert lines[1].startswith("  "), outcome.err
-        if outcome.code == 2 and not lines[0].startswith("Usage: "):
-            assert lines[1].startswith("  "), outcome.err
-        return outcome
-
-    return call
+def task_file(tasks: object) -> None:
+    """The file ``tasks.json``."""
+    data = {"format": "coordlang/tasks", "version": 1, "tasks": tasks}
+    Path("tasks.json").write_text(json.dumps(data))
 
 
-@pytest.fixture
-def files(tmp_path: Path) -> Files:
-    return Files(tmp_path)
+@pytest.fixture(autouse=True)
+def hall(shell: Shell) -> None:
+    """Files that are right, until a test writes others."""
+    write()
 
 
-def test_good_files_are_read(coordlang: Command, files: Files) -> None:
-    outcome = coordlang("plans", *files.write(), "--count")
-    assert (outcome.code, outcome.out) == (0, "1\n")
-
-
-def test_missing_file(coordlang: Command, files: Files) -> None:
-    outcome = coordlang("plans", files.domain, files.problem.with_name("none.pddl"))
-    assert outcome.code == 31
-    assert "none.pddl: there is no such file" in outcome.err
+def test_good_files_are_read(shell: Shell) -> None:
+    assert shell("plans d.pddl p.pddl --count").out == "1\n"
+    shell("plans d.pddl none.pddl", 31, "none.pddl: there is no such file")
 
 
 WRONG_DOMAINS = {
@@ -119,11 +109,10 @@ WRONG_DOMAINS = {
 
 
 @pytest.mark.parametrize("case", WRONG_DOMAINS)
-def test_wrong_domain(case: str, coordlang: Command, files: Files) -> None:
+def test_wrong_domain(case: str, shell: Shell) -> None:
     text, message = WRONG_DOMAINS[case]
-    outcome = coordlang("plans", *files.write(domain=text))
-    assert outcome.code == 31
-    assert message in outcome.err
+    write(text)
+    shell("plans d.pddl p.pddl", 31, message)
 
 
 WRONG_PROBLEMS = {
@@ -187,11 +176,10 @@ WRONG_PROBLEMS = {
 
 
 @pytest.mark.parametrize("case", WRONG_PROBLEMS)
-def test_wrong_problem(case: str, coordlang: Command, files: Files) -> None:
+def test_wrong_problem(case: str, shell: Shell) -> None:
     text, message = WRONG_PROBLEMS[case]
-    outcome = coordlang("plans", *files.write(problem=text))
-    assert outcome.code == 31
-    assert message in outcome.err
+    write(problem=text)
+    shell("plans d.pddl p.pddl", 31, message)
 
 
 @pytest.mark.parametrize(
@@ -216,14 +204,16 @@ def test_wrong_problem(case: str, coordlang: Command, files: Files) -> None:
         ),
     ],
 )
-def test_unsupported(insert: str, message: str, coordlang: Command, files: Files) -> None:
-    outcome = coordlang("plans", *files.write(domain=DOMAIN.rstrip()[:-1] + insert + ")"))
-    assert outcome.code == 34
-    assert message in outcome.err
-    assert "d.pddl:7:" in outcome.err
+def test_unsupported(insert: str, message: str, shell: Shell) -> None:
+    write(DOMAIN.rstrip()[:-1] + insert + ")")
+    shell("plans d.pddl p.pddl", 34, message, "d.pddl:7:")
 
 
 COSTLY = DOMAIN.replace(":effect (and", ":effect (and (increase (total-cost) COST)")
+TOO_MUCH = (
+    "d.pddl:5:3: an action cost above 2147483648 (of go) is not supported\n"
+    "  Write costs in a larger unit, or leave out --cost"
+)
 
 
 @pytest.mark.parametrize(
@@ -231,25 +221,15 @@ COSTLY = DOMAIN.replace(":effect (and", ":effect (and (increase (total-cost) COS
     [
         ("2147483648", 0, ""),
         ("4e", 31, "expected a number"),
-        *(
-            (
-                much,
-                34,
-                "d.pddl:5:3: an action cost above 2147483648 (of go) is not supported\n  Write costs in a larger unit, or leave "
-                "out --cost",
-            )
-            for much in ("2147483649", "4000000000", "4000000000.0", "9" * 5000)
-        ),
+        *((much, 34, TOO_MUCH) for much in ("2147483649", "4000000000.0", "9" * 5000)),
     ],
 )
-def test_large_costs(cost: str, code: int, message: str, coordlang: Command, files: Files) -> None:
+def test_large_costs(cost: str, code: int, message: str, shell: Shell) -> None:
     """The limit is one of sums: it is no matter where costs are ignored."""
-    both = files.write(domain=COSTLY.replace("COST", cost))
-    outcome = coordlang("plans", *both, "--count", "--cost", "makespan+cost")
-    assert outcome.code == code
-    assert message in outcome.err
+    write(COSTLY.replace("COST", cost))
+    shell("plans d.pddl p.pddl --count --cost makespan+cost", code, message)
     if code != 31:
-        assert coordlang("plans", *both, "--count").out == "1\n"
+        assert shell("plans d.pddl p.pddl --count").out == "1\n"
 
 
 CANDIDATES = """(define (domain en) (:types robot hall) (:predicates (q ?r - robot) (open) (busy ?r))
@@ -266,15 +246,15 @@ CANDIDATES = """(define (domain en) (:types robot hall) (:predicates (q ?r - rob
         ("hall", "hall", "robot"),
     ],
 )
-def test_what_may_be_the_robots(
-    old: str, new: str, listed: str, coordlang: Command, files: Files
-) -> None:
-    problem = "(define (problem p) (:domain en) (:objects a b - robot) (:init (busy a) (busy b)) (:goal (and (q a) (q b))))"
-    both = files.write(CANDIDATES.replace(old, new), problem.replace(old, new))
-    outcome = coordlang("plans", *both, "--robot-type", "nix", "--unowned", "shared")
-    assert outcome.code == 2, outcome.err
-    assert f"Candidates: {listed}.\n" in outcome.err
-    assert coordlang("plans", *both, "--robot-type", listed, "--unowned", "shared").code == 0
+def test_what_may_be_the_robots(old: str, new: str, listed: str, shell: Shell) -> None:
+    problem = (
+        "(define (problem p) (:domain en) (:objects a b - robot) (:init (busy a) (busy b)) "
+        "(:goal (and (q a) (q b))))"
+    )
+    write(CANDIDATES.replace(old, new), problem.replace(old, new))
+    line = "plans d.pddl p.pddl --unowned shared --robot-type"
+    shell(f"{line} nix", 2, f"Candidates: {listed}.\n")
+    shell(f"{line} {listed}")
 
 
 @pytest.mark.parametrize(
@@ -285,67 +265,38 @@ def test_what_may_be_the_robots(
         (".", "without a partner: no such files\n  "),
     ],
 )
-def test_a_folder_without_factored_files(
-    name: str, message: str, coordlang: Command, files: Files, tmp_path: Path
-) -> None:
-    outcome = coordlang("plans", "--factored", tmp_path / name)
-    assert (outcome.code, message in outcome.err) == (31, True)
+def test_a_folder_without_factored_files(name: str, message: str, shell: Shell) -> None:
+    shell(f"plans --factored {name}", 31, message)
 
 
-def test_factored_files_all_the_way(coordlang: Command, tmp_path: Path) -> None:
-    folder, language = factored(tmp_path / "hall"), tmp_path / "l.json"
-    outcome = coordlang("coordination", "--factored", folder)
-    assert (outcome.code, outcome.out) == (
-        0,
-        f"{folder}: 1 optimal plan of 1 step; coordination is not required\n",
-    )
-    assert (
-        coordlang(
-            "build", "--factored", folder, "--tasks", "all", "--method", "greedy", "-o", language
-        ).code
-        == 0
-    )
-    outcome = coordlang("verify", language, "--factored", folder)
-    assert (outcome.code, "12 tasks" in outcome.out) == (0, True)
-    file = folder / "domain-r1.pddl"
-    assert (
-        f"-o {file} would overwrite an input file"
-        in coordlang("build", "--factored", folder, "--method", "greedy", "-o", file).err
-    )
+@pytest.mark.parametrize("command", ["coordination", "build -o -", "verify l.json"])
+@pytest.mark.parametrize("files", ["", "d", "d p --factored x"])
+def test_files_or_a_folder(command: str, files: str, shell: Shell) -> None:
+    shell(f"{command} {files}", 2, "DOMAIN PROBLEMS..., or --factored DIR without")
 
 
-@pytest.mark.parametrize("command", [("coordination",), ("build", "-o", "-"), ("verify", "l.json")])
-@pytest.mark.parametrize("files", [(), ("d",), ("d", "p", "--factored", "x")])
-def test_files_or_a_folder(
-    command: tuple[str, ...], files: tuple[str, ...], coordlang: Command
-) -> None:
-    outcome = coordlang(*command, *files)
-    assert outcome.code == 2
-    assert "DOMAIN PROBLEMS..., or --factored DIR without" in outcome.err
+def test_factored_files_all_the_way(shell: Shell) -> None:
+    factored(Path("hall"))
+    out = shell("coordination --factored hall").out
+    assert out == "hall: 1 optimal plan of 1 step; coordination is not required\n"
+    shell("build --factored hall --tasks all --method greedy -o l.json")
+    shell("verify l.json --factored hall", 0, "12 tasks")
+    file = "hall/domain-r1.pddl"
+    shell(f"build --factored hall -o {file}", 2, f"-o {file} would overwrite an input file")
 
 
-def test_one_robot_is_noted(coordlang: Command, files: Files) -> None:
-    text = (
-        PROBLEM.replace("r1 r2 - robot", "r1 - robot")
-        .replace("(at r2 b)", "")
-        .replace("(at r2 a)", "")
-    )
-    outcome = coordlang("plans", *files.write(problem=text), "--count")
-    assert (outcome.code, outcome.out) == (0, "1\n")
-    assert "r1 is the only robot: there is nothing to coordinate" in outcome.err
+def test_one_robot_is_noted(shell: Shell) -> None:
+    text = PROBLEM.replace("r1 r2 - robot", "r1 - robot").replace("(at r2 b)", "")
+    write(problem=text.replace("(at r2 a)", ""))
+    said = "r1 is the only robot: there is nothing to coordinate"
+    assert shell("plans d.pddl p.pddl --count", 0, said).out == "1\n"
 
 
-def test_no_plan(coordlang: Command, files: Files) -> None:
-    outcome = coordlang("plans", *files.write(problem=PROBLEM.replace("(door a b)", "")))
-    assert outcome.code == 11
-    assert "task two: the goal cannot be reached" in outcome.err
-
-
-def test_start_is_goal(coordlang: Command, files: Files) -> None:
-    text = PROBLEM.replace("(at r1 b) (at r2 a))))", "(at r1 a))))")
-    outcome = coordlang("plans", *files.write(problem=text), "--json")
-    assert outcome.code == 0
-    assert json.loads(outcome.out) == {
+def test_no_plan_and_no_step(shell: Shell) -> None:
+    write(problem=PROBLEM.replace("(door a b)", ""))
+    shell("plans d.pddl p.pddl", 11, "task two: the goal cannot be reached")
+    write(problem=PROBLEM.replace("(at r1 b) (at r2 a))))", "(at r1 a))))"))
+    assert json.loads(shell("plans d.pddl p.pddl --json").out) == {
         "plans": [{"cost": 0, "actions": []}],
         "count": 1,
         "complete": True,
@@ -354,10 +305,10 @@ def test_start_is_goal(coordlang: Command, files: Files) -> None:
     }
 
 
-def task_file(folder: Path, tasks: object) -> Path:
-    path = folder / "tasks.json"
-    path.write_text(json.dumps({"format": "coordlang/tasks", "version": 1, "tasks": tasks}))
-    return path
+def test_problems_of_different_worlds(shell: Shell) -> None:
+    Path("q.pddl").write_text(PROBLEM.replace("(door b a)", ""))
+    said = "static fact (door b a) is not the same in all problems"
+    shell("coordination d.pddl p.pddl q.pddl", 31, said)
 
 
 @pytest.mark.parametrize(
@@ -379,152 +330,71 @@ def task_file(folder: Path, tasks: object) -> Path:
         ({}, "this is no task file: Expected `array`, got `object` - at `$.tasks`"),
     ],
 )
-def test_wrong_task_file(
-    tasks: object, message: str, coordlang: Command, files: Files, tmp_path: Path
-) -> None:
-    output = tmp_path / "out.json"
-    outcome = coordlang(
-        "build", *files.write(), "--tasks", task_file(tmp_path, tasks), "-o", output
-    )
-    assert outcome.code == 31
-    assert message in outcome.err
-    assert "tasks.json" in outcome.err
-    assert not output.exists()
-
-
-def test_unsolvable_task_in_a_file(coordlang: Command, files: Files, tmp_path: Path) -> None:
-    tasks = [{"init": ["(at r1 a)", "(at r2 b)"], "goal": ["(at r1 a)", "(at r1 b)"]}]
-    outcome = coordlang(
-        "build", *files.write(), "--tasks", task_file(tmp_path, tasks), "-o", tmp_path / "l.json"
-    )
-    assert outcome.code == 11
-    assert (
-        "tasks.json: task 1: the goal (at r1 a) (at r1 b) cannot be reached from (at r1 a) (at r2 b)\n"
-        in outcome.err
-    )
-    assert "--unsolvable skip leaves out such tasks" in outcome.err
+def test_wrong_task_file(tasks: object, message: str, shell: Shell) -> None:
+    task_file(tasks)
+    shell("build d.pddl p.pddl --tasks tasks.json -o out.json", 31, message, "tasks.json")
+    assert not Path("out.json").exists()
 
 
 EMPTY = """(define (domain e) (:types robot) (:predicates (p) (q ?r - robot))
   (:action a :agent ?r - robot :effect (q ?r)) (:action b :agent ?r - robot :precondition (q ?r) :effect (not (q ?r))))"""
 
 
-def test_an_unsolvable_problem_is_named(coordlang: Command, files: Files, tmp_path: Path) -> None:
-    """By its file: several problems may have one name."""
+def test_unsolvable_tasks_are_named(shell: Shell) -> None:
+    """Problems by their files: several may have one name."""
     goal = "(define (problem x) (:domain e) (:objects r1 r2 - robot) (:init) (:goal {}))"
-    files.write(EMPTY, goal.format("(and (q r1) (q r2))"))
-    other = tmp_path / "u.pddl"
-    other.write_text(goal.format("(p)"))
-    outcome = coordlang("coordination", files.domain, files.problem, other)
-    assert (outcome.code, outcome.out) == (11, "")
-    assert "u.pddl: task x: the goal cannot be reached\n" in outcome.err
+    write(EMPTY, goal.format("(and (q r1) (q r2))"))
+    Path("u.pddl").write_text(goal.format("(p)"))
+    said = "u.pddl: task x: the goal cannot be reached\n"
+    outcome = shell("coordination d.pddl p.pddl u.pddl", 11, said)
+    assert outcome.out == ""
     assert "--unsolvable" not in outcome.err
-    build = ("build", files.domain, files.problem, other, "-o", tmp_path / "l.json")
-    assert "u.pddl: task x: the goal cannot be reached" in (err := coordlang(*build).err)
-    assert "--unsolvable skip leaves out such tasks" in err
-    assert (
-        "left out, it has no plan: " + str(other) in coordlang(*build, "--unsolvable", "skip").err
-    )
-    assert (
-        "--unsolvable skip"
-        not in coordlang(
-            "build", files.domain, other, "--method", "greedy", "-o", "-", "--unsolvable", "skip"
-        ).err
-    )
+    skip = "--unsolvable skip leaves out such tasks"
+    build = "build d.pddl p.pddl u.pddl -o l.json"
+    shell(build, 11, said, skip)
+    shell(f"{build} --unsolvable skip", 0, "left out, it has no plan: u.pddl")
+    outcome = shell("build d.pddl u.pddl --method greedy -o - --unsolvable skip", 11)
+    assert skip not in outcome.err
+    ends = ["(q r1)"], ["(q r2)"]
+    task_file([{"init": i, "goal": g} for i, g in (ends, ([], ["(p)"]), ([], []))])
+    write(EMPTY, goal.format("(q r1)"))
+    build = "build d.pddl p.pddl --tasks tasks.json -o l.json"
+    said = "tasks.json: task 2: the goal (p) cannot be reached from (no fact holds)\n"
+    shell(build, 11, said, skip)
+    said = "left out, it has no plan: task 2 ((no fact holds) -> (p))"
+    shell(f"{build} --unsolvable skip", 0, said)
 
 
-def test_unsolvable_tasks_of_a_file_are_named(
-    coordlang: Command, files: Files, tmp_path: Path
-) -> None:
-    text = "(define (problem x) (:domain e) (:objects r1 r2 - robot) (:init) (:goal (q r1)))"
-    tasks = [
-        {"init": ["(q r1)"], "goal": ["(q r2)"]},
-        {"init": [], "goal": ["(p)"]},
-        {"init": [], "goal": []},
-    ]
-    build = (
-        "build",
-        *files.write(EMPTY, text),
-        "--tasks",
-        task_file(tmp_path, tasks),
-        "-o",
-        tmp_path / "l.json",
+def test_a_state_in_which_nothing_is_true(shell: Shell) -> None:
+    only = (
+        "(:action only :agent ?r - robot :parameters (?o - robot) :precondition (not (q ?o)) "
+        ":effect (q ?r))(:action a"
     )
-    assert "task 2: the goal (p) cannot be reached from (no fact holds)\n" in coordlang(*build).err
-    assert (
-        "left out, it has no plan: task 2 ((no fact holds) -> (p))"
-        in coordlang(*build, "--unsolvable", "skip").err
+    domain = EMPTY.replace(":effect (q ?r)", ":precondition (not (q ?r)) :effect (q ?r)")
+    write(
+        domain.replace("(:action a", only),
+        "(define (problem x) (:domain e) (:objects r1 r2 - robot) (:init) "
+        "(:goal (and (q r1) (not (q r2)))))",
     )
+    shell("build d.pddl p.pddl --tasks all --method greedy -o l.json")
+    shell("explain l.json d.pddl p.pddl --task", 0, "The task (no fact holds) -> (q r1)")
+    Path("plan").write_text("0: (b r1)\n")
+    shell("say l.json d.pddl p.pddl plan", 1, "The state before it is (no fact holds).")
 
 
-def test_a_state_in_which_nothing_is_true(coordlang: Command, files: Files, tmp_path: Path) -> None:
-    text = (
-        "(define (problem x) (:domain e) (:objects r1 r2 - robot) (:init) (:goal (and (q r1) {})))"
-    )
-    domain = EMPTY.replace(":effect (q ?r)", ":precondition (not (q ?r)) :effect (q ?r)").replace(
-        "(:action a",
-        "(:action only :agent ?r - robot :parameters (?o - robot) :precondition (not (q ?o)) :effect (q ?r))"
-        "(:action a",
-    )
-    files.write(domain, text.format("(not (q r2))"))
-    language = tmp_path / "l.json"
-    assert (
-        coordlang(
-            "build",
-            files.domain,
-            files.problem,
-            "--tasks",
-            "all",
-            "--method",
-            "greedy",
-            "-o",
-            language,
-        ).code
-        == 0
-    )
-    assert (
-        "The task (no fact holds) -> (q r1)"
-        in coordlang("choices", language, files.domain, files.problem, "w0 w1").out
-        + coordlang("explain", language, files.domain, files.problem, "--task").out
-    )
-    plan = tmp_path / "plan"
-    plan.write_text("0: (b r1)\n")
-    assert (
-        "The state before it is (no fact holds)."
-        in coordlang("say", language, files.domain, files.problem, plan).err
-    )
-
-
-def test_a_good_language_survives_a_failing_build(
-    coordlang: Command, language: Path, t_map: tuple[Path, Path], tmp_path: Path
-) -> None:
+def test_a_good_language_survives_a_failing_build(shell: Shell, language: Path) -> None:
     before = language.read_bytes()
-    assert (
-        coordlang(
-            "build",
-            *t_map,
-            "--tasks",
-            task_file(tmp_path, []),
-            "--method",
-            "greedy",
-            "-o",
-            language,
-        ).code
-        == 31
-    )
+    task_file([])
+    shell("build T-MAP --tasks tasks.json --method greedy -o language.json", 31)
     assert language.read_bytes() == before
-    assert [p.name for p in tmp_path.iterdir() if p.name.startswith(".")] == []
+    assert [p.name for p in Path().iterdir() if p.name.startswith(".")] == []
 
 
-@pytest.mark.parametrize("share", [0.1, 0.5, 0.99])
-def test_language_cut_off(
-    share: float, coordlang: Command, language: Path, t_map: tuple[Path, Path]
-) -> None:
+def test_language_cut_off(shell: Shell, language: Path) -> None:
     data = language.read_bytes()
-    language.write_bytes(data[: int(len(data) * share)])
-    outcome = coordlang("verify", language, *t_map)
-    assert outcome.code == 31
-    assert "this is no JSON, or it is cut off" in outcome.err
+    for share in (0.1, 0.5, 0.99):
+        language.write_bytes(data[: int(len(data) * share)])
+        shell("verify language.json T-MAP", 31, "this is no JSON, or it is cut off")
 
 
 @pytest.mark.parametrize(
@@ -539,108 +409,75 @@ def test_language_cut_off(
     ids=str,
 )
 def test_language_that_says_what_it_must_not(
-    changes: dict[str, object],
-    message: str,
-    coordlang: Command,
-    language: Path,
-    t_map: tuple[Path, Path],
+    changes: dict[str, object], message: str, shell: Shell, language: Path
 ) -> None:
     language.write_text(json.dumps(json.loads(language.read_text()) | changes))
-    outcome = coordlang("verify", language, *t_map)
-    assert (outcome.code, message in outcome.err) == (31, True), outcome.err
+    shell("verify language.json T-MAP", 31, message)
 
 
-def test_language_of_another_domain(coordlang: Command, language: Path, files: Files) -> None:
-    outcome = coordlang("verify", language, *files.write())
-    assert outcome.code == 31
-    assert "this language belongs to another domain ('t-map')" in outcome.err
+def test_language_of_another_domain_or_world(shell: Shell, language: Path) -> None:
+    said = "this language belongs to another domain ('t-map')"
+    shell("verify language.json d.pddl p.pddl", 31, said)
+    domain, problem = FILES["T-MAP"]
+    text = Path(problem).read_text().replace("(adjacent c0-1 c1-1)", "")
+    Path("other.pddl").write_text(text)
+    said = "has other objects or static facts than the language's problem"
+    shell(f"verify language.json {domain} other.pddl", 31, said)
+    said = "contradicts the language file, which was built with --cost makespan\n  Leave out"
+    shell("verify language.json T-MAP --cost makespan+actions", 2, said)
+    for option in ("--unowned environment", "--robots r1", "--remember-actions"):
+        said = f"Leave out {option.split()[0]}.\n"
+        shell(f"verify language.json T-MAP {option}", 2, said)
 
 
-def test_language_of_another_world(
-    coordlang: Command, language: Path, t_map: tuple[Path, Path], tmp_path: Path
-) -> None:
-    other = tmp_path / "other.pddl"
-    other.write_text(t_map[1].read_text().replace("(adjacent c0-1 c1-1)", ""))
-    outcome = coordlang("verify", language, t_map[0], other)
-    assert outcome.code == 31
-    assert "has other objects or static facts than the language's problem" in outcome.err
-
-
-def test_contradicting_flag(coordlang: Command, language: Path, t_map: tuple[Path, Path]) -> None:
-    outcome = coordlang("verify", language, *t_map, "--cost", "makespan+actions")
-    assert outcome.code == 2
-    assert (
-        "--cost makespan+actions contradicts the language file, which was built with --cost makespan\n  Leave out"
-        in outcome.err
-    )
-    for option in (["--unowned", "environment"], ["--robots", "r1"], ["--remember-actions"]):
-        assert f"Leave out {option[0]}.\n" in coordlang("verify", language, *t_map, *option).err
+PLANS, UNDERSTAND, CHOICES = "plans d p", "understand l d p w0", "choices l d p w0"
+SAMPLE = "--sample N draws N plans: leave out --max"
 
 
 @pytest.mark.parametrize(
-    "arguments", [["nonsense"], ["plans"], ["plans", "a", "b", "--max", "x"], ["build", "a", "b"]]
-)
-def test_usage(arguments: list[str], coordlang: Command) -> None:
-    assert coordlang(*arguments).code == 2
-
-
-PLANS, UNDERSTAND = ("plans", "d", "p"), ("understand", "l", "d", "p", "w0")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("line", "message"),
     [
-        ((*PLANS, "--max", "1", "--sample", "2"), "--sample N draws N plans: leave out --max"),
-        ((*UNDERSTAND, "--max", "1", "--sample", "2"), "--sample N draws N plans: leave out --max"),
-        ((*PLANS, "--seed", "0"), "--seed belongs to --sample"),
-        ((*UNDERSTAND, "--seed", "1"), "--seed belongs to --sample"),
-        ((*PLANS, "--format", "ipc", "--json"), "leave out --format ipc"),
-        ((*UNDERSTAND, "--format", "dot", "--json"), "leave out --format dot"),
-        (("choices", "l", "d", "p", "w0", "--format", "dot", "--json"), "leave out --format dot"),
-        ((*UNDERSTAND, "--nodes", "3"), "--nodes cuts the DAG"),
-        ((*UNDERSTAND, "--nodes", "3", "--json", "--count"), "--nodes cuts the DAG"),
+        ("nonsense", "No such command"),
+        ("plans", "expected DOMAIN PROBLEM"),
+        (f"{PLANS} --max x", "not a valid integer"),
+        ("build a b", "Missing option '-o'"),
+        ("build d.pddl p.pddl --seed -1 -o l.json", "--seed -1: expected 0 or more"),
+        (f"{PLANS} --max 1 --sample 2", SAMPLE),
+        (f"{UNDERSTAND} --max 1 --sample 2", SAMPLE),
+        (f"{PLANS} --seed 0", "--seed belongs to --sample"),
+        (f"{UNDERSTAND} --seed 1", "--seed belongs to --sample"),
+        (f"{PLANS} --format ipc --json", "leave out --format ipc"),
+        (f"{UNDERSTAND} --format dot --json", "leave out --format dot"),
+        (f"{CHOICES} --format dot --json", "leave out --format dot"),
+        (f"{UNDERSTAND} --nodes 3", "--nodes cuts the DAG"),
+        (f"{UNDERSTAND} --nodes 3 --json --count", "--nodes cuts the DAG"),
+        ("export l d p w0 --to ltlf --max-actions 2000", "--max-actions belongs to --to pddl"),
+        (f"{PLANS} --robots r1 --robot-type robot", "give one of them"),
         (
-            ("export", "l", "d", "p", "w0", "--to", "ltlf", "--max-actions", "2000"),
-            "--max-actions belongs to --to pddl",
+            "build d p -o l --prefer flexible --method greedy",
+            "--prefer flexible belongs to --metho",
         ),
-        ((*PLANS, "--robots", "r1", "--robot-type", "robot"), "give one of them"),
+        ("build d p -o l --alpha-only", "--alpha-only belongs to --method separating"),
+        ("build d p -o l --effort 2 --method minimal", "--effort belongs to --method best"),
     ],
 )
-def test_options_without_effect(
-    arguments: tuple[str, ...], message: str, coordlang: Command
-) -> None:
-    outcome = coordlang(*arguments)
-    assert outcome.code == 2
+def test_usage(line: str, message: str, shell: Shell) -> None:
+    outcome = shell(line, 2, message)
     assert outcome.out == "" or json.loads(outcome.out)["error"]["exit_code"] == 2
-    assert (outcome.out == "") == ("--json" not in arguments)
-    assert message in outcome.err
+    assert (outcome.out == "") == ("--json" not in line)
 
 
-def test_problems_of_different_worlds(coordlang: Command, files: Files, tmp_path: Path) -> None:
-    files.write()
-    other = tmp_path / "q.pddl"
-    other.write_text(PROBLEM.replace("(door b a)", ""))
-    outcome = coordlang("coordination", files.domain, files.problem, other)
-    assert outcome.code == 31
-    assert "static fact (door b a) is not the same in all problems" in outcome.err
+def test_model_options_that_there_are_not() -> None:
+    bogus: Any = "bogus"
+    with pytest.raises(door.UsageError, match=r"(?s)'bogus'.*makespan\+actions"):
+        ModelOptions(cost=bogus)
+    with pytest.raises(door.UsageError, match=r"(?s)'bogus'.*environment"):
+        ModelOptions(unowned=bogus)
 
 
-def test_time_limit(coordlang: Command, t_map: tuple[Path, Path]) -> None:
-    grid = t_map[0].parent.parent / "grid"
-    outcome = coordlang(
-        "build",
-        grid / "domain.pddl",
-        grid / "corners-10x10.pddl",
-        "--tasks",
-        "all",
-        "-o",
-        "-",
-        "--time-limit",
-        "0.5",
-    )
-    assert outcome.code == 23
-    assert "the time limit of 0.5 s is over" in outcome.err
-    assert outcome.out == ""
+def test_time_limit(shell: Shell) -> None:
+    said = "the time limit of 0.5 s is over"
+    assert shell("build HUGE --tasks all -o - --time-limit 0.5", 23, said).out == ""
 
 
 NOBODY_MOVES = """(define (domain d) (:requirements :typing) (:types robot cell)
@@ -659,31 +496,98 @@ NOBODY_MOVES = """(define (domain d) (:requirements :typing) (:types robot cell)
 """
 
 
-def test_verifying_no_task_at_all(coordlang: Command, tmp_path: Path) -> None:
+def test_verifying_no_task_at_all(shell: Shell) -> None:
     """A start from which nobody can move, though each fact might change: there are no pairs."""
-    paths = [tmp_path / name for name in ("d.pddl", "p.pddl", "stuck.pddl", "l.json")]
-    domain, problem, stuck, language = paths
-    domain.write_text(NOBODY_MOVES)
     text = (
         "(define (problem p) (:domain d) (:objects r1 r2 - robot a b - cell)"
         "(:init (at r1 a) (at r2 b) (way a b) (way b a) (key r1) (key r2) PASS)"
         "(:goal (at r1 a)))"
     )
-    problem.write_text(text.replace("PASS", "(pass r1) (pass r2)"))
-    stuck.write_text(text.replace("PASS", ""))
-    assert (
-        coordlang(
-            "build", domain, problem, "--tasks", "all", "--method", "greedy", "-o", language
-        ).code
-        == 0
+    write(NOBODY_MOVES, text.replace("PASS", "(pass r1) (pass r2)"))
+    Path("stuck.pddl").write_text(text.replace("PASS", ""))
+    shell("build d.pddl p.pddl --tasks all --method greedy -o l.json")
+    said = "there is no candidate task"
+    assert shell("verify l.json d.pddl stuck.pddl --tasks all", 11, said).out == ""
+
+
+def error(outcome: Outcome) -> dict[str, Any]:
+    """What stands on stdout in place of an answer."""
+    assert outcome.out.count("\n") == 1
+    data = json.loads(outcome.out)
+    jsonschema.validate(data, json_schema())
+    found: dict[str, Any] = data["error"]
+    assert found["exit_code"] == outcome.code
+    return found
+
+
+def test_an_error_as_json(shell: Shell) -> None:
+    write(problem=PROBLEM.replace("(:goal (and", "(:goal (und"))
+    outcome = shell("plans d.pddl p.pddl --json", 31)
+    found = error(outcome)
+    place = found["position"]
+    assert place["file"] == "p.pddl"
+    assert outcome.err == (
+        f"coordlang: {place['file']}:{place['line']}:{place['column']}: {found['message']}\n"
+        f"  {found['remedy']}\n"
     )
-    outcome = coordlang("verify", language, domain, stuck, "--tasks", "all")
-    assert (outcome.code, outcome.out) == (11, "")
-    assert "there is no candidate task" in outcome.err
+    without = shell("plans d.pddl p.pddl", 31)
+    assert (without.out, without.err) == ("", outcome.err)
+    for command in ("inspect", "plans --count", "check", "coordination"):
+        found = error(shell(f"{command} d.pddl none.pddl --json", 31))
+        assert found["message"] == "there is no such file"
+        assert found["position"] == {"file": "none.pddl", "line": None, "column": None}
+    found = error(shell("plans --json --max x d.pddl p.pddl", 2))
+    assert found["position"] is None
+    assert found["message"].startswith("Invalid value for '--max': 'x' is not a valid integer")
+    assert found["remedy"] == "See `coordlang plans --help`."
+    assert error(shell("plains --json", 2))["remedy"] == "See `coordlang --help`."
 
 
-def test_negative_seeds(coordlang: Command, files: Files) -> None:
-    output = files.domain.with_name("l.json")
-    outcome = coordlang("build", files.domain, files.problem, "--seed", "-1", "-o", output)
-    assert outcome.code == 2
-    assert "--seed -1: expected 0 or more" in outcome.err
+def test_refuted_as_json(shell: Shell, language: Path) -> None:
+    error(shell("understand language.json T-MAP w9 --format json", 31))
+    assert error(shell("understand language.json T-MAP 'w2 w0 w1 w2 w1' --json", 1))["remedy"]
+
+
+LATE = OutOfTime("the time is over", remedy="Use a larger --time-limit.")
+LATE.reached = "reading 3 lines"
+
+
+@pytest.mark.parametrize(
+    ("raised", "code", "part"),
+    [
+        (LATE, 23, {"reached": "reading 3 lines"}),
+        (ZeroDivisionError("here"), 32, {"message": "internal error: ZeroDivisionError: here"}),
+        (KeyboardInterrupt(), 130, {"message": "interrupted"}),
+    ],
+)
+def test_what_ends_the_work_as_json(
+    raised: BaseException,
+    code: int,
+    part: dict[str, str],
+    shell: Shell,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def ends(*_: object) -> None:
+        raise raised
+
+    monkeypatch.setattr("coordlang.commands.inputs.Arguments.instance", ends)
+    found = error(shell("inspect T-MAP --json", code))
+    assert part.items() <= found.items()
+
+
+def test_an_answer_stays_the_only_object(shell: Shell) -> None:
+    """`verify` answers, and then finds that a certificate proves less than the file claims."""
+    shell("build T-MAP --tasks all --method minimal --certificate c.json -o l.json")
+    data = json.loads(Path("c.json").read_text())
+    data["refuted"], data["reasons"] = 0, []
+    Path("c.json").write_text(json.dumps(data))
+    out = shell("verify l.json T-MAP --certificate c.json --json", 1).out
+    assert json.loads(out)["holds"] is True
+
+
+def test_what_asks_for_json() -> None:
+    assert wants_json(["plans", "d", "p", "--json"])
+    assert wants_json(["plans", "--format", "json", "d", "p"])
+    assert wants_json(["plans", "--format=json"])
+    assert not wants_json(["plans", "--format", "ipc", "json"])
+    assert not wants_json(["plans", "--", "--json"])

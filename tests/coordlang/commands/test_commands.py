@@ -1,53 +1,53 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Each command does its work, on stdout, in the documented form."""
+"""Each command does its work, on stdout, in the documented form and in plain words."""
 
 from __future__ import annotations
 
+import filecmp
 import json
 import os
-import resource
+import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import jsonschema
 import pytest
 
 import coordlang as door
+from coordlang.commands.main import COMMANDS
+from coordlang.commands.witness import witness_text
+from coordlang.required.miscoordination import Miscoordination
+from coordlang.sites.shipped import domain_names, shipped_domains
 from planners.check.validate import validate
+from planners.classical.fast_downward import FastDownwardAnswer
 from planners.loading import load
 from planners.pddl.model_options import ModelOptions
 from planners.pddl.robots import find_team
 from planners.search.plan_file import read_plans
 from planners.system.errors import UsageError
+from tests.coordlang.commands.conftest import FILES, Shell
 from tests.support.command import Command, own_process
 from tests.support.domains import DOMAINS, ROOT
 
-GRID = DOMAINS / "grid"
-JOINT = DOMAINS / "grid-joint"
+
+@pytest.mark.parametrize(
+    ("files", "count"), [("CORNERS", 18), ("JOINT", 18), ("CORNERS-4", 236), ("JOINT-4", 236)]
+)
+def test_plans_count(files: str, count: int, shell: Shell) -> None:
+    assert shell(f"plans {files} --count").out == f"{count}\n"
 
 
-@pytest.mark.parametrize("style", [GRID, JOINT])
-@pytest.mark.parametrize(("size", "count"), [("3x3", 18), ("4x4", 236)])
-def test_plans_count(style: Path, size: str, count: int, coordlang: Command) -> None:
-    outcome = coordlang("plans", style / "domain.pddl", style / f"corners-{size}.pddl", "--count")
-    assert (outcome.code, outcome.out) == (0, f"{count}\n")
-
-
-@pytest.mark.parametrize("style", [GRID, JOINT])
+@pytest.mark.parametrize("files", ["CORNERS", "JOINT"])
 @pytest.mark.parametrize("form", ["ipc", "json"])
-def test_every_printed_plan_is_valid(
-    style: Path, form: str, coordlang: Command, tmp_path: Path
-) -> None:
-    files = style / "domain.pddl", style / "corners-3x3.pddl"
-    outcome = coordlang("plans", *files, "--max", "100", "--format", form)
-    loaded = load(files[0], [files[1]])
-    texts = [outcome.out] if form == "json" else [t for t in outcome.out.split("\n\n") if t.strip()]
+def test_every_printed_plan_is_valid(files: str, form: str, shell: Shell) -> None:
+    out = shell(f"plans {files} --max 100 --format {form}").out
+    loaded = load(FILES[files][0], FILES[files][1:])
     plans = []
-    for text in texts:
-        path = tmp_path / "plans"
-        path.write_text(text)
-        plans += read_plans(path, loaded.model)
+    for text in [out] if form == "json" else [t for t in out.split("\n\n") if t.strip()]:
+        Path("plans").write_text(text)
+        plans += read_plans("plans", loaded.model)
     assert len(plans) == len(set(plans)) == 18
     team = find_team(loaded.domain, loaded.problems[0], ModelOptions())
     for plan in plans:
@@ -57,68 +57,58 @@ def test_every_printed_plan_is_valid(
 
 
 @pytest.mark.parametrize("heuristic", ["auto", "relaxed", "projections", "blind"])
-def test_plans_do_not_depend_on_the_heuristic(heuristic: str, coordlang: Command) -> None:
-    files = (GRID / "domain.pddl", GRID / "corners-4x4.pddl")
-    expected = coordlang("plans", *files, "--max", "40").out
-    assert coordlang("plans", *files, "--max", "40", "--heuristic", heuristic).out == expected
+def test_plans_do_not_depend_on_the_heuristic(heuristic: str, shell: Shell) -> None:
+    line = "plans CORNERS-4 --max 40"
+    assert shell(f"{line} --heuristic {heuristic}").out == shell(line).out
     with pytest.raises(UsageError, match="--heuristic"):
-        door.plans(*files, heuristic="best")
+        door.plans(*FILES["CORNERS-4"], heuristic="best")
 
 
-def test_plans_json(coordlang: Command) -> None:
-    outcome = coordlang(
-        "plans", GRID / "domain.pddl", GRID / "corners-3x3.pddl", "--json", "--max", "2"
-    )
-    data = json.loads(outcome.out)
-    assert data["count"] == 18
-    assert data["complete"] is False
-    assert data["optimal_cost"] == 4
+def test_plans_json_and_samples(shell: Shell) -> None:
+    data = json.loads(shell("plans CORNERS --json --max 2").out)
+    assert (data["count"], data["complete"], data["optimal_cost"]) == (18, False, 4)
     assert [len(plan["actions"]) for plan in data["plans"]] == [4, 4]
     assert all(len(step) == 2 for plan in data["plans"] for step in plan["actions"])
-
-
-def test_sample_is_seeded(coordlang: Command) -> None:
-    files = GRID / "domain.pddl", GRID / "corners-4x4.pddl"
     first, again, other = (
-        coordlang("plans", *files, "--sample", "5", "--seed", seed).out for seed in (1, 1, 2)
+        shell(f"plans CORNERS-4 --sample 5 --seed {seed}").out for seed in (1, 1, 2)
     )
     assert first == again != other
 
 
-def test_coordination_shows_a_miscoordination(coordlang: Command) -> None:
-    outcome = coordlang("coordination", GRID / "domain.pddl", GRID / "corners-3x3.pddl")
-    assert outcome.code == 0
-    assert "18 optimal plans of 4 steps; coordination is required" in outcome.out
-    assert "<-- breaks here" in outcome.out
-    assert "r1 follows this optimal plan:" in outcome.out
-    data = json.loads(
-        coordlang("coordination", GRID / "domain.pddl", GRID / "corners-3x3.pddl", "--json").out
+def test_plans_within_slack(shell: Shell) -> None:
+    data = json.loads(shell("plans CELLS --slack 1 --json --max 100").out)
+    assert (data["count"], data["optimal_cost"], data["slack"]) == (20, 2, 1)
+    costs = [plan["cost"] for plan in data["plans"]]
+    assert (costs.count(2), costs.count(3)) == (4, 16)
+    plans = door.plans(*FILES["CELLS"], slack=1)
+    assert (plans.count, plans.makespan, plans.slack) == (20, 2, 1)
+    assert [plans.rank(plan) for plan in plans] == list(range(20))
+    # One that is shown without its rest is the same plan.
+    assert {len(plan) for plan in plans} == {2, 3}
+    shell("plans JOINT --slack 1 --count", 2, "must be able to wait")
+
+
+def test_coordination(shell: Shell) -> None:
+    shell(
+        "coordination CORNERS",
+        0,
+        "18 optimal plans of 4 steps; coordination is required",
+        "<-- breaks here",
+        "r1 follows this optimal plan:",
     )
+    data = json.loads(shell("coordination CORNERS --json").out)
     assert data["tasks"][0]["requires_coordination"] is True
+    text = Path(FILES["T-MAP"][1]).read_text()
+    Path("p.pddl").write_text(text[: text.index("(:goal")] + "(:goal (and))\n)")
+    said = "1 optimal plan of 0 steps; coordination is not required"
+    shell(f"coordination {FILES['T-MAP'][0]} p.pddl", 0, said)
 
 
-def test_coordination_not_required(coordlang: Command, tmp_path: Path) -> None:
-    problem = tmp_path / "p.pddl"
-    text = (DOMAINS / "t-map" / "problem.pddl").read_text()
-    goal = text.index("(:goal")
-    problem.write_text(text[:goal] + "(:goal (and))\n)")
-    outcome = coordlang("coordination", DOMAINS / "t-map" / "domain.pddl", problem)
-    assert outcome.code == 0
-    assert "1 optimal plan of 0 steps; coordination is not required" in outcome.out
-
-
-def test_build_verify_explain(coordlang: Command, language: Path, t_map: tuple[Path, Path]) -> None:
-    verified = coordlang("verify", language, *t_map)
-    assert verified.code == 0
-    assert "132 tasks" in verified.out
-    explained = coordlang("explain", language, *t_map)
-    assert explained.code == 0
-    assert "in 2 sentences" in explained.out
-    assert "w0 (6 states): at(r1) != c1-1 and at(r2) != c1-1" in explained.out
-
-
-def test_language_file_fits_its_schema(coordlang: Command, language: Path) -> None:
-    schema = json.loads(coordlang("schema").out)
+def test_build_verify_explain(shell: Shell, language: Path) -> None:
+    shell("verify language.json T-MAP", 0, "132 tasks")
+    said = "w0 (6 states): at(r1) != c1-1 and at(r2) != c1-1"
+    shell("explain language.json T-MAP", 0, "in 2 sentences", said)
+    schema = json.loads(shell("schema").out)
     jsonschema.Draft202012Validator.check_schema(schema)
     data = json.loads(language.read_text())
     jsonschema.validate(data, schema)
@@ -126,51 +116,27 @@ def test_language_file_fits_its_schema(coordlang: Command, language: Path) -> No
         jsonschema.validate(data | {"words": "w0"}, schema)
     assert data["tasks"].keys() == {"kind", "count", "states_sha256"}
     assert (data["tasks"]["kind"], data["tasks"]["count"]) == ("all", 132)
-    assert data["robots"] == ["r1", "r2"]
-    assert len(data["states"]) == 12
-
-
-def test_refuted_language(coordlang: Command, language: Path, t_map: tuple[Path, Path]) -> None:
-    data = json.loads(language.read_text())
+    assert (data["robots"], len(data["states"])) == (["r1", "r2"], 12)
+    # One word for all states is none.
     data["states"] = dict.fromkeys(data["states"], "w0")
     language.write_text(json.dumps(data))
-    outcome = coordlang("verify", language, *t_map)
-    assert outcome.code == 1
-    assert 'refuted: plans with the sentence "w0' in outcome.out
-    assert "breaks" in outcome.out
-    data = json.loads(coordlang("verify", language, *t_map, "--json").out)
+    shell("verify language.json T-MAP", 1, 'refuted: plans with the sentence "w0', "breaks")
+    data = json.loads(shell("verify language.json T-MAP --json", 1).out)
     assert data["holds"] is False
     assert data["miscoordination"]["sentence"] == ["w0"]
 
 
-@pytest.mark.parametrize("name", ["gwb5-3x3"])
-def test_build_from_a_task_file(name: str, coordlang: Command, tmp_path: Path) -> None:
-    files = GRID / "domain.pddl", GRID / f"{name}.pddl"
-    path = tmp_path / "language.json.gz"
-    built = coordlang(
-        "build",
-        *files,
-        "--tasks",
-        GRID / f"{name}.tasks.json",
-        "--method",
-        "greedy",
-        "-o",
-        path,
-        "--json",
-    )
-    assert built.code == 0
-    assert json.loads(built.out)["tasks"] == 380
-    assert coordlang("verify", path, *files, "--json").code == 0
-
-
-def test_build_for_given_problems(coordlang: Command, tmp_path: Path) -> None:
-    files = GRID / "domain.pddl", GRID / "corners-3x3.pddl"
-    path = tmp_path / "language.json"
-    assert coordlang("build", *files, "--method", "greedy", "-o", path).code == 0
-    data = json.loads(path.read_text())
+def test_build_from_a_task_file_and_for_problems(shell: Shell) -> None:
+    domain, problem = FILES["CORNERS"][0], DOMAINS / "grid" / "gwb5-3x3.pddl"
+    tasks = problem.with_suffix(".tasks.json")
+    line = f"build {domain} {problem} --tasks {tasks} --method greedy -o l.json.gz --json"
+    assert json.loads(shell(line).out)["tasks"] == 380
+    shell(f"verify l.json.gz {domain} {problem} --json")
+    shell("build CORNERS --method greedy -o l.json")
+    data = json.loads(Path("l.json").read_text())
     assert data["tasks"]["kind"] == "problems"
     assert data["tasks"]["tasks"][0]["init"] == ["(at r1 c0-0)", "(at r2 c2-2)"]
-    assert json.loads(coordlang("verify", path, *files, "--json").out) == {
+    assert json.loads(shell("verify l.json CORNERS --json").out) == {
         "holds": True,
         "tasks": 1,
         "words": len(data["words"]),
@@ -185,11 +151,8 @@ def test_build_for_given_problems(coordlang: Command, tmp_path: Path) -> None:
         "unchecked": "not checked: the file claims that at least 2 words are needed, which a "
         "certificate would prove",
     }
-
-
-def test_build_to_stdout(coordlang: Command, t_map: tuple[Path, Path]) -> None:
-    outcome = coordlang("build", *t_map, "--method", "greedy", "-o", "-")
-    assert json.loads(outcome.out)["format"] == "coordlang/language"
+    out = shell("build T-MAP --method greedy -o -").out
+    assert json.loads(out)["format"] == "coordlang/language"
 
 
 INSEPARABLE = """(define (domain lamps)
@@ -201,79 +164,60 @@ INSEPARABLE = """(define (domain lamps)
 """
 
 
-def test_inseparable_plans(coordlang: Command, tmp_path: Path) -> None:
+def test_inseparable_plans(shell: Shell, tmp_path: Path) -> None:
     """Either robot may press, but not both: two plans through the same two states."""
-    domain, problem, path = tmp_path / "d.pddl", tmp_path / "p.pddl", tmp_path / "l.json"
-    domain.write_text(INSEPARABLE)
-    problem.write_text(
+    (tmp_path / "d.pddl").write_text(INSEPARABLE)
+    (tmp_path / "p.pddl").write_text(
         "(define (problem p) (:domain lamps) (:objects r1 r2 - robot) (:init) (:goal (lit)))"
     )
-    outcome = coordlang("build", domain, problem, "--method", "greedy", "-o", path)
-    assert outcome.code == 11
-    assert "pass through the same states" in outcome.err
-    assert "--remember-actions" in outcome.err
-    assert "r1 follows this optimal plan:" in outcome.err
-    assert not path.exists()
-    assert (
-        coordlang(
-            "build", domain, problem, "--method", "greedy", "-o", path, "--remember-actions"
-        ).code
-        == 0
-    )
-    assert "(last r1 (press r1)) (last r2 idle) (lit)" in json.loads(path.read_text())["states"]
-    assert coordlang("verify", path, domain, problem).code == 0
-
-
-def in_a_process(arguments: list[str], seed: str) -> bytes:
-    done = subprocess.run(
-        own_process(*arguments),
-        capture_output=True,
-        env={**os.environ, "PYTHONHASHSEED": seed},
-        check=True,
-    )
-    return done.stdout
+    line = "build d.pddl p.pddl --method greedy -o l.json"
+    said = "pass through the same states", "--remember-actions", "r1 follows this optimal plan:"
+    shell(line, 11, *said)
+    assert not Path("l.json").exists()
+    shell(f"{line} --remember-actions")
+    states = json.loads(Path("l.json").read_text())["states"]
+    assert "(last r1 (press r1)) (last r2 idle) (lit)" in states
+    shell("verify l.json d.pddl p.pddl")
 
 
 def test_same_input_same_bytes() -> None:
-    arguments = [
-        "build",
-        str(GRID / "domain.pddl"),
-        str(GRID / "gw1-2x2.pddl"),
-        "--tasks",
-        "all",
-        "-o",
-        "-",
-    ]
-    first, second = (json.loads(in_a_process(arguments, seed)) for seed in ("1", "2"))
-    for data in (first, second):
-        data.pop("producer")
-    assert json.dumps(first) == json.dumps(second)
+    found = []
+    for seed in ("1", "2"):
+        command = own_process("build", *FILES["SQUARE"], "--tasks", "all", "-o", "-")
+        environment = {**os.environ, "PYTHONHASHSEED": seed}
+        done = subprocess.run(command, capture_output=True, env=environment, check=True)
+        found.append(json.loads(done.stdout))
+        found[-1].pop("producer")
+    assert json.dumps(found[0]) == json.dumps(found[1])
 
 
-def test_help_is_light() -> None:
+HEAVY = ("numpy", "tarski", "unified_planning", "pysat", "networkx", "scipy", "rich")
+
+
+@pytest.mark.parametrize("command", [[], *([name] for name in COMMANDS)], ids=str)
+def test_help_is_light(command: list[str], coordlang: Command) -> None:
     """No heavy package is imported for the help: start-up is part of the interface."""
-    code = (
-        "import sys; from coordlang.commands.main import run; run(['--help']); "
-        "print([m for m in ('numpy', 'tarski', 'unified_planning', 'pysat', 'networkx', 'scipy', 'msgspec', 'rich') "
-        "if m in sys.modules], file=sys.stderr)"
-    )
-    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stderr.strip() == "[]"
-    assert "Usage: coordlang" in done.stdout
-    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime >= before
+    assert coordlang(*command, "--help").code == 0
+    if command in (["plans"], ["build"], ["simulate"], []):
+        code = (
+            f"import sys; from coordlang.commands.main import run; run({[*command, '--help']}); "
+            f"print([m for m in {HEAVY} if m in sys.modules], file=sys.stderr)"
+        )
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+        assert (done.stderr.strip(), "Usage: coordlang" in done.stdout) == ("[]", True)
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
 def test_plans_of_small_tasks_load_little() -> None:
     """What counts the plans of a small task starts no thread and loads only what it uses."""
-    files = [str(DOMAINS / "grid" / f"{name}.pddl") for name in ("domain", "corners-4x4")]
     code = (
-        f"import os, sys; sys.argv = ['coordlang', 'plans', *{files}, '--count', '--no-cache']\n"
+        f"import os, sys; sys.argv = ['coordlang', 'plans', *{FILES['CORNERS-4']}, '--count', "
+        "'--no-cache']\n"
         "from coordlang.__main__ import main\n"
         "try: main()\n"
-        "finally: print([m for m in ('psutil', 'numpy.ma', 'pysat', 'networkx', 'scipy', 'rich', 'zipfile', "
-        "'coordlang.language.candidates') if m in sys.modules], len(os.listdir('/proc/self/task')), file=sys.stderr)"
+        "finally: print([m for m in ('psutil', 'numpy.ma', 'pysat', 'networkx', 'scipy', 'rich', "
+        "'zipfile', 'coordlang.language.candidates') if m in sys.modules], "
+        "len(os.listdir('/proc/self/task')), file=sys.stderr)"
     )
     environment = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"}
     done = subprocess.run(
@@ -282,17 +226,9 @@ def test_plans_of_small_tasks_load_little() -> None:
     assert (done.stdout, done.stderr) == ("236\n", "[] 1\n")
 
 
-def test_commands_are_all_listed(coordlang: Command) -> None:
-    from coordlang.commands.main import COMMANDS
-
-    for name in COMMANDS:
-        assert coordlang(name, "--help").code == 0
-    assert (ROOT / "README.md").exists()
-
-
 @pytest.mark.parametrize("error", [ValueError("odd"), OSError(1, "odd")])
 def test_a_bug_is_said_plainly(
-    error: Exception, coordlang: Command, monkeypatch: pytest.MonkeyPatch
+    error: Exception, shell: Shell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whatever goes wrong inside: one message, exit code 32, no traceback."""
 
@@ -300,29 +236,165 @@ def test_a_bug_is_said_plainly(
         raise error
 
     monkeypatch.setattr("coordlang.language.record.json_schema", broken)
-    outcome = coordlang("schema")
-    assert outcome.code == 32
-    assert "internal error" in outcome.err
-    assert "--debug shows where" in outcome.err
+    shell("schema", 32, "internal error", "--debug shows where")
 
 
-def test_plans_within_slack(coordlang: Command) -> None:
-    files = DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "problem.pddl"
-    outcome = coordlang("plans", *files, "--slack", "1", "--json", "--max", "100")
-    data = json.loads(outcome.out)
-    assert (data["count"], data["optimal_cost"], data["slack"]) == (20, 2, 1)
-    costs = [plan["cost"] for plan in data["plans"]]
-    assert (costs.count(2), costs.count(3)) == (4, 16)
-    plans = door.plans(*files, slack=1)
-    assert (plans.count, plans.makespan, plans.slack) == (20, 2, 1)
-    assert [plans.rank(plan) for plan in plans] == list(range(20))
-    # One that is shown without its rest is the same plan.
-    assert {len(plan) for plan in plans} == {2, 3}
+@pytest.mark.parametrize("files", ["T-MAP", "CELLS"])
+def test_both_planners_agree(files: str, shell: Shell) -> None:
+    data = json.loads(shell(f"check {files} --json").out)
+    assert data["agree"] is True
+    assert data["coordlang"] == data["fast_downward"]
+    assert [*Path().iterdir()] == []
 
 
-def test_slack_where_robots_cannot_wait(coordlang: Command) -> None:
-    outcome = coordlang(
-        "plans", JOINT / "domain.pddl", JOINT / "corners-3x3.pddl", "--slack", "1", "--count"
+def test_both_prove_that_there_is_no_plan(shell: Shell) -> None:
+    text = Path(FILES["T-MAP"][1]).read_text()
+    Path("p.pddl").write_text(text.replace("(at r2 c0-1)))", "(at r2 c1-0)))"))
+    assert Path("p.pddl").read_text() != text
+    assert shell(f"check {FILES['T-MAP'][0]} p.pddl", 11).out.count("no plan exists") == 2
+
+
+def test_a_disagreement_is_refuted(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
+    answer = FastDownwardAnswer((3, 0), "explicit", 1)
+    monkeypatch.setattr("coordlang.commands.check.optimal_cost", lambda *_, **__: answer)
+    out = shell("check T-MAP", 1, "the optimal costs differ").out
+    assert "coordlang      makespan 4" in out
+    assert "Fast Downward  makespan 3" in out
+
+
+def test_the_time_limit_ends_fast_downward_too(shell: Shell) -> None:
+    shell("check HUGE --time-limit 3", 23)
+
+
+def test_prefer_flexible(shell: Shell) -> None:
+    line = "build SQUARE --tasks all --method minimal --prefer flexible --json -o"
+    figures = json.loads(shell(f"{line} l.json").out)
+    assert figures["words"] == figures["lower_bound"] == 3
+    before, now = figures["flexibility_before"], figures["flexibility"]
+    assert before < now <= figures["flexibility_bound"] + 1e-9
+    assert 0 < figures["communication_saving"] < 1
+    shell("verify l.json SQUARE")
+    shell(f"{line} again.json")
+    first, second = (json.loads(Path(p).read_text()) for p in ("l.json", "again.json"))
+    assert first["states"] == second["states"]
+    said = "a sentence leaves 1.20 plans open on average (1.20 before, 1.20 at most)"
+    shell("build CELLS --tasks all --method exhaustive --prefer flexible -o c.json", 0, said)
+
+
+def test_prefer_simple(shell: Shell) -> None:
+    """The formulas are those that `explain` then shows, and proved the shortest."""
+    out = shell("build SQUARE --tasks all --method minimal --prefer simple -o l.json").out
+    # What it had before depends on which of the smallest languages was found first.
+    said = r"formulas of 2 terms with 2 limits on variables \(\d+ terms, \d+ limits before"
+    assert re.search(said, out)
+    assert "proved the shortest)" in out
+    shown = json.loads(shell("explain l.json SQUARE --json").out)["formulas"]
+    assert sum(sorted(len(formula["terms"]) for formula in shown.values())[:-1]) == 2
+    shell("verify l.json SQUARE")
+
+
+DOMAIN = """(define (domain e) (:types robot place) (:predicates (q ?r - robot) (ok ?r - robot))
+  (:action a :agent ?r - robot :precondition (ok ?r) :effect (q ?r)))"""
+PROBLEM = """(define (problem x) (:domain e) (:objects r1 r2 - robot) (:init (ok r1) MORE)
+  (:goal (q r1)))"""
+
+
+@pytest.fixture
+def idle(shell: Shell) -> Shell:
+    """The command line beside files in which r2 cannot do anything."""
+    Path("d").write_text(DOMAIN)
+    Path("p").write_text(PROBLEM.replace("MORE", ""))
+    return shell
+
+
+def test_one_plan_of_one_step(idle: Shell) -> None:
+    """One plan is no mixture."""
+    out = idle("coordination d p").out
+    assert out == "p: 1 optimal plan of 1 step; coordination is not required\n"
+    Path("p").write_text(PROBLEM.replace("MORE", "(ok r2)"))
+    said = "2 optimal plans of 1 step; coordination is not required: any mixture of them is optimal"
+    idle("coordination d p", 0, said)
+
+
+def test_one_state(idle: Shell) -> None:
+    Path("p").write_text(PROBLEM.replace("(ok r1) MORE", ""))
+    assert idle("plans d p", 11).err == (
+        "coordlang: p: task x: the goal cannot be reached\n  "
+        "No other state can be reached.\n"
+        "  The goal needs (q r1), and nothing makes it true.\n"
+        "  Action a of r1 is never possible: nothing makes (ok r1) true.\n"
+        "  Action a of r2 is never possible: nothing makes (ok r2) true.\n"
     )
-    assert outcome.code == 2
-    assert "must be able to wait" in outcome.err
+
+
+def test_a_robot_that_only_idles(idle: Shell) -> None:
+    idle(
+        "inspect d p --states",
+        0,
+        "\n  r1            1 subaction: a 1; may idle in every step\n",
+        "\n  r2            0 subactions; may idle in every step\n",
+        "\nfluents         1 fact: q 1\n",
+        "\nreachable       2 joint states, ",
+    )
+    idle("build d p --method minimal -o l.json --certificate proof.json")
+    out = idle("verify l.json d p --certificate proof.json").out
+    assert out.splitlines()[-1] == "lower bound 1: every language has a word"
+
+
+def test_states_without_facts(idle: Shell) -> None:
+    Path("d").write_text(DOMAIN.replace(":precondition (ok ?r)", ""))
+    idle("build d p --method greedy -o l.json")
+    out = idle("understand l.json d p w0 --format dot").out
+    assert out.count("(no fact holds)\\n") == 1, out
+    plan = (("(a r1)", None), (None, "(a r2)"))
+    states, robots = ("", "(q)", ""), ("r1", "r2")
+    text = witness_text(
+        Miscoordination(
+            "t", robots, (plan, plan[::-1]), (states, states), plan, ("", "(q)"), 1, "so it is"
+        )
+    )
+    assert text.count("reaches (no fact holds)\n") == 2
+    assert "\n    (no fact holds)\n" in text
+    assert not [line for line in text.splitlines() if not line.strip()]
+
+
+def test_pairs_of_several_problems(shell: Shell) -> None:
+    shell("build CELLS --tasks all --method greedy -o l.json")
+    text = Path("l.json").read_text()
+    Path("l.json").write_text(re.sub(r'"count": ?30', '"count": 31', text))
+    Path("other.pddl").write_text(Path(FILES["CELLS"][1]).read_text())
+    said = f"records 31 tasks, but {FILES['CELLS'][1]} has 30 pairs of reachable states"
+    shell("verify l.json CELLS", 31, said)
+    said = "records 31 tasks, but these 2 problems have 30 pairs of reachable states"
+    shell("verify l.json CELLS other.pddl", 31, said)
+
+
+def test_domains_are_listed(shell: Shell) -> None:
+    lines = dict(line.split(maxsplit=1) for line in shell("domains").out.splitlines())
+    assert list(lines) == domain_names(DOMAINS)
+    assert lines["charger"] == "Cleaning robots that share one charger."
+    assert all(text.endswith(".") for text in lines.values())
+    listed = json.loads(shell("domains --json").out)["domains"]
+    assert {entry["name"]: entry["about"] for entry in listed} == lines
+    assert listed[0]["problems"] == ["in-turn.pddl", "queue.pddl", "three-robots.pddl"]
+
+
+def test_domains_are_copied(shell: Shell) -> None:
+    """The commands of the documentation run in a folder with a copy of all domains."""
+    names = domain_names(DOMAINS)
+    shell("domains --copy all domains", 0, f"{len(names)} domains copied")
+    for name in names:
+        assert not filecmp.dircmp(DOMAINS / name, Path("domains") / name).diff_files
+    shell("domains --copy t-map new")
+    assert os.listdir("new") == ["t-map"]
+    Path("file").write_text("")
+    shell("domains --copy t-map new", 2, "t-map is there already\n  Remove it")
+    shell("domains --copy tmap new", 2, "there is no domain 'tmap'\n  There are charger,")
+    shell("domains --copy t-map file", 2, "cannot be written")
+
+
+def test_the_wheel_has_the_domains() -> None:
+    """They are installed where `shipped_domains` looks for them first."""
+    build = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["hatch"]["build"]
+    assert build["targets"]["wheel"]["force-include"] == {"domains": "coordlang/shipped_domains"}
+    assert shipped_domains() == DOMAINS

@@ -13,11 +13,8 @@ from pathlib import Path
 import pytest
 
 import coordlang as door
-from tests.support.command import Command
+from tests.coordlang.commands.conftest import Shell
 from tests.support.domains import DOMAINS
-
-ALL = ("l.json", "d.pddl", "p.pddl")
-SENTENCE = "w0"
 
 
 @pytest.fixture(scope="module")
@@ -41,92 +38,77 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def folder(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of it, to work in."""
+def here(shell: Shell, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Shell:
+    """The command line in a copy of it."""
     shutil.copytree(made, tmp_path / "here")
     monkeypatch.chdir(tmp_path / "here")
-    return tmp_path / "here"
+    return shell
 
 
-BUILD = ("build", "d.pddl", "p.pddl", "--tasks", "t.json")
-UNDERSTAND = ("understand", *ALL, SENTENCE)
-CHOICES = ("choices", *ALL, SENTENCE)
-EXPORT = ("export", *ALL, SENTENCE)
-VERIFY = ("verify", *ALL, "--tasks", "t.json", "--certificate", "proof.json", "--dimacs")
-REPORT = ("report", *ALL, "-o")
+ALL = "l.json d.pddl p.pddl"
+BUILD = "build d.pddl p.pddl --tasks t.json"
+UNDERSTAND, CHOICES, EXPORT = (f"{name} {ALL} w0" for name in ("understand", "choices", "export"))
+VERIFY = f"verify {ALL} --tasks t.json --certificate proof.json --dimacs"
 OVERWRITING = [
-    *((*BUILD, "-o", name) for name in ("d.pddl", "p.pddl", "t.json", "in/../d.pddl")),
-    (*BUILD, "-o", "x.json", "--certificate", "t.json"),
-    (*UNDERSTAND, "-o", "l.json"),
-    (*CHOICES, "-o", "d.pddl"),
-    (*EXPORT, "--to", "ltlf", "-o", "l.json"),
-    (*EXPORT, "--json", "-o", "p.pddl"),
-    (*EXPORT, "--translate-plan", "plan", "-o", "plan"),
-    ("export", "l.json", "in/domain.pddl", "p.pddl", SENTENCE, "-o", "in"),
-    ("export", "l.json", "d.pddl", "in/problem.pddl", SENTENCE, "-o", "in"),
-    ("tasks", "d.pddl", "p.pddl", "-o", "p.pddl"),
-    *((*VERIFY, name) for name in (*ALL, "t.json", "proof.json")),
-    *((*REPORT, name) for name in ("l.json", "coordinates.json")),
-    *(("lift", *ALL[1:], "-o", name) for name in ("p.pddl", "coordinates.json")),
-    *(("ground", *ALL, "-o", name) for name in ("l.json", "coordinates.json")),
+    *(f"{BUILD} -o {name}" for name in ("d.pddl", "p.pddl", "t.json", "in/../d.pddl")),
+    f"{BUILD} -o x.json --certificate t.json",
+    f"{UNDERSTAND} -o l.json",
+    f"{CHOICES} -o d.pddl",
+    f"{EXPORT} --to ltlf -o l.json",
+    f"{EXPORT} --json -o p.pddl",
+    f"{EXPORT} --translate-plan plan -o plan",
+    "export l.json in/domain.pddl p.pddl w0 -o in",
+    "export l.json d.pddl in/problem.pddl w0 -o in",
+    "tasks d.pddl p.pddl -o p.pddl",
+    *(f"{VERIFY} {name}" for name in (*ALL.split(), "t.json", "proof.json")),
+    *(f"report {ALL} -o {name}" for name in ("l.json", "coordinates.json")),
+    *(f"lift d.pddl p.pddl -o {name}" for name in ("p.pddl", "coordinates.json")),
+    *(f"ground {ALL} -o {name}" for name in ("l.json", "coordinates.json")),
 ]
 
 
-@pytest.mark.parametrize("arguments", OVERWRITING, ids=" ".join)
-def test_no_input_file_is_overwritten(
-    arguments: tuple[str, ...], coordlang: Command, folder: Path
-) -> None:
-    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    outcome = coordlang(*arguments)
-    assert outcome.code == 2
+@pytest.mark.parametrize("line", OVERWRITING)
+def test_no_input_file_is_overwritten(line: str, here: Shell) -> None:
+    before = {path: path.read_bytes() for path in Path().rglob("*") if path.is_file()}
+    outcome = here(line, 2, "would overwrite an input file\n  ")
     assert outcome.out == "" or json.loads(outcome.out)["error"]["exit_code"] == 2
-    assert ("--json" in arguments) == (outcome.out != "")
-    assert "would overwrite an input file\n  " in outcome.err
-    assert before == {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    assert ("--json" in line) == (outcome.out != "")
+    assert before == {path: path.read_bytes() for path in Path().rglob("*") if path.is_file()}
 
 
-def test_a_link_to_an_input_file_is_one(coordlang: Command, folder: Path) -> None:
+def test_links_devices_and_two_names_of_one_file(here: Shell) -> None:
     Path("link.json").symlink_to("t.json")
-    outcome = coordlang(*BUILD, "-o", "link.json")
-    assert (outcome.code, "-o link.json would overwrite an input file" in outcome.err) == (2, True)
-
-
-@pytest.mark.parametrize("name", ["x.json", "./x.json", "in/../x.json"])
-def test_two_outputs_are_two_files(name: str, coordlang: Command, folder: Path) -> None:
-    outcome = coordlang(*BUILD, "-o", "x.json", "--certificate", name)
-    assert outcome.code == 2
-    assert f"-o and --certificate name the same file: {name}" in outcome.err
+    here(f"{BUILD} -o link.json", 2, "-o link.json would overwrite an input file")
+    for name in ("x.json", "./x.json", "in/../x.json"):
+        said = f"-o and --certificate name the same file: {name}"
+        here(f"{BUILD} -o x.json --certificate {name}", 2, said)
     assert not Path("x.json").exists()
+    here(f"{BUILD} --method minimal -o /dev/null --certificate /dev/null")
 
 
 TO_FILE = [
-    (*BUILD, "-o"),
-    (*BUILD, "-o", "x.json", "--certificate"),
-    (*UNDERSTAND, "-o"),
-    (*CHOICES, "-o"),
+    f"{BUILD} -o",
+    f"{BUILD} -o x.json --certificate",
+    f"{UNDERSTAND} -o",
+    f"{CHOICES} -o",
     VERIFY,
-    REPORT,
-    (*EXPORT, "--to", "ltlf", "-o"),
-    ("tasks", "d.pddl", "p.pddl", "-o"),
+    f"report {ALL} -o",
+    f"{EXPORT} --to ltlf -o",
+    "tasks d.pddl p.pddl -o",
 ]
 
 
 @pytest.mark.parametrize(
-    ("arguments", "place", "reason"),
+    ("line", "place", "reason"),
     [
-        *((arguments, "no/x", "there is no folder no") for arguments in TO_FILE),
+        *((line, "no/x", "there is no folder no") for line in TO_FILE),
         (TO_FILE[0], "plan/x", "there is no folder plan"),
         (TO_FILE[0], "in", "Is a directory"),
         (TO_FILE[0], "shut/x", "Permission denied"),
     ],
 )
 def test_the_place_is_looked_at_before_the_work(
-    arguments: tuple[str, ...],
-    place: str,
-    reason: str,
-    coordlang: Command,
-    folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    line: str, place: str, reason: str, here: Shell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     Path("shut").mkdir()
     access = os.access  # the superuser may write everywhere
@@ -136,34 +118,17 @@ def test_the_place_is_looked_at_before_the_work(
     monkeypatch.setattr(
         "coordlang.commands.inputs.read_domain", lambda *_: pytest.fail("no work before")
     )
-    outcome = coordlang(*arguments, place)
-    assert outcome.code == 2
-    assert f"{arguments[-1]} {place} cannot be written: {reason}\n  Name a file" in outcome.err
+    said = f"{line.split()[-1]} {place} cannot be written: {reason}\n  Name a file"
+    here(f"{line} {place}", 2, said)
 
 
-def test_a_shut_folder_for_exported_files(
-    coordlang: Command, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_shut_folder_for_exported_files(here: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "access", lambda path, mode: not os.path.isdir(path))
-    assert "Permission denied" in coordlang(*EXPORT, "-o", "made/here").err
+    here(f"{EXPORT} -o made/here", 2, "Permission denied")
     assert not Path("made").exists()
 
 
-@pytest.mark.parametrize(
-    "arguments", [(*BUILD, "-o", "x.json", "--certificate", "-"), (*VERIFY, "-")], ids=" ".join
-)
-def test_second_outputs_do_not_go_to_stdout(
-    arguments: tuple[str, ...], coordlang: Command, folder: Path
-) -> None:
-    outcome = coordlang(*arguments)
-    assert (outcome.code, outcome.out) == (2, "")
-    assert f"{arguments[-2]} -: this cannot go to stdout\n  Name a file." in outcome.err
-
-
-def test_a_device_may_be_both(coordlang: Command, folder: Path) -> None:
-    assert (
-        coordlang(
-            *BUILD, "--method", "minimal", "-o", "/dev/null", "--certificate", "/dev/null"
-        ).code
-        == 0
-    )
+@pytest.mark.parametrize("line", [f"{BUILD} -o x.json --certificate", VERIFY])
+def test_second_outputs_do_not_go_to_stdout(line: str, here: Shell) -> None:
+    said = f"{line.split()[-1]} -: this cannot go to stdout\n  Name a file."
+    assert here(f"{line} -", 2, said).out == ""

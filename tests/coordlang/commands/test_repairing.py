@@ -15,171 +15,137 @@ from coordlang.commands.building import build_language
 from coordlang.commands.repairing import repair_language
 from coordlang.language.words import Language
 from planners.system.errors import OutOfTime
-from tests.support.command import Command
-from tests.support.domains import DOMAINS, all_tasks, own_task
+from tests.coordlang.commands.conftest import FILES, Shell
+from tests.support.domains import all_tasks, own_task
 
-GRID = DOMAINS / "grid" / "domain.pddl"
-SMALL = GRID, DOMAINS / "grid" / "gw2-2x3.pddl"
-CELLS = DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "problem.pddl"
-T_MAP = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
+CELLS = FILES["CELLS"]
+GRID, SMALL = FILES["SMALL"]
 
 
-def build(coordlang: Command, path: Path, *arguments: object) -> dict[str, Any]:
+def build(shell: Shell, line: str) -> dict[str, Any]:
     """Build with ``--json``, which must end well; the figures."""
-    outcome = coordlang("build", *arguments, "-o", path, "--json")
-    assert outcome.code == 0, outcome.err
-    found: dict[str, Any] = json.loads(outcome.out)
+    found: dict[str, Any] = json.loads(shell(f"build {line} --json").out)
     return found
 
 
-def parts(path: Path) -> dict[str, Any]:
+def parts(path: str) -> dict[str, Any]:
     """What a language file says, without its provenance."""
-    file = json.loads(path.read_text())
+    file = json.loads(Path(path).read_text())
     return {key: file[key] for key in ("words", "states", "default")}
 
 
-def test_more_tasks(coordlang: Command, tmp_path: Path) -> None:
+def test_more_tasks(shell: Shell) -> None:
     """From one task to all: states that are new get words, and one that was there another one."""
-    old, new = tmp_path / "old.json", tmp_path / "new.json"
-    build(coordlang, old, *SMALL, "--method", "minimal")
-    figures = build(coordlang, new, *SMALL, "--tasks", "all", "--start", old)
+    build(shell, "SMALL --method minimal -o old.json")
+    figures = build(shell, "SMALL --tasks all --start old.json -o new.json")
     repair = figures["repair"]
-    assert figures["method"] == "repair"
-    assert figures["tasks"] == 870
+    assert (figures["method"], figures["tasks"]) == ("repair", 870)
     assert not repair["still_holds"]
     assert repair["miscoordination"]["sentence"]
     assert len(repair["changed"]) == repair["changed_lower_bound"] == 1
     assert len(repair["new_words"]) == repair["new_words_lower_bound"] == 2
     assert repair["new_states"] == 20
-    before, after = parts(old)["states"], parts(new)["states"]
+    before, after = parts("old.json")["states"], parts("new.json")["states"]
     changed = {key for key, word in before.items() if after[key] != word}
     assert changed == {change["state"] for change in repair["changed"]}
     for change in repair["changed"]:
         assert (before[change["state"]], after[change["state"]]) == (change["old"], change["new"])
-    assert coordlang("verify", new, *SMALL).code == 0
-    assert coordlang("verify", old, *SMALL, "--tasks", "all").code == 1
+    shell("verify new.json SMALL")
+    shell("verify old.json SMALL --tasks all", 1)
 
 
-def test_it_says_which_and_why(coordlang: Command, tmp_path: Path) -> None:
-    old, new = tmp_path / "old.json", tmp_path / "new.json"
-    build(coordlang, old, *CELLS, "--method", "minimal")
-    outcome = coordlang("build", *CELLS, "--tasks", "all", "--start", old, "-o", new)
-    assert outcome.code == 0
-    assert 'the old language fails: plans with the sentence "w' in outcome.out
-    assert "breaks here" in outcome.out
-    assert "2 states change their word, proved the fewest; 1 new word (w2)" in outcome.out
+def test_it_says_which_and_why(shell: Shell) -> None:
+    shell("build CELLS --method minimal -o old.json")
+    outcome = shell(
+        "build CELLS --tasks all --start old.json -o new.json --certificate proof.json",
+        0,
+        'the old language fails: plans with the sentence "w',
+        "breaks here",
+        "2 states change their word, proved the fewest; 1 new word (w2)",
+    )
     assert outcome.out.count(" -> w2\n") == 2
+    shell("verify new.json CELLS --certificate proof.json")
     # Again, and it holds: the same words, for the tasks that are asked for now.
-    again = tmp_path / "again.json"
-    outcome = coordlang("build", *CELLS, "--tasks", "all", "--start", new, "-o", again)
-    assert outcome.code == 0
-    assert "the old language still holds: no word is changed" in outcome.out
-    assert parts(again) == parts(new)
+    said = "the old language still holds: no word is changed"
+    shell("build CELLS --tasks all --start new.json -o again.json", 0, said)
+    assert parts("again.json") == parts("new.json")
+    before = Path("new.json").read_bytes()
+    shell("build CELLS --start new.json -o new.json", 2)
+    assert Path("new.json").read_bytes() == before
 
 
-def test_a_language_that_still_holds_is_as_it_was(coordlang: Command, tmp_path: Path) -> None:
+def test_a_language_that_still_holds_is_as_it_was(shell: Shell) -> None:
     """States that are on no plan of the tasks stay, too."""
-    old, new = tmp_path / "old.json", tmp_path / "new.json"
-    square = GRID, DOMAINS / "grid" / "gw1-2x2.pddl"
-    build(coordlang, old, *square, "--tasks", "all", "--method", "minimal")
-    figures = build(coordlang, new, *square, "--tasks", "all", "--start", old)
+    build(shell, "SQUARE --tasks all --method minimal -o old.json")
+    figures = build(shell, "SQUARE --tasks all --start old.json -o new.json")
     assert figures["repair"]["still_holds"]
     assert (figures["words"], figures["lower_bound"], figures["proved_minimal"]) == (3, 2, False)
-    assert parts(new) == parts(old)
-    assert json.loads(new.read_text())["guarantee"]["method"] == "repair"
+    assert parts("new.json") == parts("old.json")
+    assert json.loads(Path("new.json").read_text())["guarantee"]["method"] == "repair"
 
 
-def test_tasks_are_added_to_those_recorded(coordlang: Command, tmp_path: Path) -> None:
+def test_tasks_are_added_to_those_recorded(shell: Shell) -> None:
     """The new language serves the old tasks, too: they are in its file, each once."""
-    corners = DOMAINS / "grid" / "gw2-2x3.pddl"
-    other = tmp_path / "other.pddl"
-    text = corners.read_text()
-    other.write_text(text.replace("(and (at r1 c1-2) (at r2 c0-0))", "(and (at r1 c0-1))"))
-    old, new = tmp_path / "old.json", tmp_path / "new.json"
-    build(coordlang, old, *SMALL, "--method", "minimal")
-    figures = build(coordlang, new, GRID, other, "--start", old)
-    assert figures["tasks"] == 2
-    tasks = json.loads(new.read_text())["tasks"]
-    assert [task["goal"] for task in tasks["tasks"]] == [
-        ["(at r1 c1-2)", "(at r2 c0-0)"],
-        ["(at r1 c0-1)"],
-    ]
-    assert coordlang("verify", new, *SMALL).code == 0
-    figures = build(coordlang, tmp_path / "both.json", GRID, other, corners, "--start", new)
-    assert figures["tasks"] == 2
+    text = Path(SMALL).read_text()
+    Path("other.pddl").write_text(text.replace("(at r1 c1-2) (at r2 c0-0)", "(at r1 c0-1)"))
+    build(shell, "SMALL --method minimal -o old.json")
+    assert build(shell, f"{GRID} other.pddl --start old.json -o new.json")["tasks"] == 2
+    tasks = json.loads(Path("new.json").read_text())["tasks"]
+    goals = [["(at r1 c1-2)", "(at r2 c0-0)"], ["(at r1 c0-1)"]]
+    assert [task["goal"] for task in tasks["tasks"]] == goals
+    shell("verify new.json SMALL")
+    line = f"{GRID} other.pddl {SMALL} --start new.json -o both.json"
+    assert build(shell, line)["tasks"] == 2
     # A task file joins them.
-    listed = tmp_path / "tasks.json"
     task = {"init": ["(at r1 c0-1)", "(at r2 c0-0)"], "goal": ["(at r2 c0-2)"]}
-    listed.write_text(json.dumps({"format": "coordlang/tasks", "version": 1, "tasks": [task]}))
-    figures = build(coordlang, tmp_path / "3.json", *SMALL, "--tasks", listed, "--start", new)
-    assert figures["tasks"] == 3
-    assert coordlang("verify", tmp_path / "3.json", *SMALL).code == 0
+    data = {"format": "coordlang/tasks", "version": 1, "tasks": [task]}
+    Path("tasks.json").write_text(json.dumps(data))
+    line = "SMALL --tasks tasks.json --start new.json -o 3.json"
+    assert build(shell, line)["tasks"] == 3
+    shell("verify 3.json SMALL")
 
 
-def test_a_changed_map(coordlang: Command, tmp_path: Path) -> None:
+def test_a_changed_map(shell: Shell) -> None:
     """A way is closed, and then a place is gone: states that are none any more are left out."""
-    old, new = tmp_path / "old.json", tmp_path / "new.json"
-    build(coordlang, old, *SMALL, "--tasks", "all", "--method", "minimal")
-    text = (DOMAINS / "grid" / "gw2-2x3.pddl").read_text()
-    closed = tmp_path / "closed.pddl"
-    closed.write_text(text.replace("(adjacent c0-1 c1-1)", "").replace("(adjacent c1-1 c0-1)", ""))
-    assert coordlang("verify", old, GRID, closed).code == 31
-    figures = build(coordlang, new, GRID, closed, "--tasks", "all", "--start", old)
-    assert len(figures["repair"]["changed"]) == figures["repair"]["changed_lower_bound"] > 0
-    assert len(figures["repair"]["new_words"]) <= len(figures["repair"]["changed"])
+    build(shell, "SMALL --tasks all --method minimal -o old.json")
+    text = Path(SMALL).read_text()
+    closed = text.replace("(adjacent c0-1 c1-1)", "").replace("(adjacent c1-1 c0-1)", "")
+    Path("closed.pddl").write_text(closed)
+    shell(f"verify old.json {GRID} closed.pddl", 31)
+    figures = build(shell, f"{GRID} closed.pddl --tasks all --start old.json -o new.json")
+    repair = figures["repair"]
+    assert len(repair["changed"]) == repair["changed_lower_bound"] > 0
+    assert len(repair["new_words"]) <= len(repair["changed"])
     assert figures["lower_bound"] == 2  # the bound of another map is none
-    assert coordlang("verify", new, GRID, closed).code == 0
-    lines = [
-        line.replace("c1-1 c1-2", "c1-2") if line.startswith("    c1") else line
-        for line in text.splitlines()
-    ]
-    smaller = tmp_path / "smaller.pddl"
-    gone = "\n".join(lines)
+    shell(f"verify new.json {GRID} closed.pddl")
+    gone = text.replace("c1-1 c1-2 - cell", "c1-2 - cell").replace("c1-0 c1-1 c1-2", "c1-0 c1-2")
     for place in ("c0-1", "c1-0", "c1-2"):
         gone = gone.replace(f"(adjacent c1-1 {place})", "").replace(f"(adjacent {place} c1-1)", "")
-    smaller.write_text(gone)
-    outcome = coordlang("build", GRID, smaller, "--tasks", "all", "--start", old, "-o", new)
-    assert outcome.code == 0, outcome.err
-    assert "10 states of the old language: not on this map" in outcome.out
-    assert coordlang("verify", new, GRID, smaller).code == 0
+    Path("smaller.pddl").write_text(gone)
+    said = "10 states of the old language: not on this map"
+    shell(f"build {GRID} smaller.pddl --tasks all --start old.json -o new.json", 0, said)
+    shell(f"verify new.json {GRID} smaller.pddl")
 
 
 @pytest.mark.parametrize(
-    ("options", "code", "said"),
+    ("line", "code", "said"),
     [
-        ([*T_MAP], 31, "this language belongs to another domain"),
-        ([*CELLS, "--method", "minimal"], 2, "--start changes the words of a language"),
-        (
-            [*CELLS, "--alpha-only", "--method", "separating"],
-            2,
-            "--start changes the words of a language",
-        ),
-        ([*CELLS, "--cost", "makespan+actions"], 2, "--cost makespan+actions contradicts"),
-        ([*CELLS], 31, "this language serves all pairs of states, and others cannot be added"),
+        ("T-MAP", 31, "this language belongs to another domain"),
+        ("CELLS --method minimal", 2, "--start changes the words of a language"),
+        ("CELLS --alpha-only --method separating", 2, "--start changes the words of a language"),
+        ("CELLS --cost makespan+actions", 2, "--cost makespan+actions contradicts"),
+        ("CELLS", 31, "this language serves all pairs of states, and others cannot be added"),
     ],
 )
-def test_what_cannot_be_repaired(
-    options: list[object], code: int, said: str, coordlang: Command, tmp_path: Path
-) -> None:
-    old, new = tmp_path / "old.json", tmp_path / "new.json"
-    build(coordlang, old, *CELLS, "--tasks", "all")
-    outcome = coordlang("build", *options, "--start", old, "-o", new)
-    assert outcome.code == code
-    assert said in outcome.err
-    assert not new.exists()
+def test_what_cannot_be_repaired(line: str, code: int, said: str, shell: Shell) -> None:
+    shell("build CELLS --tasks all --method greedy -o old.json")
+    shell(f"build {line} --start old.json -o new.json", code, said)
+    assert not Path("new.json").exists()
 
 
-def test_the_start_is_not_written_over(coordlang: Command, tmp_path: Path) -> None:
-    old = tmp_path / "old.json"
-    build(coordlang, old, *CELLS)
-    before = old.read_bytes()
-    assert coordlang("build", *CELLS, "--start", old, "-o", old).code == 2
-    assert old.read_bytes() == before
-
-
-def test_fewer_pairs_than_it_serves(coordlang: Command, tmp_path: Path) -> None:
+def test_fewer_pairs_than_it_serves(shell: Shell) -> None:
     """A door that only opens: from where it is open there are fewer pairs."""
-    domain = tmp_path / "domain.pddl"
+    domain, shut, ajar = (Path(f"{name}.pddl") for name in ("domain", "shut", "ajar"))
     domain.write_text(
         "(define (domain door) (:types robot) (:predicates (open) (key ?r - robot) (in ?r - robot))\n"
         "(:action push :agent ?r - robot :parameters () :precondition (key ?r) :effect (open))\n"
@@ -189,33 +155,29 @@ def test_fewer_pairs_than_it_serves(coordlang: Command, tmp_path: Path) -> None:
         "(define (problem p) (:domain door) (:objects r1 r2 - robot)\n"
         "(:init (key r1) {}) (:goal (and (in r1) (in r2))))"
     )
-    shut, ajar = tmp_path / "shut.pddl", tmp_path / "ajar.pddl"
     shut.write_text(text.format(""))
     ajar.write_text(text.format("(open)"))
-    old = tmp_path / "old.json"
-    figures = build(coordlang, old, domain, shut, "--tasks", "all")
-    again = ("--tasks", "all", "--start", old, "-o", tmp_path / "new.json")
-    outcome = coordlang("build", domain, ajar, *again)
-    assert outcome.code == 31
-    assert f"serves {figures['tasks']} pairs of states, but these problems have" in outcome.err
-    assert coordlang("build", domain, shut, *again).code == 0
+    figures = build(shell, "domain.pddl shut.pddl --tasks all -o old.json")
+    said = f"serves {figures['tasks']} pairs of states, but these problems have"
+    again = "--tasks all --start old.json -o new.json"
+    shell(f"build domain.pddl ajar.pddl {again}", 31, said)
+    shell(f"build domain.pddl shut.pddl {again}")
 
 
-def test_stopped_repairs_are_written(
-    coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    old, new = tmp_path / "old.json", tmp_path / "new.json"
-    build(coordlang, old, *SMALL, "--method", "minimal")
+def test_stopped_repairs_are_written(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
+    build(shell, "SMALL --method minimal -o old.json")
 
     def late(*_: object) -> bool:
         raise OutOfTime("the time limit is over")
 
     monkeypatch.setattr("coordlang.vocabulary.repair._Repair._hit_least", late)
-    outcome = coordlang("build", *SMALL, "--tasks", "all", "--start", old, "-o", new)
-    assert outcome.code == 3
-    assert "the best language so far is written, without proof" in outcome.err
-    assert "1 state changes its word, not proved the fewest; 20 new states; 3 new w" in outcome.out
-    assert coordlang("verify", new, *SMALL).code == 0
+    shell(
+        "build SMALL --tasks all --start old.json -o new.json",
+        3,
+        "the best language so far is written, without proof",
+        "1 state changes its word, not proved the fewest; 20 new states; 3 new w",
+    )
+    shell("verify new.json SMALL")
 
 
 def test_states_on_no_plan_keep_their_words() -> None:
@@ -236,13 +198,6 @@ def test_states_on_no_plan_keep_their_words() -> None:
     assert len(built.language.states) == 30
     assert built.language.default == "away"
     assert built.verdict.holds
-
-
-def test_the_certificate_of_a_repaired_language(coordlang: Command, tmp_path: Path) -> None:
-    old, new, proof = (tmp_path / f"{name}.json" for name in ("old", "new", "proof"))
-    build(coordlang, old, *CELLS, "--method", "minimal")
-    build(coordlang, new, *CELLS, "--tasks", "all", "--start", old, "--certificate", proof)
-    assert coordlang("verify", new, *CELLS, "--certificate", proof).code == 0
 
 
 def test_a_false_bound_is_not_carried_over() -> None:
