@@ -13,7 +13,7 @@ import pytest
 
 import coordlang as door
 from coordlang.commands.main import COMMANDS
-from tests.support.command import Command
+from tests.coordlang.commands.conftest import Shell
 from tests.support.domains import SHARED
 from tests.support.hall import factored
 
@@ -47,72 +47,69 @@ def unfactored_count(name: str, folder: Path) -> int:
 
 
 @pytest.mark.parametrize("name", ["ma-basic", "ma-loader"])
-def test_files_of_unified_planning(name: str, coordlang: Command, tmp_path: Path) -> None:
+def test_files_of_unified_planning(name: str, shell: Shell, tmp_path: Path) -> None:
     folder = written(name, tmp_path / "factored")
     assert all(file.endswith(("_domain.pddl", "_problem.pddl")) for file in os.listdir(folder))
-    outcome = coordlang("plans", "--factored", folder, "--count")
-    assert (outcome.code, int(outcome.out)) == (0, unfactored_count(name, tmp_path / "one"))
+    count = int(shell("plans --factored factored --count").out)
+    assert count == unfactored_count(name, tmp_path / "one")
 
 
-def test_an_action_of_several_robots_is_one(coordlang: Command, tmp_path: Path) -> None:
+def test_an_action_of_several_robots_is_one(tmp_path: Path) -> None:
     """Its parameter is called ?robot1 and has the type robot1_type in one file, 2 in the other."""
-    folder = written("ma-loader", tmp_path / "factored")
-    loaded = door.load(factored=folder)
+    loaded = door.load(factored=written("ma-loader", tmp_path / "factored"))
     assert [schema.name for schema in loaded.domain.schemas] == ["move", "load", "unload"]
     agents = [schema.parameters[0].types for schema in loaded.domain.schemas]
     assert agents == [("robot1_type", "robot2_type")] * 3
     assert loaded.model.robots == ("robot1", "robot2")
 
 
-def _union(folder: Path, tmp_path: Path, coordlang: Command) -> None:
-    one = tmp_path / "union"
-    first = coordlang("inspect", "--factored", folder, "--write", one, "--json", "--states")
-    assert first.code == 0
-    files = one / "domain.pddl", one / "problem.pddl"
-    assert coordlang("inspect", *files, "--json", "--states").out == first.out
-    shown = [door.plans(*files), door.plans(factored=folder)]
+@pytest.mark.parametrize(
+    "name",
+    [
+        *UNIFIED,
+        "hall",
+        pytest.param(
+            "driverlog",
+            marks=[
+                pytest.mark.foreign,
+                pytest.mark.skipif(not SHARED.is_dir(), reason=f"no inputs of others: {SHARED}"),
+            ],
+        ),
+    ],
+)
+def test_the_union_is_the_same_model(name: str, shell: Shell, tmp_path: Path) -> None:
+    """A language built from either belongs to both, and is the same; the older hash serves, too."""
+    folder = tmp_path / "files"
+    if name == "driverlog":
+        folder = DRIVERLOG
+    elif name == "hall":
+        factored(folder)
+    else:
+        written(name, folder)
+    one = "union/domain.pddl union/problem.pddl"
+    out = shell(f"inspect --factored {folder} --write union --json --states").out
+    assert shell(f"inspect {one} --json --states").out == out
+    shown = [door.plans(*one.split()), door.plans(factored=folder)]
     assert shown[0].count == shown[1].count
     assert shown[0].first(20) == shown[1].first(20)
-    _one_language(folder, files, tmp_path, coordlang)
-
-
-def _one_language(
-    folder: Path, files: tuple[Path, Path], tmp_path: Path, coordlang: Command
-) -> None:
-    """A language built from either belongs to both, and is the same; one with the older hash too."""
-    factored, union = tmp_path / "factored.json", tmp_path / "union.json"
-    inseparable = (
-        coordlang("build", "--factored", folder, "--method", "greedy", "-o", factored).code == 11
-    )
-    more = ("--remember-actions",) if inseparable else ()
-    assert coordlang("build", "--factored", folder, *more, "-o", factored).code == 0
-    assert coordlang("build", *files, *more, "-o", union).code == 0
-    read = [json.loads(path.read_text()) for path in (factored, union)]
+    more = ""
+    try:
+        door.build(factored=folder, method="greedy")
+    except door.Inseparable:
+        more = "--remember-actions"
+    shell(f"build --factored {folder} {more} -o factored.json")
+    shell(f"build {one} {more} -o union.json")
+    read = [json.loads(Path(f"{name}.json").read_text()) for name in ("factored", "union")]
     for key in ("domain", "states", "words", "guarantee"):
         assert read[0][key] == read[1][key]
-    for language in (factored, union):
-        assert coordlang("verify", language, *files).code == 0
-        assert coordlang("verify", language, "--factored", folder).code == 0
+    for language in ("factored.json", "union.json"):
+        shell(f"verify {language} {one}")
+        shell(f"verify {language} --factored {folder}")
     older = read[0] | {"domain": {"name": read[0]["domain"]["name"]}}
     older["domain"]["sha256"] = door.load(factored=folder).domain.source.sha256
-    factored.write_text(json.dumps(older))
-    assert coordlang("verify", factored, "--factored", folder).code == 0
-    assert coordlang("verify", factored, *files).code == 31
-
-
-@pytest.mark.parametrize("name", UNIFIED)
-def test_the_union_is_the_same_model(name: str, coordlang: Command, tmp_path: Path) -> None:
-    _union(written(name, tmp_path / "factored"), tmp_path, coordlang)
-
-
-def test_the_union_of_the_hall(coordlang: Command, tmp_path: Path) -> None:
-    _union(factored(tmp_path / "hall"), tmp_path, coordlang)
-
-
-@pytest.mark.foreign
-@pytest.mark.skipif(not SHARED.is_dir(), reason=f"no inputs of others here: {SHARED}")
-def test_the_union_of_driverlog(coordlang: Command, tmp_path: Path) -> None:
-    _union(DRIVERLOG, tmp_path, coordlang)
+    Path("older.json").write_text(json.dumps(older))
+    shell(f"verify older.json --factored {folder}")
+    shell(f"verify older.json {one}", 31)
 
 
 @pytest.fixture(scope="module")
@@ -127,41 +124,33 @@ def loader(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, str, P
     return folder, language, door.say(language, plan=plan, factored=folder).sentence, plan
 
 
-@pytest.mark.parametrize("name", sorted(set(COMMANDS) - NO_TASK - {"lift"}))
-def test_every_command(
-    name: str, loader: tuple[Path, Path, str, Path], coordlang: Command, tmp_path: Path
-) -> None:
+def test_every_command(loader: tuple[Path, Path, str, Path], shell: Shell) -> None:
     folder, language, sentence, plan = loader
-    points = tmp_path / "points.json"
-    before: dict[str, tuple[object, ...]] = {
-        "say": (language, plan),
-        "ground": (tmp_path / "lifted.json",),
-        "plan": (language, sentence),
-        **dict.fromkeys(("understand", "choices", "export"), (language, sentence)),
-        **dict.fromkeys(("verify", "explain", "report", "simulate"), (language,)),
+    points = {"l1": [0, 0], "l2": [1, 0], "l3": [2, 0]}
+    Path("points.json").write_text(json.dumps({"coordinates": points}))
+    spoken = f"{language} '{sentence}'"
+    lines = {
+        "lift": "lift --jobs 1 -o lifted.json",
+        "build": "build -o l.json",
+        "ground": "ground lifted.json -o g.json --tasks own",
+        "report": f"report {language} -o page.html",
+        "simulate": f"simulate {language} --coordinates points.json",
+        "tasks": "tasks --start '(a_pos robot1 ?)' -o tasks.json",
+        "say": f"say {language} {plan}",
+        **{name: f"{name} {spoken}" for name in ("plan", "understand", "choices", "export")},
+        **{name: f"{name} {language}" for name in ("verify", "explain")},
+        **{name: name for name in ("inspect", "plans", "check", "coordination")},
     }
-    output = {
-        "build": ("-o", tmp_path / "l.json"),
-        "ground": ("-o", tmp_path / "l.json", "--tasks", "own"),
-        "report": ("-o", tmp_path / "page.html"),
-        "simulate": ("--coordinates", points),
-        "tasks": ("--start", "(a_pos robot1 ?)", "-o", tmp_path / "tasks.json"),
-    }
-    points.write_text('{"coordinates": {"l1": [0, 0], "l2": [1, 0], "l3": [2, 0]}}')
-    if name == "ground":
-        lift = ("lift", "--factored", folder, "--jobs", 1, "-o", tmp_path / "lifted.json")
-        assert coordlang(*lift).code == 0
-    arguments = (*before.get(name, ()), "--factored", folder, *output.get(name, ()))
-    outcome = coordlang(name, *arguments)
-    assert outcome.code == 0, outcome.err
+    assert {*lines} == {*COMMANDS} - NO_TASK
+    for line in lines.values():
+        shell(f"{line} --factored {folder}")
 
 
 @pytest.mark.parametrize("name", ["say", "understand", "choices", "export"])
-def test_what_stands_behind_the_files_is_needed(name: str, coordlang: Command) -> None:
-    outcome = coordlang(name, "l.json", "--factored", "DIR")
-    assert (outcome.code, "--factored DIR without DOMAIN PROBLEM" in outcome.err) == (2, True)
-    outcome = coordlang(name, "l.json", "d.pddl", "p.pddl", "w0", "--factored", "DIR")
-    assert (outcome.code, "--factored DIR without DOMAIN PROBLEM" in outcome.err) == (2, True)
+@pytest.mark.parametrize("files", ["", "d.pddl p.pddl w0"])
+def test_what_stands_behind_the_files_is_needed(name: str, files: str, shell: Shell) -> None:
+    said = "--factored DIR without DOMAIN PROBLEM"
+    shell(f"{name} l.json {files} --factored DIR", 2, said)
 
 
 def test_functions(loader: tuple[Path, Path, str, Path], tmp_path: Path) -> None:
@@ -182,48 +171,43 @@ def test_functions(loader: tuple[Path, Path, str, Path], tmp_path: Path) -> None
         door.say(language, factored=folder)
 
 
-def test_both_names_of_one_robot(coordlang: Command, tmp_path: Path) -> None:
-    folder = factored(tmp_path / "hall")
+def test_both_names_of_one_robot(shell: Shell) -> None:
+    folder = factored(Path("hall"))
     (folder / "r1_domain.pddl").write_text((folder / "domain-r1.pddl").read_text())
-    outcome = coordlang("inspect", "--factored", folder)
-    assert outcome.code == 31
-    assert "two domain files of robot 'r1': domain-r1.pddl and r1_domain.pddl" in outcome.err
+    said = "two domain files of robot 'r1': domain-r1.pddl and r1_domain.pddl"
+    shell("inspect --factored hall", 31, said)
 
 
-def test_an_action_that_differs_in_more(coordlang: Command, tmp_path: Path) -> None:
-    folder = written("ma-loader", tmp_path / "factored")
-    file = folder / "robot2_domain.pddl"
+def test_an_action_that_differs_in_more(shell: Shell, tmp_path: Path) -> None:
+    written("ma-loader", tmp_path / "files")
+    file = Path("files/robot2_domain.pddl")
     file.write_text(file.read_text().replace("   (is_connected ?l_from ?l_to)\n", ""))
-    outcome = coordlang("inspect", "--factored", folder)
-    assert outcome.code == 31
-    assert "action 'move' differs between the robots' files in more than" in outcome.err
-    assert "robot2_domain.pddl:12:2" in outcome.err
-    assert f"The other one is at {folder}{os.sep}robot1_domain.pddl:12:2" in outcome.err
+    shell(
+        "inspect --factored files",
+        31,
+        "action 'move' differs between the robots' files in more than",
+        "robot2_domain.pddl:12:2",
+        f"The other one is at files{os.sep}robot1_domain.pddl:12:2",
+    )
 
 
-def test_no_robot_gets_an_action_that_its_own_file_lacks(
-    coordlang: Command, tmp_path: Path
-) -> None:
+def test_no_robot_gets_an_action_that_its_own_file_lacks(shell: Shell, tmp_path: Path) -> None:
     """Robots of one type, of which only the first may load."""
-    folder = written("ma-loader", tmp_path / "factored")
-    for path in folder.iterdir():
+    for path in written("ma-loader", tmp_path / "files").iterdir():
         text = path.read_text().replace("robot1_type robot2_type - ag", "kind - ag")
         text = text.replace("robot1_type", "kind").replace("robot2_type", "kind")
-        own, other = path.name[:6], {"robot1": "robot2", "robot2": "robot1"}[path.name[:6]]
+        other = {"robot1": "robot2", "robot2": "robot1"}[path.name[:6]]
         text = text.replace(f"   {other} - kind\n", "")
         if path.name == "robot2_domain.pddl":
             text = text.replace("(:action load", "(:action take")
         path.write_text(text)
-        assert own in text
-    outcome = coordlang("inspect", "--factored", folder)
-    assert outcome.code == 31
-    assert "action 'load' is for agents such as 'robot2', whose own domain" in outcome.err
+    said = "action 'load' is for agents such as 'robot2', whose own domain"
+    shell("inspect --factored files", 31, said)
 
 
-def test_write_beside_inputs(coordlang: Command, t_map: tuple[Path, Path], tmp_path: Path) -> None:
-    outcome = coordlang("inspect", *t_map, "--write", t_map[0].parent)
-    assert (outcome.code, "would overwrite an input file" in outcome.err) == (2, True)
-    outcome = coordlang("inspect", *t_map, "--write", tmp_path / "new", "--json")
-    assert (outcome.code, json.loads(outcome.out)["robots"]) == (0, ["r1", "r2"])
-    again = coordlang("inspect", tmp_path / "new/domain.pddl", tmp_path / "new/problem.pddl")
-    assert again.out == coordlang("inspect", *t_map).out
+def test_write_beside_inputs(shell: Shell, t_map: tuple[Path, Path]) -> None:
+    shell(f"inspect T-MAP --write {t_map[0].parent}", 2, "would overwrite an input file")
+    data = json.loads(shell("inspect T-MAP --write new --json").out)
+    assert data["robots"] == ["r1", "r2"]
+    again = shell("inspect new/domain.pddl new/problem.pddl").out
+    assert again == shell("inspect T-MAP").out

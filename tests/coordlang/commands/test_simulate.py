@@ -14,85 +14,86 @@ import pytest
 
 import coordlang.simulation.run as simulation_run
 from coordlang.simulation.record import RunRecord, read_simulation
-from tests.support.command import Command
-from tests.support.domains import DOMAINS
-
-T_MAP = (DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl")
+from tests.coordlang.commands.conftest import FILES, Shell
+from tests.support.command import Outcome
 
 
 @pytest.fixture(scope="module")
-def language(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     import coordlang
 
     path = tmp_path_factory.mktemp("simulate") / "language.json"
-    coordlang.build(*T_MAP, method="minimal").language.save(path)
+    coordlang.build(*FILES["T-MAP"], method="minimal").language.save(path)
     return path
 
 
-def test_json_has_what_is_promised(language: Path, coordlang: Command, tmp_path: Path) -> None:
-    record = tmp_path / "runs.json"
-    outcome = coordlang(
-        "simulate", language, *T_MAP, "--runs", "2", "--seed", "3", "--json", "-o", record
-    )
-    assert outcome.code == 0, outcome.err
-    data = json.loads(outcome.out)
+@pytest.fixture
+def simulate(made: Path, shell: Shell) -> Shell:
+    """The command with a language of the T."""
+
+    def call(line: str, code: int = 0, *said: str) -> Outcome:
+        return shell(f"simulate {made} T-MAP {line}", code, *said)
+
+    return call
+
+
+def test_json_has_what_is_promised(simulate: Shell) -> None:
+    data = json.loads(simulate("--runs 2 --seed 3 --json -o runs.json").out)
     assert [one["seed"] for one in data["runs"]] == [3, 4]
     for one in data["runs"]:
-        assert (one["collisions"], one["deadlock"], one["late"], one["messages"]) == (
-            0,
-            False,
-            0,
-            0,
-        )
+        counts = (one["collisions"], one["deadlock"], one["late"], one["messages"])
+        assert counts == (0, False, 0, 0)
         assert one["seconds"] > 0
-    assert json.loads(record.read_text()) == data
-    assert read_simulation(record).agreement == "sentence"
-
-
-def test_a_summary_for_people(language: Path, coordlang: Command) -> None:
-    outcome = coordlang("simulate", language, *T_MAP, "--step", "barrier")
-    assert outcome.out == (
+    assert json.loads(Path("runs.json").read_text()) == data
+    assert read_simulation("runs.json").agreement == "sentence"
+    assert simulate("--step barrier").out == (
         "1 run: all arrived in 1, collisions in 0, deadlock in 0, late in 0; 8 messages\n"
     )
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code", "message"),
+    ("line", "code", "message"),
     [
-        (("--without", "--plan"), 2, "exclude each other"),
-        (("--sentence", "w9"), 31, "is no word of this language"),
-        (("--radius", "0.4"), 2, "too large"),
-        (("--radius", "0.05"), 2, "pass through each other unseen"),
-        (("--cell", "0.3"), 2, "too small"),
-        (("--cell", "-1"), 2, "above 0"),
-        (("--human", "nowhere"), 2, "there is no such place"),
-        (("--human", "random", "--no-lidar"), 2, "no robot sees"),
-        (("--visit", "r1"), 2, "expected ROBOT:STEP:PLACE"),
-        (("--visit", "r1:0:nowhere"), 2, "no atom says"),
-        (("--noise", "nan"), 2, "expected a share"),
-        (("--time-limit", "0.01"), 23, "time limit"),
+        ("--without --plan", 2, "exclude each other"),
+        ("--sentence w9", 31, "is no word of this language"),
+        ("--radius 0.4", 2, "too large"),
+        ("--radius 0.05", 2, "pass through each other unseen"),
+        ("--cell 0.3", 2, "too small"),
+        ("--cell -1", 2, "above 0"),
+        ("--human nowhere", 2, "there is no such place"),
+        ("--human random --no-lidar", 2, "no robot sees"),
+        ("--visit r1", 2, "expected ROBOT:STEP:PLACE"),
+        ("--visit r1:0:nowhere", 2, "no atom says"),
+        ("--noise nan", 2, "expected a share"),
+        ("--time-limit 0.01", 23, "time limit"),
     ],
 )
-def test_errors(
-    arguments: tuple[str, ...], code: int, message: str, language: Path, coordlang: Command
-) -> None:
-    outcome = coordlang("simulate", language, *T_MAP, *arguments)
-    assert outcome.code == code
-    assert message in outcome.err
+def test_errors(line: str, code: int, message: str, simulate: Shell) -> None:
+    simulate(line, code, message)
 
 
-def test_a_time_limit_keeps_the_runs_that_are_done(language: Path, coordlang: Command) -> None:
-    coordlang("simulate", language, *T_MAP)  # everything is loaded
-    outcome = coordlang(
-        "simulate", language, *T_MAP, "--runs", "1000", "--time-limit", "2", "--json"
-    )
-    assert outcome.code == 3
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("language.json", "expected LANGUAGE DOMAIN PROBLEM"),
+        ("--replay runs.json language.json", "--replay RECORD alone"),
+        ("--replay runs.json -o run.txt", "End the name in .json, .gif, .mp4, .png"),
+        ("--replay runs.json -o no/run.gif", "cannot be written"),
+        ("--replay runs.json -o a.gif -o a.gif", "name the same file"),
+    ],
+)
+def test_usage(line: str, message: str, shell: Shell) -> None:
+    shell(f"simulate {line}", 2, message)
+
+
+def test_a_time_limit_keeps_the_runs_that_are_done(simulate: Shell) -> None:
+    simulate("")  # everything is loaded
+    outcome = simulate("--runs 1000 --time-limit 2 --json", 3, "of 1000 done")
     assert 0 < len(json.loads(outcome.out)["runs"]) < 1000
-    assert "of 1000 done" in outcome.err
 
 
 def test_a_limit_while_the_world_is_made_is_no_line_on_stdout(
-    language: Path, coordlang: Command, monkeypatch: pytest.MonkeyPatch
+    simulate: Shell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from irsim.env import env_base
 
@@ -108,15 +109,12 @@ def test_a_limit_while_the_world_is_made_is_no_line_on_stdout(
             super().__init__(*arguments, **keywords)
 
     monkeypatch.setattr(env_base, "EnvConfig", Ringing)
-    outcome = coordlang(
-        "simulate", language, *T_MAP, "--runs", "9", "--time-limit", "600", "--json"
-    )
-    assert outcome.code == 3
+    outcome = simulate("--runs 9 --time-limit 600 --json", 3)
     assert len(json.loads(outcome.out)["runs"]) == 2
 
 
 def test_an_interrupt_keeps_the_runs_that_are_done(
-    language: Path, coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    simulate: Shell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = simulation_run.run
 
@@ -126,59 +124,32 @@ def test_an_interrupt_keeps_the_runs_that_are_done(
         return run(*arguments)
 
     monkeypatch.setattr(simulation_run, "run", interrupted)
-    record = tmp_path / "runs.json"
-    outcome = coordlang("simulate", language, *T_MAP, "--runs", "9", "-o", record)
-    assert outcome.code == 130
-    assert "interrupted; 2 runs of 9 done" in outcome.err
-    assert [one.seed for one in read_simulation(record).runs] == [0, 1]
+    simulate("--runs 9 -o runs.json", 130, "interrupted; 2 runs of 9 done")
+    assert [one.seed for one in read_simulation("runs.json").runs] == [0, 1]
 
 
-def test_a_record_is_drawn_again(language: Path, coordlang: Command, tmp_path: Path) -> None:
-    record, sheet, again = (tmp_path / name for name in ("runs.json", "sheet.png", "again.png"))
-    options = ("--runs", "2", "--shown", "1", "-o", record, "-o", sheet)
-    assert coordlang("simulate", language, *T_MAP, *options).code == 0
-    replayed = coordlang("simulate", "--replay", record, "--shown", "1", "-o", again, "--json")
-    assert replayed.code == 0
-    assert json.loads(replayed.out) == json.loads(record.read_text())
-    assert again.read_bytes() == sheet.read_bytes()
-    assert coordlang("simulate", "--replay", record, "--shown", "5", "-o", again).code == 2
-    assert again.read_bytes() == sheet.read_bytes()
+def test_a_record_is_drawn_again(simulate: Shell, shell: Shell) -> None:
+    simulate("--runs 2 --shown 1 -o runs.json -o sheet.png")
+    out = shell("simulate --replay runs.json --shown 1 -o again.png --json").out
+    assert json.loads(out) == json.loads(Path("runs.json").read_text())
+    sheet = Path("sheet.png").read_bytes()
+    assert Path("again.png").read_bytes() == sheet
+    shell("simulate --replay runs.json --shown 5 -o again.png", 2)
+    assert Path("again.png").read_bytes() == sheet
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("language.json",), "expected LANGUAGE DOMAIN PROBLEM"),
-        (("--replay", "runs.json", "language.json"), "--replay RECORD alone"),
-        (("--replay", "runs.json", "-o", "run.txt"), "End the name in .json, .gif, .mp4, .png"),
-        (("--replay", "runs.json", "-o", "no/run.gif"), "cannot be written"),
-        (("--replay", "runs.json", "-o", "a.gif", "-o", "a.gif"), "name the same file"),
-    ],
-)
-def test_usage(arguments: tuple[str, ...], message: str, coordlang: Command) -> None:
-    outcome = coordlang("simulate", *arguments)
-    assert outcome.code == 2
-    assert message in outcome.err
-
-
-def test_places_need_coordinates(coordlang: Command, tmp_path: Path) -> None:
-    files = (DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "problem.pddl")
-    language = tmp_path / "language.json"
-    assert coordlang("build", *files, "--method", "greedy", "-o", language).code == 0
-    outcome = coordlang("simulate", language, *files)
-    assert outcome.code == 31
-    assert "--coordinates" in outcome.err
-    points = tmp_path / "points.json"
-    points.write_text('{"coordinates": {"a": [0, 0], "b": [1, 0], "c": [0.5, 0.87]}}')
-    assert coordlang("simulate", language, *files, "--coordinates", points).code == 0
+def test_places_need_coordinates(shell: Shell) -> None:
+    shell("build CELLS --method greedy -o language.json")
+    shell("simulate language.json CELLS", 31, "--coordinates")
+    places = {"a": [0, 0], "b": [1, 0], "c": [0.5, 0.87]}
+    Path("points.json").write_text(json.dumps({"coordinates": places}))
+    shell("simulate language.json CELLS --coordinates points.json")
 
 
 def test_without_the_extra_it_says_what_to_install(
-    language: Path, coordlang: Command, monkeypatch: pytest.MonkeyPatch
+    simulate: Shell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in [name for name in sys.modules if name.split(".")[0] == "irsim"]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "irsim", None)
-    outcome = coordlang("simulate", language, *T_MAP)
-    assert outcome.code == 2
-    assert "pip install 'coordlang[sim]'" in outcome.err
+    simulate("", 2, "pip install 'coordlang[sim]'")
