@@ -7,14 +7,13 @@ import errno
 import json
 import signal
 from collections.abc import Sequence
-from dataclasses import dataclass
 from io import StringIO
 from itertools import pairwise
 from typing import Any
 
 import click
 
-from planners.system.errors import CoordlangError, OutOfMemory, Position
+from planners.system.errors import CoordlangError, OutOfMemory, UsageError
 from planners.system.limits import lacks_memory
 from planners.system.messages import sentence
 from planners.system.signals import Interrupted
@@ -38,49 +37,12 @@ _SIGNALS = 128
 _UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO, errno.EBADF)
 
 
-@dataclass(frozen=True, slots=True)
-class Failure:
-    """What ended a command.
+def failure_of(error: BaseException, number: int | None) -> tuple[str, CoordlangError]:
+    """What stderr shows of an error, and the error that it is in the one error tree.
 
-    Attributes
-    ----------
-    text
-        What stderr shows.
-    message, remedy
-        What is wrong, and what to do.
-    position
-        Where, in a file.
-    exit_code
-        What the process ends with.
-    reached
-        How far the work got that a limit ended.
-    """
-
-    text: str
-    message: str
-    remedy: str | None
-    position: Position | None
-    exit_code: int
-    reached: str | None = None
-
-    def json(self) -> str:
-        """Return the object that ``--json`` gives in place of an answer (docs/formats.md)."""
-        error: dict[str, Any] = {
-            "message": sentence(self.message),
-            "position": None if self.position is None else _place(self.position),
-            "remedy": None if self.remedy is None else sentence(self.remedy, keep="\n"),
-            "exit_code": self.exit_code,
-        }
-        if self.reached is not None:
-            error["reached"] = sentence(self.reached)
-        return json.dumps({"error": error})
-
-
-def failure_of(error: BaseException, number: int | None) -> Failure:
-    """Say what is wrong and what to do; a bug is reported as one, and never hidden.
-
-    ``number`` is the signal that has arrived, None if none has.  Where one has, it is what ended
-    the work, whatever error a library made of it.  So is memory that is used up.
+    A bug is reported as one, and never hidden.  ``number`` is the signal that has arrived, None if
+    none has.  Where one has, it is what ended the work, whatever error a library made of it.  So is
+    memory that is used up.
     """
     match error:
         case KeyboardInterrupt() | click.Abort():
@@ -91,15 +53,32 @@ def failure_of(error: BaseException, number: int | None) -> Failure:
             return _usage(error)
         case OSError() if error.errno in _UNWRITABLE:
             what = f"the output cannot be written: {error.strerror}"
-            return _other(what, 2, "Make room, or name another file.")
+            return _other(what, UsageError.exit_code, "Make room, or name another file.")
         case CoordlangError():
-            text, code = f"coordlang: {error}\n", error.exit_code
-            return Failure(text, error.what, error.remedy, error.position, code, error.reached)
+            return f"coordlang: {error}\n", error
     if lacks_memory(error):
         remedy = "Use a smaller task, or a larger --memory-limit."
         return _other("out of memory", OutOfMemory.exit_code, remedy)
     what = f"internal error: {type(error).__name__}: {sentence(str(error))}"
     return _other(what, CoordlangError.exit_code, "This is a bug; --debug shows where.")
+
+
+def error_json(error: CoordlangError) -> str:
+    """The object that ``--json`` gives in place of an answer (docs/formats.md)."""
+    place = error.position
+    position = None
+    if place is not None:
+        line, column = (place.line, place.column) if place.line else (None, None)
+        position = {"file": sentence(place.file), "line": line, "column": column}
+    entry: dict[str, Any] = {
+        "message": sentence(error.what),
+        "position": position,
+        "remedy": None if error.remedy is None else sentence(error.remedy, keep="\n"),
+        "exit_code": error.exit_code,
+    }
+    if error.reached is not None:
+        entry["reached"] = sentence(error.reached)
+    return json.dumps({"error": entry})
 
 
 def why_stopped(stopped: BaseException) -> str:
@@ -121,30 +100,25 @@ def wants_json(arguments: Sequence[str]) -> bool:
     return is_short or ("--format", "json") in pairwise(before)
 
 
-def _interrupted(number: int | None) -> Failure:
+def _interrupted(number: int | None) -> tuple[str, CoordlangError]:
     by = "" if number in (None, signal.SIGINT) else f" by {signal.Signals(number).name}"
     code = INTERRUPTED if number is None else _SIGNALS + number
     return _other(f"interrupted{by}", code, "Start it again.")
 
 
-def _usage(error: click.ClickException) -> Failure:
+def _usage(error: click.ClickException) -> tuple[str, CoordlangError]:
     """What click says of the arguments."""
     shown = StringIO()
     error.show(file=shown)
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else "coordlang"
-    text = sentence(shown.getvalue(), keep="\n")
-    return Failure(text, error.format_message(), f"See `{path} --help`.", None, 2)
+    usage = UsageError(error.format_message(), remedy=f"See `{path} --help`.")
+    return sentence(shown.getvalue(), keep="\n"), usage
 
 
-def _other(message: str, exit_code: int, remedy: str) -> Failure:
+def _other(message: str, exit_code: int, remedy: str) -> tuple[str, CoordlangError]:
     """A failure that no error of coordlang stands for."""
+    made = CoordlangError(message, remedy=remedy)
+    made.exit_code = exit_code
     text = f"coordlang: {message}\n"
-    if exit_code < _SIGNALS:
-        text += f"  {remedy}\n"
-    return Failure(text, message, remedy, None, exit_code)
-
-
-def _place(position: Position) -> dict[str, Any]:
-    line, column = (position.line, position.column) if position.line else (None, None)
-    return {"file": sentence(position.file), "line": line, "column": column}
+    return text + f"  {remedy}\n" * (exit_code < _SIGNALS), made

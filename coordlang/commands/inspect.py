@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from os import fspath
 from typing import TYPE_CHECKING, Any
@@ -187,10 +188,7 @@ def _labels(found: SearchEstimate) -> str:
 
 
 def _layers(found: SearchEstimate) -> str:
-    sizes = [f"{size:,}" for size in found.layers]
-    if len(sizes) > _SHOWN:
-        sizes = [*sizes[: _SHOWN - 2], "..", sizes[-1]]
-    text = ", ".join(sizes)
+    text = _sizes(found.layers)
     if found.next_steps is None:
         return f"{text} states, and no other can be reached"
     steps = counted(found.next_steps, "joint step")
@@ -198,15 +196,19 @@ def _layers(found: SearchEstimate) -> str:
     return f"{states}; not looked at: the next, with at most about {steps} into it"
 
 
+def _sizes(layers: Sequence[int]) -> str:
+    sizes = [f"{size:,}" for size in layers]
+    if len(sizes) > _SHOWN:
+        sizes = [*sizes[: _SHOWN - 2], "..", sizes[-1]]
+    return ", ".join(sizes)
+
+
 def _bound(found: SearchEstimate) -> str:
     if found.at_least is None:
         return f"{found.heuristic}: no plan is possible"
     text = f"{found.heuristic}: makespan {found.at_least:,} at least"
     if found.within:
-        sizes = [f"{size:,}" for size in found.within]
-        if len(sizes) > _SHOWN:
-            sizes = [*sizes[: _SHOWN - 2], "..", sizes[-1]]
-        text += f", by which {', '.join(sizes)} of these states are left"
+        text += f", by which {_sizes(found.within)} of these states are left"
     if found.solver_after is not None and found.next_steps is not None:
         text += f"; a SAT solver is asked after {counted(found.solver_after, 'joint step')}"
     return text

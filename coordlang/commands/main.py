@@ -17,7 +17,7 @@ from typing import Any
 import click
 
 import coordlang
-from coordlang.commands.failure import BROKEN_PIPE, failure_of, wants_json
+from coordlang.commands.failure import BROKEN_PIPE, error_json, failure_of, wants_json
 from coordlang.commands.terminal import Output, echo
 from planners.system.errors import Note, UsageError
 from planners.system.messages import visible
@@ -95,16 +95,16 @@ def run(arguments: list[str], interruptions: Interruptions | None = None) -> int
     try:
         return _run(arguments, output)
     except (Exception, KeyboardInterrupt) as error:
-        failure = failure_of(error, None if interruptions is None else interruptions.first)
+        text, known = failure_of(error, None if interruptions is None else interruptions.first)
         with suppress(OSError):  # the terminal may be gone
             if "--debug" in arguments and not isinstance(error, click.ClickException):
                 _show("".join(traceback.format_exception(error)))
-            _show(failure.text)
+            _show(text)
             if wants_json(arguments) and not output.written:
-                echo(failure.json())
+                echo(error_json(known))
                 if sys.stdout is not None:
                     sys.stdout.flush()
-        return failure.exit_code
+        return known.exit_code
 
 
 def _run(arguments: list[str], output: Output) -> int:

@@ -75,6 +75,15 @@ class CommandOptions:
     keeps_plans: ClassVar[bool] = True
     alone: ClassVar[str | None] = None
 
+    def __post_init__(self) -> None:
+        """Let ``--json`` stand for ``--format json``, where there is a format."""
+        form = getattr(self, "form", None)
+        if form is None or not getattr(self, "as_json", False):
+            return
+        if form != "json" and "form" in getattr(self, "given", ()):
+            raise click.UsageError(f"--json is short for --format json: leave out --format {form}")
+        object.__setattr__(self, "form", "json")
+
     def outputs(self) -> list[OutputFile]:
         """Files that are written, where that depends on several options."""
         return []
@@ -116,13 +125,6 @@ def coordinates_option() -> Any:
 def progress_option(help: str = "Called with a line of text when a phase begins.") -> Any:
     """The field ``progress`` of an options record."""
     return option(None, help, only="python")
-
-
-def form_of(form: str, as_json: bool, given: frozenset[str]) -> str:
-    """``--format``, for which ``--json`` may stand; ``given`` are the options that were."""
-    if as_json and form != "json" and "form" in given:
-        raise click.UsageError(f"--json is short for --format json: leave out --format {form}")
-    return "json" if as_json else form
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,6 @@ from coordlang.commands.options import (
     Source,
     TasksSource,
     coordinates_option,
-    form_of,
     form_option,
     json_option,
     output_option,
@@ -97,9 +96,6 @@ class PlansOptions(CommandOptions):
     listing: Listing = group(Listing)
     source: Source = group(Source, without=("words_see_slack",))
     given: frozenset[str] = frozenset()
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "form", form_of(self.form, self.as_json, self.given))
 
 
 @dataclass(frozen=True, slots=True)
@@ -392,7 +388,7 @@ class UnderstandOptions(CommandOptions):
     given: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "form", form_of(self.form, self.as_json, self.given))
+        CommandOptions.__post_init__(self)
         if self.form == "dot" and not self.listing.is_default:
             raise UsageError(
                 "--format dot draws the DAG of all plans",
@@ -429,7 +425,7 @@ class PlanOptions(CommandOptions):
     given: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "form", form_of(self.form, self.as_json, self.given))
+        CommandOptions.__post_init__(self)
         if isinstance(self.prefer, str):
             object.__setattr__(self, "prefer", (self.prefer,))
 
@@ -469,9 +465,6 @@ class ChoicesOptions(CommandOptions):
     output: str | None = output_option()
     source: Source = group(Source, without=NO_SLACK)
     given: frozenset[str] = frozenset()
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "form", form_of(self.form, self.as_json, self.given))
 
 
 @dataclass(frozen=True, slots=True)
