@@ -72,8 +72,6 @@ def section(records: Sequence[Record]) -> Section:
         )
         blocks += [
             Figure("communication-tasks", alt, partial(_first_tasks, found.languages)),
-            f"The first {SHOWN} tasks whose greedy sentence is shorter than the plan, as in the "
-            "paper's figure.",
         ]
     if found.orders:
         savings, systematic = found.in_orders(1)
@@ -102,13 +100,10 @@ _COLUMNS = {
 }
 
 _DEFINITION = f"""\
-The *communication saving* of a plan is `1 - words / states`: the number of words of its sentence
-relative to the number of states that it passes through, which is one more than its joint actions.
-The paper's two values, {percent(SAVING_DIFFERING)} over {DIFFERING} tasks and \
-{percent(SAVING_ALL)} over all 956, agree with each other only if
-the tasks that do not differ save nothing, as they do when states are counted. *Sentence shorter*
-are the tasks that differ; *last plan* uses each task's last plan instead of the first, *any plan*
-the expectation over all plans, *shortest* the plan with the shortest sentence. Measured on """
+The *communication saving* of a plan is `1 - words / states`. The paper's two values,
+{percent(SAVING_DIFFERING)} over {DIFFERING} tasks and {percent(SAVING_ALL)} over all 956, agree
+only if states are counted, as here. *Last plan*: for the last plan of each task in place of the
+first; *any plan*: in expectation; *shortest*: for the plan with the shortest sentence. Measured on """
 
 
 def _headlines(of: dict[str, Result]) -> list[tuple[str, str, str, str]]:

@@ -70,14 +70,12 @@ def section(records: Sequence[Record]) -> Section:
 
 
 _DEFINITION = """\
-A task is drawn, and one of its plans, uniformly. The whole *plan* is said, or its sentence, and
-then each robot draws one of the plans with this sentence by itself. They do their parts step by
-step; but in each step every robot that is not done is delayed with probability *p*: it does
-nothing, and goes on with its part afterwards. *As they come*: if what they do together is no joint
-step, the run has failed. *Yielding*: as many as can do their steps do, and the others wait; the run
-fails if all wait for ever, or the goal does not hold when all are done. Cells: runs that end in the
-goal, in percent, and how many steps more than the least makespan these take on average. For
-*p* = 0 a coordination language never fails. Lines in the figures: 95 % intervals (Wilson)."""
+A task and one of its plans are drawn uniformly. The whole *plan* is said, or its sentence, and each
+robot draws one of the plans with this sentence. In each step every robot that is not done is delayed
+with probability *p*. *As they come*: a step that is no joint step is a failure. *Yielding*: robots
+that cannot do their steps wait; the run fails if all wait for ever, or miss the goal. Cells: runs
+that end in the goal in percent, and their steps beyond the least makespan on average. Lines in the
+figures: 95 % intervals (Wilson)."""
 
 
 def _table(records: Sequence[Record]) -> str:

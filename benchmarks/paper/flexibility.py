@@ -85,11 +85,9 @@ _COLUMNS = {
 }
 
 _DEFINITION = """\
-*Open* are the optimal plans with the sentence of the first plan found, as in the paper; *several*
-counts the tasks with more than one. *Any plan* is the expectation when the speaker draws one of the
-N optimal plans uniformly, `sum of n_s^2 / N` over the sentences s with n_s plans each: it does not
-depend on the order in which plans are found. Measured on {row}; *optimal plans* is the upper bound
-for every language."""
+*Open*: the optimal plans with the sentence of the first plan, as in the paper; *several*: the tasks
+with more than one. *Any plan*: the expectation `sum of n_s^2 / N` for a plan drawn uniformly.
+*Optimal plans*: an upper bound for every language. Measured on {row}."""
 
 
 def _headlines(of: dict[str, Result]) -> list[tuple[str, str, str, str]]:

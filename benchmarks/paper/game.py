@@ -156,7 +156,7 @@ def section(records: Sequence[Record]) -> Section:
     worlds = by_world(records)
     for name, here in worlds.items():
         runs, tasks = here[0].parameters["runs"], here[0].result["tasks"]
-        text = f"{name}, {tasks:,} tasks, means of {runs} games and exact expectations:"
+        text = f"{name}, {tasks:,} tasks, {runs} games each:"
         blocks += [text, _table(here)]
         if name == ROW:
             alt = f"Proposals until accepted on {ROW}, plans against sentences, by liked plans"
@@ -165,12 +165,10 @@ def section(records: Sequence[Record]) -> Section:
 
 
 _DEFINITION = """\
-The listener likes k of the task's optimal plans, drawn at random (all of them where there are
-fewer). The speaker, who does not know them, proposes plans in random order until one is
-accepted; or sentences in random order, accepted when some liked plan has the sentence; *widest
-first* proposes the sentences with most plans first. A task is drawn at random for each game.
-*Exact* is the expectation over tasks, liked plans and orders, in closed form: (N + 1) / (k + 1)
-for N plans."""
+The listener likes k of the task's optimal plans, drawn at random. The speaker proposes plans in
+random order until the listener accepts one; or sentences, which the listener accepts if a liked plan
+has the sentence. *Widest first*: sentences with most plans first. Cells: the mean of the games, and
+in brackets the exact expectation, (N + 1) / (k + 1) for N plans."""
 
 
 def _table(records: Sequence[Record]) -> str:
@@ -183,8 +181,8 @@ def _table(records: Sequence[Record]) -> str:
     for label, result, what in kinds:
         row: list[object] = [label]
         for n, exact in enumerate(result["exact"][what]):
-            played = f"{fmean(result['played'][what][n]):.2f}, " if what in result["played"] else ""
-            row.append(f"{played}exact {exact:.2f}")
+            played = f"{fmean(result['played'][what][n]):.2f} " if what in result["played"] else ""
+            row.append(f"{played}({exact:.2f})")
         rows.append(row)
     return markdown(("proposals of", *(f"k = {k}" for k in plan["liked"])), rows)
 

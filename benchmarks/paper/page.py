@@ -64,17 +64,15 @@ def _head(lines: Sequence[Figures]) -> str:
 # Evaluation
 
 The tables and figures of the paper, reproduced with coordlang, beside the paper's own values; each
-experiment also runs on domains that are not grids. This page is written by
-`python -m benchmarks.paper`, from a checkout. Every number on it comes from the results stored
-beside its figures: one JSON line for each work unit, with the version that produced it.
+experiment also runs on domains that are not grids. `python -m benchmarks.paper` writes this page
+from the results stored beside its figures, one JSON line for each work unit:
 
     python -m benchmarks.paper all --results docs/evaluation --page docs/evaluation.md --limit 900
 
 {len(lines)} work units, {seconds:,.0f} seconds of processor time in total; \
 seed {", ".join(map(str, seeds))}; limit {", ".join(f"{limit:g}" for limit in limits)} s for each \
 unit; {", ".join(versions)}.
-Where no limit was reached, everything but the times depends only on the seed and the versions, not
-on the number of processes."""
+Everything but the times depends only on the seed and the versions, unless a limit was reached."""
 
 
 def _headlines(sections: Mapping[str, Section]) -> list[str]:

@@ -103,12 +103,10 @@ def section(records: Sequence[Record]) -> Section:
 
 
 _DEFINITION = """\
-A* searches an optimal plan of each task without a sentence, and then again under the sentence of
-the plan that it found. A node is expanded when its successors are generated. *Pruned* is the
-paper's search: what does not fit the sentence is pruned. *Bounded* also uses the number of words
-that remain as a lower bound, since each takes at least one step. *Times fewer* compares all
-nodes over all tasks (paper: {ratio} times on {row}); *per task* is the mean of the tasks' own
-ratios."""
+A* finds an optimal plan of each task alone, and again under the sentence of that plan. Numbers are
+expanded nodes. *Pruned*: what does not fit the sentence is pruned, as in the paper. *Bounded*: the
+number of words that remain is also a lower bound. *Times fewer*: over all tasks together (paper:
+{ratio} on {row}); *per task*: the mean of the ratios."""
 
 
 def _ratio(result: Result, how: str) -> float:

@@ -211,10 +211,10 @@ def section(records: Sequence[Record]) -> Section:
 
 _DEFINITION = f"""\
 Two robots exchange rooms on the map `domains/corridor`: r1 from {START[0]} to {GOAL[0]}, r2 from
-{START[1]} to {GOAL[1]}. They have agreed on the sentence of the first plan found. During
-execution {PLACE} becomes a place of interest. r1 finds a path through it among its own choices
-and takes it. r2 is not informed and does not change its part; no robot is late. (Candidate
-tasks: robot 1 from any cell of the left room to any of the right one, robot 2 the other way.)"""
+{START[1]} to {GOAL[1]}. They have agreed on the sentence of the first plan. During execution
+{PLACE} becomes a place of interest. r1 finds a path through it among its own choices and takes it.
+r2 is not informed and does not change its part; no robot is late. (Candidate tasks: robot 1 from
+any cell of the left room to any of the right one, robot 2 the other way.)"""
 
 _ALT = (
     "Above the agreed plan in the corridor; below r1 passes the place of interest and r2 does the "
@@ -222,10 +222,8 @@ _ALT = (
 )
 
 _FREEDOM = """\
-Over all tasks of the corridor, and on domains that are not grids, summed over the robots of a task:
-cells (there: subactions) in the agreed plan; further ones that robots may use under the sentence
-without communication, of which a plan allows none; and further ones in all optimal plans, most of
-which would require another agreement."""
+Cells (in other domains: subactions) in the agreed plan; further ones that robots may use under the
+sentence without communication; further ones in all optimal plans. Summed over the robots of a task:"""
 
 
 def _detour_text(record: Record) -> str:

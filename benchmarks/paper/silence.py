@@ -174,13 +174,11 @@ def section(records: Sequence[Record]) -> Section:
 
 _DEFINITION = """\
 The speaker draws one of a task's optimal plans uniformly and says its sentence; each robot then
-draws, by itself, one of the plans with that sentence. *Fail* is how often the mixture is no
-optimal plan, counted exactly: the mean over all tasks with the best words that were found, with 1
-word (silence), 2, 3 and so on, down to 0 with a coordination language; in brackets the worst task.
-An asterisk: no partition into so many words is better, for all were tried, or there is nothing to
-improve. *Bits* is the entropy of the sentence, in the mean over the tasks, with the words of the
-last column but one and of the language; *at least*: no division of the plans into sets that mix
-freely takes fewer, whatever its words; *plan*: saying which plan is meant."""
+draws one of the plans with that sentence. Columns 1, 2, .. say how often the mixture is no optimal
+plan with the best partition found into so many words, counted exactly: the mean over the tasks, and
+in brackets the worst task. An asterisk: no partition into so many words is better. *Bits*: the mean
+entropy of a sentence, with one word less than a language and with a language; *at least*: a lower
+bound for every division into sets that mix freely; *plan*: for saying which plan is meant."""
 
 
 def _table(records: Sequence[Record]) -> str:

@@ -210,34 +210,29 @@ def section(records: Sequence[Record]) -> Section:
 
 
 _DEFINITION = """\
-Discs of 0.2 m with two driven wheels, in cells of 1 m, in ir-sim: `coordlang simulate`. What their
-wheels do has 10 % noise; where they believe to be is right but for a standard deviation of 1 cm and
-0.01 rad. Lidars look all around; robots stop for what is ahead. Every robot has logic of its own:
-it knows the task, the language and the sentence, and draws uniformly among its own choices. A
-*clock* begins each joint step at the same time for all; a *barrier* opens when all have told that
-they have done the step before; with barriers before *words* only, robots run freely within a word.
-A run ends well if all arrive in time and nobody touches anything."""
+Discs of 0.2 m with two driven wheels, in cells of 1 m, in ir-sim: `coordlang simulate`. Wheels have
+10 % noise; robots know their place up to a standard deviation of 1 cm and 0.01 rad. Lidars stop robots
+for what is ahead. Every robot knows the task, the language and the sentence, and draws uniformly among
+its own choices. A *clock* begins each joint step for all; a *barrier* opens when all have done the
+step before; with barriers before *words* robots run freely within a word. A run ends well if all
+arrive in time and nobody touches anything."""
 
 _FLOORS = """\
-Tasks that require coordination, drawn uniformly, on shipped maps and on a maze of others (read, not
-shipped). *Sentence*: that of a plan drawn uniformly. *Nothing*: each robot follows an optimal plan
-of its own. *No lidar*: nothing stops robots that are about to collide. *Joint model*: runs in which
-the robots' own subplans, done in step, are an optimal plan: what joint steps promise. *Agree*: runs
-that end well exactly if they are. *Late*: runs, and how many joint steps together, where a joint
-step is a period of the clock, in which the longest way takes its time: who keeps step in another
-way has some to spare. *Messages* and simulated *seconds* are of one run on average, *nearest* is
-the least distance of two robots' middles in metres over all runs; discs touch at 0.4 m. The
-simulator moves robots and nothing else: that they stand at different doors of *handover* is seen by
-the joint model alone, so that its runs that end well are no evidence, with nothing agreed."""
+Tasks that require coordination, drawn uniformly, on shipped maps and on a maze of others.
+*Sentence*: of a plan drawn uniformly. *Nothing*: each robot follows an optimal plan of its own. *No
+lidar*: nothing stops robots that are about to collide. *Late*: runs, and in brackets joint steps
+together. *Messages* and simulated *seconds*: of one run on average. *Nearest*: the least distance of
+two robots' middles in metres; discs touch at 0.4 m. *Joint model*: runs in which the robots' own
+subplans, done in step, are an optimal plan. *Agree*: runs that end well exactly if they are. The
+simulator does not see the doors of *handover*, so its runs with nothing agreed are no evidence."""
 
 _HUMAN = """\
-A human stands in a cell that is no corner, drawn uniformly, and only lidars see that, up to two
-cells away. The tasks are the legs of deliveries, as in the section on navigation, drawn uniformly,
-with the same plan for *plan* and *sentence*, by the clock. *Floor*: runs that end well, of robots
-with wheels; a robot that sees the human asks its choices (`coordlang.execution` monitor) for a way
-that avoids the cell. *Joint model*: the same tasks, plans and cells in joint steps, where all know
-of the human before they start. In brackets 95 % intervals (Wilson). *Only there*: runs that end
-well in the joint model and not on the floor; *only here*: the other way round."""
+A human stands in a random cell that is no corner; only lidars see the human, up to two cells away.
+The tasks are deliveries as above, with the same plan for *plan* and *sentence*, by the clock.
+*Floor*: runs that end well of robots with wheels, which ask their monitor for a way that avoids the
+cell. *Joint model*: the same in joint steps, where all know of the human before they start. In
+brackets 95 % intervals (Wilson). *Only there*: well in the joint model only; *only here*: on the
+floor only."""
 
 
 def _floor_table(floors: Sequence[Record]) -> str:
@@ -293,9 +288,8 @@ def _summed(floors: Sequence[Record], agreement: Agreement, way: str) -> str:
 
 
 _WORDS = (
-    "The sentence promises that mixtures of joint steps are plans, and within a word nobody is in "
-    "step: who rests or turns less is ahead of the others, and meets them where they are only to "
-    "be when it has gone, or the other way round."
+    "A sentence promises that mixtures of joint steps are plans; within a word robots are not in "
+    "step."
 )
 _KEPT = {
     "clock": "by a common clock",

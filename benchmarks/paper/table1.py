@@ -156,13 +156,11 @@ def section(records: Sequence[Record]) -> Section:
 
 
 _DEFINITION = """\
-Tasks and states must be exactly the paper's. *Greedy* is the paper's method: fill a word with every
-state that still fits; beside it the least and the greatest number of words that it needs when the
-states come in other orders. *Least alpha* is the least number of words that separate all first
-differences, as greedy words do (`--method separating --alpha-only`); *separating* the least number
-that separate first or last differences (Theorem 3); *minimal* the least number of words of any
-partition, by definition; *exhaustive* the paper's brute force, where it ends. A star: proved to be
-the least of its kind. Every language is verified by definition."""
+Tasks and states are exactly the paper's. *Greedy*: fill a word with every state that still fits;
+beside it the range over other orders of the states. *Least alpha*: fewest words that separate all
+first differences; *separating*: that separate first or last differences (Theorem 3); *minimal*:
+fewest words of any partition; *exhaustive*: the paper's brute force. A star: proved to be the least
+of its kind. Every language is verified by definition."""
 
 
 def _words(rows: Mapping[str, _Columns]) -> str:
