@@ -103,7 +103,8 @@ _DEFINITION = f"""\
 The *communication saving* of a plan is `1 - words / states`. The paper's two values,
 {percent(SAVING_DIFFERING)} over {DIFFERING} tasks and {percent(SAVING_ALL)} over all 956, agree
 only if states are counted, as here. *Last plan*: for the last plan of each task in place of the
-first; *any plan*: in expectation; *shortest*: for the plan with the shortest sentence. Measured on """
+first; *any plan*: in expectation; *shortest*: for the plan with the shortest sentence. Measured
+on """
 
 
 def _headlines(of: dict[str, Result]) -> list[tuple[str, str, str, str]]:

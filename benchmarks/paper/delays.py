@@ -70,12 +70,12 @@ def section(records: Sequence[Record]) -> Section:
 
 
 _DEFINITION = """\
-A task and one of its plans are drawn uniformly. The whole *plan* is said, or its sentence, and each
-robot draws one of the plans with this sentence. In each step every robot that is not done is delayed
-with probability *p*. *As they come*: a step that is no joint step is a failure. *Yielding*: robots
-that cannot do their steps wait; the run fails if all wait for ever, or miss the goal. Cells: runs
-that end in the goal in percent, and their steps beyond the least makespan on average. Lines in the
-figures: 95 % intervals (Wilson)."""
+A task and one of its plans are drawn uniformly. The whole *plan* is said, or its sentence, and
+each robot draws one of the plans with this sentence. In each step every robot that is not done is
+delayed with probability *p*. *As they come*: a step that is no joint step is a failure.
+*Yielding*: robots that cannot do their steps wait; the run fails if all wait for ever, or miss the
+goal. Cells: runs that end in the goal in percent, and their steps beyond the least makespan on
+average. Lines in the figures: 95 % intervals (Wilson)."""
 
 
 def _table(records: Sequence[Record]) -> str:

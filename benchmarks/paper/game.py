@@ -166,9 +166,9 @@ def section(records: Sequence[Record]) -> Section:
 
 _DEFINITION = """\
 The listener likes k of the task's optimal plans, drawn at random. The speaker proposes plans in
-random order until the listener accepts one; or sentences, which the listener accepts if a liked plan
-has the sentence. *Widest first*: sentences with most plans first. Cells: the mean of the games, and
-in brackets the exact expectation, (N + 1) / (k + 1) for N plans."""
+random order until the listener accepts one; or sentences, which the listener accepts if a liked
+plan has the sentence. *Widest first*: sentences with most plans first. Cells: the mean of the
+games, and in brackets the exact expectation, (N + 1) / (k + 1) for N plans."""
 
 
 def _table(records: Sequence[Record]) -> str:

@@ -97,11 +97,11 @@ Two robots on a map with storage (S1, S2, left) and dispatch (D1, D2, right) in 
 start in random corners and agree on two tasks: robot i goes to Si and then Di, or the other way
 round. Then a human appears in a random cell that is no corner. The agreed *plan* fails if a robot
 would enter that cell. Under the *sentence* of that plan each robot selects among its own choices,
-without observing the other robot; it fails if no choice avoids the cell. *Of 100*: random runs with
-the same draws. *Exact*: over all starts, directions, cells and plans; with a 95 % interval (Wilson):
-of 10,000 runs, where there are too many sentences. *Possible*: if the robots may agree again. The
-paper gives no map; ours are full rectangles (*open*) or their border (*ring*). *Across* puts D1
-opposite S1, *along* on the same side."""
+without observing the other robot; it fails if no choice avoids the cell. *Of 100*: random runs
+with the same draws. *Exact*: over all starts, directions, cells and plans; with a 95 % interval
+(Wilson): of 10,000 runs, where there are too many sentences. *Possible*: if the robots may agree
+again. The paper gives no map; ours are full rectangles (*open*) or their border (*ring*). *Across*
+puts D1 opposite S1, *along* on the same side."""
 
 _OTHERS = """\
 Domains that are not grids; one subaction that optimal plans use becomes impossible. All tasks:"""

@@ -223,7 +223,8 @@ _ALT = (
 
 _FREEDOM = """\
 Cells (in other domains: subactions) in the agreed plan; further ones that robots may use under the
-sentence without communication; further ones in all optimal plans. Summed over the robots of a task:"""
+sentence without communication; further ones in all optimal plans. Summed over the robots of a
+task:"""
 
 
 def _detour_text(record: Record) -> str:

@@ -210,21 +210,22 @@ def section(records: Sequence[Record]) -> Section:
 
 
 _DEFINITION = """\
-Discs of 0.2 m with two driven wheels, in cells of 1 m, in ir-sim: `coordlang simulate`. Wheels have
-10 % noise; robots know their place up to a standard deviation of 1 cm and 0.01 rad. Lidars stop robots
-for what is ahead. Every robot knows the task, the language and the sentence, and draws uniformly among
-its own choices. A *clock* begins each joint step for all; a *barrier* opens when all have done the
-step before; with barriers before *words* robots run freely within a word. A run ends well if all
-arrive in time and nobody touches anything."""
+Discs of 0.2 m with two driven wheels, in cells of 1 m, in ir-sim: `coordlang simulate`. Wheels
+have 10 % noise; robots know their place up to a standard deviation of 1 cm and 0.01 rad. Lidars
+stop robots for what is ahead. Every robot knows the task, the language and the sentence, and draws
+uniformly among its own choices. A *clock* begins each joint step for all; a *barrier* opens when
+all have done the step before; with barriers before *words* robots run freely within a word. A run
+ends well if all arrive in time and nobody touches anything."""
 
 _FLOORS = """\
 Tasks that require coordination, drawn uniformly, on shipped maps and on a maze of others.
-*Sentence*: of a plan drawn uniformly. *Nothing*: each robot follows an optimal plan of its own. *No
-lidar*: nothing stops robots that are about to collide. *Late*: runs, and in brackets joint steps
-together. *Messages* and simulated *seconds*: of one run on average. *Nearest*: the least distance of
-two robots' middles in metres; discs touch at 0.4 m. *Joint model*: runs in which the robots' own
-subplans, done in step, are an optimal plan. *Agree*: runs that end well exactly if they are. The
-simulator does not see the doors of *handover*, so its runs with nothing agreed are no evidence."""
+*Sentence*: of a plan drawn uniformly. *Nothing*: each robot follows an optimal plan of its own.
+*No lidar*: nothing stops robots that are about to collide. *Late*: runs, and in brackets joint
+steps together. *Messages* and simulated *seconds*: of one run on average. *Nearest*: the least
+distance of two robots' middles in metres; discs touch at 0.4 m. *Joint model*: runs in which the
+robots' own subplans, done in step, are an optimal plan. *Agree*: runs that end well exactly if
+they are. The simulator does not see the doors of *handover*, so its runs with nothing agreed are
+no evidence."""
 
 _HUMAN = """\
 A human stands in a random cell that is no corner; only lidars see the human, up to two cells away.
