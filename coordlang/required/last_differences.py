@@ -243,22 +243,16 @@ def _links(choices: Choices, index: EdgeIndex, table: Ints) -> tuple[Ints, Ints,
     walking = np.column_stack((table[:, :robots], np.where(y == failed, FAILED, y)))
     sources: list[Ints] = [np.zeros(0, np.int64)]
     children: list[Ints] = [np.zeros((0, robots + 1), np.int64)]
-    numbers: list[Ints] = [np.zeros(0, np.int64)]
-    count = 0
     for move in moves(space, index, walking):
         target = space.targets(move.edges)
         fails = can_fail(choices, target, move.mixed)
-        mixed = np.where(move.mixed == FAILED, failed, move.mixed)[fails]
-        fresh, number = unique_tuples(np.column_stack((target[fails], mixed)), bounds)
-        pairs, _ = unique_tuples(
-            np.column_stack((move.source[fails], number)), [len(table), len(fresh)]
-        )
-        sources.append(pairs[:, 0])
-        numbers.append(pairs[:, 1] + count)
-        children.append(fresh)
-        count += len(fresh)
-    merged, place = unique_tuples(np.concatenate(children), bounds)
-    return np.concatenate(sources), merged, place[np.concatenate(numbers)]
+        mixed = np.where(move.mixed == FAILED, failed, move.mixed)
+        links = np.column_stack((move.source, target, mixed))[fails]
+        different, _ = unique_tuples(links, [len(table), *bounds])
+        sources.append(different[:, 0])
+        children.append(different[:, 1:])
+    merged, child = unique_tuples(np.concatenate(children), bounds)
+    return np.concatenate(sources), merged, child
 
 
 def _layers(tables: Sequence[Ints], links: Sequence[tuple[Ints, Ints]]) -> list[_Layer]:

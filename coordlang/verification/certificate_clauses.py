@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from itertools import combinations, islice
 
@@ -29,9 +30,7 @@ _CLAUSE, _LITERAL = 120, 48
 
 @dataclass(frozen=True, slots=True)
 class Cnf:
-    """A formula in conjunctive normal form.
-
-    "the states can be given ``size`` words so that every clause holds".
+    """A CNF: "the states can be given ``size`` words so that every clause holds".
 
     The last of ``clauses`` are the necessary ones, in their order; those before say what words are.
     ``word[state]`` are the variables "the state has word 0, 1, ..", ``separated[pair]`` "the two
@@ -173,19 +172,13 @@ def _words_in_order(
 def core(clauses: Iterable[Clause], size: int) -> list[Clause]:
     """A part of the clauses that still refutes ``size`` words, small but not least.
 
-    All of them where that takes long.
-
-    Raises `ValueError` if it finds that they do not refute it.
+    All of them where that takes long.  Raises `ValueError` if it finds that they do not refute it.
     """
-    every = without_implied(clauses)
-    try:
-        small = _in_the_way(every, size)
-    except Undecided:
-        return every
-    try:
-        return _used(small, size)
-    except Undecided:
-        return small
+    found = without_implied(clauses)
+    with suppress(Undecided):
+        found = _in_the_way(found, size)
+        found = _used(found, size)
+    return found
 
 
 def _in_the_way(clauses: Sequence[Clause], size: int) -> list[Clause]:
@@ -195,21 +188,17 @@ def _in_the_way(clauses: Sequence[Clause], size: int) -> list[Clause]:
     bounds = np.cumsum([0, *(len(clause) for clause in clauses)])[:-1]
     words = np.zeros(max(states, default=0) + 1, np.int64)
     kept: list[Clause] = []
-    problem = PartitionProblem(states, size)
-    try:
+    with closing(PartitionProblem(states, size)) as problem:
         while (partition := problem.solve(_EASY)) is not None:
             words[list(partition)] = list(partition.values())
             apart = words[pairs[:, 0]] != words[pairs[:, 1]]
-            broken = (
-                np.flatnonzero(~np.logical_or.reduceat(apart, bounds)) if len(clauses) else bounds
-            )
+            held = np.logical_or.reduceat(apart, bounds) if len(clauses) else apart
+            broken = np.flatnonzero(~held)
             if not len(broken):
                 raise ValueError(f"the clauses leave a partition into {size} words")
             for number in broken[:_AT_ONCE].tolist():
                 problem.separate_one(clauses[number])
                 kept.append(clauses[number])
-    finally:
-        problem.close()
     return kept
 
 

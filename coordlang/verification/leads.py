@@ -13,10 +13,6 @@ from planners.joint.tables import Ints, unique_codes
 ANY = -1
 #: The sentences differ for good.
 NEVER = -2
-_UNKNOWN = -3
-
-#: Entries of a table that holds what is known of leads.
-_LARGEST_TABLE = 4_000_000
 
 
 class Leads:
@@ -30,20 +26,20 @@ class Leads:
         self._radix = words + 1
         self._leads: list[tuple[bool, tuple[int, ...]]] = [(True, ())]
         self._numbers = {self._leads[0]: 0}
-        self._known_after = _Table()
-        self._known_wanted = _Table()
+        self._after: dict[int, int] = {}
+        self._wanted: dict[int, int] = {}
 
     def after(self, lead: Ints, first: Ints, other: Ints) -> Ints:
         """Leads after plan 1 said ``first`` and the other plan said ``other``; -1: they differ."""
         codes = (lead * self._radix + first + 1) * self._radix + other + 1
-        return self._known_after.each(codes, self._compute_after)
+        return _each(codes, self._after, self._compute_after)
 
     def wanted(self, lead: Ints, first: Ints) -> Ints:
         """What the other plan may say now, but nothing, after plan 1 said ``first``.
 
         One word, `ANY` word, or `NEVER`: whatever it says, the sentences differ.
         """
-        return self._known_wanted.each(lead * self._radix + first + 1, self._compute_wanted)
+        return _each(lead * self._radix + first + 1, self._wanted, self._compute_wanted)
 
     def _compute_after(self, code: int) -> int:
         rest, other = divmod(code, self._radix)
@@ -73,33 +69,11 @@ class Leads:
         return mine, () if first_ahead else words
 
 
-class _Table:
-    """A function of codes, computed once for each: in a table where the codes are small."""
-
-    def __init__(self) -> None:
-        self._table = np.full(0, _UNKNOWN)
-        self._rest: dict[int, int] = {}
-
-    def each(self, codes: Ints, compute: Callable[[int], int]) -> Ints:
-        """The values of many codes."""
-        most = int(codes.max(initial=-1)) + 1
-        if most > _LARGEST_TABLE:
-            return self._each_of_large(codes, compute)
-        if most > len(self._table):
-            more = np.full(max(most, 2 * len(self._table)), _UNKNOWN)
-            more[: len(self._table)] = self._table
-            self._table = more
-        unknown = codes[self._table[codes] == _UNKNOWN]
-        for code in sorted(set(unknown.tolist())):
-            self._table[code] = compute(code)
-        found: Ints = self._table[codes]
-        return found
-
-    def _each_of_large(self, codes: Ints, compute: Callable[[int], int]) -> Ints:
-        position, inverse = unique_codes(codes)
-        values = []
-        for code in codes[position].tolist():
-            if code not in self._rest:
-                self._rest[code] = compute(code)
-            values.append(self._rest[code])
-        return np.array(values, np.int64)[inverse]
+def _each(codes: Ints, known: dict[int, int], compute: Callable[[int], int]) -> Ints:
+    """A function of codes, computed once for each."""
+    position, inverse = unique_codes(codes)
+    different = codes[position].tolist()
+    for code in different:
+        if code not in known:
+            known[code] = compute(code)
+    return np.array([known[code] for code in different], np.int64)[inverse]

@@ -46,48 +46,31 @@ def views_of_robot(space: PlanSpace, robot: int, word: Ints) -> Views:
     """From the goals up, layer by layer; O(edges log edges).  ``word`` (nodes) are the words."""
     of = np.zeros(len(space), np.int64)
     labels = int(space.robot_labels(robot).max(initial=0)) + 1
-    found: list[_Layer] = []
+    words, counts, moves = [], [np.zeros(1, np.int64)], []
     number = 0
     for layer, span in enumerate(space.layers):
         below = space.layer_edges(layer)
-        moves = np.column_stack(
+        table = np.column_stack(
             (below.source - span.start, space.robot_labels(robot, below.edges), of[below.target])
         )
-        pairs, _ = unique_tuples(moves, [span.stop - span.start, labels, max(1, number)])
+        pairs, _ = unique_tuples(table, [span.stop - span.start, labels, max(1, number)])
         here = np.arange(span.start, span.stop)
         own = word[here] * (int(space.goal.max(initial=0)) + 1) + space.goal[here]
         view, some = numbered(own, pairs, [labels, max(1, number)])
         of[here] = view + number
         number += len(some)
-        found.append(_Layer.of_nodes(some, word[here], pairs))
-    view_word = np.concatenate([layer.word for layer in found])
-    first = np.concatenate(([0], np.cumsum(np.concatenate([layer.moves for layer in found]))))
-    label, child = (np.concatenate([layer.table[:, k] for layer in found]) for k in (0, 1))
+        bounds = np.searchsorted(pairs[:, 0], np.arange(len(here) + 1))
+        counts.append(np.diff(bounds)[some])
+        words.append(word[here][some])
+        moves.append(pairs[ranges(bounds[some], counts[-1]), 1:])
+    view_word, first = np.concatenate(words), np.cumsum(np.concatenate(counts))
+    label, child = np.concatenate(moves).T
     view = np.repeat(np.arange(number), np.diff(first))
     said = np.where(view_word[child] != view_word[view], view_word[child], -1)
     radix = int(word.max(initial=0)) + 2
     codes = view * radix + said + 1
     by_word = np.argsort(codes, kind="stable")
     return Views(of, view_word, first, label, child, said, by_word, codes[by_word], radix)
-
-
-@dataclass(frozen=True, slots=True)
-class _Layer:
-    """The views of a layer: their words, how many moves they have, and the moves one after another.
-
-    ``table`` (moves, 2): label and child.
-    """
-
-    word: Ints
-    moves: Ints
-    table: Ints
-
-    @classmethod
-    def of_nodes(cls, some: Ints, word: Ints, pairs: Ints) -> _Layer:
-        """Of a node for each view; ``pairs`` (moves, 3) are all nodes' moves, sorted."""
-        first = np.searchsorted(pairs[:, 0], np.arange(len(word) + 1))
-        counts = np.diff(first)[some]
-        return cls(word[some], counts, pairs[ranges(first[some], counts), 1:])
 
 
 def numbered(own: Ints, pairs: Ints, bounds: list[int]) -> tuple[Ints, Ints]:
