@@ -38,10 +38,7 @@ def differences(
 ) -> FirstDifferences:
     """Find them for tasks without inseparable plans, in jobs of about ``portion`` effort.
 
-    Raises
-    ------
-    Inseparable
-        With the plans of the first portion that has some.
+    Raises `Inseparable` with the plans of the first portion that has some.
     """
     source = candidates.source
     goals = symmetric_goals(candidates)

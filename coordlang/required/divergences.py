@@ -17,11 +17,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coordlang.required.choices import Choices, LabelSets
-from planners.joint.tables import Bools, Ints, find_rows, ranges, spans, unique_rows, unique_tuples
+from planners.joint.tables import (
+    Bools,
+    Ints,
+    Rows,
+    find_rows,
+    ranges,
+    spans,
+    unique_rows,
+    unique_tuples,
+)
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 
@@ -121,8 +132,6 @@ def states_on_plans(spaces: Sequence[PlanSpace]) -> Ints:
 
 #: Rows of a table handled together.
 _CHUNK = 1_000_000
-#: Values a coded tuple may have.
-_MOST = 2**63 - 1
 
 
 class DivergenceSearch:
@@ -133,14 +142,12 @@ class DivergenceSearch:
 
     def __init__(self, robots: int, chunk: int = _CHUNK) -> None:
         self._robots, self._chunk = robots, chunk
-        #: For each number of next states.
-        self._known: dict[int, _KnownSets] = {}
+        #: For each number of next states a sorted table of (state, next states).
+        self._known = {size: np.zeros((0, 1 + size), np.uint64) for size in range(2, robots + 1)}
 
     def add(self, choices: Choices) -> None:
         """Look for divergences at the nodes of a plan space that require coordination."""
         space = choices.space
-        for size in range(2, self._robots + 1):
-            self._known.setdefault(size, _KnownSets(size, len(space.rows)))
         nodes = np.flatnonzero(choices.requires)
         index = EdgeIndex.of(space)
         for span in spans(space.out_degrees[nodes].astype(np.float64) ** 2, self._chunk):
@@ -149,14 +156,14 @@ class DivergenceSearch:
 
     def _look(self, here: _Mixing, sets: Ints) -> None:
         """Look at sets of next nodes of one size, then at larger ones without a divergence."""
-        known = self._known[sets.shape[1]]
+        size = sets.shape[1]
         rows = here.states_of(sets)
-        open_rows = ~known.has(rows)
-        sets, rows = sets[open_rows], rows[open_rows]
-        different, number = unique_tuples(rows, [known.states] * rows.shape[1])
+        open_rows = ~_among(self._known[size], rows)
+        sets = sets[open_rows]
+        different, number = unique_rows(rows[open_rows].astype(np.uint64))
         fails = here.failing(sets, number, len(different))
-        known.enter(different[fails])
-        if sets.shape[1] == self._robots:
+        self._known[size], _ = unique_rows(np.concatenate((self._known[size], different[fails])))
+        if size == self._robots:
             return
         good = sets[~fails[number]]
         for span in spans(here.nodes_after(good).astype(np.float64), self._chunk):
@@ -171,7 +178,7 @@ class DivergenceSearch:
             for others in combinations(range(last), size - 1):
                 left = np.flatnonzero(keep)
                 some = sets[left][:, [*others, last]]
-                keep[left] = ~self._known[size].has(here.states_of(some))
+                keep[left] = ~_among(self._known[size], here.states_of(some))
         return keep
 
     def table(self) -> Ints:
@@ -179,71 +186,38 @@ class DivergenceSearch:
 
         Filled up with -1; only those that no other one implies.
         """
-        filled = [np.zeros((0, 1 + self._robots), np.int64)]
-        for size, known in self._known.items():
-            filled.append(np.full((len(known.rows), 1 + self._robots), -1))
-            filled[-1][:, : 1 + size] = known.rows
-        return minimal(np.concatenate(filled))
+        return minimal(np.concatenate([_filled(own, self._robots) for own in self._known.values()]))
 
 
 def minimal(rows: Ints) -> Ints:
     """The divergences (as in `DivergenceSearch.table`) that no other one implies, sorted."""
-    states = int(rows.max(initial=0)) + 1
+    robots = rows.shape[1] - 1
     sizes = (rows[:, 1:] >= 0).sum(axis=1)
-    known: dict[int, _KnownSets] = {}
+    known: dict[int, Rows] = {}
     kept = [rows[:0]]
     for size in np.unique(sizes).tolist():
-        known[size] = _KnownSets(size, states)
-        known[size].enter(rows[sizes == size][:, : 1 + size])
-        own = known[size].rows
+        own, _ = unique_rows(rows[sizes == size][:, : 1 + size].astype(np.uint64))
         implied = np.zeros(len(own), np.bool_)
-        for smaller in sorted(known)[:-1]:
+        for smaller, table in known.items():
             for some in combinations(range(1, 1 + size), smaller):
-                implied |= known[smaller].has(own[:, [0, *some]])
-        filled = np.full((int((~implied).sum()), rows.shape[1]), -1)
-        filled[:, : 1 + size] = own[~implied]
-        kept.append(filled)
+                implied |= _among(table, own[:, [0, *some]])
+        known[size] = own
+        kept.append(_filled(own[~implied], robots))
     found = np.concatenate(kept)
     return found[np.lexsort(found.T[::-1])]
 
 
-class _KnownSets:
-    """A table of rows (state, next states), all of one size, in which rows are looked up.
+def _filled(rows: Rows, robots: int) -> Ints:
+    """Rows (state, next states) filled up with -1."""
+    filled = np.full((len(rows), 1 + robots), -1)
+    filled[:, : rows.shape[1]] = rows
+    return filled
 
-    ``states`` is one more than the largest number of a state.  Rows are packed into one number each
-    where that fits.
-    """
 
-    def __init__(self, size: int, states: int) -> None:
-        self.states = states
-        self.rows: Ints = np.zeros((0, 1 + size), np.int64)
-        self._packs = float(states) ** (1 + size) < _MOST
-        self._codes: Ints = np.zeros(0, np.int64)
-
-    def has(self, rows: Ints) -> Bools:
-        """Which rows are in the table."""
-        if not len(self.rows):
-            return np.zeros(len(rows), np.bool_)
-        if not self._packs:
-            return find_rows(self.rows.astype(np.uint64), rows.astype(np.uint64)) >= 0
-        codes = self._packed(rows)
-        found = np.minimum(np.searchsorted(self._codes, codes), len(self._codes) - 1)
-        same: Bools = self._codes[found] == codes
-        return same
-
-    def enter(self, rows: Ints) -> None:
-        """Add rows to the table."""
-        table, _ = unique_rows(np.concatenate((self.rows, rows)).astype(np.uint64))
-        self.rows = table.astype(np.int64)
-        if self._packs:
-            self._codes = self._packed(self.rows)
-
-    def _packed(self, rows: Ints) -> Ints:
-        code = rows[:, 0].copy()
-        for column in rows.T[1:]:
-            code *= self.states
-            code += column
-        return code
+def _among(table: Rows, rows: NDArray[np.integer[Any]]) -> Bools:
+    """Which rows are in a sorted table."""
+    found: Bools = find_rows(table, rows.astype(np.uint64)) >= 0
+    return found
 
 
 @dataclass(frozen=True, slots=True)
