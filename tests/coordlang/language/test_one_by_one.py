@@ -162,15 +162,13 @@ def test_a_small_space_is_explored(monkeypatch: pytest.MonkeyPatch) -> None:
     world = built(random_model(3, "agent"))
     inits = world.tasks[0].init[None, :]
     whole = explore(world.model, inits)
-    found = explored_if_small(world.model, inits)
-    assert found is not None
-    assert np.array_equal(found.rows, whole.rows)
-    monkeypatch.setattr(reached, "MOST_STATES", len(whole) - 1)
-    assert explored_if_small(world.model, inits) is None
-    monkeypatch.setattr(reached, "MOST_STATES", len(whole))
-    assert explored_if_small(world.model, inits) is not None
-    monkeypatch.setattr(reached, "MOST_STEPS", 1)
-    assert explored_if_small(world.model, inits) is None
+    for states, steps, small in ((0, 0, False), (-1, None, False), (0, None, True)):
+        monkeypatch.setattr(reached, "MOST_STATES", len(whole) + states)
+        monkeypatch.setattr(reached, "MOST_STEPS", reached.MOST_STEPS if steps is None else 1)
+        found = explored_if_small(world.model, inits)
+        assert (found is not None) == small
+        assert found is None or np.array_equal(found.rows, whole.rows)
+        monkeypatch.undo()
 
 
 def test_an_unsolvable_task_is_named_as_before(large: None) -> None:

@@ -7,6 +7,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -156,12 +157,11 @@ def test_wrong_options(wrong: dict[str, object]) -> None:
         coordlang.lift(GRID, OPEN, jobs=1, **wrong)
 
 
-def test_a_problem_without_static_relations(tmp_path: Path) -> None:
+def test_a_problem_without_static_relations() -> None:
     """Features come from what is left: counts and sizes."""
-    folder = DOMAINS / "flags"
-    lifted = coordlang.lift(folder / "domain.pddl", folder / "parade.pddl", tasks="all", jobs=1)
+    files = [DOMAINS / "flags" / f"{stem}.pddl" for stem in ("domain", "parade")]
     language = coordlang.ground(
-        lifted.language, folder / "domain.pddl", folder / "parade.pddl", jobs=1
+        coordlang.lift(*files, tasks="all", jobs=1).language, *files, jobs=1
     )
     assert language.guarantee.method == "lifted; verified here"
 
@@ -184,18 +184,13 @@ def lifted_of(data: dict[str, object]) -> LiftedLanguage:
     return lifted_from_bytes(json.dumps(data).encode(), Position("changed.json"))
 
 
-Change = Callable[[dict[str, object]], object]
+Change = Callable[[dict[str, Any]], object]
 DAMAGED: dict[str, tuple[Change, str]] = {
     "version": (lambda d: d.update(version=2), "version 2"),
     "format": (lambda d: d.update(format="coordlang/language"), "format"),
-    "feature": (
-        lambda d: d.update(features=[{"name": "f", "definition": "(mod (x))", "complexity": 1}]),
-        "defines no feature",
-    ),
+    "feature": (lambda d: d["features"][0].update(definition="(mod (x))"), "defines no feature"),
     "modulus": (
-        lambda d: d.update(
-            features=[{"name": "f", "definition": f"(mod (row (at r1)) {10**30})", "complexity": 1}]
-        ),
+        lambda d: d["features"][0].update(definition=f"(mod (row (at r1)) {10**30})"),
         "defines no feature",
     ),
     "values": (lambda d: d.update(values={"0": "w0"}), "are no values of 2 features"),

@@ -133,17 +133,6 @@ def test_comments_say_what_variables_and_clauses_mean(
         assert holds[len(numbers) :] == [separated(r, words) for r in certificate.reasons]
 
 
-def test_a_language_satisfies_the_clauses_of_more_words(
-    built: Built, certificate: Certificate
-) -> None:
-    """The same reasons with one word more must be satisfiable: otherwise the encoding refutes
-    anything.
-    """
-    more = msgspec.structs.replace(certificate, refuted=3)
-    with pytest.raises(Refuted, match="leave languages with 3 words"):
-        check(more, built.job.candidates)
-
-
 def changed(certificate: Certificate, number: int, **fields: object) -> Certificate:
     reasons = list(certificate.reasons)
     reasons[number] = msgspec.structs.replace(reasons[number], **fields)
@@ -190,14 +179,15 @@ def test_tampered(
         check(bad, built.job.candidates)
 
 
-def test_missing_reasons_prove_nothing(built: Built, certificate: Certificate) -> None:
-    with pytest.raises(Refuted, match="leave languages with 2 words"):
-        check(
-            msgspec.structs.replace(certificate, reasons=certificate.reasons[:1]),
-            built.job.candidates,
-        )
-    with pytest.raises(Refuted, match="other robots"):
-        check(msgspec.structs.replace(certificate, robots=["a", "b"]), built.job.candidates)
+def test_what_proves_nothing(built: Built, certificate: Certificate) -> None:
+    """One word more must be satisfiable by the same reasons: else the encoding refutes anything."""
+    for changes, match in (
+        ({"reasons": certificate.reasons[:1]}, "leave languages with 2 words"),
+        ({"robots": ["a", "b"]}, "other robots"),
+        ({"refuted": 3}, "leave languages with 3 words"),
+    ):
+        with pytest.raises(Refuted, match=match):
+            check(msgspec.structs.replace(certificate, **changes), built.job.candidates)
 
 
 @pytest.mark.parametrize("method", ["greedy", "separating", "exhaustive"])
@@ -253,17 +243,9 @@ def test_command_line(coordlang: Command, tmp_path: Path) -> None:
     files = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
     language, proof, dimacs = tmp_path / "l.json", tmp_path / "c.json", tmp_path / "c.cnf"
     made = coordlang(
-        "build",
-        *files,
-        "--tasks",
-        "all",
-        "--method",
-        "minimal",
-        "-o",
-        language,
-        "--certificate",
-        proof,
-    )
+        "build", *files, "--tasks", "all", "--method", "minimal", "-o", language,
+        "--certificate", proof,
+    )  # fmt: skip
     assert made.code == 0
     good = coordlang("verify", language, *files, "--certificate", proof, "--dimacs", dimacs)
     assert (good.code, good.out.splitlines()[-1].split(":")[0]) == (0, "lower bound 3")
@@ -337,45 +319,36 @@ def test_the_bound_of_a_search_that_was_stopped(
 Data = dict[str, Any]
 
 
-def _claim_minimal(language: Data, _: Data) -> None:
-    size = language["guarantee"]["size"]
-    language["guarantee"] |= {"lower_bound": size, "proved_minimal": True}
+def _claims(language: Data, bound: int, proved: bool = False) -> Data:
+    language["guarantee"] |= {"lower_bound": bound, "proved_minimal": proved}
+    return language
 
 
-def _claim_one_more(language: Data, proof: Data) -> None:
-    language["guarantee"]["lower_bound"] += 1
-    proof["refuted"] += 1
-
-
-def _claim_minimality_of_both(language: Data, proof: Data) -> None:
-    _claim_minimal(language, proof)
-    proof["refuted"] = language["guarantee"]["size"] - 1
-
-
-def _drop_reasons(_: Data, proof: Data) -> None:
-    del proof["reasons"][1::2]
-
-
-def _repeat_a_reason(_: Data, proof: Data) -> None:
-    proof["reasons"] = proof["reasons"][:1] * len(proof["reasons"])
-
-
-def _refute_less(_: Data, proof: Data) -> None:
-    proof["refuted"] -= 1
-
-
-def _flag_without_bound(language: Data, _: Data) -> None:
-    language["guarantee"]["proved_minimal"] = True
-
-
-FORGED: list[tuple[Callable[[Data, Data], None], int, str]] = [
-    (_claim_minimal, 1, " words are needed; the certificate proves 4 only"),
-    (_claim_one_more, 1, "reasons leave languages with 4 words"),
-    (_claim_minimality_of_both, 1, "reasons leave languages with "),
-    (_drop_reasons, 1, "reasons leave languages with 3 words"),
-    (_repeat_a_reason, 1, "reasons leave languages with 3 words"),
-    (_refute_less, 1, "claims that 4 words are needed; the certificate proves 3 only"),
-    (_flag_without_bound, 31, "'proved_minimal' contradicts the lower bound"),
+#: What is changed in a language of some size and in its certificate, and what is said of it.
+FORGED: list[tuple[Callable[[Data, Data, int], object], int, str]] = [
+    (lambda d, _, size: _claims(d, size, True), 1, " words are needed; the certificate proves 4"),
+    (
+        lambda d, c, _: (_claims(d, STOPPED_AT + 1), c.update(refuted=STOPPED_AT)),
+        1,
+        "reasons leave languages with 4 words",
+    ),
+    (
+        lambda d, c, size: (_claims(d, size, True), c.update(refuted=size - 1)),
+        1,
+        "reasons leave languages with ",
+    ),
+    (lambda _, c, __: c.update(reasons=c["reasons"][::2]), 1, "leave languages with 3 words"),
+    (lambda _, c, __: c.update(reasons=c["reasons"][:1] * 9), 1, "leave languages with 3 words"),
+    (
+        lambda _, c, __: c.update(refuted=STOPPED_AT - 2),
+        1,
+        "claims that 4 words are needed; the certificate proves 3 only",
+    ),
+    (
+        lambda d, _, __: _claims(d, STOPPED_AT, True),
+        31,
+        "'proved_minimal' contradicts the lower bound",
+    ),
 ]
 
 
@@ -383,7 +356,7 @@ def test_forged_bounds(pair: tuple[Path, Path], coordlang: Command, tmp_path: Pa
     """A bound is never taken for more than its reasons prove."""
     for forge, code, said in FORGED:
         texts = [json.loads(path.read_bytes()) for path in pair]
-        forge(*texts)
+        forge(texts[0], texts[1], texts[0]["guarantee"]["size"])
         files = [tmp_path / "forged.json", tmp_path / "forged-proof.json"]
         for path, text in zip(files, texts, strict=True):
             path.write_text(json.dumps(text))
