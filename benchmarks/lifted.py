@@ -28,9 +28,8 @@ from gridmap import GridMap, open_grid, path, ring, rooms_and_corridors, two_roo
 from benchmarks import frame
 from benchmarks.frame import DOMAINS, Figures, KeptRows, PrintedTable, asked_for
 from coordlang.language.candidates import all_pairs
-from coordlang.lifted.instance import Instance
 from coordlang.lifted.language import LiftedLanguage
-from coordlang.lifted.learning import Learned, learn
+from coordlang.lifted.learning import Instance, Learned, learn
 from coordlang.lifted.wording import formula
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.sexpr import Source

@@ -25,8 +25,7 @@ from coordlang.language.partition import Partition
 from coordlang.language.recorded import check_domain
 from coordlang.language.words import Language
 from coordlang.lifted.file import read_lifted
-from coordlang.lifted.grounding import Known, described, grounded, require_robots
-from coordlang.lifted.language import LiftedLanguage
+from coordlang.lifted.language import Known, LiftedLanguage, described, grounded, require_robots
 from coordlang.lifted.world import States, World
 from coordlang.sites.coordinates import Point
 from coordlang.verification.candidates import verify_candidates

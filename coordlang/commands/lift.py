@@ -16,9 +16,8 @@ from coordlang.commands.terminal import echo, ended_early
 from coordlang.language.candidates import require_solvable
 from coordlang.language.provenance import Guarantee, provenance_of, world_sha256
 from coordlang.lifted.file import to_bytes, write_lifted
-from coordlang.lifted.instance import Instance
 from coordlang.lifted.language import LiftedLanguage, Verified
-from coordlang.lifted.learning import Learned, learn
+from coordlang.lifted.learning import Instance, Learned, learn
 from coordlang.lifted.wording import english, formula
 from planners.loading import PlanningInstance
 from planners.system.errors import BadInput, Position, ProvedImpossible, UsageError

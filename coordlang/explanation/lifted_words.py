@@ -12,8 +12,7 @@ import numpy as np
 from coordlang.explanation.minimise import Points, minimise
 from coordlang.language.words import Language
 from coordlang.lifted.features import Feature
-from coordlang.lifted.file import read_values
-from coordlang.lifted.language import LiftedLanguage, Vector, vectors
+from coordlang.lifted.language import LiftedLanguage, Vector, read_values, vectors
 from coordlang.lifted.notation import feature_of
 from coordlang.lifted.wording import condition, english, formula
 from coordlang.lifted.world import States, World

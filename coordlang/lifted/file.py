@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,16 +16,21 @@ from coordlang.language.candidates import Kind
 from coordlang.language.duplicate_keys import refuse_duplicates
 from coordlang.language.file import Fault, faults_of_robots, present, refuse_first
 from coordlang.language.record import DomainRecord, ModelRecord
-from coordlang.lifted.language import LiftedLanguage, Vector, Verified
-from coordlang.lifted.notation import LARGEST, feature_of
-from planners.system.errors import BadInput, Position
+from coordlang.lifted.language import (
+    LIFT_AGAIN,
+    LiftedLanguage,
+    Verified,
+    read_values,
+    written_values,
+)
+from coordlang.lifted.notation import feature_of
+from planners.system.errors import Position
 from planners.system.files import FileFormat, read_bytes, require_seen
 from planners.system.messages import echoed
 from planners.system.writing import write_compressed
 
 #: What words of states are called whose values a language does not have.
 _OWN_WORD = re.compile(r"v-?[0-9]+([.]-?[0-9]+)*")
-_LIFT_AGAIN = "Copy the file again, or learn the language again: `coordlang lift`."
 
 
 class FeatureRecord(msgspec.Struct):
@@ -147,41 +152,12 @@ def lifted_from_bytes(data: bytes, position: Position) -> LiftedLanguage:
 
 def _faults(record: LiftedRecord) -> Iterator[Fault]:
     """Robots that are no team, and words that are none."""
-    yield from faults_of_robots(record.model, record.robots, _LIFT_AGAIN)
+    yield from faults_of_robots(record.model, record.robots, LIFT_AGAIN)
     words = set(record.words)
     if len(words) < len(record.words) or not words or any(w.split() != [w] for w in words):
-        yield "the words must be different, without blanks, and at least one", _LIFT_AGAIN
+        yield "the words must be different, without blanks, and at least one", LIFT_AGAIN
     for word in sorted({*record.values.values()} - words):
-        yield f"'values' has the word {echoed(word)}, which 'words' has not", _LIFT_AGAIN
+        yield f"'values' has the word {echoed(word)}, which 'words' has not", LIFT_AGAIN
     for word in sorted(filter(_OWN_WORD.fullmatch, words)):
         what = f"{echoed(word)} is what states with unknown values are called"
         yield what, "Give the word another name."
-
-
-def written_values(values: Mapping[Vector, str]) -> dict[str, str]:
-    """The features' values -> word, as files have them: values joined by blanks, sorted."""
-    return {" ".join(map(str, vector)): word for vector, word in sorted(values.items())}
-
-
-def read_values(entries: Mapping[str, str], size: int, position: Position) -> dict[Vector, str]:
-    """The values of so many features -> word, as `written_values` writes them.
-
-    Raises `BadInput` for keys that are no such values.
-    """
-    return {_vector(key, size, position): word for key, word in entries.items()}
-
-
-def _vector(key: str, size: int, position: Position) -> Vector:
-    """The values in a key.  Raises `BadInput` for anything else than so many whole numbers."""
-    try:
-        vector = tuple(map(int, key.split()))
-    except ValueError:
-        vector = ()
-    is_plain = " ".join(map(str, vector)) == key and all(abs(v) < LARGEST for v in vector)
-    if len(vector) != size or not is_plain:
-        raise BadInput(
-            f"{echoed(key)} are no values of {size} features",
-            position=position,
-            remedy=_LIFT_AGAIN,
-        )
-    return vector

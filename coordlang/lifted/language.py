@@ -4,19 +4,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
 
 import numpy as np
 
-from coordlang.language.candidates import Kind
+from coordlang.language.candidates import Candidates, Kind
 from coordlang.language.partition import Partition
+from coordlang.language.provenance import Guarantee, Provenance, provenance_of
+from coordlang.language.words import Language
 from coordlang.lifted.features import Feature
+from coordlang.lifted.notation import LARGEST
 from coordlang.lifted.world import States
 from planners.joint.tables import Ints
+from planners.system.errors import BadInput, Position
+from planners.system.messages import echoed
 
 #: Entries of tables (states, objects) that are filled at a time.
 _ENTRIES = 20_000_000
+
+#: What to do about a file that was changed or damaged.
+LIFT_AGAIN = "Copy the file again, or learn the language again: `coordlang lift`."
 
 #: The values of all features in a state.
 Vector = tuple[int, ...]
@@ -95,3 +103,85 @@ class LiftedLanguage:
 
     def _word(self, vector: Vector) -> str:
         return self.values.get(vector) or "v" + ".".join(map(str, vector))
+
+
+def written_values(values: Mapping[Vector, str]) -> dict[str, str]:
+    """The features' values -> word, as files have them: values joined by blanks, sorted."""
+    return {" ".join(map(str, vector)): word for vector, word in sorted(values.items())}
+
+
+def read_values(entries: Mapping[str, str], size: int, position: Position) -> dict[Vector, str]:
+    """The values of so many features -> word, as `written_values` writes them.
+
+    Raises `BadInput` for keys that are no such values.
+    """
+    return {_vector(key, size, position): word for key, word in entries.items()}
+
+
+def _vector(key: str, size: int, position: Position) -> Vector:
+    """The values in a key.  Raises `BadInput` for anything else than so many whole numbers."""
+    try:
+        vector = tuple(map(int, key.split()))
+    except ValueError:
+        vector = ()
+    is_plain = " ".join(map(str, vector)) == key and all(abs(v) < LARGEST for v in vector)
+    if len(vector) != size or not is_plain:
+        raise BadInput(
+            f"{echoed(key)} are no values of {size} features",
+            position=position,
+            remedy=LIFT_AGAIN,
+        )
+    return vector
+
+
+# ---- in one problem: an ordinary language, which says what is known of it there
+
+#: Whether the words were verified in the problem, refuted there, or neither.
+Known = Literal["verified", "refuted", "unknown"]
+
+
+def described(lifted: LiftedLanguage) -> Language:
+    """What a lifted language records of domain and model, as a language without states."""
+    robots = lifted.robots if lifted.names_robots else ()
+    provenance = Provenance(robots, None, lifted.domain, lifted.model)
+    return Language(lifted.words, {}, lifted.words[0], provenance=provenance)
+
+
+def require_robots(lifted: LiftedLanguage, robots: Sequence[str], position: Position) -> None:
+    """Raise `BadInput` for other robots than those that the words are about."""
+    if tuple(robots) != lifted.robots:
+        raise BadInput(
+            f"the words are about {', '.join(lifted.robots)}, and the robots here are "
+            f"{', '.join(robots)}",
+            position=position,
+            remedy="Use a problem with these robots, or name them with --robots.",
+        )
+
+
+def grounded(
+    lifted: LiftedLanguage,
+    candidates: Candidates,
+    states: States,
+    known: Known,
+    producer: Mapping[str, Any],
+    *,
+    every_word: bool = False,
+) -> Language:
+    """The words of the states on plans of candidate tasks.
+
+    Unless the words are ``known`` to be verified, the language covers no task: it guarantees
+    nothing.  With ``every_word`` it has the words that no state here has, too.
+    """
+    partition = lifted.partition(states, every_word=every_word)
+    size = len(partition.words)
+    method = "lifted; not verified here" if known == "unknown" else f"lifted; {known} here"
+    provenance = provenance_of(candidates, Guarantee.of(method, size, 1), producer)
+    origin = {
+        "features": [str(feature) for feature in lifted.features],
+        "values": written_values(lifted.values),
+        "verified": [one.problem for one in lifted.verified],
+    }
+    provenance = replace(provenance, lifted=origin)
+    if known != "verified":
+        provenance = replace(provenance, tasks={"kind": "problems", "count": 0})
+    return Language.of(partition, candidates.model, provenance)

@@ -9,21 +9,25 @@ from.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
+from coordlang.language.candidates import Candidates
+from coordlang.language.partition import Partition
 from coordlang.language.warping import Clause
 from coordlang.lifted.choosing import Merged, SimplestHitting, merge_classes
 from coordlang.lifted.features import Feature
-from coordlang.lifted.instance import Instance, Progress
-from coordlang.lifted.language import Vector
+from coordlang.lifted.language import Vector, vectors
 from coordlang.lifted.pool import Pool, pool_of
-from coordlang.lifted.world import States
+from coordlang.lifted.world import States, World
 from coordlang.required.miscoordination import Inseparable, inseparable
+from coordlang.sites.coordinates import Point
 from coordlang.symmetry.group import SymmetryGroup
+from coordlang.verification.candidates import verify_candidates
 from coordlang.vocabulary.refuter import Refuter
 from planners.joint.tables import Bools, Ints
 from planners.parallel.workers import Workers
@@ -38,6 +42,40 @@ Preference = Literal["features", "words"]
 _UNSEEN = "Features see what is true, and not what was done last."
 #: Sets of features that are tried for fewer words.
 _TRIED = 8
+
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Instance:
+    """A problem with its candidate tasks, and coordinates of its places where a file has them."""
+
+    candidates: Candidates
+    points: Mapping[str, Point] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """The problem's name."""
+        return self.candidates.loaded.problems[0].name
+
+    @cached_property
+    def states(self) -> States:
+        """The states on plans of the candidate tasks."""
+        return States(World.loaded(self.candidates.loaded, self.points), self.candidates.rows)
+
+    def vectors(self, chosen: Sequence[Feature]) -> Ints:
+        """The values of features: (states, features)."""
+        return vectors(chosen, self.states)
+
+    def holds(
+        self, words: Ints, workers: Workers | None = None, progress: Progress | None = None
+    ) -> bool:
+        """Whether words of the states are a language for the candidate tasks, by definition."""
+        names = [f"w{k}" for k in range(int(words.max(initial=0)) + 1)]
+        partition = Partition.of_table(names, self.candidates.rows, words)
+        workers, progress = workers or Workers(), progress or (lambda _: None)
+        return verify_candidates(partition, self.candidates, workers, progress).holds
 
 
 @dataclass(frozen=True, slots=True)

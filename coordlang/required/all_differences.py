@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -44,11 +44,11 @@ def differences(
     goals = symmetric_goals(candidates)
     if goals is not None and isinstance(source, Explored):
         progress(f"looking at {len(goals.chosen):,} of {len(source.goals):,} goals, by symmetry")
-        some = _Goals(source.only(goals.chosen), goals.spoken_for[goals.chosen])
+        some = source.only(goals.chosen), goals.spoken_for[goals.chosen]
         tables_of_some = _tables(some, workers, progress, portion)
         if not _inseparable(tables_of_some):
             return _spread(_together(tables_of_some), goals)
-    found = _tables(_Goals(source, None), workers, progress, portion)
+    found = _tables((source, None), workers, progress, portion)
     if _inseparable(found):
         witness = inseparable(source.portion(cut(source.efforts, portion)[len(found) - 1]))
         assert witness is not None
@@ -56,24 +56,20 @@ def differences(
     return _together(found)
 
 
-@dataclass(frozen=True, slots=True)
-class _Goals:
-    """Goals that are looked at, and for how many goals each counts (None: for itself)."""
-
-    source: Source
-    spoken_for: Ints | None
+#: Goals that are looked at, and for how many goals each counts (None: for itself).
+_Goals = tuple[Source, Ints | None]
 
 
 def _tables(
     goals: _Goals, workers: Workers, progress: Callable[[str], None], portion: float
 ) -> list[Table]:
     """What the portions of the goals say, up to the first with inseparable plans."""
-    source = goals.source
+    source, spoken_for = goals
     portions = cut(source.efforts, portion)
     if len(portions) == 1:
         return [_differences(goals, portions[0])]
     efforts = [float(source.efforts[own.start : own.stop].sum()) for own in portions]
-    identity = digest(source.identity, goals.spoken_for)
+    identity = digest(source.identity, spoken_for)
     batch = Batch("first differences", _differences, goals, portions, identity, efforts)
     found: list[Table] = []
 
@@ -109,10 +105,11 @@ def _spread(found: FirstDifferences, goals: SymmetricGoals) -> FirstDifferences:
 
 def _differences(shared: _Goals, goals: range) -> Table:
     """One job: the tasks of some goals."""
-    space = shared.source.portion(goals)
+    source, spoken_for = shared
+    space = source.portion(goals)
     if not separable(space):
         return {"inseparable": np.array(True)}
-    times = None if shared.spoken_for is None else [shared.spoken_for[goals.start : goals.stop]]
+    times = None if spoken_for is None else [spoken_for[goals.start : goals.stop]]
     found = first_differences([space], times)
     figures = [found.requiring, found.nodes, found.edges, found.sets, found.evaluations]
     return {

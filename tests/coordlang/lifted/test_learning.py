@@ -17,9 +17,8 @@ from coordlang.language.candidates import all_pairs
 from coordlang.language.partition import Partition
 from coordlang.lifted.choosing import SimplestHitting, undominated
 from coordlang.lifted.features import Feature
-from coordlang.lifted.instance import Instance
 from coordlang.lifted.language import LiftedLanguage
-from coordlang.lifted.learning import Learned, learn
+from coordlang.lifted.learning import Instance, Learned, learn
 from coordlang.lifted.pool import pool_of
 from coordlang.verification.by_definition import verify
 from planners.joint.tables import Ints
