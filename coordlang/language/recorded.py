@@ -25,9 +25,7 @@ from planners.system.messages import echoed
 
 
 def options_of(
-    language: Language,
-    model: ModelOptions | None = None,
-    given: Collection[str] = (),
+    language: Language, model: ModelOptions | None = None, given: Collection[str] = ()
 ) -> ModelOptions:
     """How the language's model is built: as its file records it.
 

@@ -127,9 +127,7 @@ def _vector(key: str, size: int, position: Position) -> Vector:
     is_plain = " ".join(map(str, vector)) == key and all(abs(v) < LARGEST for v in vector)
     if len(vector) != size or not is_plain:
         raise BadInput(
-            f"{echoed(key)} are no values of {size} features",
-            position=position,
-            remedy=LIFT_AGAIN,
+            f"{echoed(key)} are no values of {size} features", position=position, remedy=LIFT_AGAIN
         )
     return vector
 

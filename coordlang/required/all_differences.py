@@ -15,12 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from coordlang.language.candidates import Candidates
-from coordlang.required.divergences import (
-    Divergences,
-    FirstDifferences,
-    first_differences,
-    minimal,
-)
+from coordlang.required.divergences import Divergences, FirstDifferences, first_differences, minimal
 from coordlang.required.miscoordination import Inseparable, inseparable, separable
 from coordlang.symmetry.goals import SymmetricGoals, symmetric_goals
 from planners.joint.tables import Ints
@@ -76,10 +71,7 @@ def _tables(
     def so_far() -> str:
         return f"{len(found):,} of {len(portions):,} portions of the goals"
 
-    with (
-        reaching(so_far, "fewer candidate tasks"),
-        closing(workers.tables(batch)) as found_tables,
-    ):
+    with reaching(so_far, "fewer candidate tasks"), closing(workers.tables(batch)) as found_tables:
         for table in found_tables:
             found.append(table)
             if table["inseparable"]:

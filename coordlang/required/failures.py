@@ -19,12 +19,7 @@ from coordlang.language.candidates import Candidates
 from coordlang.language.partition import Partition
 from coordlang.language.sentences import Sentence, sentence
 from coordlang.language.tolerance import Tolerance, percent
-from coordlang.required.failure import (
-    MOST,
-    FailureProbability,
-    TooManyToCount,
-    failure_probability,
-)
+from coordlang.required.failure import MOST, FailureProbability, TooManyToCount, failure_probability
 from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts

@@ -20,12 +20,7 @@ import numpy as np
 from coordlang.language.candidates import Candidates
 from coordlang.language.warping import Clause, pair
 from coordlang.symmetry.check import SymmetryCheck
-from coordlang.symmetry.graph import (
-    LARGEST_GRAPH,
-    Renaming,
-    automorphism_generators,
-    joined_order,
-)
+from coordlang.symmetry.graph import LARGEST_GRAPH, Renaming, automorphism_generators, joined_order
 from planners.joint.tables import Ints
 from planners.pddl.robots import natural
 

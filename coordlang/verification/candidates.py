@@ -44,10 +44,7 @@ def verify_candidates(
     def so_far() -> str:
         return f"{done:,} of {len(portions):,} portions of the goals, {nodes:,} nodes of the walk"
 
-    with (
-        reaching(so_far, "fewer candidate tasks"),
-        closing(workers.tables(batch)) as tables,
-    ):
+    with reaching(so_far, "fewer candidate tasks"), closing(workers.tables(batch)) as tables:
         for table in tables:
             nodes += int(table["nodes"])
             if not table["holds"]:

@@ -142,12 +142,7 @@ def test_tasks_on_one_plan_share_its_search(large: None, searches: list[str]) ->
 
 
 @pytest.mark.parametrize(
-    "init",
-    [
-        ("(at r1 c0-0)",),
-        ("(at r1 c0-0)", "(at r1 c0-1)", "(at r2 c1-1)"),
-        (),
-    ],
+    "init", [("(at r1 c0-0)",), ("(at r1 c0-0)", "(at r1 c0-1)", "(at r2 c1-1)"), ()]
 )
 def test_a_robot_that_is_nowhere_or_in_two_places_is_a_mistake(
     large: None, init: tuple[str, ...]

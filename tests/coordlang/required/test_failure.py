@@ -13,11 +13,7 @@ import pytest
 
 from coordlang.execution.fitting_plans import plans_with_sentence
 from coordlang.language.sentences import sentence_counts
-from coordlang.required.failure import (
-    TooManyToCount,
-    failure_of_sentence,
-    failure_probability,
-)
+from coordlang.required.failure import TooManyToCount, failure_of_sentence, failure_probability
 from coordlang.required.failures import estimated_failure
 from tests.support import naive_failures
 from tests.support.domains import all_tasks, own_task

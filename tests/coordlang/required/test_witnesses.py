@@ -11,12 +11,7 @@ import pytest
 
 from coordlang.language.candidates import Candidates
 from coordlang.required.choices import Choices
-from coordlang.required.miscoordination import (
-    Miscoordination,
-    Step,
-    inseparable,
-    miscoordination,
-)
+from coordlang.required.miscoordination import Miscoordination, Step, inseparable, miscoordination
 from coordlang.required.witnesses import witness_in_same_states
 from planners.check.validate import Verdict, validate
 from planners.joint.model import JointModel
