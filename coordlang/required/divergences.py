@@ -186,7 +186,8 @@ class DivergenceSearch:
 
         Filled up with -1; only those that no other one implies.
         """
-        return minimal(np.concatenate([_filled(own, self._robots) for own in self._known.values()]))
+        filled = [_filled(own, self._robots) for own in self._known.values()]
+        return minimal(np.concatenate([np.zeros((0, 1 + self._robots), np.int64), *filled]))
 
 
 def minimal(rows: Ints) -> Ints:

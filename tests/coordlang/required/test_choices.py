@@ -132,6 +132,7 @@ def test_several_labels_lead_to_one_state() -> None:
 
 
 def test_what_a_smaller_divergence_implies() -> None:
+    assert DivergenceSearch(1).table().shape == (0, 2)  # a robot alone parts from nobody
     rows = np.array([[0, 3, 4, 5], [0, 1, 2, 3], [0, 1, 2, -1], [1, 1, 2, 3], [0, 2, 3, 4]])
     assert minimal(np.concatenate((rows, rows))).tolist() == [
         [0, 1, 2, -1],
