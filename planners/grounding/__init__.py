@@ -4,8 +4,12 @@
 Tarski finds the reachable arguments, we evaluate the rest exactly.
 """
 
-from planners.grounding.actions import GroundAction, GroundEffect
-from planners.grounding.impossible import Impossible, impossible_actions
+from planners.grounding.actions import (
+    GroundAction,
+    GroundEffect,
+    Impossible,
+    impossible_actions,
+)
 from planners.grounding.instantiate import (
     FEWER,
     ground_actions,

@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass
 from itertools import product
 from math import prod
+from typing import NamedTuple
 
 from planners.pddl.formula_tree import conjuncts, free_variables, negated, required_atoms
 from planners.pddl.lifted import Atom, Domain, Exists, Forall, Formula, Problem, StepAtom, Variable
@@ -22,8 +22,7 @@ Guard = Atom | StepAtom
 _MANY = 1000
 
 
-@dataclass(frozen=True, slots=True)
-class Quantified:
+class Quantified(NamedTuple):
     """What is known of a quantified formula before any value is.
 
     ``free`` are the variables that it has from outside.  ``statics`` and ``steps`` are atoms that
@@ -152,27 +151,18 @@ class Bindings:
         """All values under which the guard is one of the facts, in the order of the objects."""
         rows: set[Arguments] = set()
         for fact in facts:
-            if len(fact) != len(guard.args):
-                continue
             values: Binding = {}
-            for arg, value in zip(guard.args, fact, strict=True):
-                wanted = values.setdefault(arg, value) if arg in names else outer.get(arg, arg)
-                if wanted != value:
-                    break
-            else:
-                options = [
-                    (values[n],) if n in values else tuple(own)
-                    for n, own in zip(names, members, strict=True)
-                ]
-                rows.update(product(*options))
-        typed = (
-            row
-            for row in rows
-            if all(value in own for value, own in zip(row, members, strict=True))
-        )
-        return sorted(
-            typed, key=lambda row: [own[value] for value, own in zip(row, members, strict=True)]
-        )
+            if len(fact) == len(guard.args) and all(
+                value == (values.setdefault(arg, value) if arg in names else outer.get(arg, arg))
+                for arg, value in zip(guard.args, fact, strict=True)
+            ):
+                own = zip(names, members, strict=True)
+                rows.update(product(*((values[n],) if n in values else (*m,) for n, m in own)))
+
+        def numbers(row: Arguments) -> list[int | None]:
+            return [own.get(value) for value, own in zip(row, members, strict=True)]
+
+        return sorted((row for row in rows if None not in numbers(row)), key=numbers)
 
     def objects(self, types: tuple[str, ...]) -> dict[str, int]:
         """The objects of some types, numbered in their order."""

@@ -107,12 +107,14 @@ def idling_costs(domain: Domain, problem: Problem, team: Team, *, costs: bool) -
     """
     idling = idling_schemas(domain) if costs else frozenset()
     grounder = _Grounder(domain, problem, team, {})
-    found: list[list[int]] = [[] for _ in team.robots]
-    for schema in domain.schemas:
-        if schema.name in idling:
-            for owner, cost in grounder.costs_alone(schema):
-                found[owner].append(cost)
-    return tuple(min(own, default=0) for own in found)
+    found = [
+        pair
+        for schema in domain.schemas
+        if schema.name in idling
+        for pair in grounder.costs_alone(schema)
+    ]
+    robots = range(len(team.robots))
+    return tuple(min((cost for owner, cost in found if owner == r), default=0) for r in robots)
 
 
 def ground_goal(domain: Domain, problem: Problem, goal: Formula) -> Formula:

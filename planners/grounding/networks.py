@@ -6,7 +6,7 @@ The formulas stand in the preconditions of the ground actions that they bind.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 from itertools import combinations, product
 
@@ -73,15 +73,15 @@ def _check_types(domain: Domain, problem: Problem, constraint: Constraint) -> No
         for parameter, position in zip(constraint.parameters, positions, strict=True):
             argument = schemas[name].parameters[position]
             asked, own = (
-                set(objects_of(domain, problem, types))
-                for types in (parameter.types, argument.types)
+                {*objects_of(domain, problem, one.types)} for one in (parameter, argument)
             )
             if have_common(domain.types, parameter.types, argument.types) or asked & own:
                 continue
+            here, there = (
+                f"{one.name} - {' or '.join(one.types)}" for one in (argument, parameter)
+            )
             raise BadInput(
-                f"argument {position} of {name} is {argument.name} "
-                f"- {' or '.join(argument.types)}, which is never "
-                f"{parameter.name} - {' or '.join(parameter.types)}: the "
+                f"argument {position} of {name} is {here}, which is never {there}: the "
                 f"constraint {echoed(constraint.name)} would never match",
                 position=domain.source.position(offset),
                 remedy="Positions count from 0; if the action has an :agent, it is argument 0.",
@@ -149,15 +149,17 @@ def _some(others: Sequence[list[StepAtom]], number: int) -> Formula:
     """At least ``number`` robots among the others do one of these."""
     if number > len(others):  # may be any number, too large for `combinations`
         return Or(())
-    ways = [chosen for robots in combinations(others, number) for chosen in product(*robots)]
-    return Or(tuple(chosen[0] if number == 1 else And(chosen) for chosen in ways))
+    return Or(tuple(part[0] if number == 1 else And(part) for part in _ways(others, number)))
 
 
 def _not_more(others: Sequence[list[StepAtom]], high: int) -> list[Formula]:
     """No ``high`` robots among the others do one of these (the action itself is one more)."""
     if high > len(others):
         return []
-    ways = [chosen for robots in combinations(others, high) for chosen in product(*robots)]
-    if high == 1:
-        return [Not(chosen[0]) for chosen in ways]
-    return [Or(tuple(Not(atom) for atom in chosen)) for chosen in ways]
+    forbidden = [tuple(map(Not, chosen)) for chosen in _ways(others, high)]
+    return [part[0] if high == 1 else Or(part) for part in forbidden]
+
+
+def _ways(others: Sequence[list[StepAtom]], number: int) -> Iterator[tuple[StepAtom, ...]]:
+    """One action each of so many of the others."""
+    return (chosen for robots in combinations(others, number) for chosen in product(*robots))

@@ -77,10 +77,14 @@ def reachable_arguments(
         core.add_action(schema)
     program, _ = create_reachability_lp(core.problem)
     found = _least_model([_interruptible(rule, len(objects)) for rule in program.rules])
-    number = {name: n for n, name in enumerate(core.objects.values())}
     return {
-        name: sorted(core.named(found, f"action_{symbol}"), key=lambda a: [number[o] for o in a])
-        for name, symbol in core.actions.items()
+        name: [
+            tuple([core.objects[symbol] for symbol in args])
+            for args in sorted(
+                {*found.get(f"action_{action}", ())}, key=lambda args: [int(o[1:]) for o in args]
+            )
+        ]
+        for name, action in core.actions.items()
     }
 
 
@@ -247,25 +251,21 @@ class _Core:
 
     def add_action(self, schema: Schema) -> None:
         variables: dict[str, Any] = {}
-        body = self._declare(schema.parameters, variables)
-        body += self._positive(schema.precondition, variables)
+        typed = self._declare(schema.parameters, variables)
         effects = []
         for effect in schema.effects:
             if not effect.adds:
                 continue
             # A variable that only the effect has is universal: the program's rule quantifies it.
             inner = dict(variables)
-            condition = self._declare(effect.variables, inner, always=True)
-            condition += self._positive(effect.condition, inner)
-            effects.append(self._fs.AddEffect(self._atom(effect.atom, inner), self._all(condition)))
+            own = self._declare(effect.variables, inner, always=True)
+            condition = self._all(effect.condition, inner, own)
+            effects.append(self._fs.AddEffect(self._atom(effect.atom, inner), condition))
         symbol = f"a{len(self.actions)}"
         self.actions[schema.name] = symbol
         parameters = [variables[p.name] for p in schema.parameters]
-        self.problem.action(symbol, parameters, self._all(body), effects)
-
-    def named(self, found: Mapping[str, Iterable[Arguments]], predicate: str) -> set[Arguments]:
-        """The argument tuples of a predicate of Tarski's program in the names of the domain."""
-        return {tuple([self.objects[o] for o in args]) for args in found.get(predicate, ())}
+        body = self._all(schema.precondition, variables, typed)
+        self.problem.action(symbol, parameters, body, effects)
 
     def _predicate(self, name: str, arity: int) -> Any:
         key = (name, arity)
@@ -304,11 +304,9 @@ class _Core:
         symbol = self._predicate(atom.predicate, len(atom.args))
         return symbol(*(variables[a] if a[0] == "?" else self._constants[a] for a in atom.args))
 
-    def _positive(self, formula: Formula, variables: dict[str, Any]) -> list[Any]:
-        """The atoms that the formula surely requires."""
-        return [self._atom(atom, variables) for atom in required_atoms(formula)]
-
-    def _all(self, atoms: list[Any]) -> Any:
+    def _all(self, formula: Formula, variables: dict[str, Any], atoms: list[Any]) -> Any:
+        """The conjunction of the atoms that the formula surely requires, behind others."""
+        atoms = atoms + [self._atom(atom, variables) for atom in required_atoms(formula)]
         if not atoms:
             return self._top
         return atoms[0] if len(atoms) == 1 else self._land(*atoms, flat=True)
