@@ -76,9 +76,15 @@ class Rules:
     def __init__(self, domain: Domain, problem: Problem, team: Team) -> None:
         self.domain, self.problem, self.team = domain, problem, team
         self.meaning = Meaning(domain, problem, team)
-        self._schemas = {schema.name: schema for schema in domain.schemas}
+        self.schemas = {schema.name: schema for schema in domain.schemas}
+        self.is_joint_action = domain.is_joint_action
         self._instances: dict[str, Instance | str] = {}
         self._touched: dict[tuple[StepAtom, StepAtom | None], Touched] = {}
+
+    @classmethod
+    def of(cls, domain: Domain, problem: Problem, team: Team) -> Rules:
+        """The rules of a problem's joint steps, as the docs write it."""
+        return cls(domain, problem, team)
 
     def broken_rule(self, state: State, labels: Labels) -> str | None:
         """The first rule that the step breaks, in words; None for a legal step.
@@ -88,7 +94,7 @@ class Rules:
         """
         if len(labels) != len(self.team.robots):
             return f"the step has {len(labels)} entries for {len(self.team.robots)} robots"
-        if self.domain.is_joint_action:
+        if self.is_joint_action:
             return self._joint_action(state, labels)[0]
         chosen: list[Instance | None] = []
         for robot, label in enumerate(labels):
@@ -106,7 +112,7 @@ class Rules:
 
     def result(self, state: State, labels: Labels) -> State:
         """The state after a joint step without a `broken_rule`."""
-        if self.domain.is_joint_action:
+        if self.is_joint_action:
             return self._joint_action(state, labels)[1]
         chosen = _together([self._known(label) if label is not None else None for label in labels])
         return self._after(state, chosen)
@@ -130,7 +136,7 @@ class Rules:
 
     def _read(self, label: str) -> Instance | str:
         name, *args = _tokens(label) or [""]
-        schema = self._schemas.get(name)
+        schema = self.schemas.get(name)
         if schema is None:
             return f"{label} is no action of the domain"
         if len(args) != len(schema.parameters):
