@@ -108,14 +108,9 @@ def test_two_terminals_with_a_worker_killed_in_the_middle(folder: Path) -> None:
 
 
 @needs_distributed
-def test_the_workers_of_the_page_are_two(folder: Path) -> None:
-    with running_cluster(folder, 1, command("scheduler"), command("workers")) as cluster:
-        log = cluster.workers[0].log
-        until(lambda: log.read_text().count("Registered to") >= 2, 60)
-
-
-@needs_distributed
-def test_the_cluster_of_the_page_listens_on_this_machine_only(folder: Path) -> None:
+def test_the_cluster_of_the_page_has_two_workers_and_listens_on_this_machine_only(
+    folder: Path,
+) -> None:
     with running_cluster(folder, 1, command("scheduler"), command("workers")) as cluster:
         log = cluster.workers[0].log
         until(lambda: log.read_text().count("Registered to") >= 2, 60)

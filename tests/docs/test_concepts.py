@@ -107,25 +107,6 @@ def test_three_robots_need_three_plans() -> None:
     assert miscoordination(space, 0) is not None
 
 
-def first_fit(states: list[int], apart: set[frozenset[int]]) -> list[set[int]]:
-    words: list[set[int]] = []
-    waiting = list(states)
-    while waiting:
-        word: set[int] = set()
-        for state in waiting:
-            if not any(frozenset({state, other}) in apart for other in word):
-                word.add(state)
-        words.append(word)
-        waiting = [s for s in waiting if s not in word]
-    return words
-
-
-def test_greedy_depends_on_the_order() -> None:
-    apart = {frozenset({1, 2}), frozenset({2, 3}), frozenset({3, 4})}
-    assert first_fit([1, 2, 3, 4], apart) == [{1, 3}, {2, 4}]
-    assert first_fit([1, 4, 2, 3], apart) == [{1, 4}, {2}, {3}]
-
-
 def test_names_of_the_table_exist() -> None:
     """Every name of code in the table of the paper's symbols can be imported."""
     table = rows(sections(DOCS / "concepts.md")["Symbols and names"])

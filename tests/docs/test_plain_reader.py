@@ -87,37 +87,15 @@ def test_reader_uses_the_default_and_refuses(reader: dict[str, Any], tmp_path: P
         reader["read_language"](path)
 
 
-def test_task_file_of_the_page(tmp_path: Path) -> None:
-    """The task file shown in docs/formats.md is one, and its tasks can be built for."""
-    path = tmp_path / "tasks.json"
-    path.write_text(next(b.text for b in blocks(DOCS / "formats.md") if b.kind == "json"))
-    assert len(read_task_file(path)) == 2
-    files = [
-        str(ROOT / "domains" / "three-cells" / name) for name in ("domain.pddl", "problem.pddl")
-    ]
-    assert (
-        run(
-            [
-                "build",
-                *files,
-                "--tasks",
-                str(path),
-                "--method",
-                "greedy",
-                "-o",
-                str(tmp_path / "l.json"),
-            ]
-        )
-        == 0
-    )
-
-
-def test_language_by_hand_of_the_page(reader: dict[str, Any], tmp_path: Path) -> None:
-    """The language that docs/formats.md writes by hand is one, also for the plain reader."""
-    path = tmp_path / "by-hand.json"
-    path.write_text([b.text for b in blocks(DOCS / "formats.md") if b.kind == "json"][1])
-    files = [
-        str(ROOT / "domains" / "three-cells" / name) for name in ("domain.pddl", "problem.pddl")
-    ]
-    assert run(["verify", str(path), *files, "--tasks", "all"]) == 0
-    assert reader["word"](reader["read_language"](path), ["(at r2 b)", "(at r1 c)"]) == "r2-in-b"
+def test_files_of_the_page(reader: dict[str, Any], tmp_path: Path) -> None:
+    """Tasks can be built for; the language by hand is one, also for the plain reader."""
+    tasks, by_hand, built = (tmp_path / name for name in ("tasks.json", "hand.json", "l.json"))
+    shown = [b.text for b in blocks(DOCS / "formats.md") if b.kind == "json"]
+    for path, text in zip((tasks, by_hand), shown, strict=False):
+        path.write_text(text)
+    cells = [str(ROOT / "domains" / "three-cells" / f"{n}.pddl") for n in ("domain", "problem")]
+    assert len(read_task_file(tasks)) == 2
+    build = ["build", *cells, "--tasks", str(tasks), "--method", "greedy", "-o", str(built)]
+    assert run(build) == 0
+    assert run(["verify", str(by_hand), *cells, "--tasks", "all"]) == 0
+    assert reader["word"](reader["read_language"](by_hand), ["(at r2 b)", "(at r1 c)"]) == "r2-in-b"

@@ -141,26 +141,15 @@ def test_links_are_found() -> None:
     assert sum(len(links(page)) for page in LINKING) > 50
 
 
-def test_index_links_every_page() -> None:
-    assert {p.name for p in DOCS.glob("*.md")} - {"index.md"} <= set(links(DOCS / "index.md"))
-
-
 def test_files_that_extending_names_exist() -> None:
     named = re.findall(r"`((?:planners|coordlang|tests)/[\w/]+\.py)`", prose(DOCS / "extending.md"))
     assert named
     assert [path for path in named if "NAME" not in path and not (ROOT / path).exists()] == []
 
 
-def test_every_folder_of_tests_has_its_row() -> None:
-    listed = {code(cells[0])[0] for cells in rows(sections(DOCS / "extending.md")["Tests"])}
-    real = {path.parent.relative_to(ROOT) for path in (ROOT / "tests").rglob("test_*.py")}
-    assert {folder.as_posix() for folder in real if len(folder.parts) == 2} <= listed
-    assert [folder for folder in sorted(listed) if not (ROOT / folder).is_dir()] == []
-
-
-@pytest.mark.parametrize("page", [p for p in PAGES if p.parent == DOCS], ids=lambda p: p.stem)
-def test_no_path_of_a_machine(page: Path) -> None:
-    assert not re.search(r"(?<![\w.~])/(?:work|home|root|tmp|Users)/", page.read_text())
+def test_no_path_of_a_machine() -> None:
+    path = re.compile(r"(?<![\w.~])/(?:work|home|root|tmp|Users)/")
+    assert [page for page in PAGES if page.parent == DOCS and path.search(page.read_text())] == []
 
 
 def test_blocks_are_of_known_kinds() -> None:

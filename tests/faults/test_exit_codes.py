@@ -4,57 +4,45 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
-from tests.support.command import Command
+from tests.support.command import Command, in_shell
 from tests.support.domains import DOMAINS
 
 CELLS = [str(DOMAINS / "three-cells" / name) for name in ("domain.pddl", "problem.pddl")]
 COUNT = ("plans", *CELLS, "--count")
 
 
-def shell(
-    redirection: str, arguments: Sequence[str], before: str = ""
-) -> subprocess.CompletedProcess[str]:
-    """Run a command as a shell does, ``before`` included."""
-    script = f'{before} exec {sys.executable} -m coordlang "$@" {redirection}'
-    return subprocess.run(
-        ["bash", "-c", script, "bash", *arguments], capture_output=True, text=True, timeout=120
-    )
-
-
-@pytest.mark.parametrize("redirection", ["2>&-", "2>/dev/full"])
 @pytest.mark.parametrize(
-    ("arguments", "code"), [(("plans", "missing", "x"), 31), (("plans", "--missing"), 2)]
+    ("redirection", "arguments", "code"),
+    [("2>&-", ("plans", "missing", "x"), 31), ("2>/dev/full", ("plans", "--missing"), 2)],
 )
 def test_without_stderr_an_error_keeps_its_code(
-    arguments: tuple[str, ...], code: int, redirection: str
+    redirection: str, arguments: tuple[str, ...], code: int
 ) -> None:
-    done = shell(redirection, arguments)
+    done = in_shell(f"exec COORDLANG {redirection}", *arguments)
     assert (done.returncode, done.stdout, done.stderr) == (code, "", "")
 
 
 @pytest.mark.parametrize("redirection", [">/dev/full", ">/dev/full 2>/dev/full"])
 def test_a_full_stdout(redirection: str) -> None:
-    assert shell(redirection, COUNT).returncode == 2
+    assert in_shell(f"exec COORDLANG {redirection}", *COUNT).returncode == 2
 
 
 def test_an_answer_needs_no_stderr(tmp_path: Path) -> None:
     output = str(tmp_path / "l.json")
-    done = shell("2>/dev/full", ("build", *CELLS, "--unsolvable", "skip", "-o", output))
+    build = ("build", *CELLS, "--unsolvable", "skip", "-o", output)
+    done = in_shell("exec COORDLANG 2>/dev/full", *build)
     assert done.returncode == 0
     assert done.stdout.endswith(f"written to {output}\n")
 
 
 def test_the_working_directory_is_removed(tmp_path: Path) -> None:
     gone = f"mkdir {tmp_path}/gone; cd {tmp_path}/gone; rmdir {tmp_path}/gone;"
-    assert shell("", COUNT, gone).stdout == "4\n"
-    refused = shell("", ("tasks", *CELLS, "-o", "t.json"), gone)
+    assert in_shell("exec COORDLANG", *COUNT, before=gone).stdout == "4\n"
+    refused = in_shell("exec COORDLANG", "tasks", *CELLS, "-o", "t.json", before=gone)
     assert refused.returncode == 2
     assert "cannot be written: the working directory has been removed" in refused.stderr
 

@@ -26,6 +26,7 @@ from tests.support.forks import fork, fork_command
 from tests.support.writing_commands import OLD, WRITING, Writing, given, normal
 
 QUICK = ("certificate", "tasks", "export")
+GRID = DOMAINS / "grid"
 TWO = ("t-map", "three-cells")
 
 
@@ -186,6 +187,25 @@ def copied_until(disk: FullDisk, folder: Path) -> None:
     except UsageError as error:
         print(error, file=sys.stderr)
         sys.exit(2)
+
+
+@pytest.mark.parametrize("name", QUICK[:2])
+def test_an_output_is_whole_or_none(name: str, said: dict[str, str], tmp_path: Path) -> None:
+    assert fill_at_every_length(name, said, tmp_path, 5) == 5
+
+
+@pytest.mark.usefixtures("said")
+@pytest.mark.parametrize(("problem", "count"), [("corners-10x10", 1_756_863_020), ("gw4-3x3", 18)])
+def test_plans_write_nothing(problem: str, count: int, tmp_path: Path) -> None:
+    """Not even a temporary file: it has no folder, and no file may have a byte."""
+
+    def before() -> None:
+        os.environ["TMPDIR"] = tempfile.tempdir = str(tmp_path / "none")
+        resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+
+    files = GRID / "domain.pddl", GRID / f"{problem}.pddl"
+    ended = fork_command("plans", *files, "--count", before=before).join()
+    assert (ended.code, ended.out) == (0, f"{count}\n"), ended
 
 
 @pytest.mark.slow

@@ -5,8 +5,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -18,7 +16,7 @@ from coordlang.vocabulary.loop import Budget
 from coordlang.vocabulary.minimal import MinimalSearch
 from planners.system.errors import OutOfTime, UsageError
 from planners.system.writing import write_atomically
-from tests.support.command import Command
+from tests.support.command import Command, in_shell
 from tests.support.domains import DOMAINS
 from tests.support.forks import fork_command
 
@@ -115,34 +113,18 @@ def test_names_of_every_length_are_written(letter: str, less: int, here: Path) -
     assert Path(name).read_bytes() == b"new"
 
 
-def _shell(script: str, *arguments: object) -> subprocess.CompletedProcess[str]:
-    program = f'{sys.executable} -m coordlang "$@"'
-    return subprocess.run(
-        [
-            "bash",
-            "-c",
-            f"set -o pipefail; {script.replace('COORDLANG', program)}",
-            "bash",
-            *list(map(str, arguments)),
-        ],
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
-
-
 def test_process_substitution_and_pipes_are_written_to(here: Path) -> None:
-    done = _shell("COORDLANG -o >(cat > got.json; echo done > end) && while [ ! -e end ]; do "
+    done = in_shell("COORDLANG -o >(cat > got.json; echo done > end) && while [ ! -e end ]; do "
                   "sleep 0.1; done", "tasks", *CELLS)  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert '"coordlang/tasks"' in Path("got.json").read_text()
-    piped = _shell("COORDLANG -o /dev/stdout | cat", "tasks", *CELLS)
+    piped = in_shell("COORDLANG -o /dev/stdout | cat", "tasks", *CELLS)
     assert piped.returncode == 0
     assert piped.stdout.startswith(Path("got.json").read_text())
 
 
 def test_a_pipe_whose_reader_has_gone(here: Path) -> None:
-    done = _shell("COORDLANG -o /dev/stdout | true", "tasks", *CELLS)
+    done = in_shell("COORDLANG -o /dev/stdout | true", "tasks", *CELLS)
     assert done.returncode == 141, done.stderr
     assert done.stderr == ""
 
@@ -378,29 +360,24 @@ def test_a_language_and_its_certificate_are_written_together(
 
 
 @pytest.mark.parametrize("mode", [0o600, 0o640, 0o666, 0o755])
-def test_a_file_that_is_replaced_keeps_its_permissions(mode: int, here: Path) -> None:
+def test_a_file_that_is_replaced_keeps_its_permissions(
+    mode: int, here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """And a new one has those of every new file; the mask of the process is never touched."""
     path = Path("kept")
     path.touch()
     path.chmod(mode)
     before = os.umask(0o077)
     try:
-        write_atomically(path, b"new")
-        write_atomically("made", b"new")
-        assert os.umask(0o077) == 0o077
+        with monkeypatch.context() as patched:
+            patched.setattr("os.umask", lambda _: pytest.fail("other threads see it"))
+            write_atomically(path, b"new")
+            write_atomically("made", b"new")
     finally:
         os.umask(before)
     assert path.stat().st_mode & 0o777 == mode
     assert Path("made").stat().st_mode & 0o777 == 0o600
     assert len(list(here.iterdir())) == 2
-
-
-def test_the_mask_of_the_process_is_not_touched(
-    here: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("os.umask", lambda _: pytest.fail("other threads see it"))
-    write_atomically("made", b"new")
-    write_atomically("made", b"newer")
 
 
 @pytest.mark.parametrize(
@@ -415,12 +392,6 @@ def test_the_mask_of_the_process_is_not_touched(
 def test_closed_streams_are_said(
     arguments: tuple[object, ...], closed: str, code: int, message: str
 ) -> None:
-    script = f'exec {sys.executable} -m coordlang "$@" {closed}'
-    done = subprocess.run(
-        ["bash", "-c", script, "bash", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
+    done = in_shell(f"exec COORDLANG {closed}", *arguments)
     assert (done.returncode, done.stdout) == (code, "")
     assert done.stderr.startswith(f"coordlang: {message}")

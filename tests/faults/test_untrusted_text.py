@@ -84,18 +84,9 @@ class World:
 
     def write(self, coordlang: Command) -> World:
         """Write the files that commands read, by commands."""
-        built = coordlang(
-            "build",
-            *self.pddl,
-            "--tasks",
-            "all",
-            "-o",
-            self.language,
-            "--method",
-            "minimal",
-            "--certificate",
-            self.certificate,
-        )
+        minimal = ("--tasks", "all", "--method", "minimal")
+        outputs = ("-o", self.language, "--certificate", self.certificate)
+        built = coordlang("build", *self.pddl, *minimal, *outputs)
         assert built.code == 0, built.err
         self.plan.write_text(coordlang("plans", *self.pddl, "--max", 1).out)
         assert coordlang("tasks", *self.pddl, "-o", self.tasks).code == 0
@@ -248,26 +239,12 @@ FORMS: dict[str, Callable[[str], Any]] = {
 def fast_downward(folder: Path) -> list[str]:
     """The plan of Fast Downward, whose translator reads the two files, as its actions."""
     driver = files("up_fast_downward") / "downward" / "fast-downward.py"
-    done = subprocess.run(
-        [
-            sys.executable,
-            str(driver),
-            "--plan-file",
-            "sas_plan",
-            "domain.pddl",
-            "problem.pddl",
-            "--translate-options",
-            "--invariant-generation-max-time",
-            "0",
-            "--search-options",
-            "--search",
-            "astar(blind())",
-        ],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
+    options = (
+        "--plan-file sas_plan domain.pddl problem.pddl --translate-options"
+        " --invariant-generation-max-time 0 --search-options --search astar(blind())"
     )
+    command = [sys.executable, str(driver), *options.split()]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr
     return (folder / "sas_plan").read_text().splitlines()
 
@@ -440,15 +417,9 @@ def test_other_files_and_arguments(coordlang: Command, corridor: World, bad: str
         refused(coordlang("say", *spoken, corridor.plan), bad)
         refused(coordlang("export", *spoken, sentence, "--translate-plan", corridor.plan), bad)
     for init in (f"(at r1 a{bad})", f"(at{bad} r1 a)", f"{bad}"):
-        corridor.tasks.write_text(
-            json.dumps(
-                {
-                    "format": "coordlang/tasks",
-                    "version": 1,
-                    "tasks": [{"init": [init], "goal": ["(at r1 b)"]}],
-                }
-            )
-        )
+        tasks = [{"init": [init], "goal": ["(at r1 b)"]}]
+        told = {"format": "coordlang/tasks", "version": 1, "tasks": tasks}
+        corridor.tasks.write_text(json.dumps(told))
         refused(coordlang("verify", *spoken, "--tasks", corridor.tasks), bad)
     changed(corridor.certificate, lambda data: data.update(robots=[bad, "r2"]))
     refused(coordlang("verify", *spoken, "--certificate", corridor.certificate), bad)
@@ -498,15 +469,8 @@ def test_names_of_files(coordlang: Command, tmp_path: Path) -> None:
 
 def test_coordinates_of_names_that_differ_in_case_only(coordlang: Command, corridor: World) -> None:
     corridor.coordinates.write_text('{"coordinates": {"A": [0, 0], "a": [1, 1], "b": [2, 2]}}')
-    done = coordlang(
-        "report",
-        corridor.language,
-        *corridor.pddl,
-        "-o",
-        "-",
-        "--coordinates",
-        corridor.coordinates,
-    )
+    spoken = corridor.language, *corridor.pddl
+    done = coordlang("report", *spoken, "-o", "-", "--coordinates", corridor.coordinates)
     assert done.code == 31
     assert "twice" in done.err
 

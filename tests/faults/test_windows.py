@@ -17,26 +17,21 @@ WINDOWS = {
 }
 
 
-def python(code: str) -> subprocess.CompletedProcess[str]:
+@pytest.mark.parametrize("system", WINDOWS)
+@pytest.mark.parametrize(
+    ("program", "code", "before"),
+    [
+        ("from coordlang.__main__ import main; main()", 32, "coordlang: "),
+        ("import coordlang; coordlang.plans('d.pddl', 'p.pddl')", 1, "OSError: "),
+    ],
+    ids=["command line", "library"],
+)
+def test_the_system_is_refused(system: str, program: str, code: int, before: str) -> None:
     env = dict(os.environ, PYTHONPATH=str(ROOT))
-    return subprocess.run([sys.executable, "-c", code], env=env, text=True, capture_output=True)
-
-
-@pytest.mark.parametrize("system", WINDOWS)
-@pytest.mark.parametrize("arguments", [[], ["--help"], ["plans", "d.pddl", "p.pddl"]])
-def test_command_line(system: str, arguments: list[str]) -> None:
-    start = f"sys.argv[1:] = {arguments}; from coordlang.__main__ import main; main()"
-    done = python(f"{WINDOWS[system]}; {start}")
-    assert (done.returncode, done.stdout) == (32, "")
-    assert done.stderr.startswith(
-        "coordlang: coordlang runs on Linux and macOS, not on this system"
-    )
-    assert done.stderr.splitlines()[1].startswith("  On Windows use WSL")
-
-
-@pytest.mark.parametrize("system", WINDOWS)
-def test_library(system: str) -> None:
-    done = python(f"{WINDOWS[system]}; import coordlang; coordlang.plans('d.pddl', 'p.pddl')")
-    assert "OSError: coordlang runs on Linux and macOS" in done.stderr
+    command = [sys.executable, "-c", f"{WINDOWS[system]}; {program}"]
+    done = subprocess.run(command, env=env, text=True, capture_output=True)
+    assert (done.returncode, done.stdout) == (code, "")
+    assert f"{before}coordlang runs on Linux and macOS, not on this system" in done.stderr
+    assert "\n  On Windows use WSL" in done.stderr
     assert "ImportError" not in done.stderr
     assert "ModuleNotFoundError" not in done.stderr

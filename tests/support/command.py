@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -32,3 +33,14 @@ main()
 def own_process(*arguments: object) -> list[str]:
     """The program and arguments that run ``coordlang ..`` as a process of its own."""
     return [sys.executable, "-c", _MAIN, *map(str, arguments)]
+
+
+def in_shell(script: str, *arguments: object, before: str = "") -> subprocess.CompletedProcess[str]:
+    """Run ``script``, in which COORDLANG stands for a command, after ``before``."""
+    program = script.replace("COORDLANG", f'{sys.executable} -m coordlang "$@"')
+    return subprocess.run(
+        ["bash", "-c", f"set -o pipefail; {before} {program}", "bash", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
