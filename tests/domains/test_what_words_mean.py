@@ -73,82 +73,54 @@ class Meaning:
 
 
 CARRYING = ("(holds arm1 red)", "(holds arm2 blue)")
+OWN = "its own"
+BESIDE = has("(holds r1 back)", "(tray-at parlour)")
 MEANINGS = [
     Meaning("three-cells", "problem", "all", "", (has("(at r2 a)"), has("(at r2 b)"))),
     Meaning(
-        "t-map",
-        "problem",
-        "all",
-        "",
+        *("t-map", "problem", "all", ""),
         (has("(at r1 c1-1)", "(at r2 c0-1)"), has("(at r1 c1-1)", "(at r2 c1-0)")),
     ),
-    Meaning("corridor", "problem", "its own", "", (has("(at r1 c0-4)"),)),
+    Meaning("corridor", "problem", OWN, "", (has("(at r1 c0-4)"),)),
     Meaning(
-        "charger",
-        "three-robots",
-        "its own",
-        "--cost makespan+actions",
+        *("charger", "three-robots", OWN, "--cost makespan+actions"),
         (only("r1"), only("r2"), has("(charged r3)", without=("(charged r1)", "(charged r2)"))),
     ),
     Meaning(
-        "elevator",
-        "two-calls",
-        "its own",
-        "",
+        *("elevator", "two-calls", OWN, ""),
         (has("(stops second)", "(outside r1)", "(outside r2)"),),
     ),
     Meaning(
-        "handover",
-        "two-doors",
-        "its own",
-        "",
+        *("handover", "two-doors", OWN, ""),
         (has("(at r1 west-south)", "(at r2 east-south)", "(holds r2 box)"),),
     ),
     Meaning(
-        "handover",
-        "exchange",
-        "its own",
-        "",
+        *("handover", "exchange", OWN, ""),
         (lambda s: sum("west" in a and "lies" in a for a in s) == 2,),
     ),
     Meaning(
-        "lock",
-        "both-in",
-        "all",
-        "",
+        *("lock", "both-in", "all", ""),
         (
             either(has("(at r1 yard)", "(at r2 yard)"), has("(at r1 hall)", "(at r2 hall)")),
             either(has("(at r1 lock)", "(at r2 yard)"), has("(at r1 hall)", "(at r2 lock)")),
         ),
     ),
     Meaning(
-        "lock",
-        "three-robots",
-        "its own",
-        "--remember-actions --cost makespan+actions",
+        *("lock", "three-robots", OWN, "--remember-actions --cost makespan+actions"),
         (lambda s: any(a.startswith("(last r2 (hold") for a in s),),
     ),
     Meaning(
-        "push-box",
-        "around",
-        "all",
-        "",
+        *("push-box", "around", "all", ""),
         tuple(has(f"(at r1 {p})", f"(at r2 {p})", f"(stands box {p})") for p in ("store", "yard")),
     ),
     Meaning(
-        "push-box",
-        "around",
-        "its own",
-        "",
+        *("push-box", "around", OWN, ""),
         (has("(at r1 yard)", "(at r2 yard)", "(stands box yard)"),),
     ),
-    Meaning("tray", "serve", "its own", "", (has("(holds r1 back)", "(tray-at parlour)"),)),
-    Meaning("tray", "three-robots", "its own", "", (has("(holds r1 back)", "(tray-at parlour)"),)),
+    Meaning("tray", "serve", OWN, "", (BESIDE,)),
+    Meaning("tray", "three-robots", OWN, "", (BESIDE,)),
     Meaning(
-        "two-arms",
-        "exchange",
-        "exchange.tasks.json",
-        "",
+        *("two-arms", "exchange", "exchange.tasks.json", ""),
         (
             has("(over arm1 back)", "(over arm2 front)", *CARRYING),
             either(
@@ -158,10 +130,7 @@ MEANINGS = [
         ),
     ),
     Meaning(
-        "vans",
-        "one-van",
-        "one-van.tasks.json",
-        "",
+        *("vans", "one-van", "one-van.tasks.json", ""),
         (has("(aboard d1 v1)", without=("(at v1 depot)",)),),
     ),
 ]

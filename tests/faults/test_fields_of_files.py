@@ -28,7 +28,6 @@ from tests.support import naive
 from tests.support.command import Command, Outcome
 from tests.support.domains import DOMAINS, read
 from tests.support.edited_fields import edits
-from tests.support.naive_failures import failure
 
 CELLS = "three-cells"
 #: How a language is made: the options of `build`, and of `verify`'s files.
@@ -120,7 +119,7 @@ def fails_as_claimed(data: dict[str, Any], candidates: Candidates) -> bool:
     for space in candidates.spaces:
         names = _words(data, space)
         word = [sorted(set(names)).index(name) for name in names]
-        found += [failure(space, task, word, _MOST) for task in range(len(space.starts))]
+        found += [naive.failure(space, task, word, _MOST) for task in range(len(space.starts))]
     mean, worst = float(sum(found) / len(found)), float(max(found))
     return bool(mean <= claimed["failure_mean"] and worst <= claimed["failure_worst"])
 

@@ -44,17 +44,5 @@ def marked(text: str, random: Random) -> str:
 
 
 def nothing(text: str, random: Random) -> str:
-    return random.choice(
-        (
-            "",
-            " \n",
-            "; nothing\n",
-            "()",
-            "(define)",
-            "(define (domain x))",
-            "(define ())",
-            "\x00",
-            "x",
-            ")",
-        )
-    )
+    rests = ("", " \n", "; nothing\n", "()", "(define)", "(define (domain x))", "(define ())")
+    return random.choice((*rests, "\x00", "x", ")"))

@@ -62,33 +62,22 @@ def swap_groups(text: str, random: Random) -> str:
     return text[:a] + text[c:d] + text[b:c] + text[a:b] + text[d:]
 
 
+#: What comes before and after a group.
+_AROUND = (
+    *(("(not ", ")"), ("(and ", ")"), ("(or ", ")"), ("(imply (and) ", ")"), ("(when (and) ", ")")),
+    *(("(", ")"), ("(forall (?r ?o ?x) ", ")"), ("(exists (?from ?a) ", ")"), ("(forall () ", ")")),
+    *(("(increase ", " 1)"), ("(when ", " (and))"), ("(preference p ", ")"), ("(at 5 ", ")")),
+    *(("(= ", " 1)"), ("(:private ", ")"), ("(either ", ")"), ("(oneof ", ")")),
+)
+
+
 def wrap_group(text: str, random: Random) -> str:
     """A group becomes part of another connective or quantifier."""
     spans = groups_of(text)
     if not spans:
         return text
     start, end = random.choice(spans)
-    before, after = random.choice(
-        (
-            ("(not ", ")"),
-            ("(and ", ")"),
-            ("(or ", ")"),
-            ("(imply (and) ", ")"),
-            ("(when (and) ", ")"),
-            ("(", ")"),
-            ("(forall (?r ?o ?x) ", ")"),
-            ("(exists (?from ?a) ", ")"),
-            ("(forall () ", ")"),
-            ("(increase ", " 1)"),
-            ("(when ", " (and))"),
-            ("(preference p ", ")"),
-            ("(at 5 ", ")"),
-            ("(= ", " 1)"),
-            ("(:private ", ")"),
-            ("(either ", ")"),
-            ("(oneof ", ")"),
-        )
-    )
+    before, after = random.choice(_AROUND)
     return text[:start] + before + text[start:end] + after + text[end:]
 
 

@@ -5,10 +5,12 @@ only.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from fractions import Fraction
 from itertools import product
 from typing import TypeVar
 
+from coordlang.execution.task_language import TaskLanguage
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, counts
 
@@ -123,3 +125,26 @@ def is_language(space: PlanSpace, word_of_state: dict[int, int], most: int) -> b
             if any(mixture(chosen) not in good for chosen in product(group, repeat=space.robots)):
                 return False
     return True
+
+
+def failure(space: PlanSpace, task: int, word: Sequence[int] | None, most: int) -> Fraction:
+    """The failure probability; ``word`` gives each *state* its word; None: silence."""
+    plans = listed(space, task, most)
+    said = by_sentence(space, task, lambda s: word[s] if word is not None else 0, most)
+    good, found = set(plans), Fraction(0)
+    for group in said.values():
+        failed = sum(mixture(chosen) not in good for chosen in product(group, repeat=space.robots))
+        found += Fraction(len(group), len(plans)) * Fraction(failed, len(group) ** space.robots)
+    return found
+
+
+def plans_by_sentence(task_language: TaskLanguage) -> dict[tuple[str, ...], set[Plan]]:
+    """All optimal plans of the task by their sentences, at most 1,000.
+
+    The words are looked up in the language's own list of states.  Raises `TooLarge`.
+    """
+    space, language = task_language.space, task_language.language
+    keys = [space.model.codec.key(row) for row in space.rows]
+    words = [language.states.get(key, language.default) for key in keys]
+    groups = by_sentence(space, task_language.task, words.__getitem__, 1_000)
+    return {said: set(plans) for said, plans in groups.items()}

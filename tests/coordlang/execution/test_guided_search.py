@@ -21,13 +21,13 @@ from planners.search.plan_file import read_plans, texts
 from planners.system.errors import UsageError
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
-from tests.support.naive_sentences import by_sentence
+from tests.support.naive import plans_by_sentence
 from tests.support.task_languages import RANDOM, SHIPPED, random_task_languages, shipped
 
 
 def check(candidates: Candidates, task_language: TaskLanguage, names: tuple[str, ...]) -> int:
     """The searches made; every sentence of the task with every heuristic."""
-    loaded, groups = candidates.loaded, by_sentence(task_language)
+    loaded, groups = candidates.loaded, plans_by_sentence(task_language)
     problem = loaded.problems[0]
     init, goal = ground_task(loaded.domain, problem, candidates.listed[0])
     terrain, searches = ExpandedStates(task_language.model, task_language.partition), 0
@@ -82,7 +82,7 @@ def test_a_state_is_looked_at_once(robots: int, number: int) -> None:
             init = used.space.rows[used.space.state[used.start]]
             goals = used.space.layers[0]
             most = _expandable(terrain, init, used.space.cost_of(0)[0]) + goals.stop - goals.start
-            for words in list(by_sentence(used))[:10]:
+            for words in list(plans_by_sentence(used))[:10]:
                 said = used.words_of(words)
                 found = plan_under_sentence(used, said, "blind", terrain, count_words=False)
                 assert found.states == found.expanded <= most
@@ -102,7 +102,7 @@ def test_a_sentence_of_longer_plans_only_is_no_sentence() -> None:
     """A* alone may find a longer plan with the sentence; `plan_under_sentence` knows that it is not optimal."""
     task_language = shipped("t-map/problem")[1]
     space = task_language.space
-    sentences = [task_language.words_of(words) for words in by_sentence(task_language)]
+    sentences = [task_language.words_of(words) for words in plans_by_sentence(task_language)]
     terrain = ExpandedStates(task_language.model, task_language.partition)
     goal, init = space.goals[0], space.rows[space.state[task_language.start]]
     bound = heuristic("relaxed", task_language.model, goal, init)

@@ -20,13 +20,13 @@ from planners.search.plan_file import texts
 from planners.search.plans import Plan
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
-from tests.support.naive_sentences import by_sentence
+from tests.support.naive import plans_by_sentence
 from tests.support.task_languages import RANDOM, SHIPPED, random_task_languages, shipped
 
 
 def check(task_language: TaskLanguage, seed: int) -> None:
     """Every sentence of the task, and sentences near them."""
-    groups = by_sentence(task_language)
+    groups = plans_by_sentence(task_language)
     for words, plans in list(groups.items())[:40]:
         understood = OpenPlans.of(task_language, task_language.words_of(words))
         assert understood.count == len(plans)
@@ -111,7 +111,7 @@ def test_every_sentence_of_a_random_model(robots: int, number: int) -> None:
 def most_open(name: str) -> OpenPlans:
     """The plans of the sentence that leaves most plans open."""
     task_language = shipped(name)[1]
-    words = max(by_sentence(task_language).items(), key=lambda item: len(item[1]))[0]
+    words = max(plans_by_sentence(task_language).items(), key=lambda item: len(item[1]))[0]
     return OpenPlans.of(task_language, task_language.words_of(words))
 
 

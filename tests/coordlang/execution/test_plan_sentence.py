@@ -26,12 +26,12 @@ from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
 from planners.system.errors import BadInput, Position, ProvedImpossible
 from tests.support.command import Command
-from tests.support.naive_sentences import by_sentence
+from tests.support.naive import plans_by_sentence
 from tests.support.task_languages import RANDOM, SHIPPED, random_task_languages, shipped
 
 
 def check_said(task_language: TaskLanguage) -> None:
-    for words, plans in [*by_sentence(task_language).items()][:15]:
+    for words, plans in [*plans_by_sentence(task_language).items()][:15]:
         for plan in sorted(plans)[:5]:
             said = sentence_of_plan(task_language, texts(task_language.model, plan))
             assert task_language.text(said) == " ".join(words)
@@ -146,7 +146,7 @@ def judged(
 def test_wrong_plans_of_random_models() -> None:
     seen: Counter[str] = Counter()
     for seed, candidates, used in (*random_task_languages(2, 60), *random_task_languages(3, 60)):
-        optimal = {plan for plans in by_sentence(used).values() for plan in plans}
+        optimal = {plan for plans in plans_by_sentence(used).values() for plan in plans}
         random = Random(seed)
         for _ in range(6):
             seen[judged(candidates, used, changed(used, random), optimal)] += 1
@@ -165,7 +165,7 @@ def test_wrong_plans_of_random_models() -> None:
 )
 def test_wrong_plans_of_shipped_domains(name: str) -> None:
     candidates, used = shipped(name)
-    optimal = {plan for plans in by_sentence(used).values() for plan in plans}
+    optimal = {plan for plans in plans_by_sentence(used).values() for plan in plans}
     random = Random(name)
     assert len({judged(candidates, used, changed(used, random), optimal) for _ in range(10)}) > 1
 

@@ -23,8 +23,7 @@ from planners.system.errors import OutOfMemory, UsageError
 from tests.support.command import Command, Outcome
 from tests.support.domains import DOMAINS
 from tests.support.layered_spaces import layered_space
-from tests.support.naive import sentence
-from tests.support.naive_sentences import by_sentence
+from tests.support.naive import plans_by_sentence, sentence
 from tests.support.task_languages import SHIPPED, random_task_languages, shipped
 
 #: The value of a wish, for the sentence and its plans; smaller is better.
@@ -74,7 +73,7 @@ def wishes_for(task_language: TaskLanguage, random: Random) -> list[str]:
 
 
 def check(task_language: TaskLanguage, texts: list[str]) -> Counter[str]:
-    groups = by_sentence(task_language)
+    groups = plans_by_sentence(task_language)
     number = {word: n for n, word in enumerate(task_language.language.words)}
     values = [naive_value(task_language, text) for text in texts]
 
@@ -198,7 +197,7 @@ def test_wishes_of_one_robot_are_against_those_of_the_other() -> None:
         best = best_sentence(task_language, [read_preference(task_language, f"first:{robot}")])
         assert best.values == ((0, 0),)
         found[best.words] = robot
-        (plan, *_) = by_sentence(task_language)[tuple(task_language.text(best.words).split())]
+        (plan, *_) = plans_by_sentence(task_language)[tuple(task_language.text(best.words).split())]
         assert goes_first(task_language, plan, robot) == 0
     assert len(found) == 2
 

@@ -15,7 +15,7 @@ from coordlang.execution.fitting_plans import plans_with_sentence
 from coordlang.language.sentences import sentence_counts
 from coordlang.required.failure import TooManyToCount, failure_of_sentence, failure_probability
 from coordlang.required.failures import estimated_failure
-from tests.support import naive_failures
+from tests.support import naive
 from tests.support.domains import all_tasks, own_task
 from tests.support.naive import TooLarge
 from tests.support.random_spaces import random_spaces
@@ -35,7 +35,7 @@ def compared(seeds: range, robots: int) -> Counter[str]:
             (found,) = [failure_probability([space], [word[space.state] if words > 1 else None])]
             for task, probability in enumerate(found.tasks):
                 try:
-                    twin = naive_failures.failure(space, task, word.tolist(), MOST[robots])
+                    twin = naive.failure(space, task, word.tolist(), MOST[robots])
                 except TooLarge:
                     continue
                 assert probability == twin
