@@ -108,14 +108,11 @@ def test_commands_warn_of_words_that_are_too_few(
     path, page = silent(tmp_path / "l.json", tolerance), tmp_path / "page.html"
     plan = tmp_path / "plan"
     plan.write_text(coordlang("plans", *SQUARE, "--max", 1).out)
+    sentence = [(name, "w0") for name in ("understand", "plan", "choices")]
+    others = [*sentence, ("export", "w0", "--to", "bt"), ("explain", "--task")]
     for name, *more in (
-        ("say", plan),
-        ("understand", "w0"),
-        ("plan", "w0"),
-        ("explain",),
-        ("export", "w0", "--to", "bt"),
-        ("report", "-o", page),
-        *([("choices", "w0"), ("explain", "--task")] if tolerance else []),
+        *(("say", plan), ("explain",), ("report", "-o", page)),
+        *(others if tolerance else []),
     ):
         found = coordlang(name, path, *SQUARE, *more)
         assert found.code == 0, name

@@ -163,6 +163,7 @@ def test_maps_of_others_have_a_plan(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.foreign
+@pytest.mark.thorough
 @pytest.mark.skipif(not SHARED.is_dir(), reason=f"the inputs of others are not here: {SHARED}")
 def test_all_maps_and_scenarios_of_others(tmp_path: Path) -> None:
     maps = sorted([*SHARED.glob("mapf/*.map"), *SHARED.glob("maps/*.map")])
