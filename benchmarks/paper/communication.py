@@ -66,10 +66,7 @@ def section(records: Sequence[Record]) -> Section:
         table("language", method_of, _COLUMNS, found.languages, above),
     ]
     if found.languages:
-        alt = (
-            f"Plan and sentence lengths of the first {SHOWN} tasks of {row} "
-            "whose sentence is shorter"
-        )
+        alt = f"Lengths of plans and shorter sentences of {SHOWN} tasks of {row}"
         blocks += [
             Figure("communication-tasks", alt, partial(_first_tasks, found.languages)),
         ]
@@ -77,9 +74,9 @@ def section(records: Sequence[Record]) -> Section:
         savings, systematic = found.in_orders(1)
         named = ", ".join(f"{name} {percent(saving)}" for name, saving in systematic.items())
         blocks.append(
-            f"With the states in {len(savings)} random orders, the greedy method saves "
-            f"{percent(savings[0])} to {percent(savings[-1])} over all tasks (median "
-            f"{percent(savings[len(savings) // 2])}); in systematic orders, {named}."
+            f"In {len(savings)} random orders of the states the greedy method saves "
+            f"{percent(savings[0])} to {percent(savings[-1])} (median "
+            f"{percent(savings[len(savings) // 2])}); in systematic orders: {named}."
         )
     if found.others:
         others = table("language", world_and_method, _COLUMNS, found.others)
@@ -100,11 +97,11 @@ _COLUMNS = {
 }
 
 _DEFINITION = f"""\
-The *communication saving* of a plan is `1 - words / states`. The paper's two values,
-{percent(SAVING_DIFFERING)} over {DIFFERING} tasks and {percent(SAVING_ALL)} over all 956, agree
-only if states are counted, as here. *Last plan*: for the last plan of each task in place of the
-first; *any plan*: in expectation; *shortest*: for the plan with the shortest sentence. Measured
-on """
+The *communication saving* of a plan is `1 - words / states`: only if states are counted do the
+paper's two values agree ({percent(SAVING_DIFFERING)} over {DIFFERING} tasks, \
+{percent(SAVING_ALL)} over all 956). *Last plan*: of
+each task, in place of the first; *any plan*: in expectation; *shortest*: the plan with the shortest
+sentence. Measured on """
 
 
 def _headlines(of: dict[str, Result]) -> list[tuple[str, str, str, str]]:
@@ -141,22 +138,18 @@ def _differences(found: Comparison) -> list[str]:
         return []
     text = (
         f"**Communication.** The paper saves {percent(SAVING_ALL)} over all tasks of {ROW}, our "
-        f"greedy language {percent(greedy['saving'])}. The value depends on the order in which the "
-        "greedy method tries the states and on which plan is the first; the paper does not give "
-        "them."
+        f"greedy language {percent(greedy['saving'])}. That depends on the order of the states and "
+        "on which plan is the first; the paper gives neither."
     )
     if found.orders:
         savings = [saving for _, saving in found.orders.values()]
         inside = min(savings) <= SAVING_ALL <= max(savings)
         reached = "the paper's value is in this range" if inside else "none gives the paper's value"
         text += (
-            f" {len(savings)} orders give {percent(min(savings))} to {percent(max(savings))} for "
-            f"first plans; {reached}."
+            f" {len(savings)} orders give {percent(min(savings))} to {percent(max(savings))}; "
+            f"{reached}."
         )
-    return [
-        f"{text} The last plans in our order save {percent(greedy['saving_last'])}, the plans with "
-        f"the shortest sentences {percent(greedy['saving_most'])}."
-    ]
+    return [text]
 
 
 RECIPE = Recipe(

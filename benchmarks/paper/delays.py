@@ -60,34 +60,30 @@ def section(records: Sequence[Record]) -> Section:
     """Render a table and a figure for each world."""
     blocks: list[str | Figure] = [_DEFINITION]
     for name, here in by_world(records).items():
-        alt = (
-            f"Runs on {name} that end in the goal, by the probability of a delay: as they come "
-            "and with robots that yield"
-        )
+        alt = f"Runs on {name} that end in the goal, by the probability of a delay"
         figure = Figure(f"delays-{name}", alt, partial(_figure, here))
         blocks += [f"{name}, {here[0].result['tasks']:,} tasks:", _table(here), figure]
     return Section(blocks)
 
 
 _DEFINITION = """\
-A task and one of its plans are drawn uniformly. The whole *plan* is said, or its sentence, and
-each robot draws one of the plans with this sentence. In each step every robot that is not done is
-delayed with probability *p*. *As they come*: a step that is no joint step is a failure.
-*Yielding*: robots that cannot do their steps wait; the run fails if all wait for ever, or miss the
-goal. Cells: runs that end in the goal in percent, and their steps beyond the least makespan on
-average. Lines in the figures: 95 % intervals (Wilson)."""
+A task and one of its plans are drawn. All robots follow this *plan*, or each draws a plan with its
+sentence. In each step every robot that is not done is delayed with probability *p*. As they come,
+a step that is no joint step is a failure. *Yielding*: robots that cannot do their steps wait; the
+run fails if all wait for ever, or miss the goal. Cells: runs that end in the goal in percent, and
+their mean steps beyond the least makespan."""
 
 
 def _table(records: Sequence[Record]) -> str:
     rows = []
     for record in records:
         result, title = record.result, TITLES[record.parameters["said"]]
-        for name in _YIELDING:
+        for name, yields in _YIELDING.items():
             cells = []
             for runs, well, late in result[name]:
                 mean = f" (+{late / well:.2f})" if well else ""
                 cells.append(f"{100 * well / runs:.1f}{mean}")
-            rows.append([f"{title}, {name}", result["words"], *cells])
+            rows.append([title + ", yielding" * yields, result["words"], *cells])
     return markdown(("said", "words", *(f"p = {delay:g}" for delay in DELAYS)), rows)
 
 

@@ -61,10 +61,7 @@ def section(records: Sequence[Record]) -> Section:
         table("language", method_of, _COLUMNS, found.languages, above),
     ]
     if found.languages:
-        alt = (
-            f"Distribution over the tasks of {row} of the number of plans open after the first "
-            "plan's sentence"
-        )
+        alt = f"Tasks of {row} by the number of plans open"
         blocks.append(Figure("flexibility", alt, partial(_figure, found.languages)))
     if found.orders:
         blocks.append(_orders_text(found))
@@ -85,9 +82,9 @@ _COLUMNS = {
 }
 
 _DEFINITION = """\
-*Open*: the optimal plans with the sentence of the first plan, as in the paper; *several*: the tasks
-with more than one. *Any plan*: the expectation `sum of n_s^2 / N` for a plan drawn uniformly.
-*Optimal plans*: an upper bound for every language. Measured on {row}."""
+*Open*: the optimal plans with the sentence of the first plan. *Several*: the tasks with more than
+one. *Any plan*: the expectation `sum of n_s^2 / N`. *Optimal plans*: an upper bound for every
+language. Measured on {row}."""
 
 
 def _headlines(of: dict[str, Result]) -> list[tuple[str, str, str, str]]:
@@ -109,10 +106,10 @@ def _orders_text(found: Comparison) -> str:
     middle = len(first) // 2
     named = ", ".join(f"{name} {value:.1f}" for name, value in systematic.items())
     return (
-        f"With the states in {len(first)} random orders, the greedy method leaves {first[0]:.1f} "
-        f"to {first[-1]:.1f} plans open (median {first[middle]:.1f}), in expectation "
+        f"In {len(first)} random orders of the states the greedy method leaves {first[0]:.1f} to "
+        f"{first[-1]:.1f} plans open (median {first[middle]:.1f}), in expectation "
         f"{expected[0]:.1f} to {expected[-1]:.1f} (median {expected[middle]:.1f}); in systematic "
-        f"orders, {named}."
+        f"orders: {named}."
     )
 
 
@@ -136,14 +133,10 @@ def _differences(found: Comparison) -> list[str]:
     spread = ""
     if found.orders:
         first = [measures[0] for measures in found.orders.values()]
-        spread = (
-            f" It depends on the order of the states: {len(first)} orders give {min(first):.1f} to "
-            f"{max(first):.1f}."
-        )
+        spread = f" {len(first)} orders of the states give {min(first):.1f} to {max(first):.1f}."
     return [
         f"**Flexibility.** The paper leaves {OPEN_ALL} plans open on average over all tasks of "
-        f"{ROW} and {OPEN_SEVERAL} over {SEVERAL}, our greedy language {greedy['open']:.1f} and "
-        f"{greedy['open_several']:.1f} over {greedy['several']}.{spread}"
+        f"{ROW}, our greedy language {greedy['open']:.1f}.{spread}"
     ]
 
 

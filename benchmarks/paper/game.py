@@ -159,16 +159,22 @@ def section(records: Sequence[Record]) -> Section:
         text = f"{name}, {tasks:,} tasks, {runs} games each:"
         blocks += [text, _table(here)]
         if name == ROW:
-            alt = f"Proposals until accepted on {ROW}, plans against sentences, by liked plans"
+            alt = f"Proposals until accepted on {ROW}, by liked plans"
             blocks.append(Figure("game", alt, partial(_figure, here)))
-    return Section(blocks, _differences(worlds.get(ROW, [])))
+    return Section(blocks, _DIFFERENCES if ROW in worlds else ())
 
 
 _DEFINITION = """\
 The listener likes k of the task's optimal plans, drawn at random. The speaker proposes plans in
-random order until the listener accepts one; or sentences, which the listener accepts if a liked
-plan has the sentence. *Widest first*: sentences with most plans first. Cells: the mean of the
-games, and in brackets the exact expectation, (N + 1) / (k + 1) for N plans."""
+random order until the listener likes one, or sentences until a liked plan has the sentence.
+*Widest first*: sentences with most plans first. Cells: the mean of the games, and in brackets the
+exact expectation, (N + 1) / (k + 1) for N plans."""
+
+
+_DIFFERENCES = (
+    "**Coordination game.** The paper gives neither the order of its proposals nor the values of "
+    "its figure.",
+)
 
 
 def _table(records: Sequence[Record]) -> str:
@@ -202,21 +208,6 @@ def _figure(records: Sequence[Record]) -> Any:
         shown.append(series(method, f"sentence, {TITLES[method]}", record.result, "sentence"))
     panel = Lines("", "proposals until accepted", shown)
     return lines([panel], first["liked"], "plans that the listener likes (k)")
-
-
-def _differences(records: Sequence[Record]) -> list[str]:
-    if not records:
-        return []
-    plans = records[0].result["exact"]["plan"][0]
-    sentences = ", ".join(
-        f"{record.result['exact']['sentence'][0]:.2f} sentences ({method_of(record)})"
-        for record in records
-    )
-    return [
-        "**Coordination game.** The paper does not give the order of its proposals, nor the values "
-        f"of its figure; our expectations on {ROW} for k = 1 are {plans:.2f} plans against "
-        f"{sentences}."
-    ]
 
 
 RECIPE = Recipe("game", "Coordination game: proposals until accepted", units, run, section)

@@ -81,10 +81,7 @@ def section(records: Sequence[Record]) -> Section:
     for layout in LAYOUTS:
         here = [record for record in mine if record.parameters["layout"] == layout]
         if here:
-            alt = (
-                f"Success rates of deliveries {layout} the warehouse under an agreed plan and "
-                "under sentences, by map"
-            )
+            alt = f"Success rates of deliveries {layout} the warehouse, by map"
             figure = Figure(f"navigation-{layout}", alt, partial(_figure, here))
             blocks += [f"Deliveries {layout} the warehouse:", _table(here), figure]
     if others:
@@ -93,18 +90,15 @@ def section(records: Sequence[Record]) -> Section:
 
 
 _DEFINITION = """\
-Two robots on a map with storage (S1, S2, left) and dispatch (D1, D2, right) in its corners. They
-start in random corners and agree on two tasks: robot i goes to Si and then Di, or the other way
-round. Then a human appears in a random cell that is no corner. The agreed *plan* fails if a robot
-would enter that cell. Under the *sentence* of that plan each robot selects among its own choices,
-without observing the other robot; it fails if no choice avoids the cell. *Of 100*: random runs
-with the same draws. *Exact*: over all starts, directions, cells and plans; with a 95 % interval
-(Wilson): of 10,000 runs, where there are too many sentences. *Possible*: if the robots may agree
-again. The paper gives no map; ours are full rectangles (*open*) or their border (*ring*). *Across*
-puts D1 opposite S1, *along* on the same side."""
+Two robots start in random corners: storage S1 and S2 (left), dispatch D1 and D2 (right). Robot i
+goes to Si and then to Di, or the other way round. Once they have agreed, a human appears in a
+random cell that is no corner. An agreed *plan* fails if a robot would enter that cell, its
+*sentence* if some robot has no choice of its own that avoids it. *Of 100*: random runs. *Exact*:
+over all cases; with a 95 % interval (Wilson): of 10,000 runs. *Possible*: if the robots may agree
+again. Our maps are full rectangles (*open*) or their border (*ring*). *Across*: D1 is opposite S1;
+*along*: on the same side."""
 
-_OTHERS = """\
-Domains that are not grids; one subaction that optimal plans use becomes impossible. All tasks:"""
+_OTHERS = "Domains that are not grids, all tasks; a subaction of optimal plans becomes impossible:"
 
 
 def _table(records: Sequence[Record]) -> str:
@@ -173,9 +167,9 @@ def _differences(records: Sequence[Record]) -> list[str]:
     lower = [gain for gain in gains if gain < 0]
     worse = f"and on {len(lower)} of {len(records)} it loses" if lower else "and never loses"
     return [
-        "**Robust navigation.** The paper does not give its map and rates, so nothing can be "
-        f"compared. On our maps a sentence adds {min(gains):.1f} to {max(gains):.1f} points to the "
-        f"plan's success rate, {worse}."
+        "**Robust navigation.** The paper gives neither its map nor its rates. On our maps a "
+        f"sentence adds {min(gains):.1f} to {max(gains):.1f} points to the plan's success rate, "
+        f"{worse}."
     ]
 
 

@@ -63,16 +63,15 @@ def _head(lines: Sequence[Figures]) -> str:
     return f"""\
 # Evaluation
 
-The tables and figures of the paper, reproduced with coordlang, beside the paper's own values; each
-experiment also runs on domains that are not grids. `python -m benchmarks.paper` writes this page
-from the results stored beside its figures, one JSON line for each work unit:
+The paper's tables and figures, reproduced with coordlang beside the paper's own values, and the
+same on domains that are not grids. This page is written from the results stored beside its figures:
 
     python -m benchmarks.paper all --results docs/evaluation --page docs/evaluation.md --limit 900
 
-{len(lines)} work units, {seconds:,.0f} seconds of processor time in total; \
+{len(lines)} work units, {seconds:,.0f} seconds of processor time; \
 seed {", ".join(map(str, seeds))}; limit {", ".join(f"{limit:g}" for limit in limits)} s for each \
 unit; {", ".join(versions)}.
-Everything but the times depends only on the seed and the versions, unless a limit was reached."""
+Seed and versions determine everything but the times, unless a limit was reached."""
 
 
 def _headlines(sections: Mapping[str, Section]) -> list[str]:

@@ -90,7 +90,7 @@ def section(records: Sequence[Record]) -> Section:
     ]
     if others:
         blocks += [
-            "Domains that are not grids, without a Manhattan distance; tasks drawn at random:",
+            "Domains that are not grids; tasks drawn at random:",
             table("search", name, _COLUMNS, others),
         ]
     of = {(r.parameters["heuristic"], r.parameters["method"]): r.result for r in mine}
@@ -103,10 +103,10 @@ def section(records: Sequence[Record]) -> Section:
 
 
 _DEFINITION = """\
-A* finds an optimal plan of each task alone, and again under the sentence of that plan. Numbers are
-expanded nodes. *Pruned*: what does not fit the sentence is pruned, as in the paper. *Bounded*: the
-number of words that remain is also a lower bound. *Times fewer*: over all tasks together (paper:
-{ratio} on {row}); *per task*: the mean of the ratios."""
+Expanded nodes of A*, for an optimal plan of each task alone, and again under the sentence of that
+plan. *Pruned*: only what fits the sentence, as in the paper. *Bounded*: the number of words that
+remain is also a lower bound. *Times fewer*: over all tasks together (paper: {ratio} on {row}).
+*Per task*: the mean of the ratios."""
 
 
 def _ratio(result: Result, how: str) -> float:
@@ -128,14 +128,12 @@ _COLUMNS = {
 def _difference(greedy: Result, least: Result | None) -> str:
     text = (
         f"**Planning cost.** The paper's A* expands {PLANNING_RATIO} times fewer nodes with a "
-        f"sentence on {ROW}, ours {_ratio(greedy, 'pruned'):.2f} times with the "
-        "Manhattan distance and greedy words. The possible saving depends on how ties between "
-        "equally good nodes are broken, which the paper does not say: ours expands the node that "
-        "was reached last first, and without a sentence "
-        f"{greedy['alone'] / greedy['tasks']:.1f} nodes a task."
+        f"sentence on {ROW}, ours {_ratio(greedy, 'pruned'):.2f} times (Manhattan distance, greedy "
+        "words). The saving depends on the order of equally good nodes, which the paper does not "
+        "give; ours expands the node reached last first."
     )
     if least and least["alone"] <= 1.05 * least["pruned"]:
-        text += " Minimal words prune little, because their sentences leave most plans open."
+        text += " Minimal words prune little: their sentences leave most plans open."
     return text
 
 

@@ -211,30 +211,24 @@ def section(records: Sequence[Record]) -> Section:
 
 _DEFINITION = f"""\
 Two robots exchange rooms on the map `domains/corridor`: r1 from {START[0]} to {GOAL[0]}, r2 from
-{START[1]} to {GOAL[1]}. They have agreed on the sentence of the first plan. During execution
-{PLACE} becomes a place of interest. r1 finds a path through it among its own choices and takes it.
-r2 is not informed and does not change its part; no robot is late. (Candidate tasks: robot 1 from
-any cell of the left room to any of the right one, robot 2 the other way.)"""
+{START[1]} to {GOAL[1]}. They have agreed on the sentence of the first plan. Then {PLACE} becomes a
+place of interest. r1 finds a path through it among its own choices. r2 is not informed and does not
+change its part; no robot is late."""
 
-_ALT = (
-    "Above the agreed plan in the corridor; below r1 passes the place of interest and r2 does the "
-    "same as before"
-)
+_ALT = "The agreed plan in the corridor, and below it the detour of r1"
 
 _FREEDOM = """\
-Cells (in other domains: subactions) in the agreed plan; further ones that robots may use under the
-sentence without communication; further ones in all optimal plans. Summed over the robots of a
-task:"""
+Cells (in other domains: subactions) in the agreed plan; further ones under the sentence, without
+communication; further ones in all optimal plans. Summed over the robots of a task:"""
 
 
 def _detour_text(record: Record) -> str:
     r = record.result["drawn"]
     return (
         f"The language is {method_of(record)} ({record.result['words']} words), "
-        f"the sentence `{' '.join(r['sentence'])}`. The task has {r['plans']:,} optimal plans. On "
-        f"these r1 can pass {PLACE} in {r['parts']} ways, of which {r['parts_that_fit']} are "
-        "optimal together with what r2 does; with the others the robots collide or are late. The "
-        f"sentence leaves r1 {r['ways']} of them, whatever r2 selects from its own choices."
+        f"the sentence `{' '.join(r['sentence'])}`. On the task's {r['plans']:,} optimal plans r1 "
+        f"can pass {PLACE} in {r['parts']} ways; {r['parts_that_fit']} of them are optimal with "
+        f"what r2 does. The sentence leaves r1 {r['ways']} of them, whatever r2 selects."
     )
 
 

@@ -158,8 +158,8 @@ def section(records: Sequence[Record]) -> Section:
     """Render the curves as a table and two figures."""
     fails, bits = "robots fail (% of runs)", "bits of a sentence, mean"
     both = {"mean": fails, "worst": "in the worst task (% of runs)"}
-    words_alt = "How often robots fail on average and in the worst task, by the number of words"
-    bits_alt = "How often robots fail on average over the tasks, by the bits of a sentence"
+    words_alt = "How often robots fail, by the number of words"
+    bits_alt = "How often robots fail, by the bits of a sentence"
     words = partial(_drawn, records, "words", "words", both)
     sentences = partial(_drawn, records, "bits", bits, {"mean": fails})
     return Section(
@@ -173,12 +173,12 @@ def section(records: Sequence[Record]) -> Section:
 
 
 _DEFINITION = """\
-The speaker draws one of a task's optimal plans uniformly and says its sentence; each robot then
-draws one of the plans with that sentence. Columns 1, 2, .. say how often the mixture is no optimal
-plan with the best partition found into so many words, counted exactly: the mean over the tasks, and
-in brackets the worst task. An asterisk: no partition into so many words is better. *Bits*: the mean
-entropy of a sentence, with one word less than a language and with a language; *at least*: a lower
-bound for every division into sets that mix freely; *plan*: for saying which plan is meant."""
+The speaker says the sentence of an optimal plan drawn uniformly; each robot then draws a plan with
+that sentence. Columns 1, 2, ..: how often the mixture is no optimal plan with the best partition
+found into so many words, counted exactly: the mean over the tasks, and in brackets the worst. A
+star: no such partition is better. *Bits*: the mean entropy of a sentence, with one word less than a
+language and with a language. *At least*: a lower bound for every division into sets that mix
+freely. *Plan*: bits that say which plan is meant."""
 
 
 def _table(records: Sequence[Record]) -> str:

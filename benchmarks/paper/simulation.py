@@ -17,7 +17,7 @@ from benchmarks.paper.driving import Said, counted, drive, is_well, said_of
 from benchmarks.paper.floors import FLOORS, foreign_map, tasks_of
 from benchmarks.paper.grid import task_cells
 from benchmarks.paper.recipe import Recipe, Record, Result, Section, Settings, Unit
-from benchmarks.paper.scenario import GOAL, PLACE, START, detour, drawn_task, trading_rooms
+from benchmarks.paper.scenario import PLACE, detour, drawn_task, trading_rooms
 from benchmarks.paper.suite import CORRIDOR, language_for, method_of
 from benchmarks.paper.tables import share_of_runs
 from benchmarks.paper.task_choices import TaskChoices
@@ -197,7 +197,7 @@ def section(records: Sequence[Record]) -> Section:
     warehouses = [record for record in found if "warehouse" in record.parameters]
     blocks = [_DEFINITION]
     if floors:
-        blocks += [_FLOORS, _floor_table(floors), *_ends(floors), _computed(floors)]
+        blocks += [_FLOORS, _floor_table(floors), _sums(floors), _WORDS, _computed(floors)]
     if warehouses:
         blocks += [_HUMAN, _human_table(warehouses)]
     blocks += [_detour_text(record) for record in found if "detour" in record.parameters]
@@ -210,30 +210,27 @@ def section(records: Sequence[Record]) -> Section:
 
 
 _DEFINITION = """\
-Discs of 0.2 m with two driven wheels, in cells of 1 m, in ir-sim: `coordlang simulate`. Wheels
-have 10 % noise; robots know their place up to a standard deviation of 1 cm and 0.01 rad. Lidars
-stop robots for what is ahead. Every robot knows the task, the language and the sentence, and draws
-uniformly among its own choices. A *clock* begins each joint step for all; a *barrier* opens when
-all have done the step before; with barriers before *words* robots run freely within a word. A run
-ends well if all arrive in time and nobody touches anything."""
+Discs of radius 0.2 m with two driven wheels, in cells of 1 m: `coordlang simulate`. Wheels have
+10 % noise; robots know their place up to a standard deviation of 1 cm and 0.01 rad. Lidars stop
+robots for what is ahead. Every robot draws uniformly among its own choices. A *clock* begins each
+joint step for all; a *barrier* opens when all have done the step before; with barriers before each
+*word* robots run freely within a word. A run ends *well* if all arrive in time and nobody touches
+anything."""
 
 _FLOORS = """\
-Tasks that require coordination, drawn uniformly, on shipped maps and on a maze of others.
-*Sentence*: of a plan drawn uniformly. *Nothing*: each robot follows an optimal plan of its own.
-*No lidar*: nothing stops robots that are about to collide. *Late*: runs, and in brackets joint
-steps together. *Messages* and simulated *seconds*: of one run on average. *Nearest*: the least
-distance of two robots' middles in metres; discs touch at 0.4 m. *Joint model*: runs in which the
-robots' own subplans, done in step, are an optimal plan. *Agree*: runs that end well exactly if
-they are. The simulator does not see the doors of *handover*, so its runs with nothing agreed are
-no evidence."""
+Tasks that require coordination, on shipped maps and a maze of others. *Sentence*: of a plan drawn
+uniformly. *Nothing*: each robot follows an optimal plan of its own. *Late*: runs, and in brackets
+joint steps. *Messages* and simulated *seconds*: of a run on average. *Nearest*: the least distance
+of two middles in metres; discs touch at 0.4 m. *Joint model*: runs in which the robots' subplans,
+done in step, are an optimal plan. *Agree*: runs that end well exactly if they are. The simulator
+does not see the doors of *handover*: its runs with nothing agreed are no evidence."""
 
 _HUMAN = """\
 A human stands in a random cell that is no corner; only lidars see the human, up to two cells away.
-The tasks are deliveries as above, with the same plan for *plan* and *sentence*, by the clock.
-*Floor*: runs that end well of robots with wheels, which ask their monitor for a way that avoids the
-cell. *Joint model*: the same in joint steps, where all know of the human before they start. In
-brackets 95 % intervals (Wilson). *Only there*: well in the joint model only; *only here*: on the
-floor only."""
+Deliveries as above, by the clock. *Floor*: runs that end well; robots ask their monitor for a way
+that avoids the cell. *Joint model*: the same in joint steps, where all know of the human at the
+start. In brackets 95 % intervals (Wilson). *Only there*: well in the joint model only; *only here*:
+on the floor only."""
 
 
 def _floor_table(floors: Sequence[Record]) -> str:
@@ -242,7 +239,8 @@ def _floor_table(floors: Sequence[Record]) -> str:
         for agreement, ways in _DRIVEN.items():
             for way in ways:
                 r = record.result[agreement][way]
-                row: list[object] = [f"{record.parameters['floor']}, {agreement}, {way}"]
+                floor = record.parameters["floor"].removesuffix(" robots")
+                row: list[object] = [f"{floor}, {agreement}, {way}"]
                 row.append(record.result["words"] if agreement == "sentence" else None)
                 row += [r["well"], r["collisions"], r["deadlocks"]]
                 row.append(f"{r['late']} ({r['late_steps']})" if r["late"] else 0)
@@ -250,7 +248,7 @@ def _floor_table(floors: Sequence[Record]) -> str:
                 row.append(None if r["nearest"] is None else f"{r['nearest']:.2f}")
                 rows.append([*row, r["mixes"], r["agree"]])
     head = (
-        f"floor, agreed, step; {floors[0].parameters['runs']} runs each",
+        f"floor, robots, agreed, step; {floors[0].parameters['runs']} runs each",
         *("words", "well", "collisions", "deadlocks", "late", "messages", "seconds", "nearest"),
         *("joint model", "agree"),
     )
@@ -258,46 +256,25 @@ def _floor_table(floors: Sequence[Record]) -> str:
 
 
 def _computed(floors: Sequence[Record]) -> str:
-    """How many seconds of processor time a run takes on each floor."""
+    """How many seconds of processor time a run takes on the floors."""
     ways = sum(map(len, _DRIVEN.values()))
-    told = (
-        f"{record.parameters['floor']} {record.cpu / record.parameters['runs'] / ways:.2f}"
-        for record in floors
-    )
-    return f"Seconds of processor time for a run, with the search for tasks: {', '.join(told)}."
+    seconds = [record.cpu / record.parameters["runs"] / ways for record in floors]
+    return f"A run takes {min(seconds):.2f} to {max(seconds):.2f} s of processor time."
 
 
-def _ends(floors: Sequence[Record]) -> list[str]:
-    """How runs ended, by what was agreed and way by way."""
-    found = []
-    for way in _WAYS:
-        text = f"**With a sentence, {_KEPT[way]}**: {_summed(floors, 'sentence', way)}."
-        found.append(f"{text} {_WORDS}" if way == "word" else text)
-    told = (f"{_KEPT[way]} {_summed(floors, 'nothing', way)}" for way in _DRIVEN["nothing"])
-    return [*found, f"**With nothing agreed**: {'; '.join(told)}."]
+def _sums(floors: Sequence[Record]) -> str:
+    """How runs ended on all floors together, by what was agreed and way by way."""
+    shown = ("runs", "well", "collisions", "agree")
+    rows = [
+        [f"{agreement}, {way}"]
+        + [sum(record.result[agreement][way][what] for record in floors) for what in shown]
+        for agreement, ways in _DRIVEN.items()
+        for way in ways
+    ]
+    return markdown(("all floors: agreed, step", *shown), rows)
 
 
-def _summed(floors: Sequence[Record], agreement: Agreement, way: str) -> str:
-    results = [record.result[agreement][way] for record in floors]
-    runs, well, touched, agree = (
-        sum(result[what] for result in results) for what in ("runs", "well", "collisions", "agree")
-    )
-    return (
-        f"{well:,} of {runs:,} runs end well, {touched:,} with a collision; {agree:,} end as the "
-        "joint model says"
-    )
-
-
-_WORDS = (
-    "A sentence promises that mixtures of joint steps are plans; within a word robots are not in "
-    "step."
-)
-_KEPT = {
-    "clock": "by a common clock",
-    "barrier": "with a barrier before each step",
-    "word": "with a barrier before each word only",
-    _BLIND: "by a common clock and without a lidar",
-}
+_WORDS = "Within a word robots are not in step, and a sentence promises nothing of such mixtures."
 
 
 def _human_table(warehouses: Sequence[Record]) -> str:
@@ -336,14 +313,12 @@ def _detour_text(record: Record) -> str:
         *("well", "collisions", "messages without the wish", "messages"),
     )
     return (
-        f"The motivating scenario: r1 drives from {START[0]} to {GOAL[0]} and r2 from {START[1]} "
-        f"to {GOAL[1]} through the corridor, {result['steps']} joint steps, under the sentence "
-        f"`{' '.join(known['sentence'])}` of {result['words']} words. When r1 has done {_LEARNED} "
-        f"steps, {PLACE} becomes a place of interest, and only r1 learns of it: it asks its "
-        "choices for a way through it. Each run stands beside the run with the same seed in which "
-        "nothing becomes interesting; *r2 does the same* if its subactions are the same in "
-        f"both. In joint steps {known['ways']} of the {known['parts']} parts of r1 through {PLACE} "
-        "are open under the sentence, whatever r2 does.\n\n" + markdown(head, rows)
+        f"The motivating scenario. When r1 has done {_LEARNED} of {result['steps']} steps, it "
+        f"learns that {PLACE} is of interest, and asks its choices for a way through it. *Without "
+        "the wish*: runs with the same seed in which nothing becomes interesting. *r2 does the "
+        f"same*: its subactions are equal in both. In joint steps {known['ways']} of the "
+        f"{known['parts']} parts of r1 through {PLACE} are open, whatever r2 does.\n\n"
+        + markdown(head, rows)
     )
 
 

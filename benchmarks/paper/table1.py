@@ -124,13 +124,12 @@ def section(records: Sequence[Record]) -> Section:
     }
     rows = {name: columns for name, columns in of.items() if name in TABLE_1}
     others = {name: columns for name, columns in of.items() if name not in TABLE_1}
-    alt = "Words of every row of Table 1, by method, beside the paper's"
+    alt = "Words of every row of Table 1, by method"
     blocks: list[str | Figure] = [
         _DEFINITION,
         _words(rows),
         Figure("table1-words", alt, lambda: _figure(rows)),
-        "Seconds of processor time, from the PDDL text to the verified language (the paper's on "
-        "its author's machine):",
+        "Seconds of processor time, from PDDL to the verified language:",
         _seconds(rows),
     ]
     stopped = [
@@ -157,10 +156,10 @@ def section(records: Sequence[Record]) -> Section:
 
 _DEFINITION = """\
 Tasks and states are exactly the paper's. *Greedy*: fill a word with every state that still fits;
-beside it the range over other orders of the states. *Least alpha*: fewest words that separate all
-first differences; *separating*: that separate first or last differences (Theorem 3); *minimal*:
-fewest words of any partition; *exhaustive*: the paper's brute force. A star: proved to be the least
-of its kind. Every language is verified by definition."""
+*orders*: the range over other orders of the states. *Least alpha*: fewest words that separate all
+first differences. *Separating*: that separate first or last differences (Theorem 3). *Minimal*:
+fewest words of any partition. *Exhaustive*: the paper's brute force. A star: proved the least of
+its kind. Every language is verified by definition."""
 
 
 def _words(rows: Mapping[str, _Columns]) -> str:
@@ -242,16 +241,15 @@ def _differences(rows: Mapping[str, _Columns]) -> Iterator[str]:
         exact = " and ".join(name for name, paper in TABLE_1.items() if paper.exact)
         yield (
             f"**The least number of words** is {min(ratios):.1f} to {max(ratios):.1f} times "
-            f"smaller than the paper's (median {median(ratios):.1f}), which has an exact value for "
-            f"{exact} only."
+            f"smaller than the paper's (median {median(ratios):.1f}), which is exact for {exact} "
+            "only."
         )
     brute = [columns["exhaustive"] for columns in rows.values() if "exhaustive" in columns]
     unfinished = [record for record in brute if record.result["words"] is None]
     if unfinished:
         yield (
             f"**Brute force** ends within {BRUTE_SECONDS:g} s on {len(rows) - len(unfinished)} of "
-            f"{len(rows)} rows; where the tasks have more than {MOST_PAIRS:,} pairs of optimal "
-            "plans in total, it is not started."
+            f"{len(rows)} rows. Beyond {MOST_PAIRS:,} pairs of optimal plans it is not started."
         )
 
 
@@ -276,8 +274,8 @@ def _about_orders(rows: Mapping[str, _Columns]) -> Iterator[str]:
         return
     text = (
         f"**Words of the greedy method** differ from the paper's on {len(other)} of {len(rows)} "
-        f"rows ({', '.join(other)}). The result depends on the order of the states, which the "
-        "paper does not give."
+        f"rows ({', '.join(other)}). They depend on the order of the states, which the paper does "
+        "not give."
     )
     beyond = [
         name
@@ -301,9 +299,8 @@ def _about_alpha(rows: Mapping[str, _Columns]) -> Iterator[str]:
     if below:
         yield (
             f"**Fewer words than alpha allows.** On {', '.join(below)} the paper's greedy method "
-            "reports fewer words than any partition has that separates all first differences, as "
-            "is proved. So its condition must be a weaker one there; if last differences count, "
-            "too, fewer words are possible."
+            "reports fewer words than any partition has that separates all first differences "
+            "(proved). So its condition must be weaker there."
         )
 
 
