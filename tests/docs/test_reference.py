@@ -19,13 +19,15 @@ from tests.support.domains import ROOT
 from tests.support.pages import DOCS, PAGES, anchor, blocks, code, links, prose, rows, sections
 
 CLI = DOCS / "cli.md"
+#: Sections of options that a command's section links, by the text of the link.
 SHARED = {
-    "factored files": "Factored files",
-    "model options": "Model options",
     "cores and machines": "Cores and machines",
     "plans that are kept": "Plans that are kept",
     "limits": "Limits",
 }
+#: Sections of options that all commands have but these.
+OF_ALL = ("Model options", "Limits")
+BUT = ("domains", "schema")
 
 
 @cache
@@ -65,8 +67,9 @@ def told(option: click.Option) -> str:
 def test_options(name: str) -> None:
     """The tables say what the options records say; a cell may go on with more."""
     section = sections(CLI)[name]
-    linked = [text for link, text in SHARED.items() if f"[{link}]" in section]
-    tables = [section, *(sections(CLI)[text] for text in linked)]
+    shared = [text for link, text in SHARED.items() if f"[{link}]" in section]
+    shared += OF_ALL if name not in BUT else ()
+    tables = [section, *(sections(CLI)[text] for text in shared)]
     listed = {c[0]: c[1] for text in tables for c in rows(text) if c[0].startswith("`-")}
     expected = {
         cell_of(option): told(option)
