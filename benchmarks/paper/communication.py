@@ -18,7 +18,7 @@ from benchmarks.paper.sentences import (
     comparison_units,
 )
 from benchmarks.paper.suite import ROW, TITLES, method_of, world_and_method
-from benchmarks.paper.tables import percent, rounded_mean, table
+from benchmarks.paper.tables import in_percent, percent, rounded_mean, table
 from coordlang.language.flexibility import Flexibility
 
 #: Tasks that the paper's figure shows.
@@ -59,7 +59,7 @@ def section(records: Sequence[Record]) -> Section:
     """Render the savings by method, the paper's figure, and the savings on other domains."""
     found = Comparison.of(records)
     row = found.row
-    paper = ["paper", 4, f"{DIFFERING} of 956", percent(SAVING_DIFFERING), percent(SAVING_ALL)]
+    paper = ["paper", 4, f"{DIFFERING} of 956", *map(in_percent, (SAVING_DIFFERING, SAVING_ALL))]
     above = [[*paper, None, None, None]] if found.of_paper else []
     blocks: list[str | Figure] = [
         f"{_DEFINITION}{row}.",
@@ -88,12 +88,12 @@ _COLUMNS = {
     "words": lambda r: r.result["words"],
     "sentence shorter": lambda r: f"{r.result['differing']:,} of {r.result['tasks']:,}",
     "saving there": lambda r: (
-        percent(r.result["saving_differing"]) if r.result["differing"] else None
+        in_percent(r.result["saving_differing"]) if r.result["differing"] else None
     ),
-    "saving, all": lambda r: percent(r.result["saving"]),
-    "last plan": lambda r: percent(r.result["saving_last"]),
-    "any plan": lambda r: percent(r.result["saving_expected"]),
-    "shortest": lambda r: percent(r.result["saving_most"]),
+    "saving, all": lambda r: in_percent(r.result["saving"]),
+    "last plan": lambda r: in_percent(r.result["saving_last"]),
+    "any plan": lambda r: in_percent(r.result["saving_expected"]),
+    "shortest": lambda r: in_percent(r.result["saving_most"]),
 }
 
 _DEFINITION = f"""\
@@ -101,7 +101,7 @@ The *communication saving* of a plan is `1 - words / states`: only if states are
 paper's two values agree ({percent(SAVING_DIFFERING)} over {DIFFERING} tasks, \
 {percent(SAVING_ALL)} over all 956). *Last plan*: of
 each task, in place of the first; *any plan*: in expectation; *shortest*: the plan with the shortest
-sentence. Measured on """
+sentence. Measured in percent on """
 
 
 def _headlines(of: dict[str, Result]) -> list[tuple[str, str, str, str]]:

@@ -18,7 +18,7 @@ from benchmarks.paper.disruptions import subaction_trials, warehouse_trials
 from benchmarks.paper.plots import Series, by_category
 from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
 from benchmarks.paper.suite import METHODS, OTHERS, TITLES, WORLDS, language_for, method_of
-from benchmarks.paper.tables import Columns, percent, rate, share_of_runs, table
+from benchmarks.paper.tables import Columns, in_percent, rate, share_of_runs, table
 from benchmarks.paper.warehouse import LAYOUTS, WAREHOUSES, deliveries, listed_tasks
 
 #: Languages that take more than minutes to build: an unfinished one would depend on the machine.
@@ -94,9 +94,9 @@ Two robots start in random corners: storage S1 and S2 (left), dispatch D1 and D2
 goes to Si and then to Di, or the other way round. Once they have agreed, a human appears in a
 random cell that is no corner. An agreed *plan* fails if a robot would enter that cell, its
 *sentence* if some robot has no choice of its own that avoids it. *Of 100*: random runs. *Exact*:
-over all cases; with a 95 % interval (Wilson): of 10,000 runs. *Possible*: if the robots may agree
-again. Our maps are full rectangles (*open*) or their border (*ring*). *Across*: D1 is opposite S1;
-*along*: on the same side."""
+percent of all cases; with a 95 % interval (Wilson): of 10,000 runs. *Possible*: if the robots may
+agree again. Our maps are full rectangles (*open*) or their border (*ring*). *Across*: D1 is
+opposite S1; *along*: on the same side."""
 
 _OTHERS = "Domains that are not grids, all tasks; a subaction of optimal plans becomes impossible:"
 
@@ -108,11 +108,11 @@ def _table(records: Sequence[Record]) -> str:
 
     def exact(what: str, record: Record) -> str | None:
         known = record.result["exact"]
-        return percent(known[what]) if known else many(what, record)
+        return in_percent(known[what]) if known else many(what, record)
 
     def possible(record: Record) -> str | None:
         known = record.result["exact"]
-        return percent(known["possible"]) if known else None
+        return in_percent(known["possible"]) if known else None
 
     def few(what: str, record: Record) -> str:
         return f"{record.result['few'][what]}"

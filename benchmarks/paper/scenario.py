@@ -27,7 +27,7 @@ from benchmarks.paper.suite import (
     method_of,
     world_and_method,
 )
-from benchmarks.paper.tables import percent, table
+from benchmarks.paper.tables import in_percent, table
 from benchmarks.paper.task_choices import TaskChoices
 from coordlang.execution.automaton import Automaton
 from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
@@ -219,7 +219,7 @@ _ALT = "The agreed plan in the corridor, and below it the detour of r1"
 
 _FREEDOM = """\
 Cells (in other domains: subactions) in the agreed plan; further ones under the sentence, without
-communication; further ones in all optimal plans. Summed over the robots of a task:"""
+communication; further ones in all optimal plans. Summed over a task's robots; *share* in percent:"""
 
 
 def _detour_text(record: Record) -> str:
@@ -239,7 +239,7 @@ _COLUMNS = {
     "more under the sentence": lambda r: f"{r.result['sentence'] / r.result['tasks']:.2f}",
     "more in optimal plans": lambda r: f"{r.result['optimal'] / r.result['tasks']:.2f}",
     "share": lambda r: (
-        percent(r.result["sentence"] / r.result["optimal"]) if r.result["optimal"] else None
+        in_percent(r.result["sentence"] / r.result["optimal"]) if r.result["optimal"] else None
     ),
 }
 

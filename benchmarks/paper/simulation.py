@@ -227,10 +227,10 @@ does not see the doors of *handover*: its runs with nothing agreed are no eviden
 
 _HUMAN = """\
 A human stands in a random cell that is no corner; only lidars see the human, up to two cells away.
-Deliveries as above, by the clock. *Floor*: runs that end well; robots ask their monitor for a way
-that avoids the cell. *Joint model*: the same in joint steps, where all know of the human at the
-start. In brackets 95 % intervals (Wilson). *Only there*: well in the joint model only; *only here*:
-on the floor only."""
+Deliveries as above, by the clock. *Floor*: percent of runs that end well; robots ask their monitor
+for a way that avoids the cell. *Joint model*: the same in joint steps, where all know of the human
+at the start. In brackets 95 % intervals (Wilson). *Only there*: well in the joint model only; *only
+here*: on the floor only."""
 
 
 def _floor_table(floors: Sequence[Record]) -> str:

@@ -36,13 +36,18 @@ def by_world(records: Sequence[Record]) -> dict[str, list[Record]]:
 
 def percent(share: float) -> str:
     """Return a share as ``27.3 %``."""
-    return f"{100 * share:.1f} %"
+    return f"{in_percent(share)} %"
+
+
+def in_percent(share: float) -> str:
+    """Return a share as ``27.3``, for tables of shares in percent."""
+    return f"{100 * share:.1f}"
 
 
 def share_of_runs(successes: int, runs: int) -> str:
-    """Return a share of runs with its 95 % interval (Wilson)."""
+    """Return a share of runs in percent, with its 95 % interval (Wilson)."""
     low, high = wilson(successes, runs)
-    return f"{percent(successes / runs)} ({100 * low:.1f} to {100 * high:.1f})"
+    return f"{in_percent(successes / runs)} ({100 * low:.1f} to {100 * high:.1f})"
 
 
 def rate(successes: int, runs: int) -> tuple[float, float, float]:
