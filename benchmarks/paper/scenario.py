@@ -219,7 +219,7 @@ _ALT = "The agreed plan in the corridor, and below it the detour of r1"
 
 _FREEDOM = """\
 Cells (in other domains: subactions) in the agreed plan; further ones under the sentence, without
-communication; further ones in all optimal plans. Summed over a task's robots; *share* in percent:"""
+communication; further ones in all optimal plans. Sums over a task's robots; *share* in percent:"""
 
 
 def _detour_text(record: Record) -> str:
