@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from coordlang.required.choices import Choices
+from coordlang.vocabulary.sat import Undecided
 from coordlang.vocabulary.sentence_sets import NOTHING, Words
 from coordlang.vocabulary.spoken_choices import SpokenChoices, Step
 from planners.joint.tables import Ints
@@ -95,7 +96,7 @@ class Counterexamples:
 
 
 def many_counterexamples(
-    mixtures: Mixtures, word: Ints, most: int, ways: int = 1
+    mixtures: Mixtures, word: Ints, most: int, ways: int = 1, steps: int = sys.maxsize
 ) -> list[Counterexamples]:
     """Failing tuples of plans with one sentence, one table for each number of steps.
 
@@ -112,11 +113,18 @@ def many_counterexamples(
         About how many are wanted.  If there is none at all, ``word`` is a language for the tasks.
     ways
         So many times as many are wanted from each node: it stands for so many images.
+    steps
+        Steps of robots that may be looked at.
+
+    Raises
+    ------
+    Undecided
+        After so many steps.
     """
     choices, space = mixtures.choices, mixtures.choices.space
     if not choices.requires[space.starts].any():
         return []
-    mixtures.say(word)
+    mixtures.say(word, steps)
     nodes = np.flatnonzero(choices.requires & space.descendants(space.starts)).tolist()
     random = Random(0)  # always the same ones
     found: dict[int, list[_Plans]] = {}
@@ -172,6 +180,7 @@ class Mixtures:
         self._shared: dict[_Ahead, tuple[Words, int]] = {}
         #: How often the next steps of a mixture were looked at.
         self.visited = 0
+        self._steps_left = sys.maxsize
 
     def suspects_first(self, nodes: Sequence[int]) -> list[int]:
         """Some nodes, those first from which mixtures failed last."""
@@ -187,12 +196,12 @@ class Mixtures:
         """The robots' choices without words."""
         return self._choices
 
-    def say(self, word: Ints) -> None:
-        """Set the word of each node (nodes)."""
+    def say(self, word: Ints, steps: int = sys.maxsize) -> None:
+        """Set the word of each node (nodes), and how many steps of robots may be looked at."""
         if len(self._shared) + len(self._safe) + len(self._spoken) > _KEPT:
             self._forget()
         self._spoken.say(word)
-        self.visited = 0
+        self.visited, self._steps_left = 0, steps
 
     def failing(self, node: int, random: Random | None = None) -> _Failing | None:
         """A mixture of plans from a node that fails while all of them have one sentence.
@@ -268,6 +277,9 @@ class Mixtures:
             if step is None:
                 open_steps.pop()
                 continue
+            self._steps_left -= 1
+            if self._steps_left < 0:
+                raise Undecided
             robot = len(open_steps) - 1
             label, entered, after = step
             words = reached[robot][0] + entered

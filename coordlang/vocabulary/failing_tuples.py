@@ -150,6 +150,15 @@ class FailingTuples:
         """Where the identity and each symmetry take every state."""
         return self._images
 
+    def by_length(self) -> Iterator[tuple[int, Ints]]:
+        """Each length with the states (length, robots, tuples) of its tuples, old ones first."""
+        for length, table in sorted(self._tables.items()):
+            yield length, table.by_step
+
+    def numbers(self) -> dict[int, int]:
+        """How many tuples there are of each length."""
+        return {length: len(table.states) for length, table in self._tables.items()}
+
     def add(self, found: Counterexamples, space: PlanSpace) -> int:
         """Add failing tuples of plans; how many of them are new."""
         low, high = _different_part(found.states)
@@ -336,11 +345,15 @@ def agree(word: Ints, by_step: Ints) -> Bools:
     by_step
         (length, robots, tuples) the states.
     """
-    named = word.astype(np.uint64) + np.uint64(1)
-    before = named[by_step[0]]
+    return sequences_agree(word.take(by_step))
+
+
+def sequences_agree(words: Ints) -> Bools:
+    """(tuples) `agree` by the words (length, robots, tuples) of the states."""
+    named = words.astype(np.uint64) + np.uint64(1)
+    before = named[0]
     code = before.copy()
-    for states in by_step[1:]:
-        here = named[states]
+    for here in named[1:]:
         np.copyto(code, code * MULTIPLIER + here, where=here != before)
         before = here
     agree: Bools = (code == code[:1]).all(axis=0)

@@ -2,36 +2,39 @@
 """Merging from below: two words of a language become one, as long as it stays a language.
 
 What a partition does not tell apart no coarser one does.  A merge that fails once fails for
-ever, also of words that hold the two (Proposition 21 of docs/concepts.md), and the clauses of
-failed merges say which other ones fail.
+ever, also of words that hold the two (Proposition 21 of docs/concepts.md).  So the failing plans
+met so far are asked about all merges at once, and tasks are searched only for one that none of
+them forbids.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
-from coordlang.symmetry.subgroups import WordAction, group_table
-from coordlang.vocabulary.clause_table import ClauseTable
+from coordlang.vocabulary.failing_tuples import FailingTuples, sequences_agree
 from coordlang.vocabulary.job import Assignment
-from coordlang.vocabulary.orbit_words import OrbitWords
 from coordlang.vocabulary.refuter import Refuter
+from coordlang.vocabulary.sat import Undecided
 from planners.joint.tables import Bools, Ints
 
-#: Failing tuples after which longer ones are not looked for, and clauses that are taken of them.
-_ENOUGH, _AT_ONCE = 500, 300
+#: Steps of robots that may be looked at to decide a merge, at first: some seconds.
+_STEPS = 2_000_000
+#: Failing tuples, under one symmetry, that are asked together: some megabytes.
+_TOGETHER = 100_000
 
 
 def merged(
-    language: Assignment, states: Sequence[int], refuter: Refuter, seed: int = 0
+    language: Assignment, states: Sequence[int], refuter: Refuter
 ) -> Iterator[dict[int, int]]:
     """Languages with fewer and fewer words, made from each other by merging words.
 
-    Those words are merged that fail to merge with the most others in common: as when a graph is
-    coloured by contraction (Zykov).  Of the last one no two words can be merged.  Known failing
-    plans are asked before every merge; tasks are walked after some, which are taken back if they
-    fail, and twice as many the next time if not.
+    Those words are merged that hold the fewest states together.  Tasks are searched after some
+    merges, which are taken back if they fail, and twice as many the next time if not.  A merge that
+    takes too long to decide is left for later, and then given twice the work.  Of the last language
+    no two words can be merged.  The best one so far comes after each search.
 
     Parameters
     ----------
@@ -41,79 +44,98 @@ def merged(
         Numbers of the states that need words.
     refuter
         Tells what is wrong with a partition.
-    seed
-        Of what is drawn at random: which clauses are taken.
     """
-    random = np.random.default_rng(seed)
-    word = _numbered(language, states, refuter.pool.states)
-    table = _table(states, refuter, int(word.max()) + 1)
-    merges = 1
+    mine, pool = np.array(states), refuter.pool
+    word = _numbered(language, mine, pool.states)
+    closed, left = forbidden_merges(pool, word), False
+    merges, steps = 1, _STEPS
     while True:
-        trial = word
+        trial, of_trial, pair = word, closed, None
         for _ in range(merges):
-            trial = _merge_best(trial, table, refuter, random)
-        if trial.max() == word.max():
-            return
-        agreeing = refuter.agreeing(trial, None, _ENOUGH)
-        if agreeing:
-            table.add(refuter.pool.codes(trial, agreeing, _AT_ONCE, random))
-            merges = max(1, merges // 2)
-        else:
+            if (pair := _next_merge(trial[mine], of_trial)) is None:
+                break
+            trial, of_trial = _merge(trial, of_trial, pair)
+        if trial is word:
+            if not left:
+                return
+            closed, left, steps = forbidden_merges(pool, word), False, 2 * steps
+            continue
+        known = pool.numbers()
+        try:
+            holds = not refuter.agreeing(trial, None, 1, steps)
+        except Undecided:
+            holds = False
+            if merges == 1 and pair is not None:
+                closed[pair] = closed[pair[::-1]] = left = True
+        if holds:
             word, merges = trial, 2 * merges
-            yield {state: int(word[state]) for state in states}
+            closed = of_trial | forbidden_merges(pool, word)
+        else:
+            merges = max(1, merges // 2)
+            closed |= forbidden_merges(pool, word, known)
+        yield {state: int(word[state]) for state in states}
 
 
-def _merge_best(
-    word: Ints, table: ClauseTable, refuter: Refuter, random: np.random.Generator
-) -> Ints:
-    """The words after the best merge that no known failing plans refute; the same if none is."""
-    while (pair := _best_merge(forbidden_merges(table, word))) is not None:
-        trial = np.where(word == pair[1], pair[0], word)
-        trial -= trial > pair[1]
-        agreeing = refuter.pool.agreeing(trial, None, _ENOUGH)
-        if not agreeing:
-            return trial
-        table.add(refuter.pool.codes(trial, agreeing, _AT_ONCE, random))
-    return word
+def forbidden_merges(
+    pool: FailingTuples, word: Ints, known: Mapping[int, int] = MappingProxyType({})
+) -> Bools:
+    """(words, words) the pairs of words of a language that some failing tuple forbids to merge.
 
-
-def forbidden_merges(table: ClauseTable, word: Ints) -> Bools:
-    """(words, words) the pairs of words of a language that some clause forbids to merge.
-
-    A clause does whose separated pairs all have these two words.
+    Those after whose merge all its sequences have one sentence.  Of two sentences the words that
+    differ first become one, or one of them becomes the word before: three pairs can do that.
+    ``known`` says how many tuples of each length are not asked.
     """
-    words = int(word.max()) + 1
-    one, other = word[table.first[: len(table)]], word[table.second[: len(table)]]
-    codes = np.minimum(one, other) * words + np.maximum(one, other)
-    least = np.where(one == other, words**2, codes).min(axis=1)
-    only = least == np.where(one == other, -1, codes).max(axis=1)
-    a, b = divmod(least[only], words)
-    forbidden = np.eye(words, dtype=np.bool_)
-    forbidden[a, b] = forbidden[b, a] = True
+    forbidden = np.eye(int(word.max()) + 1, dtype=np.bool_)
+    for length, by_step in pool.by_length():
+        for first in range(known.get(length, 0), by_step.shape[2], _TOGETHER):
+            some = by_step[:, :, first : first + _TOGETHER]
+            for to in pool.images:
+                _forbid(forbidden, word[to].take(some))
     return forbidden
 
 
-def _best_merge(forbidden: Bools) -> tuple[int, int] | None:
-    """The allowed pair with the most words that neither may be merged with; the first of such."""
+def _forbid(forbidden: Bools, said: Ints) -> None:
+    """Note the merges after which sequences, by their words (length, robots, tuples), agree."""
+    entered = np.zeros(said.shape, np.int64)
+    entered[1:] = (said[1:] != said[:-1]).cumsum(axis=0)
+    sentence = np.full(said.shape, -1)
+    np.put_along_axis(sentence, entered, said, axis=0)
+    other = (sentence[:, 1:] != sentence[:, :1]).any(axis=0).argmax(axis=0) + 1
+    every = np.arange(said.shape[2])
+    one, two = sentence[:, 0], sentence[:, other, every]
+    first = (one != two).argmax(axis=0)
+    before, x, y = one[first - 1, every], one[first, every], two[first, every]
+    for a, b in ((x, y), (x, before), (y, before)):
+        rows = np.flatnonzero((a >= 0) & (b >= 0) & ~forbidden[a, b])
+        into, gone = np.minimum(a, b)[rows], np.maximum(a, b)[rows]
+        words = said[:, :, rows]
+        agree = sequences_agree(np.where(words == gone, into, words))
+        forbidden[into[agree], gone[agree]] = forbidden[gone[agree], into[agree]] = True
+
+
+def _next_merge(word: Ints, forbidden: Bools) -> tuple[int, int] | None:
+    """Of the words of some states two that may be merged, with the fewest; None if none may."""
     if forbidden.all():
         return None
-    share = forbidden.astype(np.int64)
-    common = np.where(forbidden, -1, share @ share)
-    a, b = divmod(int(common.argmax()), len(common))
-    return min(a, b), max(a, b)
+    size = np.bincount(word, minlength=len(forbidden))
+    together = np.where(forbidden, 2 * len(word) + 1, size[:, None] + size)
+    a, b = divmod(int(together.argmin()), len(forbidden))
+    return a, b
 
 
-def _numbered(language: Assignment, states: Sequence[int], rows: int) -> Ints:
+def _merge(word: Ints, forbidden: Bools, pair: tuple[int, int]) -> tuple[Ints, Bools]:
+    """The words, and the merges that are forbidden, after two became one."""
+    into, gone = pair
+    word = np.where(word == gone, into, word)
+    forbidden = forbidden.copy()
+    forbidden[into] |= forbidden[gone]
+    forbidden[:, into] |= forbidden[:, gone]
+    left = np.delete(np.delete(forbidden, gone, axis=0), gone, axis=1)
+    return word - (word > gone), left
+
+
+def _numbered(language: Assignment, states: Ints, rows: int) -> Ints:
     """The word of each state number, words from 0 on without gaps."""
     word = np.zeros(rows, np.int64)
-    _, numbers = np.unique([language[state] for state in states], return_inverse=True)
-    word[list(states)] = numbers
+    _, word[states] = np.unique([language[s] for s in states.tolist()], return_inverse=True)
     return word
-
-
-def _table(states: Sequence[int], refuter: Refuter, size: int) -> ClauseTable:
-    images = refuter.pool.images
-    alone = WordAction({0: tuple(range(size))})
-    kind = OrbitWords.of(states, group_table(images), alone, size)
-    assert kind is not None, "the identity fixes all words"
-    return ClauseTable(kind, images)

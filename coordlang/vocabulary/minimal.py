@@ -31,6 +31,10 @@ if TYPE_CHECKING:  # they load networkx
 
 #: A thousand conflicts are a unit of effort; a refuted partition counts as so many ..
 _UNIT, _ROUND = 1_000, 250
+#: .. a search for plans that a merge of words confuses as a share of it ..
+_MERGES = 5
+#: Merged words are verified once they are so many times the last ones that were.
+_FEWER = 0.9
 #: .. and besides as one for so many pairs of edges that leave one node; the first failing plans
 #: count as one for far fewer.
 _PAIRS, _FIRST_PAIRS = 1_000, 30
@@ -151,7 +155,7 @@ class MinimalSearch:
         """What was done so far."""
         if "languages" not in self.__dict__:
             return 0
-        rounds = self.languages.rounds + self._merges
+        rounds = self.languages.rounds + self._merges // _MERGES
         return self._partitions.conflicts + rounds * (_ROUND + self._pairs // _PAIRS)
 
     @property
@@ -163,8 +167,11 @@ class MinimalSearch:
         if self.best is None or self.upper <= self.lower:
             return
         languages, coarsest = self.languages, self.best
-        for coarser in merged(self.best, self._job.states, languages.refuter, self._job.seed):
-            coarsest = coarser
+        for coarser in merged(self.best, self._job.states, languages.refuter):
+            if word_count(coarser) < word_count(coarsest):
+                coarsest = coarser
+                if word_count(coarsest) <= _FEWER * self.upper:
+                    self._offer(coarsest)  # what is not verified is lost when time is over
             self._merges += 1
             self._report(f"merging words: {word_count(coarser)} left")
             if self._is_spent:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
@@ -47,7 +48,9 @@ class TaskPart:
         """The plan space of the tasks."""
         return self.choices.space
 
-    def failing(self, word: Ints, most: int, ways: int = 1) -> list[Counterexamples]:
+    def failing(
+        self, word: Ints, most: int, ways: int = 1, steps: int = sys.maxsize
+    ) -> list[Counterexamples]:
         """Failing tuples of plans with one sentence, as tables.
 
         None only if the partition is a language for these tasks.
@@ -60,11 +63,18 @@ class TaskPart:
             About how many are wanted.
         ways
             For how many images each task stands.
+        steps
+            Steps of robots that may be looked at, where sets are searched.
+
+        Raises
+        ------
+        Undecided
+            After so many steps.
         """
         nodes = word[self.space.state]
         if isinstance(self.finder, CounterexampleWalk):
             return self.finder.failing(nodes, max(most, _OF_WALK), ways)
-        return many_counterexamples(self.finder, nodes, most, ways)
+        return many_counterexamples(self.finder, nodes, most, ways, steps)
 
 
 class NecessaryClauses:

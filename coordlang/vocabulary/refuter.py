@@ -49,9 +49,9 @@ class _Walked:
     part: TaskPart
     images: tuple[int, ...]
 
-    def failing(self, word: Ints, most: int) -> list[Counterexamples]:
+    def failing(self, word: Ints, most: int, steps: int = sys.maxsize) -> list[Counterexamples]:
         """See `TaskPart.failing`."""
-        return self.part.failing(word, most, ways=len(self.images))
+        return self.part.failing(word, most, len(self.images), steps)
 
     @property
     def effort(self) -> float:
@@ -121,7 +121,11 @@ class Refuter:
         return other
 
     def agreeing(
-        self, word: Ints, images: Sequence[Ints] | None = None, enough: int = sys.maxsize
+        self,
+        word: Ints,
+        images: Sequence[Ints] | None = None,
+        enough: int = sys.maxsize,
+        steps: int = sys.maxsize,
     ) -> list[Agreeing]:
         """Failing tuples of which some image has one sentence; none if ``word`` is a language.
 
@@ -135,13 +139,20 @@ class Refuter:
             The symmetries under which images of tuples are looked at: by default all.
         enough
             Longer tuples are left out once there are so many.
+        steps
+            See `TaskPart.failing`.
+
+        Raises
+        ------
+        Undecided
+            After so many steps.
         """
         known = self.pool.agreeing(word, images, enough)
         for number, walked in enumerate(self._parts):
             if known:
                 break
             mine = images or [self.pool.images[image] for image in walked.images]
-            if any(self._walk(walked, word[to]) for to in mine):
+            if any(self._walk(walked, word[to], steps) for to in mine):
                 known = self.pool.agreeing(word, images, enough)
                 assert known, "plans that a walk has found are known"
                 self._parts.insert(0, self._parts.pop(number))
@@ -154,9 +165,9 @@ class Refuter:
         """
         return self.pool.clauses(word, self.agreeing(word, enough=_ENOUGH), self._random)
 
-    def _walk(self, walked: _Walked, word: Ints) -> bool:
+    def _walk(self, walked: _Walked, word: Ints, steps: int) -> bool:
         """Add failing plans with one sentence to the pool; whether there are any."""
-        return self._add(walked, walked.failing(word, _LATER))
+        return self._add(walked, walked.failing(word, _LATER, steps))
 
     def _add(self, walked: _Walked, found: Sequence[Counterexamples]) -> bool:
         """Add what a walk has found; whether that is anything."""
