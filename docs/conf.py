@@ -53,8 +53,11 @@ suppress_warnings = [
     "misc.highlighting_failure",  # JSON with ".." for what is left out
     "ref.python",  # two classes of one name, in an annotation that does not say which
 ]
-#: Names of other projects that are imported for annotations only, and types with arguments.
-nitpick_ignore_regex = [("py:.*", r"Axes|Figure|Drawing|types\.Annotated|.*\[.*")]
+#: Names of other projects that are imported for annotations only, names of what functions read
+#: (unions without an entry), and types with arguments.
+nitpick_ignore_regex = [
+    ("py:.*", r"Axes|Figure|Drawing|(Problem|Language)Source|types\.Annotated|.*\[.*")
+]
 
 default_role = "autolink"  # a name in single backticks links to its entry, where it has one
 autodoc_member_order = "bysource"
