@@ -45,7 +45,7 @@ def options_of(
         words_see_slack=entries.get("words_see_slack", False),
         recorded=bool(language.provenance.robots),
     )
-    for name in given if model else ():
+    for name in sorted(given) if model else ():
         _require_same(name, getattr(model, name), getattr(recorded, name))
     return recorded
 

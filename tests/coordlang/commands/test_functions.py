@@ -12,6 +12,8 @@ from typing import Any
 import pytest
 
 import coordlang
+from coordlang.language.recorded import options_of
+from planners.pddl.model_options import ModelOptions
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
 from tests.support.hall import factored
@@ -286,6 +288,14 @@ def test_parsed_objects_stand_for_files(language: Path) -> None:
         coordlang.plans(loaded, cost="makespan")
     with pytest.raises(coordlang.UsageError, match="contradicts the language file"):
         coordlang.verify(language, loaded)
+
+
+@pytest.mark.parametrize("given", [("cost", "robots"), ("robots", "cost")])
+def test_of_two_contradictions_the_same_is_told(language: Path, given: tuple[str, ...]) -> None:
+    """Whatever the order of a set of names, which depends on how strings are hashed."""
+    model = ModelOptions(robots="r1", cost="makespan+actions")
+    with pytest.raises(coordlang.UsageError, match=r"--cost makespan\+actions contradicts"):
+        options_of(coordlang.load_language(language), model, given)
 
 
 def test_robots_by_type_of_a_loaded_domain() -> None:
