@@ -33,13 +33,13 @@ if TYPE_CHECKING:  # they load networkx
 _UNIT, _ROUND = 1_000, 250
 #: .. a search for plans that a merge of words confuses as a share of it ..
 _MERGES = 5
-#: Merged words are verified once they are so many times the last ones that were.
-_FEWER = 0.9
 #: .. and besides as one for so many pairs of edges that leave one node; the first failing plans
 #: count as one for far fewer.
 _PAIRS, _FIRST_PAIRS = 1_000, 30
 #: Effort that is not enough for a tenth of the first failing plans is not begun with.
 _BEGINNING = 10
+#: Merged words are verified once they are so many times the last ones that were.
+_FEWER = 0.9
 
 
 def minimal(job: Job) -> Outcome:

@@ -160,12 +160,6 @@ class StateCodec:
         for fact in facts:
             rows[which, fact // _BLOCK_BITS] |= np.uint64(1 << fact % _BLOCK_BITS)
 
-    def set_each(self, rows: Rows, which: Ints, facts: Ints) -> None:
-        """Make fact ``facts[k]`` true in state ``which[k]`` of a table without gaps, in place."""
-        place = which * rows.shape[1] + facts // _BLOCK_BITS
-        value = np.uint64(1) << (facts % _BLOCK_BITS).astype(np.uint64)
-        np.bitwise_or.at(rows.reshape(-1), place, value)
-
     def clear(self, rows: Rows, which: Ints | Bools | slice, facts: Iterable[int]) -> None:
         """Make facts false in some states of a table (by number or mask), in place."""
         for fact in facts:

@@ -229,11 +229,6 @@ class PlanSpace:
         counts = self.first[nodes + 1] - self.first[nodes]
         return np.repeat(np.arange(len(nodes)), counts), ranges(self.first[nodes], counts)
 
-    def first_edges(self, nodes: Ints) -> Ints:
-        """The first edge out of each of these nodes, none of which may be at a goal."""
-        found: Ints = self.first[nodes]
-        return found
-
     def layer_edges(self, layer: int) -> LayerEdges:
         """The edges out of the nodes of a layer, by its number (0: the goals, which have none)."""
         low, high = np.searchsorted(self.layer, (layer, layer + 1))
