@@ -17,8 +17,8 @@ from benchmarks.paper.sentences import (
     compare,
     comparison_units,
 )
-from benchmarks.paper.suite import ROW, TITLES, method_of, world_and_method
-from benchmarks.paper.tables import in_percent, percent, rounded_mean, table
+from benchmarks.paper.suite import ROW, TITLES, method_of
+from benchmarks.paper.tables import elsewhere, in_percent, percent, rounded_mean, table
 from coordlang.language.flexibility import Flexibility
 
 #: Tasks that the paper's figure shows.
@@ -56,7 +56,7 @@ def measures(tasks: Sequence[SentenceStatistics]) -> Result:
 
 
 def section(records: Sequence[Record]) -> Section:
-    """Render the savings by method, the paper's figure, and the savings on other domains."""
+    """Render the savings by method, and the paper's figure."""
     found = Comparison.of(records)
     row = found.row
     paper = ["paper", 4, f"{DIFFERING} of 956", *map(in_percent, (SAVING_DIFFERING, SAVING_ALL))]
@@ -67,9 +67,7 @@ def section(records: Sequence[Record]) -> Section:
     ]
     if found.languages:
         alt = f"Lengths of plans and shorter sentences of {SHOWN} tasks of {row}"
-        blocks += [
-            Figure("communication-tasks", alt, partial(_first_tasks, found.languages)),
-        ]
+        blocks.append(Figure("communication-tasks", alt, partial(_first_tasks, found.languages)))
     if found.orders:
         savings, systematic = found.in_orders(1)
         named = ", ".join(f"{name} {percent(saving)}" for name, saving in systematic.items())
@@ -78,10 +76,8 @@ def section(records: Sequence[Record]) -> Section:
             f"{percent(savings[0])} to {percent(savings[-1])} (median "
             f"{percent(savings[len(savings) // 2])}); in systematic orders: {named}."
         )
-    if found.others:
-        others = table("language", world_and_method, _COLUMNS, found.others)
-        blocks += ["Domains that are not grids, all tasks:", others]
-    return Section(blocks, _differences(found), _headlines(found.of_paper))
+    others = elsewhere({"saving": _COLUMNS["saving, all"]}, found.others)
+    return Section(blocks, _differences(found), _headlines(found.of_paper), others)
 
 
 _COLUMNS = {

@@ -7,7 +7,7 @@ late are not in step.  How often does a run still end in the goal, and how late?
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from random import Random
 from typing import Any
@@ -24,6 +24,8 @@ from coordlang.execution.task_language import languages_in_tasks
 SAID = ("plan", "minimal", "flexible", "slack", "few", "silence")
 #: Probabilities with which a robot is delayed in a step.
 DELAYS = (0.0, 0.05, 0.1, 0.2, 0.3)
+#: The one that the table shows.
+_SHOWN = 0.1
 _WORLDS = ("GW1", "GWB5", *(world.name for world in OTHERS if world.name != "push-box"))
 #: Whether robots wait for each other where they cannot all do their steps.
 _YIELDING = {"as they come": False, "yielding": True}
@@ -57,12 +59,12 @@ def run(unit: Unit, settings: Settings) -> Result:
 
 
 def section(records: Sequence[Record]) -> Section:
-    """Render a table and a figure for each world."""
-    blocks: list[str | Figure] = [_DEFINITION]
-    for name, here in by_world(records).items():
+    """Render a table of all worlds for one probability, and a figure for each world."""
+    worlds = by_world(records)
+    blocks: list[str | Figure] = [_DEFINITION, _table(worlds)]
+    for name, here in worlds.items():
         alt = f"Runs on {name} that end in the goal, by the probability of a delay"
-        figure = Figure(f"delays-{name}", alt, partial(_figure, here))
-        blocks += [f"{name}, {here[0].result['tasks']:,} tasks:", _table(here), figure]
+        blocks.append(Figure(f"delays-{name}", alt, partial(_figure, here)))
     return Section(blocks)
 
 
@@ -70,21 +72,27 @@ _DEFINITION = """\
 A task and one of its plans are drawn. All robots follow this *plan*, or each draws a plan with its
 sentence. In each step every robot that is not done is delayed with probability *p*. As they come,
 a step that is no joint step is a failure. *Yielding*: robots that cannot do their steps wait; the
-run fails if all wait for ever, or miss the goal. Cells: runs that end in the goal in percent, and
-their mean steps beyond the least makespan."""
+run fails if all wait for ever, or miss the goal. The figures show all *p*; the table has
+p = 0.1: runs that end in the goal in percent, as they come and yielding, and in brackets the mean
+steps of the yielding ones beyond the least makespan."""
 
 
-def _table(records: Sequence[Record]) -> str:
-    rows = []
-    for record in records:
-        result, title = record.result, TITLES[record.parameters["said"]]
-        for name, yields in _YIELDING.items():
-            cells = []
-            for runs, well, late in result[name]:
-                mean = f" (+{late / well:.2f})" if well else ""
-                cells.append(f"{100 * well / runs:.1f}{mean}")
-            rows.append([title + ", yielding" * yields, result["words"], *cells])
-    return markdown(("said", "words", *(f"p = {delay:g}" for delay in DELAYS)), rows)
+def _table(worlds: Mapping[str, Sequence[Record]]) -> str:
+    cells = {
+        (name, record.parameters["said"]): _cell(record)
+        for name, here in worlds.items()
+        for record in here
+    }
+    rows = [[TITLES[said], *(cells.get((name, said)) for name in worlds)] for said in SAID]
+    return markdown(("said", *worlds), rows)
+
+
+def _cell(record: Record) -> str:
+    """The share of runs that end well, as they come and yielding, and how late the latter are."""
+    shown = DELAYS.index(_SHOWN)
+    (runs, well, _), (_, yielding, late) = (record.result[name][shown] for name in _YIELDING)
+    mean = f" (+{late / yielding:.2f})" if yielding else ""
+    return f"{100 * well / runs:.1f}, {100 * yielding / runs:.1f}{mean}"
 
 
 def _figure(records: Sequence[Record]) -> Any:

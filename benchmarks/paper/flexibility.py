@@ -17,8 +17,8 @@ from benchmarks.paper.sentences import (
     compare,
     comparison_units,
 )
-from benchmarks.paper.suite import ROW, TITLES, method_of, world_and_method
-from benchmarks.paper.tables import rounded_mean, table
+from benchmarks.paper.suite import ROW, TITLES, method_of
+from benchmarks.paper.tables import elsewhere, rounded_mean, table
 from coordlang.language.flexibility import Flexibility
 
 
@@ -51,7 +51,7 @@ def measures(tasks: Sequence[SentenceStatistics]) -> Result:
 
 
 def section(records: Sequence[Record]) -> Section:
-    """Render the open plans by method, their distribution, and those of other domains."""
+    """Render the open plans by method, and their distribution."""
     found = Comparison.of(records)
     row = found.row
     paper = ["paper", 4, OPEN_ALL, f"{SEVERAL} of 956", OPEN_SEVERAL, None, None, None]
@@ -65,10 +65,9 @@ def section(records: Sequence[Record]) -> Section:
         blocks.append(Figure("flexibility", alt, partial(_figure, found.languages)))
     if found.orders:
         blocks.append(_orders_text(found))
-    if found.others:
-        others = table("language", world_and_method, _COLUMNS, found.others)
-        blocks += ["Domains that are not grids, all tasks:", others]
-    return Section(blocks, _differences(found), _headlines(found.of_paper))
+    shown = {"optimal plans": _COLUMNS["optimal plans"], "open": _COLUMNS["open"]}
+    others = elsewhere(shown, found.others)
+    return Section(blocks, _differences(found), _headlines(found.of_paper), others)
 
 
 _COLUMNS = {

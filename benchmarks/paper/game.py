@@ -22,7 +22,7 @@ from benchmarks.paper.plots import Lines, Series, lines
 from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
 from benchmarks.paper.sentences import candidate_statistics
 from benchmarks.paper.suite import METHODS, OTHERS, TITLES, WORLDS, language_for, method_of
-from benchmarks.paper.tables import by_world
+from benchmarks.paper.tables import Columns, elsewhere
 
 #: The row of Table 1 that the paper plays on.
 ROW = "GWB5"
@@ -151,17 +151,22 @@ def expected_widest_first(sizes: Sequence[int], liked: int) -> Fraction:
 
 
 def section(records: Sequence[Record]) -> Section:
-    """Render the numbers of proposals, world by world."""
-    blocks: list[str | Figure] = [_DEFINITION]
-    worlds = by_world(records)
-    for name, here in worlds.items():
-        runs, tasks = here[0].parameters["runs"], here[0].result["tasks"]
-        text = f"{name}, {tasks:,} tasks, {runs} games each:"
-        blocks += [text, _table(here)]
-        if name == ROW:
-            alt = f"Proposals until accepted on {ROW}, by liked plans"
-            blocks.append(Figure("game", alt, partial(_figure, here)))
-    return Section(blocks, _DIFFERENCES if ROW in worlds else ())
+    """Render the numbers of proposals."""
+    mine = [record for record in records if record.parameters["world"] == ROW]
+    others = [record for record in records if record.parameters["world"] != ROW]
+    columns: Columns = {
+        "proposals": lambda r: ", ".join(
+            f"{r.result['exact'][what][0]:.2f}" for what in ("plan", "sentence")
+        )
+    }
+    found = elsewhere(columns, others)
+    if not mine:
+        return Section([_DEFINITION], elsewhere=found)
+    runs, tasks = mine[0].parameters["runs"], mine[0].result["tasks"]
+    alt = f"Proposals until accepted on {ROW}, by liked plans"
+    figure = Figure("game", alt, partial(_figure, mine))
+    text = f"{ROW}, {tasks:,} tasks, {runs} games each:"
+    return Section([_DEFINITION, text, _table(mine), figure], _DIFFERENCES, elsewhere=found)
 
 
 _DEFINITION = """\

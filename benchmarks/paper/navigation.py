@@ -18,7 +18,7 @@ from benchmarks.paper.disruptions import subaction_trials, warehouse_trials
 from benchmarks.paper.plots import Series, by_category
 from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
 from benchmarks.paper.suite import METHODS, OTHERS, TITLES, WORLDS, language_for, method_of
-from benchmarks.paper.tables import Columns, in_percent, rate, share_of_runs, table
+from benchmarks.paper.tables import Columns, elsewhere, in_percent, rate, share_of_runs, table
 from benchmarks.paper.warehouse import LAYOUTS, WAREHOUSES, deliveries, listed_tasks
 
 #: Languages that take more than minutes to build: an unfinished one would depend on the machine.
@@ -74,7 +74,7 @@ def run(unit: Unit, settings: Settings) -> Result:
 
 
 def section(records: Sequence[Record]) -> Section:
-    """Render the success rates by map and method, and those on other domains."""
+    """Render the success rates by map and method."""
     mine = [record for record in records if "warehouse" in record.parameters]
     others = [record for record in records if "world" in record.parameters]
     blocks: list[str | Figure] = [_DEFINITION]
@@ -84,52 +84,43 @@ def section(records: Sequence[Record]) -> Section:
             alt = f"Success rates of deliveries {layout} the warehouse, by map"
             figure = Figure(f"navigation-{layout}", alt, partial(_figure, here))
             blocks += [f"Deliveries {layout} the warehouse:", _table(here), figure]
-    if others:
-        blocks += [_OTHERS, _table(others)]
-    return Section(blocks, _differences(mine))
+    columns: Columns = {
+        "robust": lambda r: f"{_exact('plan', r)}, {_exact('sentence', r)}",
+    }
+    return Section(blocks, _differences(mine), elsewhere=elsewhere(columns, others))
 
 
 _DEFINITION = """\
 Two robots start in random corners: storage S1 and S2 (left), dispatch D1 and D2 (right). Robot i
 goes to Si and then to Di, or the other way round. Once they have agreed, a human appears in a
 random cell that is no corner. An agreed *plan* fails if a robot would enter that cell, its
-*sentence* if some robot has no choice of its own that avoids it. *Of 100*: random runs. *Exact*:
-percent of all cases; with a 95 % interval (Wilson): of 10,000 runs. *Possible*: if the robots may
-agree again. Our maps are full rectangles (*open*) or their border (*ring*). *Across*: D1 is
-opposite S1; *along*: on the same side."""
-
-_OTHERS = "Domains that are not grids, all tasks; a subaction of optimal plans becomes impossible:"
+*sentence* if some robot has no choice of its own that avoids it. Cells: successes, percent of all
+cases; with a 95 % interval (Wilson): of 10,000 runs. *Possible*: if the robots may agree again. Our
+maps are full rectangles (*open*) or their border (*ring*). *Across*: D1 is opposite S1; *along*: on
+the same side."""
 
 
 def _table(records: Sequence[Record]) -> str:
     def name(record: Record) -> str:
-        asked = record.parameters
-        return f"{asked.get('warehouse', asked.get('world'))}, {method_of(record)}"
-
-    def exact(what: str, record: Record) -> str | None:
-        known = record.result["exact"]
-        return in_percent(known[what]) if known else many(what, record)
+        return f"{record.parameters['warehouse']}, {method_of(record)}"
 
     def possible(record: Record) -> str | None:
         known = record.result["exact"]
         return in_percent(known["possible"]) if known else None
 
-    def few(what: str, record: Record) -> str:
-        return f"{record.result['few'][what]}"
-
-    def many(what: str, record: Record) -> str:
-        return share_of_runs(record.result["many"][what], record.result["many"]["runs"])
-
-    runs = f"of {records[0].result['few']['runs']}"
     columns: Columns = {
         "words": lambda r: r.result["words"],
-        f"plan, {runs}": partial(few, "plan"),
-        f"sentence, {runs}": partial(few, "sentence"),
-        "plan, exact": partial(exact, "plan"),
-        "sentence, exact": partial(exact, "sentence"),
+        "plan": partial(_exact, "plan"),
+        "sentence": partial(_exact, "sentence"),
         "possible": possible,
     }
     return table("map, language", name, columns, records)
+
+
+def _exact(what: str, record: Record) -> str:
+    """A success rate: exact, or of many runs with its interval if it is not known."""
+    known, many = record.result["exact"], record.result["many"]
+    return in_percent(known[what]) if known else share_of_runs(many[what], many["runs"])
 
 
 def _figure(records: Sequence[Record]) -> Any:

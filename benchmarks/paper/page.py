@@ -49,6 +49,7 @@ def page_of(
         *_differences(sections),
         *_unfinished(lines),
         *parts,
+        *_elsewhere(sections),
     ]
     return "\n\n".join(parts) + "\n", sections
 
@@ -80,6 +81,27 @@ def _headlines(sections: Mapping[str, Section]) -> list[str]:
         return []
     head = ("measure", "paper", "ours, greedy", "ours, minimal")
     return ["## The paper's values and ours", markdown(head, headlines)]
+
+
+def _elsewhere(sections: Mapping[str, Section]) -> list[str]:
+    columns: dict[str, Mapping[str, object]] = {}
+    for section in sections.values():
+        columns |= section.elsewhere
+    names = dict.fromkeys(name for column in columns.values() for name in column)
+    if not names:
+        return []
+    rows = [[name, *(column.get(name) for column in columns.values())] for name in names]
+    return [_ELSEWHERE, markdown(("world, language", *columns), rows)]
+
+
+_ELSEWHERE = """\
+## Domains that are not grids
+
+The measures of the sections above, over all tasks; *A\\** and *share* over 300 tasks drawn.
+*Saving*: of communication, percent. *A\\**: times fewer nodes, relaxed bound, pruned. *Robust*: a
+subaction of optimal plans becomes impossible; percent of the cases in which the plan, and in which
+the sentence, succeeds. *Proposals*: expected, of plans and of sentences, k = 1. *Share*: of the
+further subactions in optimal plans those under the sentence, percent."""
 
 
 def _differences(sections: Mapping[str, Section]) -> list[str]:

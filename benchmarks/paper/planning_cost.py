@@ -9,8 +9,8 @@ from statistics import fmean
 
 from benchmarks.paper.recipe import Recipe, Record, Result, Section, Settings, Unit
 from benchmarks.paper.reported import PLANNING_RATIO
-from benchmarks.paper.suite import METHODS, OTHERS, QUICK_ROW, ROW, TITLES, WORLDS, language_for
-from benchmarks.paper.tables import table
+from benchmarks.paper.suite import METHODS, OTHERS, QUICK_ROW, ROW, WORLDS, language_for, method_of
+from benchmarks.paper.tables import elsewhere, table
 from coordlang.execution.guided_search import ExpandedStates, plan_under_sentence
 from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
 
@@ -74,32 +74,30 @@ def expansions(
 
 
 def section(records: Sequence[Record]) -> Section:
-    """Render the expanded nodes by heuristic and method, and those on other domains."""
+    """Render the expanded nodes by heuristic and method."""
 
     def name(record: Record) -> str:
-        asked = record.parameters
-        world = "" if asked["world"] == row else f"{asked['world']}, "
-        return f"{world}{asked['heuristic']}, {TITLES[asked['method']]}"
+        return f"{record.parameters['heuristic']}, {method_of(record)}"
 
     row = records[0].parameters["world"]
-    others = [record for record in records if record.parameters["world"] != row]
+    others = [
+        record
+        for record in records
+        if record.parameters["world"] != row and record.parameters["heuristic"] == "relaxed"
+    ]
     mine = [record for record in records if record.parameters["world"] == row]
     blocks = [
         _DEFINITION.format(row=row, ratio=PLANNING_RATIO),
         table("search", name, _COLUMNS, mine),
     ]
-    if others:
-        blocks += [
-            "Domains that are not grids; tasks drawn at random:",
-            table("search", name, _COLUMNS, others),
-        ]
+    columns = elsewhere({r"A\*": _COLUMNS["times fewer"]}, others)
     of = {(r.parameters["heuristic"], r.parameters["method"]): r.result for r in mine}
     greedy, least = (of.get(("manhattan", method)) for method in ("greedy", "minimal"))
     if row != ROW or greedy is None:
-        return Section(blocks)
+        return Section(blocks, elsewhere=columns)
     found = tuple(f"{_ratio(r, 'pruned'):.2f}" if r else "–" for r in (greedy, least))
     headline = (f"{row}: A* with a sentence, times fewer nodes", f"{PLANNING_RATIO}", *found)
-    return Section(blocks, [_difference(greedy, least)], [headline])
+    return Section(blocks, [_difference(greedy, least)], [headline], columns)
 
 
 _DEFINITION = """\

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from random import Random
 from typing import TYPE_CHECKING, Any
 
@@ -78,12 +78,14 @@ class Section:
     """An experiment rendered: Markdown and figures, and what differs from the paper and why.
 
     ``headlines`` are lines of the first table of the page: the measure, the paper's value, ours
-    with a greedy and with a minimal language.
+    with a greedy and with a minimal language.  ``elsewhere`` are columns of its last table, of
+    domains that are not grids: a cell for each world and method.
     """
 
     blocks: Sequence[str | Figure]
     differences: Sequence[str] = ()
     headlines: Sequence[Sequence[str]] = ()
+    elsewhere: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
 
     @property
     def figures(self) -> list[Figure]:

@@ -19,15 +19,8 @@ from benchmarks.paper.grid import entered_cells, placement, task_cells
 from benchmarks.paper.grid_drawing import draw_map
 from benchmarks.paper.plots import drawing
 from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
-from benchmarks.paper.suite import (
-    METHODS,
-    OTHERS,
-    WORLDS,
-    language_for,
-    method_of,
-    world_and_method,
-)
-from benchmarks.paper.tables import in_percent, table
+from benchmarks.paper.suite import CORRIDOR, METHODS, OTHERS, WORLDS, language_for, method_of
+from benchmarks.paper.tables import elsewhere, in_percent, table
 from benchmarks.paper.task_choices import TaskChoices
 from coordlang.execution.automaton import Automaton
 from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
@@ -204,9 +197,10 @@ def section(records: Sequence[Record]) -> Section:
     if shown:
         figure = Figure("scenario", _ALT, partial(_figure, shown[-1]))
         blocks += [figure, _detour_text(shown[-1])]
-    return Section(
-        [*blocks, _FREEDOM, table("world, language", world_and_method, _COLUMNS, records)]
-    )
+    mine = [record for record in records if record.parameters["world"] == CORRIDOR.name]
+    others = [record for record in records if record.parameters["world"] != CORRIDOR.name]
+    blocks += [_FREEDOM, table("language", method_of, _COLUMNS, mine)]
+    return Section(blocks, elsewhere=elsewhere({"share": _COLUMNS["share"]}, others))
 
 
 _DEFINITION = f"""\
@@ -218,8 +212,8 @@ change its part; no robot is late."""
 _ALT = "The agreed plan in the corridor, and below it the detour of r1"
 
 _FREEDOM = """\
-Cells (in other domains: subactions) in the agreed plan; further ones under the sentence, without
-communication; further ones in all optimal plans. Sums over a task's robots; *share* in percent:"""
+Cells in the agreed plan; further ones under the sentence, without communication; further ones in
+all optimal plans. Sums over a task's robots; *share* in percent:"""
 
 
 def _detour_text(record: Record) -> str:

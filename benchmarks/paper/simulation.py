@@ -19,7 +19,6 @@ from benchmarks.paper.grid import task_cells
 from benchmarks.paper.recipe import Recipe, Record, Result, Section, Settings, Unit
 from benchmarks.paper.scenario import PLACE, detour, drawn_task, trading_rooms
 from benchmarks.paper.suite import CORRIDOR, language_for, method_of
-from benchmarks.paper.tables import share_of_runs
 from benchmarks.paper.task_choices import TaskChoices
 from benchmarks.paper.warehouse import WAREHOUSES, deliveries, human_in, listed_tasks
 from coordlang.execution.task_language import languages_in_tasks
@@ -197,9 +196,9 @@ def section(records: Sequence[Record]) -> Section:
     warehouses = [record for record in found if "warehouse" in record.parameters]
     blocks = [_DEFINITION]
     if floors:
-        blocks += [_FLOORS, _floor_table(floors), _sums(floors), _WORDS, _computed(floors)]
+        blocks += [_FLOORS, _sums(floors), _WORDS, _floor_table(floors), _computed(floors)]
     if warehouses:
-        blocks += [_HUMAN, _human_table(warehouses)]
+        blocks += [_HUMAN, _human_table(warehouses), _compared(warehouses)]
     blocks += [_detour_text(record) for record in found if "detour" in record.parameters]
     blocks += [
         f"Not run: {record.key}, for want of {record.result['absent']}."
@@ -219,40 +218,33 @@ anything."""
 
 _FLOORS = """\
 Tasks that require coordination, on shipped maps and a maze of others. *Sentence*: of a plan drawn
-uniformly. *Nothing*: each robot follows an optimal plan of its own. *Late*: runs, and in brackets
-joint steps. *Messages* and simulated *seconds*: of a run on average. *Nearest*: the least distance
-of two middles in metres; discs touch at 0.4 m. *Joint model*: runs in which the robots' subplans,
-done in step, are an optimal plan. *Agree*: runs that end well exactly if they are. The simulator
-does not see the doors of *handover*: its runs with nothing agreed are no evidence."""
+uniformly. *Nothing*: each robot follows an optimal plan of its own. *Messages* and simulated
+*seconds*: of a run on average. *Nearest*: the least distance of two middles in metres; discs touch
+at 0.4 m. *Joint model*: runs in which the robots' subplans, done in step, are an optimal plan.
+*Agree*: runs that end well exactly if they are. The simulator does not see the doors of *handover*:
+its runs with nothing agreed are no evidence."""
 
 _HUMAN = """\
 A human stands in a random cell that is no corner; only lidars see the human, up to two cells away.
-Deliveries as above, by the clock. *Floor*: percent of runs that end well; robots ask their monitor
-for a way that avoids the cell. *Joint model*: the same in joint steps, where all know of the human
-at the start. In brackets 95 % intervals (Wilson). *Only there*: well in the joint model only; *only
-here*: on the floor only."""
+Deliveries as above, by the clock. Runs that end well on the floor, where robots ask their monitor
+for a way that avoids the cell, and in the *joint model*, where all know of the human at the
+start."""
 
 
 def _floor_table(floors: Sequence[Record]) -> str:
-    rows: list[list[object]] = []
-    for record in floors:
-        for agreement, ways in _DRIVEN.items():
-            for way in ways:
-                r = record.result[agreement][way]
-                floor = record.parameters["floor"].removesuffix(" robots")
-                row: list[object] = [f"{floor}, {agreement}, {way}"]
-                row.append(record.result["words"] if agreement == "sentence" else None)
-                row += [r["well"], r["collisions"], r["deadlocks"]]
-                row.append(f"{r['late']} ({r['late_steps']})" if r["late"] else 0)
-                row += [f"{r[what] / r['runs']:.1f}" for what in ("messages", "seconds")]
-                row.append(None if r["nearest"] is None else f"{r['nearest']:.2f}")
-                rows.append([*row, r["mixes"], r["agree"]])
-    head = (
-        f"floor, robots, agreed, step; {floors[0].parameters['runs']} runs each",
-        *("words", "well", "collisions", "deadlocks", "late", "messages", "seconds", "nearest"),
-        *("joint model", "agree"),
-    )
-    return markdown(head, rows)
+    """The runs that ended well on each floor."""
+    ways = [(agreement, way) for agreement, ways in _DRIVEN.items() for way in ways]
+    rows = [
+        [
+            record.parameters["floor"].removesuffix(" robots"),
+            record.result["words"],
+            *(record.result[agreement][way]["well"] for agreement, way in ways),
+        ]
+        for record in floors
+    ]
+    runs = floors[0].parameters["runs"]
+    heads = (f"{agreement}, {way}" for agreement, way in ways)
+    return markdown((f"well of {runs}: floor, robots", "words", *heads), rows)
 
 
 def _computed(floors: Sequence[Record]) -> str:
@@ -264,36 +256,49 @@ def _computed(floors: Sequence[Record]) -> str:
 
 def _sums(floors: Sequence[Record]) -> str:
     """How runs ended on all floors together, by what was agreed and way by way."""
-    shown = ("runs", "well", "collisions", "agree")
-    rows = [
-        [f"{agreement}, {way}"]
-        + [sum(record.result[agreement][way][what] for record in floors) for what in shown]
-        for agreement, ways in _DRIVEN.items()
-        for way in ways
-    ]
-    return markdown(("all floors: agreed, step", *shown), rows)
+    counts = ("runs", "well", "collisions", "deadlocks", "late", "mixes", "agree")
+    rows = []
+    for agreement, ways in _DRIVEN.items():
+        for way in ways:
+            results = [record.result[agreement][way] for record in floors]
+            sums = {what: sum(r[what] for r in results) for what in (*counts, *_MEANS)}
+            nearest = min(r["nearest"] for r in results if r["nearest"] is not None)
+            means = (f"{sums[what] / sums['runs']:.1f}" for what in _MEANS)
+            row = [f"{agreement}, {way}", *(sums[what] for what in counts), *means]
+            rows.append([*row, f"{nearest:.2f}"])
+    heads = (*counts[:-2], "joint model", "agree", *_MEANS, "nearest")
+    return markdown(("all floors: agreed, step", *heads), rows)
 
 
+#: What is told of a run on average.
+_MEANS = ("messages", "seconds")
 _WORDS = "Within a word robots are not in step, and a sentence promises nothing of such mixtures."
 
 
 def _human_table(warehouses: Sequence[Record]) -> str:
-    rows: list[list[object]] = []
+    rows = []
     for record in warehouses:
-        name = (
-            f"{record.parameters['warehouse']}, {record.parameters['layout']}, {method_of(record)}"
-        )
-        for agreement in ("plan", "sentence"):
-            r = record.result[agreement]
-            words = record.result["words"] if agreement == "sentence" else None
-            shares = [share_of_runs(r[what], r["runs"]) for what in ("well", "model")]
-            counts = [r[what] for what in ("model_only", "floor_only", "collisions")]
-            rows.append([f"{name}: {agreement}", words, *shares, *counts])
-    head = (
-        f"map, layout, language: agreed; {warehouses[0].result['plan']['runs']} runs each",
-        *("words", "floor", "joint model", "only there", "only here", "collisions"),
+        name = f"{record.parameters['warehouse']}, {record.parameters['layout']}"
+        ends = (record.result[agreed][what] for agreed in _AGREED for what in ("well", "model"))
+        rows.append([f"{name}, {method_of(record)}", record.result["words"], *ends])
+    runs = warehouses[0].result["plan"]["runs"]
+    heads = (f"{agreed}{where}" for agreed in _AGREED for where in ("", ", joint model"))
+    return markdown((f"well of {runs}: map, layout, language", "words", *heads), rows)
+
+
+#: What robots in a warehouse have agreed on.
+_AGREED = ("plan", "sentence")
+
+
+def _compared(warehouses: Sequence[Record]) -> str:
+    """How often floor and joint model say different things, and how often somebody collided."""
+    results = [record.result[agreed] for record in warehouses for agreed in _AGREED]
+    runs, touched = (sum(r[what] for r in results) for what in ("runs", "collisions"))
+    other = sum(r["model_only"] + r["floor_only"] for r in results)
+    return (
+        f"Floor and joint model differ in {other} of {runs} runs, and in {touched} somebody "
+        "touched something."
     )
-    return markdown(head, rows)
 
 
 def _detour_text(record: Record) -> str:

@@ -12,6 +12,7 @@ from benchmarks.paper.plots import Series, by_category
 from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
 from benchmarks.paper.reported import TABLE_1
 from benchmarks.paper.state_orders import RANDOM_ORDERS, greedy_partitions
+from benchmarks.paper.suite import METHODS as COMPARED
 from benchmarks.paper.suite import OTHERS, ROWS, WORLDS, World
 from benchmarks.paper.tables import by_world
 from coordlang.commands.building import build_language
@@ -116,14 +117,13 @@ _Columns = Mapping[str, Record]
 
 
 def section(records: Sequence[Record]) -> Section:
-    """Render the words and the seconds of all rows, and the words of other domains."""
+    """Render the words and the seconds of all rows."""
     of = {
         world: {record.parameters["column"]: record for record in here}
         for world, here in by_world(records).items()
         if any(record.parameters["column"] == "greedy" for record in here)
     }
     rows = {name: columns for name, columns in of.items() if name in TABLE_1}
-    others = {name: columns for name, columns in of.items() if name not in TABLE_1}
     alt = "Words of every row of Table 1, by method"
     blocks: list[str | Figure] = [
         _DEFINITION,
@@ -140,45 +140,41 @@ def section(records: Sequence[Record]) -> Section:
     ]
     if stopped:
         blocks.append(f"Stopped by its limit before its proof was complete: {', '.join(stopped)}.")
-    if others:
-        blocks += ["Domains that are not grids, all tasks:", _words(others)]
-    headlines = [
-        (
-            f"{name}: words",
-            f"{TABLE_1[name].words}",
-            f"{columns['greedy'].result['words']}",
-            _starred(columns.get("minimal")) or "–",
-        )
-        for name, columns in rows.items()
-    ]
-    return Section(blocks, list(_differences(rows)), headlines)
+    return Section(blocks, list(_differences(rows)), elsewhere=_elsewhere(of))
 
 
 _DEFINITION = """\
 Tasks and states are exactly the paper's. *Greedy*: fill a word with every state that still fits;
 *orders*: the range over other orders of the states. *Least alpha*: fewest words that separate all
 first differences. *Separating*: that separate first or last differences (Theorem 3). *Minimal*:
-fewest words of any partition. *Exhaustive*: the paper's brute force. A star: proved the least of
-its kind. Every language is verified by definition."""
+fewest words of any partition. A star: proved the least of its kind. Every language is verified by
+definition."""
 
 
 def _words(rows: Mapping[str, _Columns]) -> str:
-    """The table of words; the column of brute force is for the paper's rows only."""
+    """The table of words."""
     lines = []
     for name, columns in rows.items():
         greedy, orders = columns["greedy"].result, _in_orders(columns)
-        paper = TABLE_1.get(name)
-        exact = f" (exact {paper.exact})" if paper and paper.exact else ""
+        paper = TABLE_1[name]
+        exact = f" (exact {paper.exact})" if paper.exact else ""
         line: list[object] = [name, greedy["tasks"], greedy["states"], greedy["divergences"]]
-        line += [f"{paper.words}{exact}" if paper else None, greedy["words"]]
+        line += [f"{paper.words}{exact}", greedy["words"]]
         line.append(f"{min(orders)} to {max(orders)}" if orders else None)
-        line += [_starred(columns.get(column)) for column in PROVED]
-        if paper:
-            brute = columns.get("exhaustive")
-            line.append(brute.result["words"] if brute else None)
-        lines.append(line)
-    head = ["row", "tasks", "states", "divergences", "paper", "greedy", "greedy, orders", *PROVED]
-    return markdown([*head, "exhaustive"][: len(lines[0])] if lines else head, lines)
+        lines.append([*line, *(_starred(columns.get(column)) for column in PROVED)])
+    head = ("row", "tasks", "states", "divergences", "paper", "greedy", "greedy, orders", *PROVED)
+    return markdown(head, lines)
+
+
+def _elsewhere(of: Mapping[str, _Columns]) -> dict[str, dict[str, object]]:
+    """Tasks and words of the other worlds."""
+    found: dict[str, dict[str, object]] = {"tasks": {}, "words": {}}
+    for name, columns in of.items():
+        for method in COMPARED if name not in TABLE_1 else ():
+            if method in columns:
+                found["tasks"][f"{name}, {method}"] = columns[method].result["tasks"]
+                found["words"][f"{name}, {method}"] = _starred(columns[method])
+    return found
 
 
 def _in_orders(columns: _Columns) -> list[int]:
@@ -203,14 +199,11 @@ def _seconds(rows: Mapping[str, _Columns]) -> str:
     shown = ("greedy", *PROVED)
     lines = []
     for name, columns in rows.items():
-        paper, brute = TABLE_1[name], columns.get("exhaustive")
+        paper = TABLE_1[name]
         exact = f" (exact {paper.exact_seconds})" if paper.exact_seconds else ""
         seconds = [f"{columns[c].cpu:.2f}" if c in columns else None for c in shown]
-        end = None
-        if brute:
-            end = f"{brute.cpu:.2f}" if brute.result["words"] else brute.result["why"]
-        lines.append([name, f"{paper.seconds:,.1f}{exact}", *seconds, end])
-    return markdown(("row", "paper", *shown, "exhaustive"), lines)
+        lines.append([name, f"{paper.seconds:,.1f}{exact}", *seconds])
+    return markdown(("row", "paper", *shown), lines)
 
 
 def _figure(rows: Mapping[str, _Columns]) -> Any:
@@ -244,12 +237,12 @@ def _differences(rows: Mapping[str, _Columns]) -> Iterator[str]:
             f"smaller than the paper's (median {median(ratios):.1f}), which is exact for {exact} "
             "only."
         )
-    brute = [columns["exhaustive"] for columns in rows.values() if "exhaustive" in columns]
-    unfinished = [record for record in brute if record.result["words"] is None]
-    if unfinished:
+    brute = {name: c["exhaustive"].result["words"] for name, c in rows.items() if "exhaustive" in c}
+    ended = [f"{name}: {words} words" for name, words in brute.items() if words is not None]
+    if len(ended) < len(brute):
         yield (
-            f"**Brute force** ends within {BRUTE_SECONDS:g} s on {len(rows) - len(unfinished)} of "
-            f"{len(rows)} rows. Beyond {MOST_PAIRS:,} pairs of optimal plans it is not started."
+            f"**Brute force** ends within {BRUTE_SECONDS:g} s on {len(ended)} of {len(brute)} rows "
+            f"({', '.join(ended)}). Beyond {MOST_PAIRS:,} pairs of optimal plans it is not started."
         )
 
 

@@ -8,6 +8,7 @@ from statistics import fmean
 
 from benchmarks.frame import markdown
 from benchmarks.paper.recipe import Record
+from benchmarks.paper.suite import METHODS, world_and_method
 from coordlang.required.failures import wilson
 
 #: Columns of a table: their heads, and what they show of a record.
@@ -24,6 +25,15 @@ def table(
     """Return a Markdown table with a row for each record, below the rows ``above``."""
     rows = [[name(record), *(show(record) for show in columns.values())] for record in records]
     return markdown((first, *columns), [*above, *rows])
+
+
+def elsewhere(columns: Columns, records: Sequence[Record]) -> dict[str, dict[str, object]]:
+    """Return columns of the page's table of other worlds, for the methods that are compared."""
+    shown = [record for record in records if record.parameters["method"] in METHODS]
+    return {
+        head: {world_and_method(record): show(record) for record in shown}
+        for head, show in columns.items()
+    }
 
 
 def by_world(records: Sequence[Record]) -> dict[str, list[Record]]:

@@ -167,6 +167,10 @@ def test_what_table_1_says_of_the_paper() -> None:
         record("GW1", "least alpha", **least),
         record("GW1", "minimal", **{**base, "proved_minimal": True}, words=3),
         record("GW1", "orders", words={"by number": 8, "random 1": 9}),
+        record("GW1", "exhaustive", words=3),
+        record("GW2", "greedy", **base, words=13),
+        record("GW2", "exhaustive", words=None),
+        record("tray", "greedy", **base, words=9),
     ]
     section = table1.section(records)
     assert "| GW1 | 132 | 12 | 68 | 7 (exact 3) | 8 | 8 to 9 | 8* |" in "\n".join(
@@ -176,7 +180,8 @@ def test_what_table_1_says_of_the_paper() -> None:
     assert "On GW1 the paper's number is outside of what 2 orders gave" in told
     assert "GW1 (7 against 8)" in told
     assert "2.3 to 2.3 times smaller" in told
-    assert section.headlines == [("GW1: words", "7", "8", "3*")]
+    assert section.elsewhere == {"tasks": {"tray, greedy": 132}, "words": {"tray, greedy": "9"}}
+    assert "(GW1: 3 words)" in told
     same = [
         record("GW1", "greedy", **base, words=7),
         record("GW1", "orders", words={"by number": 6, "random 1": 8}),

@@ -144,9 +144,9 @@ def test_units_are_reproducible_and_the_section_shows_them() -> None:
         assert result["well"] == result["model"] - result["model_only"] + result["floor_only"]
     section = simulation.section(records)
     text = "".join(block for block in section.blocks if isinstance(block, str))
-    assert "| T-map, 2, sentence, clock | 3 | 1 | 0 |" in text
-    assert "| sentence, clock | 2 | 2 | 0 | 2 |" in text
-    assert "| open 3x3, across, minimal: sentence |" in text
+    assert "| T-map, 2 | 3 | 1 | 1 |" in text
+    assert "| sentence, clock | 2 | 2 | 0 | 0 | 0 | 2 | 2 | 0.0 |" in text
+    assert "| open 3x3, across, minimal | 3 |" in text
 
 
 @pytest.mark.thorough
