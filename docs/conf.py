@@ -69,6 +69,7 @@ numpydoc_show_class_members = False
 html_theme = "furo"
 html_title = "coordlang"
 html_show_sourcelink = False
+html_static_path, html_css_files = ["_static"], ["wide.css"]
 
 ROOM = """\
 {title}

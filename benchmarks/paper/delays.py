@@ -59,21 +59,18 @@ def run(unit: Unit, settings: Settings) -> Result:
 
 
 def section(records: Sequence[Record]) -> Section:
-    """Render a table of all worlds for one probability, and a figure for each world."""
+    """Render a table for one probability, and a figure for all."""
     worlds = by_world(records)
-    blocks: list[str | Figure] = [_DEFINITION, _table(worlds)]
-    for name, here in worlds.items():
-        alt = f"Runs on {name} that end in the goal, by the probability of a delay"
-        blocks.append(Figure(f"delays-{name}", alt, partial(_figure, here)))
-    return Section(blocks)
+    alt = "Runs that end in the goal, by the probability of a delay"
+    return Section([_DEFINITION, _table(worlds), Figure("delays", alt, partial(_figure, worlds))])
 
 
 _DEFINITION = """\
 A task and one of its plans are drawn. All robots follow this *plan*, or each draws a plan with its
 sentence. In each step every robot that is not done is delayed with probability *p*. As they come,
 a step that is no joint step is a failure. *Yielding*: robots that cannot do their steps wait; the
-run fails if all wait for ever, or miss the goal. The figures show all *p*; the table has
-p = 0.1: runs that end in the goal in percent, as they come and yielding, and in brackets the mean
+run fails if all wait for ever, or miss the goal. The figure shows all *p*; the table has p = 0.1:
+runs that end in the goal in percent, as they come and yielding, and in brackets the mean
 steps of the yielding ones beyond the least makespan."""
 
 
@@ -95,15 +92,19 @@ def _cell(record: Record) -> str:
     return f"{100 * well / runs:.1f}, {100 * yielding / runs:.1f}{mean}"
 
 
-def _figure(records: Sequence[Record]) -> Any:
+def _figure(worlds: Mapping[str, Sequence[Record]]) -> Any:
     def series(record: Record, name: str) -> Series:
         said = record.parameters["said"]
         points = [rate(well, runs) for runs, well, _ in record.result[name]]
         return Series(said, TITLES[said], *zip(*points, strict=True))
 
     unit = "runs that end in the goal (%)"
-    panels = [Lines(name, unit, [series(r, name) for r in records]) for name in _YIELDING]
-    return lines(panels, DELAYS, "probability of a delay", len(panels))
+    panels = [
+        Lines(f"{world}, {name}", unit, [series(record, name) for record in here])
+        for world, here in worlds.items()
+        for name in _YIELDING
+    ]
+    return lines(panels, DELAYS, "probability of a delay", len(_YIELDING))
 
 
 RECIPE = Recipe("delays", "Robots that are late", units, run, section)

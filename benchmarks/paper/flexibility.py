@@ -63,8 +63,6 @@ def section(records: Sequence[Record]) -> Section:
     if found.languages:
         alt = f"Tasks of {row} by the number of plans open"
         blocks.append(Figure("flexibility", alt, partial(_figure, found.languages)))
-    if found.orders:
-        blocks.append(_orders_text(found))
     shown = {"optimal plans": _COLUMNS["optimal plans"], "open": _COLUMNS["open"]}
     others = elsewhere(shown, found.others)
     return Section(blocks, _differences(found), _headlines(found.of_paper), others)
@@ -93,23 +91,10 @@ def _headlines(of: dict[str, Result]) -> list[tuple[str, str, str, str]]:
     plans, there = ([f"{r[what]:.1f}" for r in both] for what in ("open", "open_several"))
     number = [str(r["several"]) for r in both]
     return [
-        (f"{ROW}: plans open, all tasks", f"{OPEN_ALL}", plans[0], plans[1]),
-        (f"{ROW}: plans open where several", f"{OPEN_SEVERAL}", there[0], there[1]),
-        (f"{ROW}: tasks with several", f"{SEVERAL}", number[0], number[1]),
+        ("plans open, all tasks", f"{OPEN_ALL}", plans[0], plans[1]),
+        ("plans open where several", f"{OPEN_SEVERAL}", there[0], there[1]),
+        ("tasks with several", f"{SEVERAL}", number[0], number[1]),
     ]
-
-
-def _orders_text(found: Comparison) -> str:
-    first, systematic = found.in_orders(0)
-    expected, _ = found.in_orders(1)
-    middle = len(first) // 2
-    named = ", ".join(f"{name} {value:.1f}" for name, value in systematic.items())
-    return (
-        f"In {len(first)} random orders of the states the greedy method leaves {first[0]:.1f} to "
-        f"{first[-1]:.1f} plans open (median {first[middle]:.1f}), in expectation "
-        f"{expected[0]:.1f} to {expected[-1]:.1f} (median {expected[middle]:.1f}); in systematic "
-        f"orders: {named}."
-    )
 
 
 def _figure(records: Sequence[Record]) -> Any:

@@ -11,6 +11,7 @@ from benchmarks.frame import Figures, markdown
 from benchmarks.paper.plots import save
 from benchmarks.paper.recipe import Recipe, Section, Settings
 from benchmarks.paper.runner import kept, records_of
+from benchmarks.paper.suite import ROW
 from planners.system.writing import write_atomically
 
 
@@ -79,7 +80,7 @@ def _headlines(sections: Mapping[str, Section]) -> list[str]:
     headlines = [headline for section in sections.values() for headline in section.headlines]
     if not headlines:
         return []
-    head = ("measure", "paper", "ours, greedy", "ours, minimal")
+    head = (f"measure on {ROW}", "paper", "ours, greedy", "ours, minimal")
     return ["## The paper's values and ours", markdown(head, headlines)]
 
 

@@ -96,7 +96,7 @@ def section(records: Sequence[Record]) -> Section:
     if row != ROW or greedy is None:
         return Section(blocks, elsewhere=columns)
     found = tuple(f"{_ratio(r, 'pruned'):.2f}" if r else "–" for r in (greedy, least))
-    headline = (f"{row}: A* with a sentence, times fewer nodes", f"{PLANNING_RATIO}", *found)
+    headline = ("A* with a sentence, times fewer nodes", f"{PLANNING_RATIO}", *found)
     return Section(blocks, [_difference(greedy, least)], [headline], columns)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from benchmarks.paper.recipe import Record, Result, Settings, Unit
-from benchmarks.paper.state_orders import RANDOM_ORDERS, SYSTEMATIC, greedy_partitions
+from benchmarks.paper.state_orders import RANDOM_ORDERS, greedy_partitions
 from benchmarks.paper.suite import METHODS, OTHERS, QUICK_ROW, ROW, WORLDS, language_for
 from coordlang.language.candidates import Candidates
 from coordlang.language.flexibility import Flexibility, flexibility
@@ -176,9 +176,3 @@ class Comparison:
         if self.row != ROW:
             return {}
         return {record.parameters["method"]: record.result for record in self.languages}
-
-    def in_orders(self, number: int) -> tuple[list[float], dict[str, float]]:
-        """Return a measure in random orders, sorted, and in systematic orders by name."""
-        found = {name: measures[number] for name, measures in self.orders.items()}
-        random = sorted(value for name, value in found.items() if name not in SYSTEMATIC)
-        return random, {name: found[name] for name in SYSTEMATIC}

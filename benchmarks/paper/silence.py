@@ -175,10 +175,10 @@ def section(records: Sequence[Record]) -> Section:
 _DEFINITION = """\
 The speaker says the sentence of an optimal plan drawn uniformly; each robot then draws a plan with
 that sentence. Columns 1, 2, ..: how often, in percent, the mixture is no optimal plan with the best
-partition found into so many words, counted exactly: the mean over the tasks, and in brackets the
-worst. A star: no such partition is better. *Bits*: the mean entropy of a sentence, with one word
-less than a language and with a language. *At least*: a lower bound for every division into sets
-that mix freely. *Plan*: bits that say which plan is meant."""
+partition found into so many words, counted exactly: the mean over the tasks (the figure also has
+the worst). A star: no such partition is better. *Bits*: the mean entropy of a sentence, with one
+word less than a language and with a language. *At least*: a lower bound for every division into
+sets that mix freely. *Plan*: bits that say which plan is meant."""
 
 
 def _table(records: Sequence[Record]) -> str:
@@ -195,7 +195,7 @@ def _table(records: Sequence[Record]) -> str:
                 record.key,
                 *cells,
                 *([None] * (most - len(cells))),
-                " / ".join(bits),
+                ", ".join(bits),
                 f"{r['least_bits']:.2f}",
                 f"{r['plan_bits']:.2f}",
             ]
@@ -207,8 +207,7 @@ def _fails(point: Result) -> str:
     mark = "*" if point["is_best"] else ""
     if not point["worst"]:
         return f"0{mark}"
-    mean, worst = (percent(point[what]).removesuffix(" %") for what in ("mean", "worst"))
-    return f"{mean}{mark} ({worst})"
+    return f"{percent(point['mean']).removesuffix(' %')}{mark}"
 
 
 def _drawn(records: Sequence[Record], x: str, x_label: str, units: dict[str, str]) -> Any:

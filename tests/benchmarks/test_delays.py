@@ -193,5 +193,5 @@ def test_units_are_reproducible_and_the_section_shows_them() -> None:
     runs, well, _ = results[0]["as they come"][delays.DELAYS.index(0.1)]
     assert "| said | GW1 |" in text
     assert f"| plan | {100 * well / runs:.1f}, " in text
-    assert [figure.name for figure in section.figures] == ["delays-GW1"]
+    assert [figure.name for figure in section.figures] == ["delays"]
     section.figures[0].draw()
