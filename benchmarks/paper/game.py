@@ -66,8 +66,7 @@ def run(unit: Unit, settings: Settings) -> Result:
         "tasks": len(tasks),
         "liked": list(LIKED),
         "exact": {
-            name: [values[n] for values in exact]
-            for n, name in enumerate(("plan", "sentence", "widest"))
+            name: [values[n] for values in exact] for n, name in enumerate(("plan", "sentence"))
         },
         "played": {
             name: [[game[n] for game in one] for one in games]
@@ -77,15 +76,11 @@ def run(unit: Unit, settings: Settings) -> Result:
 
 
 def _expectations(tasks: Counter[tuple[int, ...]], liked: int) -> list[float]:
-    """The mean expectations over tasks: plans, sentences, sentences with most plans first."""
-    sums = [Fraction(0)] * 3
+    """The mean expectations over tasks, of plans and of sentences."""
+    sums = [Fraction(0)] * 2
     for sizes, number in tasks.items():
         k = min(liked, sum(sizes))
-        values = (
-            expected_for_plans(sum(sizes), k),
-            expected_for_sentences(sizes, k),
-            expected_widest_first(sizes, k),
-        )
+        values = expected_for_plans(sum(sizes), k), expected_for_sentences(sizes, k)
         sums = [total + number * value for total, value in zip(sums, values, strict=True)]
     return [round(float(total / tasks.total()), 6) for total in sums]
 
@@ -136,20 +131,6 @@ def expected_for_sentences(sizes: Sequence[int], liked: int) -> Fraction:
     return sum(shares, Fraction(0)) / comb(sum(sizes), liked)
 
 
-def expected_widest_first(sizes: Sequence[int], liked: int) -> Fraction:
-    """Return the expected proposals of sentences, those with most plans first.
-
-    It is the sum over j of the probability that the first j are all rejected.
-    """
-    left = sum(sizes)
-    ways = comb(left, liked)
-    result = Fraction(0)
-    for n in sorted(sizes, reverse=True):
-        result += Fraction(comb(left, liked), ways)
-        left -= n
-    return result
-
-
 def section(records: Sequence[Record]) -> Section:
     """Render the numbers of proposals."""
     mine = [record for record in records if record.parameters["world"] == ROW]
@@ -171,9 +152,8 @@ def section(records: Sequence[Record]) -> Section:
 
 _DEFINITION = """\
 The listener likes k of the task's optimal plans, drawn at random. The speaker proposes plans in
-random order until the listener likes one, or sentences until a liked plan has the sentence.
-*Widest first*: sentences with most plans first. Cells: the mean of the games, and in brackets the
-exact expectation, (N + 1) / (k + 1) for N plans."""
+random order until the listener likes one, or sentences until a liked plan has the sentence. Cells:
+the mean of the games, and in brackets the exact expectation, (N + 1) / (k + 1) for N plans."""
 
 
 _DIFFERENCES = (
@@ -185,16 +165,11 @@ _DIFFERENCES = (
 def _table(records: Sequence[Record]) -> str:
     plan = records[0].result
     kinds = [("plan", plan, "plan")]
-    for record in records:
-        kinds.append((f"sentence, {method_of(record)}", record.result, "sentence"))
-        kinds.append((f"{method_of(record)}, widest first", record.result, "widest"))
+    kinds += [(f"sentence, {method_of(r)}", r.result, "sentence") for r in records]
     rows = []
     for label, result, what in kinds:
-        row: list[object] = [label]
-        for n, exact in enumerate(result["exact"][what]):
-            played = f"{fmean(result['played'][what][n]):.2f} " if what in result["played"] else ""
-            row.append(f"{played}({exact:.2f})")
-        rows.append(row)
+        both = zip(result["played"][what], result["exact"][what], strict=True)
+        rows.append([label, *(f"{fmean(games):.2f} ({exact:.2f})" for games, exact in both)])
     return markdown(("proposals of", *(f"k = {k}" for k in plan["liked"])), rows)
 
 

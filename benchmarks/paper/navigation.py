@@ -9,16 +9,17 @@ robot selects among its own choices.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from random import Random
 from typing import Any
 
+from benchmarks.frame import markdown
 from benchmarks.paper.disruptions import subaction_trials, warehouse_trials
 from benchmarks.paper.plots import Series, by_category
 from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
 from benchmarks.paper.suite import METHODS, OTHERS, TITLES, WORLDS, language_for, method_of
-from benchmarks.paper.tables import Columns, elsewhere, in_percent, rate, share_of_runs, table
+from benchmarks.paper.tables import Columns, elsewhere, in_percent, rate, share_of_runs
 from benchmarks.paper.warehouse import LAYOUTS, WAREHOUSES, deliveries, listed_tasks
 
 #: Languages that take more than minutes to build: an unfinished one would depend on the machine.
@@ -78,12 +79,13 @@ def section(records: Sequence[Record]) -> Section:
     mine = [record for record in records if "warehouse" in record.parameters]
     others = [record for record in records if "world" in record.parameters]
     blocks: list[str | Figure] = [_DEFINITION]
-    for layout in LAYOUTS:
-        here = [record for record in mine if record.parameters["layout"] == layout]
+    by_layout = {n: [r for r in mine if r.parameters["layout"] == n] for n in LAYOUTS}
+    if mine:
+        blocks.append(_table(by_layout))
+    for layout, here in by_layout.items():
         if here:
             alt = f"Success rates of deliveries {layout} the warehouse, by map"
-            figure = Figure(f"navigation-{layout}", alt, partial(_figure, here))
-            blocks += [f"Deliveries {layout} the warehouse:", _table(here), figure]
+            blocks.append(Figure(f"navigation-{layout}", alt, partial(_figure, layout, here)))
     columns: Columns = {
         "robust": lambda r: f"{_exact('plan', r)}, {_exact('sentence', r)}",
     }
@@ -100,30 +102,32 @@ maps are full rectangles (*open*) or their border (*ring*). *Across*: D1 is oppo
 the same side."""
 
 
-def _table(records: Sequence[Record]) -> str:
-    def name(record: Record) -> str:
-        return f"{record.parameters['warehouse']}, {method_of(record)}"
+def _table(by_layout: Mapping[str, Sequence[Record]]) -> str:
+    cells: dict[str, dict[str, list[object]]] = {}
+    for layout, records in by_layout.items():
+        for record in records:
+            name = f"{record.parameters['warehouse']}, {method_of(record)}"
+            rates = (_exact(what, record) for what in ("plan", "sentence", "possible"))
+            cells.setdefault(name, {})[layout] = [record.result["words"], *rates]
+    heads = (
+        f"{n}: {what}" for n in by_layout for what in ("words", "plan", "sentence", "possible")
+    )
+    rows = [
+        [name, *(cell for layout in by_layout for cell in of.get(layout, [None] * 4))]
+        for name, of in cells.items()
+    ]
+    return markdown(("map, language", *heads), rows)
 
-    def possible(record: Record) -> str | None:
-        known = record.result["exact"]
-        return in_percent(known["possible"]) if known else None
 
-    columns: Columns = {
-        "words": lambda r: r.result["words"],
-        "plan": partial(_exact, "plan"),
-        "sentence": partial(_exact, "sentence"),
-        "possible": possible,
-    }
-    return table("map, language", name, columns, records)
-
-
-def _exact(what: str, record: Record) -> str:
+def _exact(what: str, record: Record) -> str | None:
     """A success rate: exact, or of many runs with its interval if it is not known."""
     known, many = record.result["exact"], record.result["many"]
-    return in_percent(known[what]) if known else share_of_runs(many[what], many["runs"])
+    if known:
+        return in_percent(known[what])
+    return share_of_runs(many[what], many["runs"]) if what in many else None
 
 
-def _figure(records: Sequence[Record]) -> Any:
+def _figure(layout: str, records: Sequence[Record]) -> Any:
     maps = list(dict.fromkeys(r.parameters["warehouse"] for r in records))
     of = {(r.parameters["warehouse"], r.parameters["method"]): r.result for r in records}
 
@@ -134,7 +138,7 @@ def _figure(records: Sequence[Record]) -> Any:
     shown = [series("plan", "plan", "greedy", "plan")]
     shown += [series(m, f"sentence, {TITLES[m]}", m, "sentence") for m in METHODS]
     few = records[0].result["few"]["runs"]
-    return by_category(maps, shown, f"success rate (%), {few} runs; line: 95 %")
+    return by_category(maps, shown, f"{layout}: success rate (%), {few} runs; line: 95 %")
 
 
 def _point(result: Result | None, what: str) -> tuple[float | None, ...]:

@@ -211,10 +211,9 @@ def section(records: Sequence[Record]) -> Section:
 _DEFINITION = """\
 Discs of radius 0.2 m with two driven wheels, in cells of 1 m: `coordlang simulate`. Wheels have
 10 % noise; robots know their place up to a standard deviation of 1 cm and 0.01 rad. Lidars stop
-robots for what is ahead. Every robot draws uniformly among its own choices. A *clock* begins each
-joint step for all; a *barrier* opens when all have done the step before; with barriers before each
-*word* robots run freely within a word. A run ends *well* if all arrive in time and nobody touches
-anything."""
+robots for what is ahead. Every robot draws uniformly among its own choices. A *clock*, or a
+*barrier* before each step or *word*, [keeps step](simulation.md#three-ways-to-keep-step). A run
+ends *well* if all arrive in time and nobody touches anything."""
 
 _FLOORS = """\
 Tasks that require coordination, on shipped maps and a maze of others. *Sentence*: of a plan drawn

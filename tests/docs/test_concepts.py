@@ -93,7 +93,7 @@ def test_failing_after_the_plans_have_met() -> None:
 
 
 def test_three_robots_need_three_plans() -> None:
-    """Every two of the plans aaa, bbb, ccc mix well, and all three do not."""
+    """Flags: every two of the plans aaa, bbb, ccc mix well, and all three do not."""
     good = [parts for parts in product("abc", repeat=3) if len(set(parts)) < 3]
     space = joint_space([(" ".join(parts), "", "(p0)") for parts in good], 3, "(p0)")
     plans = Plans.of(space)
