@@ -17,8 +17,8 @@ version of the project that it is of.
 
 ``--table`` names a table of docs/coverage.md, ``all`` prints one after the other: `codmap`,
 `makespan`, `blind` and `blind-makespan` (the first three problems of each domain), and `grids`.
-With ``--markdown`` they are printed as they stand there, with how many rows are solved and the
-versions that they are of.
+With ``--markdown`` they are printed as there, where some columns are left out, with how many rows
+are solved and the versions that they are of.
 """
 
 from __future__ import annotations
