@@ -9,14 +9,13 @@ does its own part without being informed, and both are still on an optimal plan.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import partial
-from itertools import product
+from itertools import groupby, product
 from random import Random
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from benchmarks.paper.grid import entered_cells, placement, task_cells
-from benchmarks.paper.grid_drawing import draw_map
+from benchmarks.paper.grid import cell_position, entered_cells, placement, task_cells
 from benchmarks.paper.plots import drawing
 from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
 from benchmarks.paper.suite import CORRIDOR, METHODS, OTHERS, WORLDS, language_for, method_of
@@ -27,6 +26,9 @@ from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
 from coordlang.language.listed import ListedTask
 from planners.joint.model import JointModel
 from planners.search.plans import Plan, Plans
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 #: One robot's part of a plan, as label numbers.
 Part = tuple[int, ...]
@@ -245,9 +247,66 @@ def _figure(record: Record) -> Any:
     cells = {*ROOMS[0], *ROOMS[1], *r["detour"], *r["agreed"][0], *r["agreed"][1]}
     after = f"executed: {PLACE} has become interesting, r1 passes it, r2 is not informed"
     with drawing(8.2, 6.4, rows=2) as (figure, [above, below]):
-        draw_map(above, cells, agreed, None, "agreed: the first optimal plan")
-        draw_map(below, cells, executed, PLACE, after)
+        _draw_map(above, cells, agreed, None, "agreed: the first optimal plan")
+        _draw_map(below, cells, executed, PLACE, after)
         return figure
+
+
+#: For each robot a colour, distinguishable with every kind of colour vision, and by how much its
+#: path is shifted from the middle of a cell.
+_ROBOTS = {"r1": ("#0072B2", -0.13), "r2": ("#D55E00", 0.13)}
+
+
+def _draw_map(
+    axes: Axes,
+    cells: Collection[str],
+    paths: Mapping[str, Sequence[str]],
+    star: str | None,
+    title: str,
+) -> None:
+    """Draw cells, each robot's path (a cell for each time from 0), and a star in one cell."""
+    from matplotlib.patches import Rectangle
+
+    for row, column in map(cell_position, sorted(cells)):
+        corner = (column - 0.5, row - 0.5)
+        axes.add_patch(Rectangle(corner, 1, 1, facecolor="#f4f4f4", edgecolor="#bbbbbb"))
+    if star is not None:
+        row, column = cell_position(star)
+        axes.plot(column + 0.33, row - 0.3, "*", markersize=15, color="#E69F00", zorder=5)
+    for robot, path in paths.items():
+        _draw_path(axes, robot, path)
+    axes.set_title(title, fontsize=10, loc="left")
+    axes.set_aspect("equal")
+    axes.autoscale_view()
+    axes.invert_yaxis()
+    axes.set_axis_off()
+
+
+def _draw_path(axes: Axes, robot: str, path: Sequence[str]) -> None:
+    """Draw a line from the robot's name to a hollow circle, with the times at each cell."""
+    hue, shift = _ROBOTS[robot]
+    points = [(column + shift, row + shift) for row, column in map(cell_position, path)]
+    axes.plot(*zip(*points, strict=True), color=hue, linewidth=2, zorder=3)
+    style: Any = {"fontsize": 7.5, "ha": "center", "va": "center", "zorder": 7}
+    round_ = {"boxstyle": "circle", "edgecolor": hue}
+    axes.annotate(robot, points[0], color="white", bbox={**round_, "facecolor": hue}, **style)
+    for cell, times in _times(path).items():
+        row, column = cell_position(cell)
+        at, box = (column + 1.7 * shift, row + 2.8 * shift), {"facecolor": "#f4f4f4", "pad": 0.6}
+        if cell == path[-1]:
+            at, box = points[-1], {**round_, "facecolor": "white"}
+        axes.annotate(", ".join(times), at, color=hue, bbox={"edgecolor": "none", **box}, **style)
+
+
+def _times(path: Sequence[str]) -> dict[str, list[str]]:
+    """The times at which a robot is at each of its cells: ``3``, or ``4–5`` where it waits."""
+    found: dict[str, list[str]] = {}
+    time = 0
+    for cell, stay in groupby(path):
+        last = time + len(list(stay)) - 1
+        found.setdefault(cell, []).append(f"{time}" if last == time else f"{time}–{last}")
+        time = last + 1
+    return found
 
 
 RECIPE = Recipe(
