@@ -108,7 +108,7 @@ def build(grid: Grid) -> Figures:
     from coordlang.language.candidates import all_pairs, from_problems
     from coordlang.language.partition import Partition
     from coordlang.required.all_differences import differences
-    from coordlang.verification.candidates import verify_candidates
+    from coordlang.verification.by_definition import verify_candidates
     from coordlang.vocabulary import Job, greedy
     from planners.parallel.workers import Workers
 

@@ -17,8 +17,7 @@ from coordlang.required.all_differences import differences
 from coordlang.required.divergences import FirstDifferences, states_on_plans, without_divergences
 from coordlang.required.failures import Failures
 from coordlang.required.miscoordination import Inseparable
-from coordlang.verification.by_definition import Verdict
-from coordlang.verification.candidates import verify_candidates
+from coordlang.verification.by_definition import Verdict, verify_candidates
 from coordlang.vocabulary import METHODS, Job, Outcome
 from coordlang.vocabulary.few_words import few_words
 from coordlang.vocabulary.flexible import flexible

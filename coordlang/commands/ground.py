@@ -28,7 +28,7 @@ from coordlang.lifted.file import read_lifted
 from coordlang.lifted.language import Known, LiftedLanguage, described, grounded, require_robots
 from coordlang.lifted.world import States, World
 from coordlang.sites.coordinates import Point
-from coordlang.verification.candidates import verify_candidates
+from coordlang.verification.by_definition import verify_candidates
 from planners.parallel.workers import Workers
 from planners.system.errors import OutOfMemory, Position, Refuted, note
 from planners.system.limits import stop_clock

@@ -20,7 +20,7 @@ from coordlang.language.tolerance import Tolerance, tolerance_data
 from coordlang.required.failure import TooManyToCount
 from coordlang.required.failures import NONE, Failures, failures_under
 from coordlang.required.miscoordination import Miscoordination
-from coordlang.verification.candidates import verify_candidates
+from coordlang.verification.by_definition import verify_candidates
 from coordlang.verification.certificate_file import read_certificate
 from coordlang.verification.check_certificate import Checked
 from coordlang.verification.check_certificate import check as check_certificate

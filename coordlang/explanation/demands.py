@@ -130,17 +130,13 @@ def _part(choices: Choices, robot: int, few: int) -> RobotPart:
     own = int(choices.of_node[robot, space.starts[0]])
     subplans = choices.sets.size(own)
     listed = choices.sets.sequences(own) if subplans <= few else ()
+
+    def texts(used: Sequence[int]) -> Subplan:
+        return tuple(_own_text(space.model, robot, label) for label in used)
+
     return RobotPart(
-        space.model.robots[robot],
-        subplans,
-        tuple(_subplan(space.model, robot, sequence) for sequence in listed),
-        tuple(_subplan(space.model, robot, used) for used in labels),
+        space.model.robots[robot], subplans, tuple(map(texts, listed)), tuple(map(texts, labels))
     )
-
-
-def _subplan(model: JointModel, robot: int, labels: Sequence[int]) -> Subplan:
-    """A robot's labels as text."""
-    return tuple(_own_text(model, robot, label) for label in labels)
 
 
 def _own_text(model: JointModel, robot: int, label: int) -> str | None:
@@ -163,10 +159,8 @@ def _change(
     order: Sequence[int],
 ) -> WordChange:
     """The change out of the nodes ``before`` (a mask) into the next word."""
-    source, edges = space.edges_from(np.flatnonzero(before))
-    node = np.flatnonzero(before)[source]
-    makes = ~before[space.targets(edges)]
-    node, edges = node[makes], edges[makes]
+    edges = np.flatnonzero(before[space.sources] & ~before[space.targets()])
+    node = space.sources[edges]
     step = space.cost_of(0)[0] - space.layer[node] + 1
     robots = _deciding(space, partition, np.unique(space.state[node]), pair[1], order)
     ways: dict[Subplan, set[int]] = defaultdict(set)

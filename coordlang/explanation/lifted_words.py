@@ -18,7 +18,7 @@ from coordlang.lifted.wording import condition, english, formula
 from coordlang.lifted.world import States, World
 from coordlang.sites.coordinates import Point
 from planners.joint.model import JointModel
-from planners.joint.tables import Ints
+from planners.joint.tables import Bools, Ints
 from planners.pddl.lifted import Domain, Problem
 from planners.system.errors import Position, note
 
@@ -97,28 +97,26 @@ def _terms(
     word = np.array([values[vector] for vector in vectors], object)
     table = np.array(vectors, np.int64).reshape(len(vectors), len(features))
     domains = [np.unique(column) for column in table.T]
-    number = np.zeros_like(table)
-    for column, own in enumerate(domains):
-        number[:, column] = np.searchsorted(own, table[:, column])
-    sizes = tuple(map(len, domains))
+    columns = zip(domains, table.T, strict=True)
+    number = np.array([np.searchsorted(own, column) for own, column in columns])
+    number = number.reshape(table.T.shape).T
     found = {}
     for name in words:
         mine = word == name
         if mine.any():
-            points = Points(sizes, number[mine], number[~mine])
-            terms = []
-            for box in minimise(points).prime:
-                allowed = [own[box[s]] for own, s in zip(domains, points.spans, strict=True)]
-                terms.append(_term(features, allowed, sizes))
-            found[name] = tuple(terms)
+            points = Points(tuple(map(len, domains)), number[mine], number[~mine])
+            found[name] = tuple(
+                _term(features, domains, [box[span] for span in points.spans])
+                for box in minimise(points).prime
+            )
     return found
 
 
-def _term(features: Sequence[Feature], allowed: Sequence[Ints], sizes: Sequence[int]) -> str:
+def _term(features: Sequence[Feature], domains: Sequence[Ints], allowed: Sequence[Bools]) -> str:
     """A conjunction of limits on features; the empty one is ``true``."""
     parts = []
-    for feature, values, size in zip(features, allowed, sizes, strict=True):
-        if len(values) < size:
-            limits = [condition(feature, value) for value in values.tolist()]
+    for feature, values, own in zip(features, domains, allowed, strict=True):
+        if not own.all():
+            limits = [condition(feature, value) for value in values[own].tolist()]
             parts.append(limits[0] if len(limits) == 1 else f"({' or '.join(limits)})")
     return " and ".join(parts) or "true"

@@ -145,25 +145,21 @@ def _part_lines(part: RobotPart, steps: int) -> list[str]:
             f"  {part.robot}{head}",
             *(f"    {_sequence(subplan[first:])}" for subplan in part.listed),
         ]
-    return [f"  {part.robot} has {_ways(part)}:", *_step_lines(part)]
-
-
-def _ways(part: RobotPart) -> str:
-    """How many of the combinations that a table of steps shows are subplans."""
+    # The table of steps shows combinations of which some may be no subplans.
+    ways = "ways, not every combination of these (choices lists them)"
     if part.subplans == prod(map(len, part.by_step)):
-        return f"{part.subplans:,} ways, any combination of"
-    return f"{part.subplans:,} ways, not every combination of these (choices lists them)"
+        ways = "ways, any combination of"
+    return [f"  {part.robot} has {part.subplans:,} {ways}:", *_step_lines(part)]
 
 
 def _step_lines(part: RobotPart) -> list[str]:
     """What a robot may do in each step, equal steps together."""
     lines = []
-    first = 1
+    last = 0
     for subactions, run in groupby(part.by_step):
-        last = first + len(list(run)) - 1
+        first, last = last + 1, last + len(list(run))
         name = f"step {first}" if first == last else f"steps {first} to {last}"
         lines.append(f"    {name}: {_alternatives([own or 'wait' for own in subactions])}")
-        first = last + 1
     return lines
 
 

@@ -127,11 +127,15 @@ def _surroundings(model: JointModel, rows: Rows) -> Rows:
 
 
 def _variable(group: _Group, used: Sequence[int], atoms: Sequence[Atom], none: bool) -> Variable:
-    rest = dict(zip(group.atoms, group.rest, strict=True))
     key = f"({', '.join(group.key)})" if group.key else ""
-    texts = [(rest[number][0] + key, _value(group.key, rest[number][1])) for number in used]
+    positions = dict(group.family)
     values: list[Atom | None] = [atoms[number] for number in used]
-    name = "/".join(sorted({predicate for predicate, _ in group.rest})) + key
+    texts = []
+    for atom in (atoms[number] for number in used):
+        own = positions[atom.predicate]
+        others = [arg for position, arg in enumerate(atom.args) if position not in own]
+        texts.append((atom.predicate + key, _value(group.key, others)))
+    name = "/".join(sorted({atoms[number].predicate for number in group.atoms})) + key
     if none:
         values.append(None)
         texts.append((name, "none"))
@@ -159,18 +163,11 @@ _Shape = tuple[str, tuple[int, ...]]
 
 @dataclass(frozen=True, slots=True)
 class _Group:
-    """The numbers of atoms that agree in the arguments ``key``.
+    """The numbers of atoms of some shapes, of different predicates, that agree in the ``key``."""
 
-    ``rest`` are for each of them its predicate and its other arguments.
-    """
-
+    family: tuple[_Shape, ...]
     key: tuple[str, ...]
     atoms: list[int]
-    rest: list[tuple[str, tuple[str, ...]]]
-
-    def owner(self, robots: Sequence[str]) -> int:
-        """The number of the first robot that the key names; the number of robots if none."""
-        return min((robots.index(k) for k in self.key if k in robots), default=len(robots))
 
 
 def _mutex_groups(atoms: Sequence[Atom], holds: Bools, robots: Sequence[str]) -> list[_Group]:
@@ -179,35 +176,40 @@ def _mutex_groups(atoms: Sequence[Atom], holds: Bools, robots: Sequence[str]) ->
     Groups of which one atom is always true, and then large ones, are preferred; those of robots and
     large ones are listed first.  ``holds`` says which are true in each state, (states, atoms).
     """
+
+    def owner(group: _Group) -> int:
+        """The first robot that the key names, by number; the number of robots if none."""
+        return min((robots.index(k) for k in group.key if k in robots), default=len(robots))
+
+    def preference(group: _Group) -> tuple[object, ...]:
+        size, own = -len(group.atoms), owner(group)
+        rank = (not table.exhaustive(group), own == len(robots), size)
+        return (*rank, len(group.family), group.family, own, group.key)
+
+    def place(group: _Group) -> tuple[object, ...]:
+        own = owner(group)
+        return own == len(robots), len(group.atoms) < 2, group.family[0][0], own, group.key
+
     table = _AtomTable(atoms, holds)
-    candidates: list[tuple[tuple[object, ...], str, _Group]] = []
-    for family in table.families():
-        for group in table.groups(family):
-            if len(group.atoms) > 1 and table.exclusive(group):
-                owner, inexact = group.owner(robots), not table.exhaustive(group)
-                size = -len(group.atoms)
-                own = owner == len(robots)
-                rank = (inexact, own, size, len(family), family, owner, group.key)
-                candidates.append((rank, family[0][0], group))
+    several = (g for f in table.families() for g in table.groups(f) if len(g.atoms) > 1)
+    candidates = sorted(filter(table.exclusive, several), key=preference)
     for number, atom in enumerate(atoms):  # what is left is a fact of its own
-        single = _Group(atom.args, [number], [(atom.predicate, ())])
-        candidates.append(((True, True, 0), atom.predicate, single))
+        whole = atom.predicate, tuple(range(len(atom.args)))
+        candidates.append(_Group((whole,), atom.args, [number]))
     taken: set[int] = set()
     chosen = []
-    for _, predicate, group in sorted(candidates, key=lambda candidate: candidate[0]):
+    for group in candidates:
         if taken.isdisjoint(group.atoms):
             taken.update(group.atoms)
-            owner = group.owner(robots)
-            own = owner == len(robots)
-            chosen.append(((own, len(group.atoms) < 2, predicate, owner, group.key), group))
-    return [group for _, group in sorted(chosen, key=lambda one: one[0])]
+            chosen.append(group)
+    return sorted(chosen, key=place)
 
 
 class _AtomTable:
     """The atoms by shape and key, and what is known of them in all states."""
 
     def __init__(self, atoms: Sequence[Atom], holds: Bools) -> None:
-        self._atoms, self._holds = atoms, holds
+        self._holds = holds
         weights = holds.astype(np.float32)
         self._together: Bools = np.asarray(weights.T @ weights > 0)
         np.fill_diagonal(self._together, False)
@@ -220,18 +222,13 @@ class _AtomTable:
                     key = tuple(atom.args[p] for p in positions)
                     self._shapes[atom.predicate, positions][key].append(number)
 
-    def groups(self, family: Sequence[_Shape]) -> list[_Group]:
+    def groups(self, family: tuple[_Shape, ...]) -> list[_Group]:
         """The atoms of some shapes, by key."""
-        groups = []
-        for key in sorted({key for shape in family for key in self._shapes[shape]}):
-            group = _Group(key, [], [])
-            for predicate, positions in family:
-                for number in self._shapes[predicate, positions].get(key, ()):
-                    args = enumerate(self._atoms[number].args)
-                    group.atoms.append(number)
-                    group.rest.append((predicate, tuple(a for p, a in args if p not in positions)))
-            groups.append(group)
-        return groups
+        keys = sorted({key for shape in family for key in self._shapes[shape]})
+        return [
+            _Group(family, key, [n for shape in family for n in self._shapes[shape].get(key, ())])
+            for key in keys
+        ]
 
     def exclusive(self, group: _Group) -> bool:
         """Whether no two of the atoms are true together."""

@@ -91,29 +91,25 @@ def cover(
     other = ~mine if against is None else np.isin(mapped.word, list(against)) & ~mine
     points = Points(tuple(len(v.values) for v in variables), value[mine], value[other])
     found = minimise(points, quick)
-    terms, counts = [], []
-    for least, prime in zip(found.least, found.prime, strict=True):
-        term, box = _shortest(variables, points, least, prime)
-        terms.append(term)
-        counts.append(int(points.inside(box[None, :], points.on).sum()))
+    boxes = found.prime.copy()
+    terms = [_shortest(variables, points, *both) for both in zip(found.least, boxes, strict=True)]
+    counts = points.inside(boxes, points.on).sum(axis=1).tolist()
     return Cover(tuple(terms), tuple(counts), int(mine.sum()), found.fewest)
 
 
-def _shortest(
-    variables: Sequence[Variable], points: Points, least: Bools, prime: Bools
-) -> tuple[Term, Bools]:
-    """The shortest term between the least box and the prime one, and its box."""
-    literals, box = [], prime.copy()
+def _shortest(variables: Sequence[Variable], points: Points, least: Bools, box: Bools) -> Term:
+    """The shortest term between the least box and the prime one, which becomes the term's box."""
+    literals = []
     for variable, span in zip(variables, points.spans, strict=True):
-        if prime[span].all():
+        if box[span].all():
             continue
         limits = [
             (Literal(variable, frozenset(compress(variable.values, values))), values)
-            for values in (least[span], prime[span])
+            for values in (least[span], box[span].copy())
         ]
         literal, box[span] = min(limits, key=lambda one: (one[0].length, one[0].is_negative))
         literals.append(literal)
-    return tuple(literals), box
+    return tuple(literals)
 
 
 # ---- in which form words are described: each by itself, or one after the other

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import compress
 from typing import Literal
 
 import numpy as np
 
 from coordlang.language.listed import ListedTask, goal_text, listed_task, model_of_listed
-from coordlang.language.reached import MOST_STATES, explored_if_small, surely_unreachable
 from planners.joint.model import NO_FACT, FullState, Goal, JointModel, PlanningTask
 from planners.joint.tables import Rows, find_rows, unique_rows
 from planners.loading import PlanningInstance, build
@@ -22,31 +22,44 @@ from planners.search.optimal_plans import joined, plan_spaces, solvable
 from planners.search.plan_space import PlanSpace
 from planners.search.portions import Explored, PlanSpaces, Searched, Source
 from planners.search.reachable import Space, explore
+from planners.search.state_variables import state_variables
 from planners.search.unreachable import searched
 from planners.system.errors import BadInput, Position, ProvedImpossible, note
 
 Kind = Literal["problems", "all", "file"]
 
+#: A space of more states than this, or with more joint steps composed, is not explored for listed
+#: tasks: they are searched one by one.
+MOST_STATES = 20_000
+MOST_STEPS = 4_000_000
+#: States expanded at a time.
+_PIECE = 500
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True)
 class Candidates:
     """The candidate tasks ``T`` over one joint model.
 
     ``kind`` "problems": the problems' own tasks; "all": every ordered pair of different reachable
-    states; "file": ``listed``.  ``spaces`` are their optimal plans, in batches over one common
-    table of states; ``count`` is the number of tasks.  ``states`` is the number of reachable states
-    where the whole space was explored, else None. ``skipped`` names tasks that were left out
-    because they have no plan.  ``source`` makes the plan spaces of any portion of the goals, where
-    that is done as jobs.
+    states; "file": ``listed``.  ``source`` makes their plan spaces, those of any portion of the
+    goals where that is done as jobs.  ``states`` is the number of reachable states where the whole
+    space was explored, else None.  ``skipped`` names tasks that were left out because they have no
+    plan.
     """
 
     kind: Kind
     loaded: PlanningInstance
-    listed: tuple[ListedTask, ...]
-    spaces: Sequence[PlanSpace]
     source: Source
-    states: int | None
+    states: int | None = None
+    listed: tuple[ListedTask, ...] = ()
     skipped: tuple[str, ...] = ()
+
+    @cached_property
+    def spaces(self) -> Sequence[PlanSpace]:
+        """The optimal plans of the tasks, in batches over one common table of states."""
+        if isinstance(self.source, Searched):
+            return (self.source.plans,)
+        return PlanSpaces(self.source)
 
     @property
     def model(self) -> JointModel:
@@ -62,36 +75,6 @@ class Candidates:
     def rows(self) -> Rows:
         """The table of states that every plan space's state numbers refer to."""
         return self.source.rows
-
-    @classmethod
-    def explored(
-        cls,
-        kind: Kind,
-        loaded: PlanningInstance,
-        space: Space,
-        goals: Sequence[tuple[Goal, Rows | None]],
-        states: int,
-        listed: Sequence[ListedTask] = (),
-        skipped: Sequence[str] = (),
-    ) -> Candidates:
-        """Tasks over one explored space, by goal; None: from all other states."""
-        source = Explored(space, goals)
-        spaces = PlanSpaces(source)
-        return cls(kind, loaded, tuple(listed), spaces, source, states, tuple(skipped))
-
-    @classmethod
-    def searched(
-        cls,
-        kind: Kind,
-        loaded: PlanningInstance,
-        spaces: Sequence[PlanSpace],
-        listed: Sequence[ListedTask],
-        skipped: Sequence[str] = (),
-    ) -> Candidates:
-        """Tasks that were searched one by one."""
-        plans = joined(spaces)
-        source = Searched(plans)
-        return cls(kind, loaded, tuple(listed), (plans,), source, None, tuple(skipped))
 
 
 def from_problems(
@@ -130,7 +113,7 @@ def all_pairs(
     inits = np.stack([task.init for task in loaded.tasks])
     if not model.remembers:
         space = explore(model, inits)
-        return Candidates.explored("all", loaded, space, _to_each_state(space), len(space))
+        return Candidates("all", loaded, Explored(space, _to_each_state(space)), len(space))
     forgetting = replace(model.without_slack, codec=replace(model.codec, memory=None))
     base = explore(forgetting, model.codec.facts_part(inits))
     starts = np.hstack((base.rows, np.zeros((len(base), len(model.robots)), np.uint64)))
@@ -141,7 +124,7 @@ def all_pairs(
             mine = state[goal_of_task == number]
             if len(mine):
                 groups.append((goal, starts[mine]))
-    return Candidates.explored("all", loaded, explore(model, starts), groups, len(base))
+    return Candidates("all", loaded, Explored(explore(model, starts), groups), len(base))
 
 
 def _to_each_state(space: Space) -> list[tuple[Goal, Rows | None]]:
@@ -181,7 +164,7 @@ def from_listed(
     inits = np.stack([task.init for task in tasks])
     space = explored_if_small(model, starts)
     if space is None:
-        unreachable = surely_unreachable(model, starts, inits)
+        unreachable = _surely_unreachable(model, starts, inits)
     else:
         reached, _ = unique_rows(model.codec.facts_part(space.rows))
         found = find_rows(reached, model.codec.facts_part(inits))
@@ -204,14 +187,54 @@ def from_listed(
     kept = solvable(space, goals)
     known = {(goal, init.tobytes()) for goal, inits in kept for init in inits}
     served = [(task.goal, task.init.tobytes()) in known for task in tasks]
-    skipped = []
-    for number, (text, task, good) in enumerate(zip(listed, tasks, served, strict=True), 1):
-        if not good and not (skip_unsolvable and kept):
-            raise _unsolvable(number, text, position, searched(model, task.goal, space.rows))
-        if not good:
-            skipped.append(_named(number, text))
-    listed = list(compress(listed, served))
-    return Candidates.explored("file", loaded, space, kept, len(reached), listed, skipped)
+    lost = [number for number, good in enumerate(served) if not good]
+    if lost and not (skip_unsolvable and kept):
+        first = lost[0]
+        remedy = searched(model, tasks[first].goal, space.rows)
+        raise _unsolvable(first, listed[first], position, remedy)
+    skipped = tuple(_named(number, listed[number]) for number in lost)
+    source = Explored(space, kept)
+    return Candidates(
+        "file", loaded, source, len(reached), tuple(compress(listed, served)), skipped
+    )
+
+
+def explored_if_small(model: JointModel, inits: Rows) -> Space | None:
+    """All states that are reachable, if they are few: see `MOST_STATES` and `MOST_STEPS`.
+
+    Work is bounded before it is done: by products of the robots' own choices.
+    """
+    layer, _ = unique_rows(inits)
+    seen, left = layer, MOST_STEPS
+    while len(layer):
+        fresh = [layer[:0]]
+        for start in range(0, len(layer), _PIECE):
+            rows = layer[start : start + _PIECE]
+            left -= model.stepper.most_steps(model.codec.facts_part(rows))
+            if left < 0:
+                return None
+            fresh.append(unique_rows(model.successors(rows).result)[0])
+        new, _ = unique_rows(np.concatenate(fresh))
+        layer = new[find_rows(seen, new) < 0]
+        seen, _ = unique_rows(np.concatenate((seen, layer)))
+        if len(seen) > MOST_STATES:
+            return None
+    return explore(model, inits)
+
+
+def _surely_unreachable(model: JointModel, starts: Rows, inits: Rows) -> list[int]:
+    """The numbers of states that no start can reach, as far as state variables prove it.
+
+    Of the facts of a state variable exactly one is true in every state that a start reaches.
+    """
+    true = model.codec.truth(inits)
+    possible = np.zeros(len(inits), np.bool_)
+    for start in starts:
+        own = np.ones(len(inits), np.bool_)
+        for variable in state_variables(model, start):
+            own &= true[:, list(variable.facts)].sum(axis=1) == 1
+        possible |= own
+    return np.flatnonzero(~possible).tolist()
 
 
 def _listed_one_by_one(
@@ -236,9 +259,9 @@ def _listed_one_by_one(
         try:
             return _search_once(loaded.model, tasks[number], plans)
         except ProvedImpossible as error:
-            raise _unsolvable(number + 1, listed[number], position, error.remedy) from None
+            raise _unsolvable(number, listed[number], position, error.remedy) from None
 
-    names = [_named(number, text) for number, text in enumerate(listed, 1)]
+    names = [_named(number, task) for number, task in enumerate(listed)]
     return _one_by_one("file", loaded, listed, names, found, skip_unsolvable)
 
 
@@ -262,7 +285,8 @@ def _one_by_one(
             if not skip_unsolvable or len(skipped) == len(names) - 1:
                 raise
             skipped.append(name)
-    return Candidates.searched(kind, loaded, spaces, kept, skipped)
+    source = Searched(joined(spaces))
+    return Candidates(kind, loaded, source, listed=tuple(kept), skipped=tuple(skipped))
 
 
 def _search_once(
@@ -290,7 +314,7 @@ def _texts(task: ListedTask) -> tuple[str, str]:
 
 
 def _named(number: int, task: ListedTask) -> str:
-    return f"task {number} ({' -> '.join(_texts(task))})"
+    return f"task {number + 1} ({' -> '.join(_texts(task))})"
 
 
 def _unsolvable(
@@ -298,7 +322,7 @@ def _unsolvable(
 ) -> ProvedImpossible:
     init, goal = _texts(task)
     return ProvedImpossible(
-        f"task {number}: the goal {goal} cannot be reached from {init}",
+        f"task {number + 1}: the goal {goal} cannot be reached from {init}",
         position=position,
         remedy=remedy,
     )
@@ -316,8 +340,8 @@ def from_recorded(
     They are searched one by one, without the rest of the space.
     """
     loaded, tasks = model_of_listed(domain, problems, listed, options, position)
-    spaces = [search(loaded.model, task) for task in tasks]
-    return Candidates.searched("problems", loaded, spaces, listed)
+    source = Searched(joined([search(loaded.model, task) for task in tasks]))
+    return Candidates("problems", loaded, source, listed=tuple(listed))
 
 
 def describe(space: PlanSpace, task: int) -> str:

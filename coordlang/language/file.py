@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-from msgspec import UNSET
+from msgspec import UNSET, UnsetType
 
-from coordlang.language.duplicate_keys import refuse_duplicates
 from coordlang.language.provenance import Guarantee, Provenance
 from coordlang.language.record import (
     LANGUAGE,
@@ -20,6 +19,7 @@ from coordlang.language.record import (
     ModelRecord,
     TasksRecord,
     ToleranceRecord,
+    refuse_duplicates,
 )
 from coordlang.language.tolerance import Tolerance
 from coordlang.language.words import Language
@@ -96,24 +96,18 @@ def language_from_bytes(data: bytes, position: Position) -> Language:
     refuse_duplicates(data, position)
     refuse_first(_faults_of_words(record), position)
     _check_seen(record, position)
-    robots = [] if record.robots is UNSET else record.robots
-    refuse_first(_faults(record, robots), position)
-    guarantee, tolerance = record.guarantee, record.tolerance
-    return Language(
-        words=tuple(record.words),
-        states=record.states,
-        default=record.default,
-        provenance=Provenance(
-            robots=tuple(robots),
-            guarantee=None if guarantee is UNSET else Guarantee(**_plain(guarantee)),
-            domain={} if record.domain is UNSET else present(record.domain),
-            model=present(record.model),
-            tasks=present(TasksRecord("problems", 0) if record.tasks is UNSET else record.tasks),
-            producer=record.producer,
-            lifted={} if record.lifted is UNSET else _plain(record.lifted),
-            tolerance=None if tolerance is UNSET else Tolerance(**_plain(tolerance)),
-        ),
+    refuse_first(_faults(record), position)
+    provenance = Provenance(
+        robots=() if record.robots is UNSET else tuple(record.robots),
+        model=present(record.model),
+        tasks=present(TasksRecord("problems", 0) if record.tasks is UNSET else record.tasks),
+        producer=record.producer,
+        guarantee=None if record.guarantee is UNSET else Guarantee(**_plain(record.guarantee)),
+        domain={} if record.domain is UNSET else present(record.domain),
+        lifted={} if record.lifted is UNSET else _plain(record.lifted),
+        tolerance=None if record.tolerance is UNSET else Tolerance(**_plain(record.tolerance)),
     )
+    return Language(tuple(record.words), record.states, record.default, provenance)
 
 
 def _plain(record: msgspec.Struct) -> dict[str, Any]:
@@ -132,16 +126,14 @@ def refuse_first(faults: Iterator[Fault], position: Position) -> None:
         raise BadInput(what, position=position, remedy=remedy)
 
 
-def faults_of_robots(model: ModelRecord, robots: Sequence[str], remedy: str) -> Iterator[Fault]:
+def faults_of_robots(
+    model: ModelRecord, robots: Sequence[str] | UnsetType, remedy: str
+) -> Iterator[Fault]:
     """Robots that are no team, and a file of an older version, with another rule of idling."""
-    if len(set(robots)) < len(robots) or not robots:
+    own = () if robots is UNSET else robots
+    if robots is not UNSET and (len(set(own)) < len(own) or not own):
         yield "the robots must be different, and at least one", remedy
-    yield from faults_of_idling(model, robots, remedy)
-
-
-def faults_of_idling(model: ModelRecord, robots: Sequence[str], remedy: str) -> Iterator[Fault]:
-    """A file of an older version, with another rule of idling."""
-    if model.idle is not None and set(model.idle) != set(robots):
+    if model.idle is not None and set(model.idle) != set(own):
         yield (
             "this file is of an older version, in which some robot might not idle; its words are "
             "of other plans",
@@ -149,10 +141,9 @@ def faults_of_idling(model: ModelRecord, robots: Sequence[str], remedy: str) -> 
         )
 
 
-def _faults(record: LanguageRecord, robots: Sequence[str]) -> Iterator[Fault]:
+def _faults(record: LanguageRecord) -> Iterator[Fault]:
     """What contradicts itself in a record, but for its words."""
-    of_robots = faults_of_idling if record.robots is UNSET else faults_of_robots
-    yield from of_robots(record.model, robots, _BUILD_AGAIN)
+    yield from faults_of_robots(record.model, record.robots, _BUILD_AGAIN)
     if record.guarantee is not UNSET:
         yield from _faults_of_guarantee(record.guarantee, len(record.words))
     claimed = ToleranceRecord() if record.tolerance is UNSET else record.tolerance

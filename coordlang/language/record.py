@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import json
+from collections import Counter
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 import msgspec
@@ -11,7 +14,9 @@ from msgspec import UNSET, Meta, UnsetType
 from coordlang.language.candidates import Kind
 from coordlang.language.listed import ListedTask
 from planners.pddl.model_options import MOST_SLACK, Cost, Unowned
+from planners.system.errors import BadInput, Position
 from planners.system.files import FileFormat
+from planners.system.messages import echoed
 
 # What JSON Schema can say and the reader checks with messages of its own.
 _SOME = {"minItems": 1, "uniqueItems": True}
@@ -209,3 +214,21 @@ def json_schema() -> dict[str, Any]:
     ``words``, the guarantee fits their number, and no key occurs twice.
     """
     return LANGUAGE.json_schema()
+
+
+def refuse_duplicates(data: bytes, position: Position) -> None:
+    """Raise `BadInput` for a key that an object of a JSON text has twice; it was read before.
+
+    Most readers keep the last of two entries and say nothing.
+    """
+
+    def different(pairs: Sequence[tuple[str, Any]]) -> None:
+        if len({key for key, _ in pairs}) < len(pairs):
+            (key, _), *_ = Counter(key for key, _ in pairs).most_common(1)
+            raise BadInput(
+                f"the key {echoed(key)} occurs twice",
+                position=position,
+                remedy="Of two entries one would be lost.",
+            )
+
+    json.loads(data, object_pairs_hook=different, parse_int=str, parse_float=str)

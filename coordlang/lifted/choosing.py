@@ -29,15 +29,14 @@ _COMPARED = 4_000
 class SimplestHitting:
     """The members of least weight that meet all sets of a list that only grows.
 
-    Weights are asked for from below, so what is found is proved to be lightest.
-
-    ``weights`` are those of the members, by number; positive.
+    Weights are asked for from below, so what is found is proved to be lightest.  ``weights`` are
+    those of the members, by number; positive.
     """
 
     def __init__(self, weights: Sequence[int]) -> None:
         self._weights = np.array(weights, np.int64)
         self._sets: dict[bytes, Bools] = {}
-        self.bound = 0
+        self._bound = 0
 
     def add(self, members: Bools) -> None:
         """Add a set, which is not empty, as a table of what is in it."""
@@ -51,11 +50,9 @@ class SimplestHitting:
         useful = undominated(inside, self._weights)
         weights = self._weights[useful].tolist()
         clauses = [[*(np.flatnonzero(one) + 1).tolist()] for one in inside[useful].T]
-        while True:
-            found = _lightest(weights, clauses, self.bound)
-            if found is not None:
-                return sorted(useful[found].tolist())
-            self.bound += 1
+        while (found := _lightest(weights, clauses, self._bound)) is None:
+            self._bound += 1
+        return sorted(useful[found].tolist())
 
 
 def undominated(inside: Bools, weights: Ints) -> Ints:
@@ -82,13 +79,10 @@ def _lightest(
     weights: Sequence[int], clauses: Sequence[Sequence[int]], bound: int
 ) -> list[int] | None:
     """Members with at most a total weight, by position; None if there are none."""
-    solver = sat_solver("cadical153", [*_at_most(weights, bound), *clauses])
-    try:
+    with sat_solver("cadical153", [*_at_most(weights, bound), *clauses]) as solver:
         if not satisfiable(solver):
             return None
         return [var - 1 for var in solver.get_model() if 0 < var <= len(weights)]
-    finally:
-        solver.delete()
 
 
 def _at_most(weights: Sequence[int], bound: int) -> Iterator[list[int]]:

@@ -39,6 +39,8 @@ class Expression:
 
     __slots__ = ()
     HEAD: ClassVar[str]
+    #: What is made of its parts, as a formula and in English.
+    FORMS: ClassVar[tuple[str, str]]
     __match_args__: ClassVar[tuple[str, ...]]
 
     @property
@@ -111,6 +113,8 @@ class Role(Expression):
 class Everything(Expression):
     """All objects."""
 
+    FORMS = ("all", "any")
+
     def __str__(self) -> str:
         return "all"
 
@@ -122,6 +126,7 @@ class Everything(Expression):
 class Named(Expression):
     """The objects of a type, or of which a predicate with one argument is true."""
 
+    FORMS = ("{}", "{}")
     name: str
 
     def __str__(self) -> str:
@@ -144,6 +149,7 @@ class One(Expression):
     """The object of a name; none where the problem does not have it."""
 
     HEAD = "one"
+    FORMS = ("{{{}}}", "{}")
     name: str
 
     def _read(self, states: States) -> Bools:
@@ -156,6 +162,7 @@ class Without(Expression):
     """The objects that are not in a concept."""
 
     HEAD = "not"
+    FORMS = ("not {}", "not {}")
     concept: Concept
 
     def _read(self, states: States) -> Bools:
@@ -168,6 +175,7 @@ class Both(Expression):
     """The objects in two concepts."""
 
     HEAD = "and"
+    FORMS = ("({} and {})", "({} and {})")
     one: Concept
     other: Concept
 
@@ -181,6 +189,7 @@ class Some(Expression):
     """The objects that a role relates with one in a concept."""
 
     HEAD = "some"
+    FORMS = ("some {}.{}", "{} to something {}")
     role: Role
     concept: Concept
 
@@ -241,6 +250,7 @@ class Distance(Expression):
     """The links of a static relation between the objects of two terms; `NONE` without a way."""
 
     HEAD = "distance"
+    FORMS = ("{}-distance({}, {})", "the links of {} between {} and {}")
     relation: str
     one: Term
     other: Term
@@ -275,6 +285,7 @@ class Size(Expression):
     """How many objects are in a concept."""
 
     HEAD = "size"
+    FORMS = ("|{}|", "the number of objects that are {}")
     concept: Concept
 
     def _read(self, states: States) -> Ints:
@@ -287,6 +298,10 @@ class Gap(Expression):
     """The fewest links of a static relation from an object of one concept to one of another."""
 
     HEAD = "gap"
+    FORMS = (
+        "{}-distance({}, {})",
+        "the fewest links of {} between an object that is {} and one that is {}",
+    )
     relation: str
     one: Concept
     other: Concept
@@ -310,10 +325,16 @@ Number = Attribute | Distance | Count | Size | Gap
 # ---- features
 
 
+def _defined(value: Any, *numbers: Ints) -> Ints:
+    """The value where all numbers are defined."""
+    return np.where(np.any([number == NONE for number in numbers], axis=0), UNDEFINED, value)
+
+
 @dataclass(frozen=True, slots=True)
 class Sign(Expression):
     """Which of two numbers is larger: -1, 0 or 1."""
 
+    FORMS = ("sign({} - {})", "which is larger, {} or {}")
     one: Number
     other: Number
 
@@ -322,7 +343,7 @@ class Sign(Expression):
 
     def _read(self, states: States) -> Ints:
         one, other = states.get(self.one), states.get(self.other)
-        return np.where((one == NONE) | (other == NONE), UNDEFINED, np.sign(one - other))
+        return _defined(np.sign(one - other), one, other)
 
 
 @dataclass(frozen=True, slots=True)
@@ -330,6 +351,7 @@ class Residue(Expression):
     """What is left of a number by division."""
 
     HEAD = "mod"
+    FORMS = ("{} mod {}", "{}, modulo {}")
     number: Number
     modulus: int
 
@@ -340,7 +362,7 @@ class Residue(Expression):
 
     def _read(self, states: States) -> Ints:
         number = states.get(self.number)
-        return np.where(number == NONE, UNDEFINED, number % self.modulus)
+        return _defined(number % self.modulus, number)
 
 
 @dataclass(frozen=True, slots=True)
@@ -348,6 +370,7 @@ class Least(Expression):
     """A number up to a most."""
 
     HEAD = "min"
+    FORMS = ("min({}, {})", "{0}, where {1} stands for {1} or more")
     number: Number
     most: int
 
@@ -358,7 +381,7 @@ class Least(Expression):
 
     def _read(self, states: States) -> Ints:
         number = states.get(self.number)
-        return np.where(number == NONE, UNDEFINED, np.minimum(number, self.most))
+        return _defined(np.minimum(number, self.most), number)
 
 
 @dataclass(frozen=True, slots=True)
@@ -366,12 +389,13 @@ class Same(Expression):
     """Whether two terms name one object: 0 or 1."""
 
     HEAD = "same"
+    FORMS = ("[{} = {}]", "whether {} is {}")
     one: Term
     other: Term
 
     def _read(self, states: States) -> Ints:
         one, other = states.get(self.one), states.get(self.other)
-        return np.where((one == NONE) | (other == NONE), UNDEFINED, one == other)
+        return _defined(one == other, one, other)
 
 
 Feature = Sign | Residue | Least | Same

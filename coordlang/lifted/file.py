@@ -13,9 +13,8 @@ import msgspec
 from msgspec import Meta
 
 from coordlang.language.candidates import Kind
-from coordlang.language.duplicate_keys import refuse_duplicates
 from coordlang.language.file import Fault, faults_of_robots, present, refuse_first
-from coordlang.language.record import DomainRecord, ModelRecord
+from coordlang.language.record import DomainRecord, ModelRecord, refuse_duplicates
 from coordlang.lifted.language import (
     LIFT_AGAIN,
     LiftedLanguage,

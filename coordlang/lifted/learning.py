@@ -27,7 +27,7 @@ from coordlang.lifted.world import States, World
 from coordlang.required.miscoordination import Inseparable, inseparable
 from coordlang.sites.coordinates import Point
 from coordlang.symmetry.group import SymmetryGroup
-from coordlang.verification.candidates import verify_candidates
+from coordlang.verification.by_definition import verify_candidates
 from coordlang.vocabulary.refuter import Refuter
 from planners.joint.tables import Bools, Ints
 from planners.parallel.workers import Workers
@@ -38,8 +38,11 @@ from planners.system.limits import run_until_stopped
 #: simple features, and a word for each of their combinations.
 Preference = Literal["features", "words"]
 
-#: Why some plans are beyond features.
-_UNSEEN = "Features see what is true, and not what was done last."
+#: What to do about plans that are beyond features.
+_REMEMBER = (
+    "Features see what is true, and not what was done last. "
+    "`coordlang build --remember-actions` finds words of one problem."
+)
 #: Sets of features that are tried for fewer words.
 _TRIED = 8
 
@@ -69,13 +72,12 @@ class Instance:
         return vectors(chosen, self.states)
 
     def holds(
-        self, words: Ints, workers: Workers | None = None, progress: Progress | None = None
+        self, words: Ints, workers: Workers | None = None, progress: Progress = lambda _: None
     ) -> bool:
         """Whether words of the states are a language for the candidate tasks, by definition."""
         names = [f"w{k}" for k in range(int(words.max(initial=0)) + 1)]
         partition = Partition.of_table(names, self.candidates.rows, words)
-        workers, progress = workers or Workers(), progress or (lambda _: None)
-        return verify_candidates(partition, self.candidates, workers, progress).holds
+        return verify_candidates(partition, self.candidates, workers or Workers(), progress).holds
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,11 +193,9 @@ class _Learner:
         With many robots plans fail in too many ways for all of them to be looked at.
         """
         group = SymmetryGroup(())  # features need not be symmetric
-        candidates = own.candidates
-        rows = len(candidates.rows)
+        spaces, rows = own.candidates.spaces, len(own.candidates.rows)
         self.taken.append(own)
-        found = Refuter(candidates.spaces, group, rows, self._seed, self._progress, refuted)
-        self._refuters.append(found)
+        self._refuters.append(Refuter(spaces, group, rows, self._seed, self._progress, refuted))
         self._clauses.append({})
 
     def begin(self, landmarks: bool = False) -> None:
@@ -250,22 +250,20 @@ class _Learner:
             for own, of_states in zip(self._every, words.of_states, strict=True)
         )
         number = {word: k for k, word in enumerate(dict.fromkeys(words.merged.words))}
-        word = {
-            tuple(vector): number[own]
-            for vector, own in zip(words.table.tolist(), words.merged.words, strict=True)
-        }
+        classes = zip(map(tuple, words.table.tolist()), words.merged.words, strict=True)
         return Learned(
             words.features,
-            word,
+            {vector: number[own] for vector, own in classes},
             words.merged.proved,
             sizes,
-            self._pool.tried,
-            len(self._pool.features),
-            self.rounds,
-            len(self.taken),
+            tried=self._pool.tried,
+            pool=len(self._pool.features),
+            rounds=self.rounds,
+            taken=len(self.taken),
         )
 
     def _words(self, chosen: Sequence[int], prefer: Preference | None) -> _Words:
+        """Words over some features: one for each class of states, or as few as are found."""
         every = self._every
         features = tuple(self._pool.features[k] for k in chosen)
         vectors = np.concatenate([own.vectors(features) for own in every])
@@ -312,41 +310,37 @@ class _Learner:
 
     def _separating(self, number: int, clause: Clause, excluded: Sequence[int]) -> Bools:
         """The features that tell some pair of a clause apart."""
+        own = self.taken[number]
         if not clause:
-            raise self._inseparable(number)
+            raise _inseparable(own.candidates)
         pairs = np.array(sorted(clause))
         table = self._tables[number]
         apart: Bools = (table[:, pairs[:, 0]] != table[:, pairs[:, 1]]).any(axis=1)
         apart[list(excluded)] = False
         if not apart.any():
-            raise self._too_weak(number, clause)
+            raise _too_weak(own, pairs, self._complexity)
         return apart
 
-    def _too_weak(self, number: int, clause: Clause) -> ProvedImpossible:
-        own = self.taken[number]
-        one, other = min(clause)
-        model, rows = own.candidates.model, own.candidates.rows
-        pairs = np.array(sorted(clause))
-        facts = model.codec.facts_part(rows)
-        if (facts[pairs[:, 0]] == facts[pairs[:, 1]]).all():
-            remedy = f"{_UNSEEN} `coordlang build --remember-actions` finds words of one problem."
-        else:
-            remedy = (
-                "Allow more complex features, or name places so that they say where they lie "
-                "(c2-3)."
-            )
-        return ProvedImpossible(
-            f"no feature up to complexity {self._complexity} tells states apart of which every "
-            f"language separates some, such as {model.state_text(rows[one])} and "
-            f"{model.state_text(rows[other])} of {own.name}",
-            remedy=remedy,
-        )
 
-    def _inseparable(self, number: int) -> Inseparable:
-        """What an empty clause means: plans that fail together have the same states."""
-        candidates = self.taken[number].candidates
-        found = map(inseparable, candidates.spaces)
-        error = Inseparable(next(witness for witness in found if witness is not None))
-        error.position = Position(candidates.loaded.problems[0].source.name)
-        error.remedy = f"{_UNSEEN} `coordlang build --remember-actions` finds words of one problem."
-        return error
+def _too_weak(own: Instance, pairs: Ints, complexity: int) -> ProvedImpossible:
+    """The error for pairs of states that no feature tells apart."""
+    model, rows = own.candidates.model, own.candidates.rows
+    facts = model.codec.facts_part(rows)
+    remedy = "Allow more complex features, or name places so that they say where they lie (c2-3)."
+    if (facts[pairs[:, 0]] == facts[pairs[:, 1]]).all():
+        remedy = _REMEMBER
+    one, other = (model.state_text(rows[state]) for state in pairs[0])
+    return ProvedImpossible(
+        f"no feature up to complexity {complexity} tells states apart of which every language "
+        f"separates some, such as {one} and {other} of {own.name}",
+        remedy=remedy,
+    )
+
+
+def _inseparable(candidates: Candidates) -> Inseparable:
+    """What an empty clause means: plans that fail together have the same states."""
+    found = map(inseparable, candidates.spaces)
+    error = Inseparable(next(witness for witness in found if witness is not None))
+    error.position = Position(candidates.loaded.problems[0].source.name)
+    error.remedy = _REMEMBER
+    return error

@@ -5,28 +5,20 @@ from __future__ import annotations
 
 import re
 from dataclasses import fields, replace
-from typing import Any
+from typing import Any, get_args
 
 from coordlang.lifted.features import (
     Attribute,
-    Both,
+    Concept,
     Count,
-    Distance,
     Everything,
     Expression,
     Feature,
-    Gap,
-    Least,
     Named,
-    One,
-    Residue,
+    Number,
     Role,
-    Same,
     Sign,
-    Size,
-    Some,
     Term,
-    Without,
 )
 from planners.system.errors import BadInput, Position
 from planners.system.messages import echoed
@@ -39,18 +31,12 @@ LARGEST = 1_000_000
 
 Tree = str | list["Tree"]
 
-#: What is written as its head and its parts in order, by its kind.
+#: What is written as its head and its parts in order, by its kind, the type of a field.
 _MADE: dict[tuple[str, str], type[Expression]] = {
-    ("Feature", "mod"): Residue,
-    ("Feature", "min"): Least,
-    ("Feature", "same"): Same,
-    ("Number", "distance"): Distance,
-    ("Number", "size"): Size,
-    ("Number", "gap"): Gap,
-    ("Concept", "one"): One,
-    ("Concept", "not"): Without,
-    ("Concept", "and"): Both,
-    ("Concept", "some"): Some,
+    (kind, made.HEAD): made
+    for kind, types in (("Feature", Feature), ("Number", Number), ("Concept", Concept))
+    for made in get_args(types)
+    if hasattr(made, "HEAD")
 }
 
 

@@ -92,10 +92,8 @@ def _simplest(one: Feature | Number) -> tuple[int, str]:
 
 def _partition(values: Ints) -> tuple[bytes, int]:
     """What states values tell apart: classes numbered by first occurrence, and how many."""
-    classes, number = np.unique(values, return_inverse=True)
-    first = np.full(len(classes), len(values))
-    np.minimum.at(first, number, np.arange(len(values)))
-    return np.argsort(np.argsort(first))[number].astype(np.int16).tobytes(), len(classes)
+    _, first, number = np.unique(values, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(first))[number].astype(np.int16).tobytes(), len(first)
 
 
 class _Vocabulary:
@@ -130,12 +128,10 @@ class _Vocabulary:
 
     def roles(self) -> Iterator[Role]:
         binary = [name for name, arity in self.fluents if arity == 2]
-        for name in (*binary, *self.relations):
-            yield Role(name)
-            yield Role(name, inverse=True)
-        for name in self.relations:
-            yield Role(name, closure=True)
-            yield Role(name, inverse=True, closure=True)
+        for closure, names in ((False, [*binary, *self.relations]), (True, self.relations)):
+            for name in names:
+                yield Role(name, closure=closure)
+                yield Role(name, inverse=True, closure=closure)
 
 
 def _features(vocabulary: _Vocabulary, numbers: Sequence[Number], most: int) -> Iterator[Feature]:

@@ -3,52 +3,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from coordlang.lifted.features import (
     UNDEFINED,
     Attribute,
-    Both,
     Count,
-    Distance,
-    Everything,
     Expression,
     Feature,
-    Gap,
     Least,
-    Named,
-    One,
     Residue,
     Role,
     Same,
     Sign,
-    Size,
-    Some,
     Term,
-    Without,
 )
 from coordlang.lifted.world import ANY
 
 _SIGNS = {-1: "<", 0: "=", 1: ">"}
-#: What is made of its parts, as a formula and in English.
-_FORMS: Mapping[type[Expression], tuple[str, str]] = {
-    Sign: ("sign({} - {})", "which is larger, {} or {}"),
-    Residue: ("{} mod {}", "{}, modulo {}"),
-    Least: ("min({}, {})", "{0}, where {1} stands for {1} or more"),
-    Same: ("[{} = {}]", "whether {} is {}"),
-    Distance: ("{}-distance({}, {})", "the links of {} between {} and {}"),
-    Size: ("|{}|", "the number of objects that are {}"),
-    Gap: (
-        "{}-distance({}, {})",
-        "the fewest links of {} between an object that is {} and one that is {}",
-    ),
-    Everything: ("all", "any"),
-    Named: ("{}", "{}"),
-    One: ("{{{}}}", "{}"),
-    Without: ("not {}", "not {}"),
-    Both: ("({} and {})", "({} and {})"),
-    Some: ("some {}.{}", "{} to something {}"),
-}
 
 
 def condition(feature: Feature, value: int) -> str:
@@ -78,7 +48,7 @@ def formula(part: object) -> str:
         case Role(predicate, inverse, closure):
             return f"{predicate}{'^-1' * inverse}{'+' * closure}"
         case Expression():
-            return _FORMS[type(part)][0].format(*map(formula, part.parts))
+            return part.FORMS[0].format(*map(formula, part.parts))
     return str(part)
 
 
@@ -100,5 +70,5 @@ def english(part: object) -> str:
             steps = " in one or more steps" * closure
             return f"{'inversely ' * inverse}{predicate}-related{steps}"
         case Expression():
-            return _FORMS[type(part)][1].format(*map(english, part.parts))
+            return part.FORMS[1].format(*map(english, part.parts))
     return str(part)

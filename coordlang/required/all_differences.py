@@ -2,27 +2,35 @@
 """Required coordination of many tasks, by goals.
 
 Divergences at a node depend on its goal only, so the goals are cut into portions, and each is a
-job (`planners.parallel`).  Of goals that are images of each other under a symmetry one is
-looked at (`coordlang.symmetry.goals`).
+job (`planners.parallel`).  A symmetry takes the optimal plans to a goal to those to the goal's
+image, mixtures to mixtures and failing ones to failing ones (Proposition 15 of docs/concepts.md):
+of goals that are images of each other one is looked at, and speaks for all.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from coordlang.language.candidates import Candidates
 from coordlang.required.divergences import Divergences, FirstDifferences, first_differences, minimal
 from coordlang.required.miscoordination import Inseparable, inseparable, separable
-from coordlang.symmetry.goals import SymmetricGoals, symmetric_goals
-from planners.joint.tables import Ints
+from coordlang.symmetry.group import checked_generators
+from planners.joint.tables import Ints, find_rows, unique_rows
 from planners.parallel.batch import Batch, Table, digest
 from planners.parallel.workers import Workers
+from planners.search.graphs import parts_of_graph
 from planners.search.portions import PORTION, Explored, Source, cut
 from planners.system.limits import reaching
+
+#: Pairs of a goal and a state, times robots, from which on symmetries are looked for: below, what
+#: they save takes no longer than to find them.
+LEAST_WORK = 50_000
+#: So many pairs for each ground action and fact, which symmetries are checked on.
+PAIRS_FOR_ACTION = 10
 
 
 def differences(
@@ -40,11 +48,11 @@ def differences(
     if goals is not None and isinstance(source, Explored):
         progress(f"looking at {len(goals.chosen):,} of {len(source.goals):,} goals, by symmetry")
         some = source.only(goals.chosen), goals.spoken_for[goals.chosen]
-        tables_of_some = _tables(some, workers, progress, portion)
-        if not _inseparable(tables_of_some):
-            return _spread(_together(tables_of_some), goals)
+        found = _tables(some, workers, progress, portion)
+        if not found[-1]["inseparable"]:
+            return _spread(_together(found), goals)
     found = _tables((source, None), workers, progress, portion)
-    if _inseparable(found):
+    if found[-1]["inseparable"]:
         witness = inseparable(source.portion(cut(source.efforts, portion)[len(found) - 1]))
         assert witness is not None
         raise Inseparable(witness)
@@ -80,21 +88,6 @@ def _tables(
     return found
 
 
-def _inseparable(found: Sequence[Table]) -> bool:
-    return bool(found[-1]["inseparable"])
-
-
-def _spread(found: FirstDifferences, goals: SymmetricGoals) -> FirstDifferences:
-    """What the chosen goals say, for all goals (Proposition 15 of docs/concepts.md).
-
-    The numbers of tasks, nodes and edges are those of all goals already.
-    """
-    rows = np.column_stack((found.divergences.last, found.divergences.following))
-    rows = minimal(goals.images_of_rows(rows))
-    states = goals.images_of_states(found.states)
-    return replace(found, divergences=Divergences(rows[:, 0], rows[:, 1:]), states=states)
-
-
 def _differences(shared: _Goals, goals: range) -> Table:
     """One job: the tasks of some goals."""
     source, spoken_for = shared
@@ -118,3 +111,90 @@ def _together(found: Sequence[Table]) -> FirstDifferences:
     states = np.unique(np.concatenate([table["states"] for table in found]))
     figures = np.stack([table["figures"] for table in found]).sum(axis=0)
     return FirstDifferences(Divergences(rows[:, 0], rows[:, 1:]), states, *figures.tolist())
+
+
+# ---- goals up to symmetry
+
+
+@dataclass(frozen=True, slots=True)
+class SymmetricGoals:
+    """The goals "every state", of which some speak for all.
+
+    ``generators`` (states) say where each state number goes, for a group of symmetries;
+    ``representative`` (states) is for each goal, by the number of its state, the least goal that a
+    symmetry takes to it.
+    """
+
+    generators: tuple[Ints, ...]
+    representative: Ints
+
+    @classmethod
+    def of(cls, generators: Sequence[Ints], states: int) -> SymmetricGoals:
+        """Find the orbits of the group that permutations of state numbers generate."""
+        here = np.tile(np.arange(states), len(generators))
+        count, orbit = parts_of_graph(states, here, np.concatenate(generators))
+        least = np.full(count, states)
+        np.minimum.at(least, orbit, np.arange(states))
+        return cls(tuple(generators), least[orbit])
+
+    @property
+    def chosen(self) -> Ints:
+        """The goals that speak for all, sorted."""
+        return np.unique(self.representative)
+
+    @property
+    def spoken_for(self) -> Ints:
+        """(goals) for how many goals each speaks: 0 for those that are not chosen."""
+        return np.bincount(self.representative, minlength=len(self.representative))
+
+    def images_of_states(self, states: Ints) -> Ints:
+        """The images of states under all symmetries of the group, sorted."""
+        return np.flatnonzero(np.isin(self.representative, self.representative[states]))
+
+    def images_of_rows(self, rows: Ints) -> Ints:
+        """The images of rows (state, other states sorted, -1 to fill up), sorted, each once."""
+        known, _ = unique_rows(rows.astype(np.uint64))
+        new = known
+        while len(new):
+            images = [_image(new.astype(np.int64), to) for to in self.generators]
+            images_once, _ = unique_rows(np.concatenate(images).astype(np.uint64))
+            new = images_once[find_rows(known, images_once) < 0]
+            known, _ = unique_rows(np.concatenate((known, new)))
+        return known.astype(np.int64)
+
+
+def _image(rows: Ints, to: Ints) -> Ints:
+    most = len(to)
+    image = np.append(to, most)[rows]  # -1 is the last entry: beyond all states
+    image[:, 1:].sort(axis=1)
+    return np.where(image == most, -1, image)
+
+
+def symmetric_goals(
+    candidates: Candidates, least: int = LEAST_WORK, for_action: int = PAIRS_FOR_ACTION
+) -> SymmetricGoals | None:
+    """The goals of all pairs of states up to symmetry; None where one speaks for itself only.
+
+    None, too, where it is not worth the while: for tasks of other kinds, under
+    ``--remember-actions`` and slack, for less work than ``least``, and for fewer than
+    ``for_action`` pairs of states for each ground action and fact.
+    """
+    model = candidates.model
+    states = len(candidates.rows)
+    if candidates.kind != "all" or model.remembers or model.slack:
+        return None
+    if states**2 * len(model.robots) < least:
+        return None
+    if states**2 < for_action * (len(model.actions) + len(model.codec.facts)):
+        return None
+    found, _ = checked_generators(candidates, with_tasks=False)
+    generators = [s.states for s in found if (s.states != np.arange(states)).any()]
+    return SymmetricGoals.of(generators, states) if generators else None
+
+
+def _spread(found: FirstDifferences, goals: SymmetricGoals) -> FirstDifferences:
+    """What the chosen goals say, for all goals; numbers are of all already."""
+    rows = np.column_stack((found.divergences.last, found.divergences.following))
+    rows = minimal(goals.images_of_rows(rows))
+    states = goals.images_of_states(found.states)
+    return replace(found, divergences=Divergences(rows[:, 0], rows[:, 1:]), states=states)

@@ -152,10 +152,6 @@ class LabelSets:
         answers[left] = known[inverse]
         return answers
 
-    def all_within(self, one: Sequence[int], other: Sequence[int]) -> bool:
-        """Whether each set of ``one`` is `within` its partner."""
-        return all(map(self.within, one, other))
-
 
 #: A robot's choices below some node: each first label with the set of what may follow it.
 Moves = dict[int, int]
@@ -238,7 +234,7 @@ class Choices:
         known = self._failing.get(key)
         if known is None:
             self.evaluations += 1
-            if not self.sets.all_within(chosen, self.of_node[:, node].tolist()):
+            if not all(map(self.sets.within, chosen, self.of_node[:, node].tolist())):
                 known = True  # that sequence is in no optimal plan, the other sets are not empty
             elif not self.requires[node]:
                 known = False

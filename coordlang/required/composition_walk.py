@@ -51,10 +51,11 @@ class Moves:
 def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints, most: float = _MOST) -> Iterator[Moves]:
     """All moves of n plans and their mixture out of walk nodes ``(x_1 .. x_n, y)``, in chunks.
 
-    Raises `OutOfMemory` where there are more than ``most``, or one node needs too much at once.
+    There is one for every choice of the plans' next steps.  Raises `OutOfMemory` where there are
+    more than ``most``, or one node needs too much at once.
     """
     robots = nodes.shape[1] - 1
-    sizes = edges_out_of(space, nodes)
+    sizes = np.prod(space.out_degrees.astype(np.float64)[nodes[:, :-1]], axis=1)
     _check_size(sizes, space, most)
     for span in spans(sizes, _PIECE):
         source = np.arange(span.start, span.stop)
@@ -63,14 +64,10 @@ def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints, most: float = _MOST) 
         for robot in range(robots):
             which, edge = space.edges_from(nodes[source, robot])
             source, prefix = source[which], prefix[which]
-            edges = [old[which] for old in edges]
-            edges.append(edge)
+            edges = [*(old[which] for old in edges), edge]
             prefix = index.follow(robot, prefix, space.robot_labels(robot, edge))
-        mixed = (
-            np.where(prefix >= 0, space.targets(np.maximum(prefix, 0)), FAILED)
-            if len(prefix)
-            else prefix
-        )
+        mixed = np.full(len(prefix), FAILED)
+        mixed[prefix >= 0] = space.targets(prefix[prefix >= 0])
         yield Moves(source, np.stack(edges, axis=1), mixed)
 
 
@@ -84,16 +81,6 @@ def can_fail(choices: Choices, targets: Ints, mixed: Ints) -> Bools:
     nodes = np.column_stack((targets[open_rows], mixed[open_rows]))
     possible[open_rows] = choices.fails_each(nodes)
     return possible
-
-
-def edges_out_of(space: PlanSpace, nodes: Ints) -> NDArray[np.float64]:
-    """How many edges of the walk leave each of its nodes.
-
-    One for every choice of the plans' next steps.
-    """
-    degree = space.out_degrees.astype(np.float64)
-    product: NDArray[np.float64] = np.prod(degree[nodes[:, :-1]], axis=1)
-    return product
 
 
 def _check_size(sizes: NDArray[np.float64], space: PlanSpace, most: float) -> None:

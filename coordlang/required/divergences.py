@@ -112,9 +112,9 @@ def without_divergences(spaces: Sequence[PlanSpace]) -> FirstDifferences:
     return FirstDifferences(
         Divergences(np.zeros(0, np.int64), np.zeros((0, spaces[0].robots), np.int64)),
         states_on_plans(spaces),
-        sum(int(required_nodes(space)[space.starts].sum()) for space in spaces),
-        sum(map(len, spaces)),
-        sum(len(space.targets()) for space in spaces),
+        requiring=sum(int(required_nodes(space)[space.starts].sum()) for space in spaces),
+        nodes=sum(map(len, spaces)),
+        edges=sum(len(space.target) for space in spaces),
         sets=0,
         evaluations=0,
     )
@@ -221,18 +221,6 @@ def _among(table: Rows, rows: NDArray[np.integer[Any]]) -> Bools:
     return found
 
 
-@dataclass(frozen=True, slots=True)
-class _Mixed:
-    """Mixed steps that are edges: for each the set that it is for, its edge's target, who follows.
-
-    ``row`` numbers the sets, ``next`` (mixed steps, robots) is the node that each robot was given.
-    """
-
-    row: Ints
-    target: Ints
-    next: Ints
-
-
 class _Mixing:
     """Mixtures of edges out of some nodes of a plan space.
 
@@ -289,23 +277,32 @@ class _Mixing:
         given = [way for way in product(range(size), repeat=robots) if len(set(way)) == size]
         for assigned in given:
             rows = np.flatnonzero(~fails[number])
-            mixed, none = self._mixed(sets[rows][:, assigned])
-            fails[number[rows[none]]] = True
+            row, target, chosen, missing = self._mixed(sets[rows][:, assigned])
+            fails[number[rows[missing]]] = True
+            which = number[rows[row]]
             for robot in range(robots):
-                left = np.flatnonzero(~fails[number[rows[mixed.row]]])
-                mine = choices.of_node[robot, mixed.next[left, robot]]
-                theirs = choices.of_node[robot, mixed.target[left]]
-                lost = ~choices.sets.within_each(mine, theirs)
-                fails[number[rows[mixed.row[left[lost]]]]] = True
-            asked[number[rows[mixed.row[choices.requires[mixed.target]]]]] = True
+                left = np.flatnonzero(~fails[which])
+                theirs = choices.of_node[robot, target[left]]
+                lost = ~choices.sets.within_each(chosen[left, robot], theirs)
+                fails[which[left[lost]]] = True
+            asked[which[choices.requires[target]]] = True
         for assigned in given:
             rows = np.flatnonzero(asked[number] & ~fails[number])
-            mixed, _ = self._mixed(sets[rows][:, assigned])
-            self._search(mixed, number[rows], fails)
+            row, target, chosen, _ = self._mixed(sets[rows][:, assigned])
+            open_rows = choices.requires[target]
+            columns = (number[rows[row]], target, chosen)
+            every = (column[open_rows].tolist() for column in columns)
+            for which_set, node, mine in zip(*every, strict=True):
+                if not fails[which_set] and choices.fails(tuple(mine), node):
+                    fails[which_set] = True
         return fails
 
-    def _mixed(self, ways: Ints) -> tuple[_Mixed, Ints]:
-        """The edges that mix the ways given to the robots, and the rows where one is missing."""
+    def _mixed(self, ways: Ints) -> tuple[Ints, Ints, Ints, Ints]:
+        """The edges that mix the ways given to the robots.
+
+        (numbers of the rows that they are for, their targets, the robots' choices after the nodes
+        that they were given, the rows where an edge is missing).
+        """
         row = np.arange(len(ways))
         prefix = self._node[ways[:, 0]]
         missing = [row[:0]]
@@ -315,32 +312,12 @@ class _Mixing:
                 counts = first[own + 1] - first[own]
                 own = ranges(first[own], counts)
                 row, prefix = np.repeat(row, counts), np.repeat(prefix, counts)
-            label = labels[own]
-            prefix = self._index.follow(robot, prefix, label)
+            prefix = self._index.follow(robot, prefix, labels[own])
             missing.append(row[prefix < 0])
             row, prefix = row[prefix >= 0], prefix[prefix >= 0]
-        target = self._space.targets(prefix)
-        return _Mixed(row, target, self._target[ways[row]]), np.concatenate(missing)
-
-    def _search(self, mixed: _Mixed, number: Ints, fails: Bools) -> None:
-        """Sets whose mixed steps are edges, one after another, each until it is known."""
-        choices = self._choices
-        asked = np.flatnonzero(choices.requires[mixed.target])
-        chosen = np.column_stack(
-            [
-                choices.of_node[robot, mixed.next[asked, robot]]
-                for robot in range(self._space.robots)
-            ]
-        )
-        columns = zip(
-            number[mixed.row[asked]].tolist(),
-            map(tuple, chosen.tolist()),
-            mixed.target[asked].tolist(),
-            strict=True,
-        )
-        for which, sets, target in columns:
-            if not fails[which] and choices.fails(sets, target):
-                fails[which] = True
+        following = self._target[ways[row]]
+        chosen = self._choices.of_node[np.arange(following.shape[1]), following]
+        return row, self._space.targets(prefix), chosen, np.concatenate(missing)
 
 
 def _labels_of_ways(way: Ints, labels: Ints) -> tuple[Ints, Ints]:

@@ -154,9 +154,7 @@ def failure_of_sentence(
     sets = WeightedSets(LabelSets())
     begin = int(fits.starts[0])
     (parts,) = FailureCount(fits, None, sets, most).by_sentence({begin})[begin].values()
-    factors, chosen = zip(*parts, strict=True)
-    good = prod(factors) * FailureCount(space, None, sets, most).good(chosen, start)
-    size = factors[0] * sets.totals[chosen[0]]
+    size, good = FailureCount(space, None, sets, most).good_of(parts, start)
     return 1 - Fraction(good, size**space.robots)
 
 
@@ -198,9 +196,8 @@ class FailureCount:
 
     def tasks(self) -> list[Fraction]:
         """The failure probability of each task."""
-        requires = self.choices.requires
         starts: list[int] = self.space.starts.tolist()
-        asked = {start for start in starts if requires[start]}
+        asked = {start for start in starts if self.choices.requires[start]}
 
         def so_far() -> str:
             return (
@@ -210,9 +207,7 @@ class FailureCount:
 
         with reaching(so_far, self.space.model.smaller("smaller tasks")):
             said = self.by_sentence(asked) if asked else {}
-            found = {
-                node: self._probability(node, [*said[node].values()]) for node in sorted(asked)
-            }
+            found = {node: self._probability(node, said[node].values()) for node in sorted(asked)}
         return [found.get(start, Fraction(0)) for start in starts]
 
     def by_sentence(self, nodes: set[int]) -> dict[int, dict[int, _Parts]]:
@@ -240,25 +235,26 @@ class FailureCount:
                 for mine, label, part in zip(own, labels, plans, strict=True):
                     mine[label].append(part)
         self._check()
-        return {
-            sentence: tuple(self._sets.of_moves(mine) for mine in own)
-            for sentence, own in moves.items()
-        }
+        return {sentence: tuple(map(self._sets.of_moves, own)) for sentence, own in moves.items()}
 
     def _front(self, word: int, rest: int) -> int:
         """The number of the sentence that says ``word`` and then ``rest`` (-1: nothing)."""
         return self._sentences.setdefault((word, rest), len(self._sentences))
 
-    def _probability(self, start: int, said: Sequence[_Parts]) -> Fraction:
+    def _probability(self, start: int, said: Iterable[_Parts]) -> Fraction:
         robots = self.space.robots
         found, plans = Fraction(0), 0
         for parts in said:
-            factors, chosen = zip(*parts, strict=True)
-            size = factors[0] * self._sets.totals[chosen[0]]
-            good = prod(factors) * self.good(chosen, start)
+            size, good = self.good_of(parts, start)
             found += Fraction(size**robots - good, size ** (robots - 1))
             plans += size
         return found / plans
+
+    def good_of(self, parts: _Parts, start: int) -> tuple[int, int]:
+        """Of the plans with one sentence: how many, and how many n-tuples mix to a plan."""
+        factors, chosen = zip(*parts, strict=True)
+        size = factors[0] * self._sets.totals[chosen[0]]
+        return size, prod(factors) * self.good(chosen, start)
 
     def good(self, chosen: tuple[int, ...], node: int) -> int:
         """How many choices of one sequence from each weighted set are an optimal plan from a node.
@@ -273,9 +269,8 @@ class FailureCount:
     def _count(self, chosen: tuple[int, ...], node: int) -> int:
         sets, choices = self._sets, self.choices
         supports = [sets.supports[number] for number in chosen]
-        if not choices.requires[node] and choices.sets.all_within(
-            supports, choices.of_node[:, node].tolist()
-        ):
+        here = choices.of_node[:, node].tolist()
+        if not choices.requires[node] and all(map(choices.sets.within, supports, here)):
             return prod(sets.totals[number] for number in chosen)  # whatever they choose
         moves = [sets.moves[number] for number in chosen]
         total = 0

@@ -19,7 +19,7 @@ from coordlang.language.candidates import Candidates
 from coordlang.language.partition import Partition
 from coordlang.language.sentences import Sentence, sentence
 from coordlang.language.tolerance import Tolerance, percent
-from coordlang.required.failure import MOST, FailureProbability, TooManyToCount, failure_probability
+from coordlang.required.failure import MOST, TooManyToCount, failure_probability
 from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
@@ -116,17 +116,16 @@ NONE = Failures(Fraction(0), Fraction(0))
 
 
 def failures(
-    spaces: Sequence[PlanSpace], words: Sequence[Ints | None], most: int = MOST, seed: int = 0
+    spaces: Sequence[PlanSpace], words: Sequence[Ints | None], most: int = MOST
 ) -> Failures:
     """Count how often robots fail in some tasks; what is too much work is estimated.
 
-    ``spaces``, ``words`` and ``most`` are as in `failure_probability`; an estimate depends on
-    ``seed``.
+    ``spaces``, ``words`` and ``most`` are as in `failure_probability`.
     """
     try:
-        found: FailureProbability = failure_probability(spaces, words, most)
+        found = failure_probability(spaces, words, most)
     except TooManyToCount as error:
-        return Failures(None, None, estimated_failure(spaces, words, _RUNS, seed), error.what)
+        return Failures(None, None, estimated_failure(spaces, words, _RUNS, seed=0), error.what)
     return Failures(found.mean, found.worst)
 
 
@@ -201,28 +200,27 @@ class _Game:
 
     def fails(self, start: int, random: Random) -> bool:
         """Whether robots that draw by themselves, after a sentence was said, miscoordinate."""
-        said = sentence(self._word[node] for node in self._drawn(start, None, random)[0])
-        plans = [self._drawn(start, said, random)[1] for _ in range(self.space.robots)]
-        labels = [[self.space.labels_of(edge) for edge in plan] for plan in plans]
-        steps = [tuple(row[n] for n, row in enumerate(step)) for step in zip(*labels, strict=True)]
+        first = self._drawn(start, None, random)
+        said = sentence(self._word[node] for node in self.space.nodes_on(start, first))
+        plans = [self._drawn(start, said, random) for _ in range(self.space.robots)]
+        steps = [
+            tuple(self.space.labels_of(edge)[robot] for robot, edge in enumerate(step))
+            for step in zip(*plans, strict=True)
+        ]
         return self.space.path_with(start, steps) is None
 
-    def _drawn(
-        self, node: int, said: Sentence | None, random: Random
-    ) -> tuple[list[int], list[int]]:
-        """The nodes and edges of a plan drawn uniformly, of those with a sentence (None: all)."""
-        nodes, path = [node], []
+    def _drawn(self, node: int, said: Sentence | None, random: Random) -> list[int]:
+        """The edges of a plan drawn uniformly, of those with a sentence (None: of all)."""
+        path = []
         while edges := self.space.out_edges(node):
-            rests = [self._rest(node, self.space.target_of(edge), said) for edge in edges]
-            weights = [
-                self._number(self.space.target_of(edge), rest)
-                for edge, rest in zip(edges, rests, strict=True)
-            ]
-            chosen = bisect(list(accumulate(weights)), random.randrange(sum(weights)))
+            targets = self.space.successors(node)
+            rests = [self._rest(node, target, said) for target in targets]
+            weights = map(self._number, targets, rests)
+            ends = list(accumulate(weights))
+            chosen = bisect(ends, random.randrange(ends[-1]))
             path.append(edges[chosen])
-            node, said = self.space.target_of(path[-1]), rests[chosen]
-            nodes.append(node)
-        return nodes, path
+            node, said = targets[chosen], rests[chosen]
+        return path
 
     def _rest(self, node: int, target: int, said: Sentence | None) -> Sentence | None:
         """What is left to say from ``target`` on, after ``said`` from ``node`` on."""
@@ -237,9 +235,6 @@ class _Game:
         key = (node, said)
         if key not in self._fitting:
             targets = self.space.successors(node)
-            self._fitting[key] = (
-                sum(self._number(t, self._rest(node, t, said)) for t in targets)
-                if targets
-                else int(len(said) == 1)
-            )
+            following = sum(self._number(t, self._rest(node, t, said)) for t in targets)
+            self._fitting[key] = following if targets else int(len(said) == 1)
         return self._fitting[key]

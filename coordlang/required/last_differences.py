@@ -92,28 +92,21 @@ class DifferenceWalk:
         None at all: the partition satisfies Theorem 3 for these tasks.  O(links).
         """
         state = self._space.state
+        x = state[self._layers[0].x]
+        bad = (x != x[:, :1]).any(axis=1) & (word[x] == word[x[:, :1]]).all(axis=1)
         # Per node: a link (of any layer, numbered through) or goal node that ends badly.
-        ending = np.zeros(0, np.int64)
+        ending = np.where(bad, np.arange(len(x)), -1)
         # Rows (q, t_1 .. t_n), or (-1, t_1 .. t_n) for different goal states.
-        endings: list[Ints] = []
-        offset = 0
-        for number, layer in enumerate(self._layers):
-            x = state[layer.x]
-            if number == 0:
-                bad = (x != x[:, :1]).any(axis=1) & (word[x] == word[x[:, :1]]).all(axis=1)
-                ending = np.where(bad, np.arange(len(x)), -1)
-                endings.append(np.column_stack((np.full(len(x), -1), x)))
-                offset = len(x)
-                continue
-            below = self._layers[number - 1]
+        endings = [np.column_stack((np.full(len(x), -1), x))]
+        offset = len(x)
+        for below, layer in pairwise(self._layers):
             first = state[layer.x[layer.source]]
             after = state[below.x[layer.child]]
-            if layer.parts.any():
-                rows = np.flatnonzero(layer.parts & (ending[layer.child] >= 0))
-                rows = rows[~_separated(word, first[rows, 0], after[rows])]
-                yield from self._with_endings(
-                    first[rows, 0], after[rows], endings, ending[layer.child[rows]]
-                )
+            rows = np.flatnonzero(layer.parts & (ending[layer.child] >= 0))
+            rows = rows[~_separated(word, first[rows, 0], after[rows])]
+            yield from self._with_endings(
+                first[rows, 0], after[rows], endings, ending[layer.child[rows]]
+            )
             last = np.flatnonzero(layer.meets & below.tail[layer.child])
             last = last[~_separated(word, after[last, 0], first[last])]
             endings.append(np.column_stack((after[last, 0], first[last])))
@@ -145,22 +138,16 @@ class DifferenceWalk:
         state = self._space.state
         number: dict[Difference, int] = {}
         firsts: dict[Difference, int] = {}
-        x = state[self._layers[0].x]
         following = [
             1 << number.setdefault((-1, *sorted(row)), len(number)) if len(set(row)) > 1 else 0
-            for row in x.tolist()
+            for row in state[self._layers[0].x].tolist()
         ]
         for below, layer in pairwise(self._layers):
             here, after = state[layer.x[layer.source]], state[below.x[layer.child]]
             meets = layer.meets & below.tail[layer.child]
             ends = [0] * len(layer.x)
-            links = zip(
-                layer.source.tolist(),
-                layer.child.tolist(),
-                layer.parts.tolist(),
-                meets.tolist(),
-                strict=True,
-            )
+            columns = (layer.source, layer.child, layer.parts, meets)
+            links = zip(*(column.tolist() for column in columns), strict=True)
             for link, (source, child, parts, meet) in enumerate(links):
                 more = following[child]
                 if parts and more:
@@ -231,19 +218,13 @@ def _walk(space: PlanSpace) -> list[_Layer]:
 
 
 def _links(choices: Choices, index: EdgeIndex, table: Ints) -> tuple[Ints, Ints, Ints]:
-    """Links out of a table of nodes.
-
-    (source, different children, number of each link's child among them).
-    """
+    """Links out of a table of nodes: (source, different children, each link's child among them)."""
     space = choices.space
-    robots = space.robots
     failed = len(space)
-    bounds = [failed + 1] * (robots + 1)
-    y = table[:, robots]
-    walking = np.column_stack((table[:, :robots], np.where(y == failed, FAILED, y)))
+    bounds = [failed + 1] * table.shape[1]
     sources: list[Ints] = [np.zeros(0, np.int64)]
-    children: list[Ints] = [np.zeros((0, robots + 1), np.int64)]
-    for move in moves(space, index, walking):
+    children: list[Ints] = [table[:0]]
+    for move in moves(space, index, np.where(table == failed, FAILED, table)):
         target = space.targets(move.edges)
         fails = can_fail(choices, target, move.mixed)
         mixed = np.where(move.mixed == FAILED, failed, move.mixed)

@@ -110,43 +110,33 @@ def describe_failure(
     The mixture goes up to its breaking step, with the reason why it breaks.
     """
     model = space.model
-    paths = [_complete(space, plan) for plan in zip(*trail.edges, strict=True)]
-    mixed_nodes, mixture = _mixture(space, trail)
+    paths = [
+        [*edges, *space.first_path(space.target_of(edges[-1]))]
+        for edges in zip(*trail.edges, strict=True)
+    ]
+    nodes, mixture = [trail.start], list[tuple[int, ...]]()
+    for edges in trail.edges:
+        mixture.append(tuple(space.labels_of(edge)[robot] for robot, edge in enumerate(edges)))
+        mixed = space.edge_with(nodes[-1], mixture[-1])
+        if mixed is None:
+            break
+        nodes.append(space.target_of(mixed))
+
+    def keys(passed: Sequence[int]) -> tuple[str, ...]:
+        return tuple(model.codec.key(space.rows[space.state[node]]) for node in passed)
+
     return Miscoordination(
         task=describe(space, int(np.flatnonzero(space.starts == trail.start)[0])),
         robots=model.robots,
         plans=tuple(tuple(model.texts(space.labels_of(e)) for e in path) for path in paths),
-        states=tuple(
-            tuple(_key(space, node) for node in space.nodes_on(trail.start, path)) for path in paths
-        ),
+        states=tuple(keys(space.nodes_on(trail.start, path)) for path in paths),
         mixture=tuple(model.texts(labels) for labels in mixture),
-        mixed_states=tuple(_key(space, node) for node in mixed_nodes),
+        mixed_states=keys(nodes),
         step=len(mixture) - 1,
-        reason=_reason(space, mixed_nodes[len(mixture) - 1], mixture[-1]),
+        reason=_reason(space, nodes[len(mixture) - 1], mixture[-1]),
         sentence=sentence,
         kind=model.kept_plan,
     )
-
-
-def _complete(space: PlanSpace, edges: Sequence[int]) -> list[int]:
-    """A path continued to the goal by first edges."""
-    return [*edges, *space.first_path(space.target_of(edges[-1]))]
-
-
-def _mixture(space: PlanSpace, trail: Trail) -> tuple[list[int], list[tuple[int, ...]]]:
-    """The mixture of a trail up to its breaking step: nodes before each step, and its labels."""
-    nodes, mixture = [trail.start], []
-    for edges in trail.edges:
-        mixture.append(tuple(space.labels_of(edge)[robot] for robot, edge in enumerate(edges)))
-        edge = space.edge_with(nodes[-1], mixture[-1])
-        if edge is None:
-            break
-        nodes.append(space.target_of(edge))
-    return nodes, mixture
-
-
-def _key(space: PlanSpace, node: int) -> str:
-    return space.model.codec.key(space.rows[space.state[node]])
 
 
 def _reason(space: PlanSpace, node: int, labels: tuple[int, ...]) -> str:

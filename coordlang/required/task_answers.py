@@ -13,7 +13,7 @@ import numpy as np
 
 from coordlang.language.tolerance import percent
 from coordlang.required.choices import Choices, LabelSets
-from coordlang.required.failures import NONE, FailureEstimate, Failures, failures
+from coordlang.required.failures import NONE, Failures, failures
 from coordlang.required.miscoordination import Miscoordination, miscoordination
 from planners.joint.composition import cost_of
 from planners.joint.model import JointModel, PlanningTask
@@ -31,21 +31,10 @@ from planners.system.notebook import counted
 
 #: Additions after which the failures of one task are estimated, some seconds of work.
 _ADDITIONS = 3_000_000
-
-
-@dataclass(frozen=True, slots=True)
-class TaskAnswer:
-    """One task: its optimal makespan and plans, and plans that miscoordinate, if there are any.
-
-    ``failures`` says how often robots do that draw their plans without a word, ``fewest`` the same
-    of the plans with the fewest actions, if they fail less often.
-    """
-
-    makespan: int
-    plans: int
-    witness: Miscoordination | None
-    failures: Failures
-    fewest: FewestActions | None = None
+#: The cost that has the plans with the fewest actions only.
+FEWEST: Cost = "makespan+actions"
+#: Edges of plan spaces up to which `requiring` looks at them: some seconds of work.
+MOST_EDGES = 300_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +61,21 @@ class FewestActions:
         return f"{line}they fail in {percent(self.failure)}."
 
 
+@dataclass(frozen=True, slots=True)
+class TaskAnswer:
+    """One task: its optimal makespan and plans, and plans that miscoordinate, if there are any.
+
+    ``failures`` says how often robots do that draw their plans without a word, ``fewest`` the same
+    of the plans with the fewest actions, if they fail less often.
+    """
+
+    makespan: int
+    plans: int
+    witness: Miscoordination | None
+    failures: Failures
+    fewest: FewestActions | None = None
+
+
 def answers(loaded: PlanningInstance, workers: Workers) -> list[TaskAnswer]:
     """Search the task of each problem and decide whether it requires coordination, as jobs.
 
@@ -84,34 +88,32 @@ def answers(loaded: PlanningInstance, workers: Workers) -> list[TaskAnswer]:
     identity = digest(*hashes, repr(loaded.options))
     shared = (model, tasks, store_in_use())
     batch = Batch("coordination", _answer, shared, numbers, identity, [effort for _ in numbers])
-    return [_read_answer(table) for table in workers.tables(batch)]
-
-
-#: An answer as JSON holds it: makespan, plans, witness, failures, and what the fewest actions do:
-#: plans, whether coordination is required, failure.  Exact numbers are texts.
-_Failures = tuple[str | None, tuple[int, int] | None, str]
-_Record = tuple[int, str, Miscoordination | None, _Failures, tuple[str, bool, float] | None]
+    return [_decoded(table["answer"]) for table in workers.tables(batch)]
 
 
 def _answer(shared: tuple[JointModel, Sequence[PlanningTask], Store | None], number: int) -> Table:
-    """One job: a task."""
+    """One job: a task; its answer as JSON, in which fractions are texts."""
     model, tasks, folder = shared
     with keeping_plans(folder):
         space = search(model, tasks[number])
     witness = miscoordination(space, 0)
     found = NONE if witness is None else failures([space], [None], _ADDITIONS)
-    drawn = None if found.estimate is None else (found.estimate.failures, found.estimate.runs)
-    said = (None if found.mean is None else str(found.mean), drawn, found.why_not)
     fewest = None if witness is None else _fewest(space, found)
-    record: _Record = (space.least_makespan(0), _plans(space), witness, said, fewest)
-    return {"answer": np.frombuffer(msgspec.json.encode(record), np.uint8)}
+    answer = TaskAnswer(space.least_makespan(0), _plans(space), witness, found, fewest)
+    return {"answer": np.frombuffer(msgspec.json.encode(answer, enc_hook=str), np.uint8)}
 
 
-def _plans(space: PlanSpace) -> str:
-    return str(counts(space)[int(space.starts[0])])
+def _decoded(answer: Ints) -> TaskAnswer:
+    return msgspec.json.decode(
+        answer.tobytes(), type=TaskAnswer, dec_hook=lambda _, text: Fraction(text)
+    )
 
 
-def _fewest(space: PlanSpace, found: Failures) -> tuple[str, bool, float] | None:
+def _plans(space: PlanSpace) -> int:
+    return counts(space)[int(space.starts[0])]
+
+
+def _fewest(space: PlanSpace, found: Failures) -> FewestActions | None:
     """What holds of the plans with the fewest actions, None if it is no better."""
     fewer = fewest_actions(space)
     if fewer is None:
@@ -120,26 +122,7 @@ def _fewest(space: PlanSpace, found: Failures) -> tuple[str, bool, float] | None
     own = failures([fewer], [None], _ADDITIONS) if required else NONE
     if required and (own.mean is None or found.mean is None or own.mean >= found.mean):
         return None
-    return _plans(fewer), required, float(own.mean or 0)
-
-
-def _read_answer(table: Table) -> TaskAnswer:
-    record = msgspec.json.decode(table["answer"].tobytes(), type=_Record)
-    makespan, plans, witness, (mean, drawn, why_not), fewest = record
-    exact = None if mean is None else Fraction(mean)
-    return TaskAnswer(
-        makespan,
-        int(plans),
-        witness,
-        Failures(exact, exact, FailureEstimate(*drawn) if drawn else None, why_not),
-        FewestActions(int(fewest[0]), *fewest[1:]) if fewest else None,
-    )
-
-
-#: The cost that has these plans only.
-FEWEST: Cost = "makespan+actions"
-#: Edges of plan spaces up to which `requiring` looks at them: some seconds of work.
-MOST_EDGES = 300_000
+    return FewestActions(_plans(fewer), required, float(own.mean or 0))
 
 
 def fewest_actions(space: PlanSpace) -> PlanSpace | None:
@@ -167,10 +150,8 @@ def requiring(spaces: Sequence[PlanSpace]) -> int | None:
     if all(fewer is None for _, fewer in found):
         return None
     sets = LabelSets()
-    return sum(
-        int(Choices(used, sets).requires[used.starts].sum())
-        for used in (space if fewer is None else fewer for space, fewer in found)
-    )
+    used = [space if fewer is None else fewer for space, fewer in found]
+    return sum(int(Choices(space, sets).requires[space.starts].sum()) for space in used)
 
 
 def _actions(model: JointModel) -> list[Ints]:

@@ -22,6 +22,8 @@ from planners.system.limits import reaching
 
 #: The labels of all robots in one joint step.
 Labels = tuple[int, ...]
+#: Nodes ``(D_1 .. D_n, y)`` from which some mixture fails, and the mixed labels on a way to them.
+_Failing = dict[tuple[int, ...], tuple[Labels, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,12 +54,10 @@ def earliest_witness(choices: Choices, start: int) -> Trail:
 
 def _earliest_labels(choices: Choices, start: int) -> list[Labels]:
     """The mixed labels, step by step, of a failing choice that breaks earliest; the last breaks."""
-    layer: dict[tuple[int, ...], tuple[Labels, ...]] = {
-        (*choices.of_node[:, start].tolist(), start): ()
-    }
+    layer: _Failing = {(*choices.of_node[:, start].tolist(), start): ()}
+    steps = 0
 
     def so_far() -> str:
-        steps = len(next(iter(layer.values())))
         return (
             f"{steps} of {int(choices.space.layer[start])} steps to the first break of a mixture, "
             f"{len(layer):,} nodes"
@@ -65,17 +65,15 @@ def _earliest_labels(choices: Choices, start: int) -> list[Labels]:
 
     with reaching(so_far, choices.space.model.smaller("smaller tasks")):
         while True:
-            below, broken = _steps_of_choices(choices, layer)
+            layer, broken = _steps_of_choices(choices, layer)
             if broken is not None:
                 return broken
-            layer = below
+            steps += 1
 
 
-def _steps_of_choices(
-    choices: Choices, layer: Mapping[tuple[int, ...], tuple[Labels, ...]]
-) -> tuple[dict[tuple[int, ...], tuple[Labels, ...]], list[Labels] | None]:
+def _steps_of_choices(choices: Choices, layer: _Failing) -> tuple[_Failing, list[Labels] | None]:
     """The failing choices one step on; or none, and the labels up to the first break."""
-    below: dict[tuple[int, ...], tuple[Labels, ...]] = {}
+    below: _Failing = {}
     for (*chosen, node), path in layer.items():
         moves = [choices.sets.moves(number) for number in chosen]
         edges = choices.edges_of(node)

@@ -40,11 +40,9 @@ class _Part:
         self._space, self._end = space, end
         self._states = np.unique(space.state)
         self._index = EdgeIndex.of(space)
-        self._source = space.sources
-        goal_of = np.full(len(space.rows), -1)
-        goal_of[end[end >= 0]] = np.flatnonzero(end >= 0)
-        self._goal_of = goal_of
-        codes = self._codes(space.state, space.goal)
+        self._goal_of = np.full(len(space.rows), -1)
+        self._goal_of[end[end >= 0]] = np.flatnonzero(end >= 0)
+        codes = space.state * len(end) + space.goal
         self._order = np.argsort(codes)
         self._ordered = codes[self._order]
         facts = space.model.codec.facts
@@ -55,8 +53,7 @@ class _Part:
         robots = self._space.model.robots
         if {renaming.get(robot, robot) for robot in robots} != set(robots):
             return None
-        symmetry = Symmetry(renaming, np.arange(len(self._space.rows)))
-        states = self._states_under(symmetry)
+        states = self._states_under(Symmetry(renaming, self._states))
         if states is None:
             return None
         symmetry = Symmetry(renaming, states)
@@ -88,7 +85,7 @@ class _Part:
         labels = self._labels_under(symmetry)
         if nodes is None or labels is None:
             return False
-        edge = nodes[self._source]
+        edge = nodes[space.sources]
         for robot in range(space.robots):
             edge = self._index.follow(robot, edge, labels[robot])
         alike = (edge >= 0).all() and (space.target[edge] == nodes[space.target]).all()
@@ -98,7 +95,7 @@ class _Part:
         """Where the nodes go, None if one goes to none."""
         space = self._space
         goal = np.where(self._end >= 0, self._goal_of[states[self._end]], -1)[space.goal]
-        codes = self._codes(states[space.state], goal)
+        codes = states[space.state] * len(self._end) + goal
         found = np.minimum(np.searchsorted(self._ordered, codes), len(codes) - 1)
         if not (np.array_equal(self._ordered[found], codes) and (goal >= 0).all()):
             return None
@@ -120,6 +117,3 @@ class _Part:
                 return None
             images[to] = np.array(image, np.int64)[place]
         return images
-
-    def _codes(self, state: Ints, goal: Ints) -> Ints:
-        return state * len(self._end) + goal

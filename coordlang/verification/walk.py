@@ -3,9 +3,9 @@
 
 A node is ``(view_1 .. view_n, y or failed, lead_2 .. lead_n)``: what each plan can still do and say
 (`coordlang.verification.views`), the node of the plan space that the mixture has reached, and the
-words by which the sentence of plan 1 is ahead of that of plan i, or behind it
-(`coordlang.verification.leads`).  Moves whose sentences differ for good are left out.  A walk that
-ends failed with all leads empty is a violation (Proposition 9 of docs/concepts.md).
+words by which the sentence of plan 1 is ahead of that of plan i, or behind it.  Moves whose
+sentences differ for good are left out.  A walk that ends failed with all leads empty is a violation
+(Proposition 9 of docs/concepts.md).
 
 Nodes in which the plans and their mixture are in one state and nobody leads are *diagonal*: most
 are, and of these a mask is kept.  A walk that grows, or that meets a state with very many moves,
@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 
 from coordlang.required.miscoordination import Trail
 from coordlang.verification.continuations import Continuations
-from coordlang.verification.leads import ANY, NEVER, Leads
-from coordlang.verification.views import views_of_robot
+from coordlang.verification.views import ANY, NEVER, Leads, views_of_robot
 from planners.joint.tables import Bools, Ints, ranges, spans, unique_tuples
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace

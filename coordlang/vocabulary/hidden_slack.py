@@ -20,7 +20,7 @@ from coordlang.required.divergences import (
     without_divergences,
 )
 from coordlang.required.miscoordination import Inseparable
-from coordlang.verification.candidates import verify_candidates
+from coordlang.verification.by_definition import verify_candidates
 from planners.parallel.workers import Workers
 
 

@@ -12,9 +12,9 @@ import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
-from coordlang.explanation import word_formulas
 from coordlang.explanation.demands import RobotPart, SentenceDemands, sentence_demands
 from coordlang.explanation.text import demands_text
+from coordlang.explanation.words import word_formulas
 from coordlang.language.candidates import all_pairs, from_problems
 from planners.pddl import read_domain, read_problem
 from planners.search.plans import Plan, Plans

@@ -11,11 +11,16 @@ import numpy as np
 import pytest
 
 from coordlang.commands.building import build_language
-from coordlang.explanation import Cover, Literal, Variable, word_formulas
+from coordlang.explanation.cover import Cover, Literal
 from coordlang.explanation.minimise import Points, expand, minimise
 from coordlang.explanation.text import literal_text, pddl_condition, shown
-from coordlang.explanation.variables import truth, valuation
-from coordlang.explanation.words import all_covers, describe_words, mapped_states
+from coordlang.explanation.variables import Variable, truth, valuation
+from coordlang.explanation.words import (
+    all_covers,
+    describe_words,
+    mapped_states,
+    word_formulas,
+)
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.language.words import Language
 from planners.joint.model import show

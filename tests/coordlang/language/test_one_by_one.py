@@ -9,10 +9,9 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from coordlang.language import reached
-from coordlang.language.candidates import Candidates, describe, from_listed
+from coordlang.language import candidates as room
+from coordlang.language.candidates import Candidates, describe, explored_if_small, from_listed
 from coordlang.language.listed import ListedTask, goal_text
-from coordlang.language.reached import explored_if_small
 from planners.joint.model import JointModel, PlanningTask
 from planners.joint.tables import Rows
 from planners.pddl import parse_domain, parse_problem, read_domain, read_problem
@@ -35,7 +34,7 @@ CORNERS = DOMAINS / "grid" / "gw4-3x3.pddl"
 @pytest.fixture
 def large(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every space is too large to be explored."""
-    monkeypatch.setattr(reached, "MOST_STATES", 0)
+    monkeypatch.setattr(room, "MOST_STATES", 0)
 
 
 @pytest.fixture
@@ -115,7 +114,7 @@ def test_random_tasks_have_the_same_plans(
                     continue
                 if sum(sum(counts(space)) for space in explored.spaces) > 2000:
                     continue  # plans are listed one by one
-                patched.setattr(reached, "MOST_STATES", 0)
+                patched.setattr(room, "MOST_STATES", 0)
                 before = len(searches)
                 single = from_listed(domain, [problem], listed, options, skip_unsolvable=True)
             assert (explored.states is None, single.states) == (False, None)
@@ -158,8 +157,8 @@ def test_a_small_space_is_explored(monkeypatch: pytest.MonkeyPatch) -> None:
     inits = world.tasks[0].init[None, :]
     whole = explore(world.model, inits)
     for states, steps, small in ((0, 0, False), (-1, None, False), (0, None, True)):
-        monkeypatch.setattr(reached, "MOST_STATES", len(whole) + states)
-        monkeypatch.setattr(reached, "MOST_STEPS", reached.MOST_STEPS if steps is None else 1)
+        monkeypatch.setattr(room, "MOST_STATES", len(whole) + states)
+        monkeypatch.setattr(room, "MOST_STEPS", room.MOST_STEPS if steps is None else 1)
         found = explored_if_small(world.model, inits)
         assert (found is not None) == small
         assert found is None or np.array_equal(found.rows, whole.rows)

@@ -19,8 +19,7 @@ from coordlang.required.all_differences import differences
 from coordlang.required.divergences import FirstDifferences
 from coordlang.required.miscoordination import Inseparable
 from coordlang.required.task_answers import answers
-from coordlang.verification.by_definition import verify
-from coordlang.verification.candidates import verify_candidates
+from coordlang.verification.by_definition import verify, verify_candidates
 from planners.loading import load
 from planners.parallel.store import Store
 from planners.parallel.workers import Workers

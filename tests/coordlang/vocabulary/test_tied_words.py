@@ -14,7 +14,7 @@ from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates
 from coordlang.language.partition import Partition
 from coordlang.symmetry.subgroups import group_table
-from coordlang.verification.candidates import verify_candidates
+from coordlang.verification.by_definition import verify_candidates
 from coordlang.vocabulary.abstractions import abstractions
 from coordlang.vocabulary.failing_tuples import agree
 from coordlang.vocabulary.job import Assignment, Job

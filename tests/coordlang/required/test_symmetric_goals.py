@@ -12,10 +12,9 @@ import pytest
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.required import all_differences
-from coordlang.required.all_differences import differences
+from coordlang.required.all_differences import SymmetricGoals, differences, symmetric_goals
 from coordlang.required.divergences import FirstDifferences
 from coordlang.required.miscoordination import Inseparable, separable
-from coordlang.symmetry.goals import SymmetricGoals, symmetric_goals
 from planners.parallel.workers import Workers
 from planners.pddl import parse_problem, read_domain, read_problem
 from planners.pddl.model_options import ModelOptions
