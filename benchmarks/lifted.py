@@ -30,7 +30,7 @@ from benchmarks.frame import DOMAINS, Figures, KeptRows, PrintedTable, asked_for
 from coordlang.language.candidates import all_pairs
 from coordlang.lifted.language import LiftedLanguage
 from coordlang.lifted.learning import Instance, Learned, learn
-from coordlang.lifted.wording import formula
+from coordlang.lifted.notation import formula
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.sexpr import Source
 from planners.system.errors import CoordlangError

@@ -18,7 +18,7 @@ from coordlang.language.provenance import Guarantee, provenance_of, world_sha256
 from coordlang.lifted.file import to_bytes, write_lifted
 from coordlang.lifted.language import LiftedLanguage, Verified
 from coordlang.lifted.learning import Instance, Learned, learn
-from coordlang.lifted.wording import english, formula
+from coordlang.lifted.notation import english, formula
 from planners.loading import PlanningInstance
 from planners.system.errors import BadInput, Position, ProvedImpossible, UsageError
 from planners.system.limits import stop_clock

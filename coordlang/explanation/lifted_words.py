@@ -13,8 +13,7 @@ from coordlang.explanation.minimise import Points, minimise
 from coordlang.language.words import Language
 from coordlang.lifted.features import Feature
 from coordlang.lifted.language import LiftedLanguage, Vector, read_values, vectors
-from coordlang.lifted.notation import feature_of
-from coordlang.lifted.wording import condition, english, formula
+from coordlang.lifted.notation import condition, english, feature_of, formula
 from coordlang.lifted.world import States, World
 from coordlang.sites.coordinates import Point
 from planners.joint.model import JointModel

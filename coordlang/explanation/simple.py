@@ -88,15 +88,21 @@ class _Search:
         self._job, self._found, self._conflicts = job, found, conflicts
         self.best: Assignment = found.partition
         values = valuation(job.candidates.model, job.candidates.rows[list(job.states)])
-        self._values = values
         self._value = dict(zip(job.states, values.value, strict=True))
         self._sizes = [len(variable.values) for variable in values.variables]
         self._before = self.lengths = formula_lengths(_mapped(job, values, found.partition))
         self.bound: Lengths = (found.size - 1, found.size - 1)  # each term limits a variable
-        self._languages: Languages | None = None
+        self._languages: Languages | None = found.languages
         self._problems: ProblemsBySize[Clause] = ProblemsBySize(
             self._problem, PartitionProblem.separate_one
         )
+
+    @property
+    def languages(self) -> Languages:
+        """What tells languages from other partitions, with the clauses that are known."""
+        if self._languages is None:
+            self._languages = Languages.of(self._job)
+        return self._languages
 
     def close(self) -> None:
         """Give back what the solvers hold."""
@@ -104,22 +110,16 @@ class _Search:
 
     def outcome(self, stopped: BaseException | None) -> Outcome:
         """The best language, with what is known of it."""
-        figures = {
-            **self._found.figures,
-            "terms": self.lengths[0],
-            "limits": self.lengths[1],
-            "terms_before": self._before[0],
-            "limits_before": self._before[1],
-            "terms_lower_bound": self.bound[0],
-            "limits_lower_bound": self.bound[1],
-        }
+        figures = dict(self._found.figures)
+        named = {"": self.lengths, "_before": self._before, "_lower_bound": self.bound}
+        for name, lengths in named.items():
+            figures |= {f"terms{name}": lengths[0], f"limits{name}": lengths[1]}
         return replace(self._found, partition=self.best, figures=figures, stopped=stopped)
 
     def run(self) -> None:
         """Fewer terms, and then fewer variables in them, until none can be."""
         if self._found.size < 2 or len(self._job.states) * self.lengths[0] > _PLACES:
             return
-        self._languages = self._found.languages or Languages.of(self._job)
         try:
             close_bounds(lambda: (self.bound[0], self.lengths[0]), self._decide)
             while self.bound[1] < self.lengths[1]:
@@ -134,14 +134,16 @@ class _Search:
         """
         if budget.conflicts > self._conflicts:
             raise Undecided
-        languages = self._languages
-        assert languages is not None
+
+        def problem() -> FormulaProblem:
+            under = self._problems.under(terms, self.languages.clauses)
+            assert isinstance(under, FormulaProblem)
+            return under
+
         try:
             found = find(
-                lambda most: self._problems.under(terms, languages.clauses).solve(most),
-                lambda partition: self._is_accepted(
-                    partition, self._problems.under(terms, languages.clauses)
-                ),
+                lambda most: problem().solve(most),
+                lambda p: self._is_accepted(p, problem()),
                 budget,
             )
         except Undecided:
@@ -153,30 +155,28 @@ class _Search:
 
     def _limit_fewer(self) -> None:
         """Find a language with as many terms that limit fewer variables, or prove there is none."""
-        languages = self._languages
-        assert languages is not None
+        clauses = self.languages.clauses
         terms, limits = self.lengths
-        with closing(self._problem(terms, languages.clauses, limits - 1)) as problem:
-            seen = len(languages.clauses)
+        with closing(self._problem(terms, clauses, limits - 1)) as problem:
+            seen = len(clauses)
             while (partition := problem.solve(self._conflicts)) is not None:
                 if self._is_accepted(partition, problem):
                     return
-                for clause in languages.clauses[seen:]:
+                clauses = self.languages.clauses
+                for clause in clauses[seen:]:
                     problem.separate_one(clause)
-                seen = len(languages.clauses)
+                seen = len(clauses)
             self.bound = self.lengths
 
-    def _is_accepted(self, partition: dict[int, int], problem: PartitionProblem) -> bool:
+    def _is_accepted(self, partition: dict[int, int], problem: FormulaProblem) -> bool:
         """Whether a partition is a language; then it is the best."""
-        assert self._languages is not None
-        assert isinstance(problem, FormulaProblem)
         lengths = problem.lengths()
         self._job.progress(
             f"{self._found.size} words with formulas of {self.bound[0]} to {self.lengths[0]} "
             f"terms: trying {lengths[0]} over {lengths[1]} variables, "
-            f"{len(self._languages.clauses):,} clauses"
+            f"{len(self.languages.clauses):,} clauses"
         )
-        if not self._languages.holds(partition):
+        if not self.languages.holds(partition):
             return False
         self._job.check(partition)
         self.best, self.lengths = partition, lengths
@@ -228,31 +228,24 @@ class FormulaProblem(PartitionProblem):
         self._allows = [[self._new() for _ in range(sum(values))] for _ in range(terms)]
         self._limits = [[self._new() for _ in values] for _ in range(terms)]
         self._of_word = [[self._new() for _ in range(size)] for _ in range(terms)]
-        self._values = values
         for term in range(terms):
             self._one_word(self._of_word[term])
-            self._limit_variables(term)
+            # A term that does not allow all values of a variable limits it.
+            columns = np.repeat(np.arange(len(values)), values).tolist()
+            for allowed, variable in zip(self._allows[term], columns, strict=True):
+                self._solver.add_clause([allowed, self._limits[term][variable]])
         self._order_terms()
         self._say_states({state: value[state] for state in order})
         if limits is not None:
-            self._allow_limits(limits)
+            variables = [variable for row in self._limits for variable in row]
+            clauses, self._last = at_most(variables, limits, self._last)
+            for clause in clauses:
+                self._solver.add_clause(clause)
 
     def lengths(self) -> tuple[int, int]:
         """The number of terms of the partition found last, and of the variables that they limit."""
         true = {v for v in self._solver.get_model() if v > 0}
         return len(self._limits), sum(v in true for row in self._limits for v in row)
-
-    def _allow_limits(self, number: int) -> None:
-        variables = [variable for row in self._limits for variable in row]
-        clauses, self._last = at_most(variables, number, self._last)
-        for clause in clauses:
-            self._solver.add_clause(clause)
-
-    def _limit_variables(self, term: int) -> None:
-        """A term that does not allow all values of a variable limits it."""
-        for v, (first, number) in enumerate(zip(self._first.tolist(), self._values, strict=True)):
-            for allowed in self._allows[term][first : first + number]:
-                self._solver.add_clause([allowed, self._limits[term][v]])
 
     def _order_terms(self) -> None:
         for before, after in zip(self._of_word, self._of_word[1:], strict=False):

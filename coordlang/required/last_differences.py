@@ -189,51 +189,42 @@ def _separated(word: Ints, shared: Ints, others: Ints) -> Bools:
 
 def _walk(space: PlanSpace) -> list[_Layer]:
     """All layers, goals first, of nodes from which some mixture fails."""
-    robots = space.robots
-    failed = len(space)
+    width, bound = space.robots + 1, len(space) + 1  # the last number: the mixture has failed
     choices, index = Choices(space), EdgeIndex.of(space)
     requiring = np.flatnonzero(choices.requires)
     tables: list[Ints] = []
     links: list[tuple[Ints, Ints]] = []
-    arriving = np.zeros((0, robots + 1), np.int64)
+    source, arriving = np.zeros(0, np.int64), np.zeros((0, width), np.int64)
     for number in range(len(space.layers) - 1, -1, -1):
         here = requiring[space.layer[requiring] == number]
-        starting = np.repeat(here[:, None], robots + 1, axis=1)
-        table, place = unique_tuples(
-            np.concatenate((starting, arriving)), [failed + 1] * (robots + 1)
-        )
-        if links:
-            links[-1] = (links[-1][0], place[len(starting) :][links[-1][1]])
+        starting = np.repeat(here[:, None], width, axis=1)
+        table, place = unique_tuples(np.concatenate((starting, arriving)), [bound] * width)
         tables.append(table)
+        links.append((source, place[len(starting) :]))
         if number:
-            source, arriving, child = _links(choices, index, table)
-            links.append((source, child))
+            source, arriving = _links(choices, index, table)
         if 4 * sum(a.nbytes + b.nbytes for a, b in links) > memory_left():
             raise OutOfMemory(
                 f"the composition walk has more than {sum(len(t) for t in tables):,} nodes: too "
                 "large to keep",
                 remedy=f"Use --method greedy or minimal, fewer tasks, or {more_memory()}.",
             )
-    return _layers(tables[::-1], links[::-1])
+    return _layers(tables[::-1], links[:0:-1])
 
 
-def _links(choices: Choices, index: EdgeIndex, table: Ints) -> tuple[Ints, Ints, Ints]:
-    """Links out of a table of nodes: (source, different children, each link's child among them)."""
+def _links(choices: Choices, index: EdgeIndex, table: Ints) -> tuple[Ints, Ints]:
+    """The different links out of a table of nodes: (source, where each leads)."""
     space = choices.space
     failed = len(space)
-    bounds = [failed + 1] * table.shape[1]
-    sources: list[Ints] = [np.zeros(0, np.int64)]
-    children: list[Ints] = [table[:0]]
+    bounds = [len(table), *[failed + 1] * table.shape[1]]
+    links = [np.zeros((0, len(bounds)), np.int64)]
     for move in moves(space, index, np.where(table == failed, FAILED, table)):
         target = space.targets(move.edges)
         fails = can_fail(choices, target, move.mixed)
         mixed = np.where(move.mixed == FAILED, failed, move.mixed)
-        links = np.column_stack((move.source, target, mixed))[fails]
-        different, _ = unique_tuples(links, [len(table), *bounds])
-        sources.append(different[:, 0])
-        children.append(different[:, 1:])
-    merged, child = unique_tuples(np.concatenate(children), bounds)
-    return np.concatenate(sources), merged, child
+        links.append(unique_tuples(np.column_stack((move.source, target, mixed))[fails], bounds)[0])
+    together = np.concatenate(links)
+    return together[:, 0], together[:, 1:]
 
 
 def _layers(tables: Sequence[Ints], links: Sequence[tuple[Ints, Ints]]) -> list[_Layer]:

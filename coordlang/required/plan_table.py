@@ -7,7 +7,7 @@ of a task which has these plans only: near the true one, and a guide for a searc
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from random import Random
@@ -83,14 +83,18 @@ class PlanTable:
             return np.zeros(0)
         plans = ranges(self.plan_of_task[tasks], self.plans[tasks])
         number = np.repeat(np.arange(len(tasks)), self.plans[tasks])
-        said = _sentences(word[self.states[plans]], number)
-        first, inverse, sizes = said
+        first, inverse, sizes = _sentences(word[self.states[plans]], number)
         task = number[first]
-        robots = self.parts.shape[1]
+
+        def weights(robot: int) -> tuple[Ints, Ints, Ints]:
+            """Plans with each sentence and part of a robot; each sentence's first part, parts."""
+            width = self.of_robot[tasks, robot][task]
+            offset = np.cumsum(width) - width
+            at = offset[inverse] + self.parts[plans, robot]
+            return np.bincount(at, minlength=int(width.sum())), offset, width
+
         # Robot 1 does something of the sentence in few cells: the others are not looked at.
-        width = self.of_robot[tasks, 0][task]
-        offset = np.cumsum(width) - width
-        weight = np.bincount(offset[inverse] + self.parts[plans, 0], minlength=int(width.sum()))
+        weight, offset, width = weights(0)
         does = np.flatnonzero(weight)
         sentence = np.repeat(np.arange(len(first)), width)[does]
         part = does - offset[sentence] + self.part_of_task[tasks[task]][sentence]
@@ -98,11 +102,9 @@ class PlanTable:
         cell = ranges(self.cell_of_part[part], cells)
         sentence = np.repeat(sentence, cells)
         good = np.repeat(weight[does], cells).astype(np.float64)
+        robots = self.parts.shape[1]
         for robot in range(1, robots):
-            width = self.of_robot[tasks, robot][task]
-            offset = np.cumsum(width) - width
-            at = offset[inverse] + self.parts[plans, robot]
-            weight = np.bincount(at, minlength=int(width.sum()))
+            weight, offset, _ = weights(robot)
             good *= weight[offset[sentence] + self.cells[cell, robot]]
         well = np.bincount(sentence, good, minlength=len(first))
         size = sizes.astype(np.float64)
@@ -148,24 +150,18 @@ def plan_table(
     with more plans fewer are drawn.
     """
     random = Random(seed)
-    chosen = [(space, Choices(space)) for space in spaces]
-    asked = [
-        (space, choices, start)
-        for space, choices in chosen
-        for start in space.starts.tolist()
-        if choices.requires[start] or not mixtures
-    ]
+    asked: list[tuple[Plans, Choices]] = []
+    for space in spaces:
+        choices, counted = Choices(space), counts(space)
+        starts = space.starts[choices.requires[space.starts]] if mixtures else space.starts
+        asked += [(Plans(space, start, counted), choices) for start in starts.tolist()]
     is_complete = len(asked) <= most_tasks
     if not is_complete:
-        kept = sorted(random.sample(range(len(asked)), most_tasks))
-        asked = [asked[number] for number in kept]
-    counted = {id(space): counts(space) for space, _ in chosen}
-    entries = []
-    for space, choices, start in asked:
-        plans = Plans(space, start, counted[id(space)])
-        is_complete &= plans.count <= listed
-        entries.append(_task(plans, choices, listed, mixtures, random))
-    return _together(entries, sum(len(space.starts) for space in spaces), states, is_complete)
+        asked = [asked[k] for k in sorted(random.sample(range(len(asked)), most_tasks))]
+    is_complete &= all(plans.count <= listed for plans, _ in asked)
+    entries = [_task(*own, listed, mixtures, random) for own in asked]
+    number = sum(len(space.starts) for space in spaces)
+    return _together(entries, number, states, spaces[0].robots, is_complete)
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,37 +178,27 @@ class _Task:
 def _task(plans: Plans, choices: Choices, listed: int, mixtures: bool, random: Random) -> _Task:
     space, robots = plans.space, plans.space.robots
     if plans.count <= listed:
-        chosen = list(_paths(plans.start, choices))
+        chosen = list(plans)
     else:
         number = max(2, round(_MIXTURES ** (1 / robots))) if mixtures else listed
         ranks: set[int] = set()
         while len(ranks) < number:
             ranks.add(random.randrange(plans.count))
-        drawn = [plans.unrank(rank) for rank in sorted(ranks)]
-        chosen = [(plan, _nodes(plan, plans.start, choices)) for plan in drawn]
+        chosen = [plans.unrank(rank) for rank in sorted(ranks)]
     own: list[dict[tuple[int, ...], int]] = [{} for _ in range(robots)]
     parts = np.array(
         [
             [of.setdefault(labels, len(of)) for of, labels in zip(own, sequences, strict=True)]
-            for sequences in (zip(*plan, strict=True) for plan, _ in chosen)
+            for sequences in (zip(*plan, strict=True) for plan in chosen)
         ],
         np.int64,
     )
     is_listed = plans.count <= listed or not mixtures
     cells = parts if is_listed else _optimal(own, plans, choices)
-    states: Ints = space.state[np.array([nodes for _, nodes in chosen], np.int64)]
+    nodes = [_nodes(plan, plans.start, choices) for plan in chosen]
+    states: Ints = space.state[np.array(nodes, np.int64)]
     count = float(min(plans.count, MANY))
     return _Task(states, count, parts, tuple(map(len, own)), cells)
-
-
-def _paths(node: int, choices: Choices) -> Iterator[tuple[Plan, tuple[int, ...]]]:
-    """All plans from a node, each with the nodes that it passes through."""
-    edges = choices.edges_of(node)
-    if not edges:
-        yield (), (node,)
-    for labels, target in edges.items():
-        for plan, nodes in _paths(target, choices):
-            yield (labels, *plan), (node, *nodes)
 
 
 def _optimal(own: Sequence[dict[tuple[int, ...], int]], plans: Plans, choices: Choices) -> Ints:
@@ -236,40 +222,38 @@ def _nodes(plan: Plan, node: int, choices: Choices) -> tuple[int, ...]:
     return tuple(nodes)
 
 
-def _together(entries: Sequence[_Task], tasks: int, states: int, is_complete: bool) -> PlanTable:
+def _together(
+    entries: Sequence[_Task], tasks: int, states: int, robots: int, is_complete: bool
+) -> PlanTable:
     steps = max((entry.states.shape[1] for entry in entries), default=1)
     padded = [
         np.pad(entry.states, ((0, 0), (0, steps - entry.states.shape[1])), mode="edge")
         for entry in entries
     ]
+    none = np.zeros((0, robots), np.int64)
     plans = np.array([len(entry.states) for entry in entries], np.int64)
-    cells, cell_of_part = _sorted_cells(entries)
-    ways = np.array([entry.of_robot[0] for entry in entries], np.int64)
+    ways = [entry.of_robot for entry in entries]
+    of_robot = np.array(ways, np.int64).reshape(len(entries), robots)
+    part_of_task = np.cumsum(of_robot[:, 0]) - of_robot[:, 0]
+    cells = np.concatenate([none, *(entry.cells for entry in entries)])
+    sizes = np.array([len(entry.cells) for entry in entries], np.int64)
+    part = np.repeat(part_of_task, sizes) + cells[:, 0]
+    order = np.argsort(part, kind="stable")
     of_state: list[list[int]] = [[] for _ in range(states)]
     for number, entry in enumerate(entries):
         for state in np.unique(entry.states).tolist():
             of_state[state].append(number)
     return PlanTable(
         tasks,
-        np.concatenate(padded) if padded else np.zeros((0, 1), np.int64),
-        np.cumsum(plans) - plans,
-        plans,
-        np.array([entry.count for entry in entries], np.float64),
-        np.concatenate([entry.parts for entry in entries]) if entries else np.zeros((0, 1), int),
-        np.array([entry.of_robot for entry in entries], np.int64),
-        cells,
-        np.cumsum(ways) - ways,
-        cell_of_part,
-        tuple(np.array(numbers, np.int64) for numbers in of_state),
-        is_complete,
+        states=np.concatenate([np.zeros((0, steps), np.int64), *padded]),
+        plan_of_task=np.cumsum(plans) - plans,
+        plans=plans,
+        count=np.array([entry.count for entry in entries], np.float64),
+        parts=np.concatenate([none, *(entry.parts for entry in entries)]),
+        of_robot=of_robot,
+        cells=cells[order],
+        part_of_task=part_of_task,
+        cell_of_part=np.searchsorted(part[order], np.arange(of_robot[:, 0].sum() + 1)),
+        tasks_of_state=tuple(np.array(numbers, np.int64) for numbers in of_state),
+        is_complete=is_complete,
     )
-
-
-def _sorted_cells(entries: Sequence[_Task]) -> tuple[Ints, Ints]:
-    """The cells of all tasks, sorted by what robot 1 does, and where those of each way begin."""
-    cells, counts = [np.zeros((0, 1), np.int64)], [np.zeros(0, np.int64)]
-    for entry in entries:
-        cells.append(entry.cells[np.argsort(entry.cells[:, 0], kind="stable")])
-        counts.append(np.bincount(entry.cells[:, 0], minlength=entry.of_robot[0]))
-    bounds = np.concatenate(([0], np.cumsum(np.concatenate(counts))))
-    return np.concatenate(cells[1:] or cells), bounds

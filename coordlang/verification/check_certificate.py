@@ -113,7 +113,14 @@ def _clause(reason: Reason, tasks: _Tasks) -> Clause:
     robots = len(space.model.robots)
     if len(reason.plans) != robots:
         raise Refuted(f"expected a plan for each of {robots} robots", remedy=_REBUILD)
-    states = [_states(space, start, plan, f"plan {n}") for n, plan in enumerate(reason.plans)]
+    states = []
+    for number, plan in enumerate(reason.plans):
+        passed = _follow(space, start, plan)
+        if passed is None:
+            raise Refuted(
+                f"plan {number} is no {space.model.kept_plan} of the task", remedy=_REBUILD
+            )
+        states.append(passed)
     mixture = [
         [own[robot] for robot, own in enumerate(step)] for step in zip(*reason.plans, strict=True)
     ]
@@ -137,7 +144,14 @@ def _different_cells(path: WarpingPath, states: Sequence[Sequence[int]]) -> set[
     if not (0 <= a < len(states) and 0 <= b < len(states)):
         raise Refuted(f"there are no plans {a} and {b}", remedy=_REBUILD)
     one, other = states[a], states[b]
-    _check_path(path.cells, len(one), len(other), f"the path of plans {a} and {b}")
+    ends = [(0, 0), (len(one) - 1, len(other) - 1)]
+    steps = {(c - a, d - b) for (a, b), (c, d) in pairwise(path.cells)}
+    is_between = bool(path.cells) and [path.cells[0], path.cells[-1]] == ends
+    if not is_between or not steps <= {(0, 1), (1, 0), (1, 1)}:
+        raise Refuted(
+            f"the path of plans {a} and {b} is no warping path from {ends[0]} to {ends[1]}",
+            remedy=_REBUILD,
+        )
     return {pair(one[i], other[j]) for i, j in path.cells if one[i] != other[j]}
 
 
@@ -147,13 +161,6 @@ def _joins_all(links: Sequence[tuple[int, int]], plans: int) -> bool:
     for _ in range(plans):
         joined |= {plan for link in links if joined & {*link} for plan in link}
     return len(joined) == plans
-
-
-def _states(space: PlanSpace, start: int, plan: PlanTexts, name: str) -> list[int]:
-    states = _follow(space, start, plan)
-    if states is None:
-        raise Refuted(f"{name} is no {space.model.kept_plan} of the task", remedy=_REBUILD)
-    return states
 
 
 def _follow(space: PlanSpace, start: int, plan: PlanTexts) -> list[int] | None:
@@ -169,13 +176,6 @@ def _follow(space: PlanSpace, start: int, plan: PlanTexts) -> list[int] | None:
         return None
     states: list[int] = space.state[space.nodes_on(start, path)].tolist()
     return states
-
-
-def _check_path(path: list[tuple[int, int]], rows: int, columns: int, name: str) -> None:
-    ends = [(0, 0), (rows - 1, columns - 1)]
-    steps = [(c - a, d - b) for (a, b), (c, d) in pairwise(path)]
-    if not path or [path[0], path[-1]] != ends or not set(steps) <= {(0, 1), (1, 0), (1, 1)}:
-        raise Refuted(f"{name} is no warping path from {ends[0]} to {ends[1]}", remedy=_REBUILD)
 
 
 class _Tasks:

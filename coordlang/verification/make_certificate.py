@@ -4,19 +4,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from coordlang.language.candidates import Candidates
 from coordlang.language.listed import goal_text
 from coordlang.language.warping import Clause, pair, warping_path
-from coordlang.symmetry.group import Symmetry
 from coordlang.verification.certificate_clauses import core
-from coordlang.verification.certificate_file import Certificate, PlanTexts, Reason, WarpingPath
-from coordlang.vocabulary.counterexamples import Counterexample
+from coordlang.verification.certificate_file import Certificate, Reason, WarpingPath
 from coordlang.vocabulary.job import Evidence
-from planners.joint.model import JointModel
 from planners.joint.states import split_atoms
 from planners.search.plan_space import PlanSpace
 
@@ -33,61 +29,29 @@ def certify(candidates: Candidates, evidence: Mapping[Clause, Evidence], size: i
     return Certificate(candidates.loaded.domain.name, list(candidates.model.robots), size, reasons)
 
 
-@dataclass(frozen=True, slots=True)
-class _Argument:
-    """A task, and for each robot a plan: its texts, and the numbers of the states it passes."""
-
-    init: list[str]
-    goal: list[str]
-    plans: list[PlanTexts]
-    states: list[list[int]]
-
-
 def _reason(candidates: Candidates, clause: Clause, evidence: Evidence) -> Reason:
     """The plans behind a clause, from a candidate task's start on, with their warping paths."""
-    shown = _argument(evidence.space, evidence.example)
-    robots = list(range(len(shown.plans)))
-    symmetry = evidence.symmetry
-    if symmetry is not None:
-        shown = _image(shown, symmetry, candidates.model)
-        # Where the symmetry takes robot i to robot k, plan i is what robot k follows in the image.
-        robots = [symmetry.robot(candidates.model.robots, robot) for robot in robots]
-    paths = []
-    for number in range(1, len(robots)):
-        cells = _warping_path(shown.states[0], shown.states[number], clause)
-        paths.append(WarpingPath((robots[0], robots[number]), cells))
-    plans = [shown.plans[robots.index(robot)] for robot in range(len(robots))]
-    return Reason(shown.init, shown.goal, plans, paths)
-
-
-def _argument(space: PlanSpace, example: Counterexample) -> _Argument:
-    """The plans of a counterexample, each with the way to it from the start of a task."""
-    model = space.model
+    space, example, symmetry = evidence.space, evidence.example, evidence.symmetry
+    model = candidates.model
     start, prefix = _way_to(space, example.start)
     before = space.state[space.nodes_on(start, prefix)[:-1]].tolist()
-    plans: list[PlanTexts] = []
-    for robot in range(len(model.robots)):
-        edges = [*prefix, *(step[robot] for step in example.edges)]
-        plans.append([list(model.texts(space.labels_of(edge))) for edge in edges])
-    return _Argument(
-        model.codec.decode(space.rows[space.state[start]]),
-        split_atoms(goal_text(model, space.goals[space.goal[start]])),
-        plans,
-        [[*before, *own] for own in example.states],
-    )
-
-
-def _image(shown: _Argument, symmetry: Symmetry, model: JointModel) -> _Argument:
-    """What a symmetry makes of a task and its plans."""
-    return _Argument(
-        sorted(symmetry.text(atom) for atom in shown.init),
-        sorted(symmetry.text(atom) for atom in shown.goal),
-        [
-            [list(symmetry.joint_action(model.robots, step)) for step in plan]
-            for plan in shown.plans
-        ],
-        [symmetry.states[own].tolist() for own in shown.states],
-    )
+    init = model.codec.decode(space.rows[space.state[start]])
+    goal = split_atoms(goal_text(model, space.goals[space.goal[start]]))
+    robots = list(range(space.robots))
+    edges = [[*prefix, *(step[robot] for step in example.edges)] for robot in robots]
+    plans = [[list(model.texts(space.labels_of(edge))) for edge in own] for own in edges]
+    states = [[*before, *own] for own in example.states]
+    if symmetry is not None:
+        init, goal = (sorted(map(symmetry.text, texts)) for texts in (init, goal))
+        plans = [[list(symmetry.joint_action(model.robots, s)) for s in plan] for plan in plans]
+        states = [symmetry.states[own].tolist() for own in states]
+        # Where the symmetry takes robot i to robot k, plan i is what robot k follows in the image.
+        robots = [symmetry.robot(model.robots, robot) for robot in robots]
+    paths = [
+        WarpingPath((robots[0], robot), _warping_path(states[0], own, clause))
+        for robot, own in zip(robots[1:], states[1:], strict=True)
+    ]
+    return Reason(init, goal, [plans[robots.index(n)] for n in range(len(robots))], paths)
 
 
 def _warping_path(

@@ -6,8 +6,7 @@ from __future__ import annotations
 import pytest
 
 from coordlang.lifted.features import UNDEFINED
-from coordlang.lifted.notation import feature_of
-from coordlang.lifted.wording import condition, english, formula
+from coordlang.lifted.notation import condition, english, feature_of, formula
 from planners.system.errors import Position
 
 #: Definition, formula, a value, what it means, in English.
