@@ -110,7 +110,12 @@ def minimise(points: Points, quick: bool = False) -> Boxes:
         while not fewest and (smaller := _fewer(points, len(boxes) - 1, needed)) is not None:
             fewest = not len(smaller)
             boxes = boxes if fewest else smaller
-    return _least(points, _shorten(points, boxes), fewest)
+    boxes = _shorten(points, boxes)
+    held = points.inside(boxes, points.on)
+    order = np.argsort(-held.sum(axis=1), kind="stable")
+    first = np.argmax(held[order], axis=0)  # the first box that holds each point
+    least = [points.supercube(np.flatnonzero(first == number)) for number in range(len(boxes))]
+    return Boxes(boxes[order], np.array(least), fewest)
 
 
 # ---- covers by expanding points
@@ -355,12 +360,3 @@ def _hitting(rows: Bools, weights: Sequence[int]) -> Sequence[int]:
         if rows[:, others].any(axis=1).all():
             chosen = others
     return chosen
-
-
-def _least(points: Points, boxes: Bools, fewest: bool) -> Boxes:
-    held = points.inside(boxes, points.on)
-    order = np.argsort(-held.sum(axis=1), kind="stable")
-    prime, held = boxes[order], held[order]
-    first = np.argmax(held, axis=0)  # the first box that holds each point
-    least = [points.supercube(np.flatnonzero(first == number)) for number in range(len(prime))]
-    return Boxes(prime, np.array(least), fewest)

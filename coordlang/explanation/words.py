@@ -151,22 +151,18 @@ def describe_words(
 
     With ``each`` every one by a formula of its own, exact by itself.
     """
+    apart = WordDescriptions(tuple(formulas.items()), False)
     if each or len(formulas) < 2:
-        return WordDescriptions(tuple(formulas.items()), False)
-    apart = _apart(formulas)
+        return apart
+    # The longest formula, if it mentions more than one value, is "every other state".
+    longest = max(formulas, key=lambda word: (formulas[word].length, formulas[word].states))
+    if formulas[longest].length > 1:
+        others = tuple((word, own) for word, own in formulas.items() if word != longest)
+        apart = WordDescriptions((*others, (longest, None)), False)
     if not _SHORT * len(formulas) < apart.length <= _LONG * len(formulas):
         return apart
     ordered = _in_order(mapped, formulas)
     return ordered if ordered.length <= _SHORTER * apart.length else apart
-
-
-def _apart(formulas: dict[str, Cover]) -> WordDescriptions:
-    """The longest formula, if it mentions more than one value, is "every other state"."""
-    longest = max(formulas, key=lambda word: (formulas[word].length, formulas[word].states))
-    if formulas[longest].length < 2:
-        return WordDescriptions(tuple(formulas.items()), False)
-    others = tuple((word, formula) for word, formula in formulas.items() if word != longest)
-    return WordDescriptions((*others, (longest, None)), False)
 
 
 def _in_order(mapped: MappedStates, formulas: dict[str, Cover]) -> WordDescriptions:

@@ -84,7 +84,10 @@ class LiftedLanguage:
     def words_of(self, states: States) -> list[str]:
         """The word of each state of any problem of the domain."""
         different, number = np.unique(vectors(self.features, states), axis=0, return_inverse=True)
-        words = [self._word(tuple(vector)) for vector in different.tolist()]
+        words = [
+            self.values.get(vector) or "v" + ".".join(map(str, vector))
+            for vector in map(tuple, different.tolist())
+        ]
         return [words[k] for k in number.reshape(-1).tolist()]
 
     def partition(self, states: States, *, every_word: bool = False) -> Partition:
@@ -101,9 +104,6 @@ class LiftedLanguage:
         most = int(np.bincount(word, minlength=1).argmax())
         return Partition.of_table(names or ["w0"], states.rows, word, most)
 
-    def _word(self, vector: Vector) -> str:
-        return self.values.get(vector) or "v" + ".".join(map(str, vector))
-
 
 def written_values(values: Mapping[Vector, str]) -> dict[str, str]:
     """The features' values -> word, as files have them: values joined by blanks, sorted."""
@@ -115,21 +115,21 @@ def read_values(entries: Mapping[str, str], size: int, position: Position) -> di
 
     Raises `BadInput` for keys that are no such values.
     """
-    return {_vector(key, size, position): word for key, word in entries.items()}
-
-
-def _vector(key: str, size: int, position: Position) -> Vector:
-    """The values in a key.  Raises `BadInput` for anything else than so many whole numbers."""
-    try:
-        vector = tuple(map(int, key.split()))
-    except ValueError:
-        vector = ()
-    is_plain = " ".join(map(str, vector)) == key and all(abs(v) < LARGEST for v in vector)
-    if len(vector) != size or not is_plain:
-        raise BadInput(
-            f"{echoed(key)} are no values of {size} features", position=position, remedy=LIFT_AGAIN
-        )
-    return vector
+    found: dict[Vector, str] = {}
+    for key, word in entries.items():
+        try:
+            vector = tuple(map(int, key.split()))
+        except ValueError:
+            vector = ()
+        is_plain = " ".join(map(str, vector)) == key and all(abs(v) < LARGEST for v in vector)
+        if len(vector) != size or not is_plain:
+            raise BadInput(
+                f"{echoed(key)} are no values of {size} features",
+                position=position,
+                remedy=LIFT_AGAIN,
+            )
+        found[vector] = word
+    return found
 
 
 # ---- in one problem: an ordinary language, which says what is known of it there

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -50,7 +50,7 @@ def differences(
         some = source.only(goals.chosen), goals.spoken_for[goals.chosen]
         found = _tables(some, workers, progress, portion)
         if not found[-1]["inseparable"]:
-            return _spread(_together(found), goals)
+            return _together(found, goals)
     found = _tables((source, None), workers, progress, portion)
     if found[-1]["inseparable"]:
         witness = inseparable(source.portion(cut(source.efforts, portion)[len(found) - 1]))
@@ -105,10 +105,15 @@ def _differences(shared: _Goals, goals: range) -> Table:
     }
 
 
-def _together(found: Sequence[Table]) -> FirstDifferences:
-    """What jobs found as one: sets and mixtures are counted anew in each."""
+def _together(found: Sequence[Table], goals: SymmetricGoals | None = None) -> FirstDifferences:
+    """What jobs found as one: sets and mixtures are counted anew in each.
+
+    Where the ``goals`` are some that speak for all, the other figures are those of all already.
+    """
     rows = minimal(np.concatenate([table["divergences"] for table in found]))
     states = np.unique(np.concatenate([table["states"] for table in found]))
+    if goals is not None:
+        rows, states = minimal(goals.images_of_rows(rows)), goals.images_of_states(states)
     figures = np.stack([table["figures"] for table in found]).sum(axis=0)
     return FirstDifferences(Divergences(rows[:, 0], rows[:, 1:]), states, *figures.tolist())
 
@@ -190,11 +195,3 @@ def symmetric_goals(
     found, _ = checked_generators(candidates, with_tasks=False)
     generators = [s.states for s in found if (s.states != np.arange(states)).any()]
     return SymmetricGoals.of(generators, states) if generators else None
-
-
-def _spread(found: FirstDifferences, goals: SymmetricGoals) -> FirstDifferences:
-    """What the chosen goals say, for all goals; numbers are of all already."""
-    rows = np.column_stack((found.divergences.last, found.divergences.following))
-    rows = minimal(goals.images_of_rows(rows))
-    states = goals.images_of_states(found.states)
-    return replace(found, divergences=Divergences(rows[:, 0], rows[:, 1:]), states=states)

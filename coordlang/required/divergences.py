@@ -243,9 +243,12 @@ class _Mixing:
         self._target = target[fresh]
         #: One more than the last way out of the same node.
         self._end = np.searchsorted(position[fresh], position[fresh], side="right")
-        self._labels = [
-            _labels_of_ways(way, space.robot_labels(robot, edges)) for robot in range(space.robots)
-        ]
+        self._labels: list[tuple[Ints, Ints]] = []
+        for robot in range(space.robots):
+            own = np.column_stack((way, space.robot_labels(robot, edges)))
+            pairs, _ = unique_tuples(own, [int(column.max(initial=0)) + 1 for column in own.T])
+            first = np.searchsorted(pairs[:, 0], np.arange(len(self._node) + 1))
+            self._labels.append((first, pairs[:, 1]))
 
     def pairs(self) -> Ints:
         """All pairs of ways out of one node, the first before the second."""
@@ -318,13 +321,3 @@ class _Mixing:
         following = self._target[ways[row]]
         chosen = self._choices.of_node[np.arange(following.shape[1]), following]
         return row, self._space.targets(prefix), chosen, np.concatenate(missing)
-
-
-def _labels_of_ways(way: Ints, labels: Ints) -> tuple[Ints, Ints]:
-    """For each way the different labels on its edges: (first of each way, labels)."""
-    pairs, _ = unique_tuples(
-        np.column_stack((way, labels)),
-        [int(way.max(initial=0)) + 1, int(labels.max(initial=0)) + 1],
-    )
-    first = np.searchsorted(pairs[:, 0], np.arange(int(way.max(initial=-1)) + 2))
-    return first, pairs[:, 1]

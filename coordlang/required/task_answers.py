@@ -88,7 +88,8 @@ def answers(loaded: PlanningInstance, workers: Workers) -> list[TaskAnswer]:
     identity = digest(*hashes, repr(loaded.options))
     shared = (model, tasks, store_in_use())
     batch = Batch("coordination", _answer, shared, numbers, identity, [effort for _ in numbers])
-    return [_decoded(table["answer"]) for table in workers.tables(batch)]
+    decoder = msgspec.json.Decoder(TaskAnswer, dec_hook=lambda _, text: Fraction(text))
+    return [decoder.decode(table["answer"].tobytes()) for table in workers.tables(batch)]
 
 
 def _answer(shared: tuple[JointModel, Sequence[PlanningTask], Store | None], number: int) -> Table:
@@ -101,12 +102,6 @@ def _answer(shared: tuple[JointModel, Sequence[PlanningTask], Store | None], num
     fewest = None if witness is None else _fewest(space, found)
     answer = TaskAnswer(space.least_makespan(0), _plans(space), witness, found, fewest)
     return {"answer": np.frombuffer(msgspec.json.encode(answer, enc_hook=str), np.uint8)}
-
-
-def _decoded(answer: Ints) -> TaskAnswer:
-    return msgspec.json.decode(
-        answer.tobytes(), type=TaskAnswer, dec_hook=lambda _, text: Fraction(text)
-    )
 
 
 def _plans(space: PlanSpace) -> int:

@@ -4,26 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, suppress
 from dataclasses import dataclass
 from itertools import combinations, islice
 
-import numpy as np
-
 from coordlang.language.warping import Clause, Pair
-from coordlang.vocabulary.clauses import most_constrained_first, without_implied
-from coordlang.vocabulary.sat import PartitionProblem, Undecided, satisfiable
+from coordlang.vocabulary.clauses import most_constrained_first
 from planners.search.sat import SolverName, sat_solver, solve_slice
 from planners.system.errors import OutOfMemory
 from planners.system.limits import memory_left, more_memory
 
 #: Conflicts after which the checking solver comes back.
 _SLICE = 10_000
-#: Conflicts, of one partition on the way to a core and of its last reduction, after which it is
-#: taken as it is.
-_EASY, _CONFLICTS = 5_000, 50_000
-#: Clauses that a core takes in for each partition that breaks them.
-_AT_ONCE = 50
 #: Bytes that a clause and each of its literals take, here and in a solver.
 _CLAUSE, _LITERAL = 120, 48
 
@@ -167,50 +158,3 @@ def _words_in_order(
         so_far.append(after)
         used = after
     return so_far, cnf
-
-
-def core(clauses: Iterable[Clause], size: int) -> list[Clause]:
-    """A part of the clauses that still refutes ``size`` words, small but not least.
-
-    All of them where that takes long.  Raises `ValueError` if it finds that they do not refute it.
-    """
-    found = without_implied(clauses)
-    with suppress(Undecided):
-        found = _in_the_way(found, size)
-        found = _used(found, size)
-    return found
-
-
-def _in_the_way(clauses: Sequence[Clause], size: int) -> list[Clause]:
-    """Clauses that some partition, found under those before, broke; short ones first."""
-    states = states_of(clauses)
-    pairs = np.array([p for clause in clauses for p in sorted(clause)], np.int64).reshape(-1, 2)
-    bounds = np.cumsum([0, *(len(clause) for clause in clauses)])[:-1]
-    words = np.zeros(max(states, default=0) + 1, np.int64)
-    kept: list[Clause] = []
-    with closing(PartitionProblem(states, size)) as problem:
-        while (partition := problem.solve(_EASY)) is not None:
-            words[list(partition)] = list(partition.values())
-            apart = words[pairs[:, 0]] != words[pairs[:, 1]]
-            held = np.logical_or.reduceat(apart, bounds) if len(clauses) else apart
-            broken = np.flatnonzero(~held)
-            if not len(broken):
-                raise ValueError(f"the clauses leave a partition into {size} words")
-            for number in broken[:_AT_ONCE].tolist():
-                problem.separate_one(clauses[number])
-                kept.append(clauses[number])
-    return kept
-
-
-def _used(clauses: Sequence[Clause], size: int) -> list[Clause]:
-    """The clauses that a solver's refutation used."""
-    cnf = encode(clauses, size)
-    rest, asked = cnf.clauses[: -len(clauses)], cnf.clauses[-len(clauses) :]
-    with sat_solver("cadical153", rest) as sat:
-        select = [cnf.variables + 1 + n for n in range(len(clauses))]
-        for variable, clause in zip(select, asked, strict=True):
-            sat.add_clause([*clause, -variable])
-        if satisfiable(sat, select, _CONFLICTS):
-            raise AssertionError("a subset of the clauses refuted the words a moment ago")
-        needed = set(sat.get_core() or ())
-    return [clause for clause, variable in zip(clauses, select, strict=True) if variable in needed]

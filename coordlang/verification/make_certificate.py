@@ -3,18 +3,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import closing, suppress
 
 import numpy as np
 
 from coordlang.language.candidates import Candidates
 from coordlang.language.listed import goal_text
 from coordlang.language.warping import Clause, pair, warping_path
-from coordlang.verification.certificate_clauses import core
+from coordlang.verification.certificate_clauses import encode, states_of
 from coordlang.verification.certificate_file import Certificate, Reason, WarpingPath
+from coordlang.vocabulary.clauses import without_implied
 from coordlang.vocabulary.job import Evidence
+from coordlang.vocabulary.sat import PartitionProblem, Undecided, satisfiable
 from planners.joint.states import split_atoms
 from planners.search.plan_space import PlanSpace
+from planners.search.sat import sat_solver
+
+#: Conflicts, of one partition on the way to a core and of its last reduction, after which it is
+#: taken as it is.
+_EASY, _CONFLICTS = 5_000, 50_000
+#: Clauses that a core takes in for each partition that breaks them.
+_AT_ONCE = 50
 
 
 def certify(candidates: Candidates, evidence: Mapping[Clause, Evidence], size: int) -> Certificate:
@@ -47,20 +57,13 @@ def _reason(candidates: Candidates, clause: Clause, evidence: Evidence) -> Reaso
         states = [symmetry.states[own].tolist() for own in states]
         # Where the symmetry takes robot i to robot k, plan i is what robot k follows in the image.
         robots = [symmetry.robot(model.robots, robot) for robot in robots]
-    paths = [
-        WarpingPath((robots[0], robot), _warping_path(states[0], own, clause))
-        for robot, own in zip(robots[1:], states[1:], strict=True)
-    ]
+    paths = []
+    for robot, own in zip(robots[1:], states[1:], strict=True):
+        joined = [[a == b or pair(a, b) in clause for b in own] for a in states[0]]
+        cells = warping_path(states[0], own, joined)
+        assert cells is not None, "the clause was made from warping paths of these plans"
+        paths.append(WarpingPath((robots[0], robot), cells))
     return Reason(init, goal, [plans[robots.index(n)] for n in range(len(robots))], paths)
-
-
-def _warping_path(
-    first: Sequence[int], other: Sequence[int], clause: Clause
-) -> list[tuple[int, int]]:
-    joined = [[a == b or pair(a, b) in clause for b in other] for a in first]
-    cells = warping_path(first, other, joined)
-    assert cells is not None, "the clause was made from warping paths of these plans"
-    return cells
 
 
 def _way_to(space: PlanSpace, node: int) -> tuple[int, list[int]]:
@@ -73,3 +76,53 @@ def _way_to(space: PlanSpace, node: int) -> tuple[int, list[int]]:
         edges.append(edge)
         node = int(sources[edge])
     return node, edges[::-1]
+
+
+# ---- few clauses that still refute
+
+
+def core(clauses: Iterable[Clause], size: int) -> list[Clause]:
+    """A part of the clauses that still refutes ``size`` words, small but not least.
+
+    All of them where that takes long.  Raises `ValueError` if it finds that they do not refute it.
+    """
+    found = without_implied(clauses)
+    with suppress(Undecided):
+        found = _in_the_way(found, size)
+        return _used(found, size)
+    return found
+
+
+def _in_the_way(clauses: Sequence[Clause], size: int) -> list[Clause]:
+    """Clauses that some partition, found under those before, broke; short ones first."""
+    states = states_of(clauses)
+    pairs = np.array([p for clause in clauses for p in sorted(clause)], np.int64).reshape(-1, 2)
+    bounds = np.cumsum([0, *(len(clause) for clause in clauses)])[:-1]
+    words = np.zeros(max(states, default=0) + 1, np.int64)
+    kept: list[Clause] = []
+    with closing(PartitionProblem(states, size)) as problem:
+        while (partition := problem.solve(_EASY)) is not None:
+            words[list(partition)] = list(partition.values())
+            apart = words[pairs[:, 0]] != words[pairs[:, 1]]
+            held = np.logical_or.reduceat(apart, bounds) if len(clauses) else apart
+            broken = np.flatnonzero(~held)
+            if not len(broken):
+                raise ValueError(f"the clauses leave a partition into {size} words")
+            for number in broken[:_AT_ONCE].tolist():
+                problem.separate_one(clauses[number])
+                kept.append(clauses[number])
+    return kept
+
+
+def _used(clauses: Sequence[Clause], size: int) -> list[Clause]:
+    """The clauses that a solver's refutation used."""
+    cnf = encode(clauses, size)
+    rest, asked = cnf.clauses[: -len(clauses)], cnf.clauses[-len(clauses) :]
+    with sat_solver("cadical153", rest) as sat:
+        select = [cnf.variables + 1 + n for n in range(len(clauses))]
+        for variable, clause in zip(select, asked, strict=True):
+            sat.add_clause([*clause, -variable])
+        if satisfiable(sat, select, _CONFLICTS):
+            raise AssertionError("a subset of the clauses refuted the words a moment ago")
+        needed = set(sat.get_core() or ())
+    return [clause for clause, variable in zip(clauses, select, strict=True) if variable in needed]

@@ -22,7 +22,7 @@ from coordlang.commands.verify import verify
 from coordlang.language.candidates import all_pairs, from_problems
 from coordlang.language.file import read_language
 from coordlang.required.miscoordination import inseparable
-from coordlang.verification.certificate_clauses import core, encode
+from coordlang.verification.certificate_clauses import encode
 from coordlang.verification.certificate_file import (
     Certificate,
     Reason,
@@ -31,6 +31,7 @@ from coordlang.verification.certificate_file import (
     write_certificate,
 )
 from coordlang.verification.check_certificate import Checked, check
+from coordlang.verification.make_certificate import core
 from coordlang.vocabulary.loop import Budget
 from coordlang.vocabulary.minimal import MinimalSearch, refuting_clauses
 from planners.system.errors import OutOfTime, ProvedImpossible, Refuted
