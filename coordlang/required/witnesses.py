@@ -114,8 +114,9 @@ def _shared_plans(
 _Bundle = list[int]
 #: A node ``(x, y)`` of the walk: where the plans are, and where their mixture is.
 _Pair = tuple[int, int]
-#: How the walk came to a node: from which one, and what the plans and their mixture did.
-_Came = tuple[_Pair, _Bundle, Labels]
+#: How the walk came to a node: the way before, and what the plans and their mixture did; at the
+#: beginning the number of a node of the plan space.
+_Way = int | tuple["_Way", _Bundle, Labels]
 
 
 def witness_in_same_states(space: PlanSpace) -> Trail | None:
@@ -126,23 +127,21 @@ def witness_in_same_states(space: PlanSpace) -> Trail | None:
     the worst case.
     """
     leaking = np.flatnonzero(_leaks(space))
-    history: list[dict[_Pair, _Came | None]] = []
+    arriving: dict[_Pair, _Way] = {}
+    steps = nodes = 0
 
     def so_far() -> str:
-        return (
-            f"{len(history)} of {len(space.layers) - 1} steps along equal states, "
-            f"{sum(map(len, history)):,} nodes"
-        )
+        return f"{steps} of {len(space.layers) - 1} steps along equal states, {nodes:,} nodes"
 
     with reaching(so_far, space.model.smaller("smaller tasks")):
-        arriving: dict[_Pair, _Came] = {}
         for layer in range(len(space.layers) - 1, 0, -1) if len(leaking) else ():
             here = leaking[space.layer[leaking] == layer].tolist()
-            history.append({pair: arriving[pair] for pair in sorted(arriving)})
-            history[-1].update(((node, node), None) for node in here)
-            arriving, broken = _steps_in_same_states(space, history[-1])
+            ways = {pair: arriving[pair] for pair in sorted(arriving)}
+            ways.update(((node, node), node) for node in here)
+            steps, nodes = steps + 1, nodes + len(ways)
+            arriving, broken = _steps_in_same_states(space, ways)
             if broken is not None:
-                return _trail_in_same_states(space, history, broken)
+                return _trail_in_same_states(space, broken)
     return None
 
 
@@ -165,15 +164,15 @@ def _leaks(space: PlanSpace) -> Bools:
 
 
 def _steps_in_same_states(
-    space: PlanSpace, layer: Mapping[_Pair, object]
-) -> tuple[dict[_Pair, _Came], _Came | None]:
+    space: PlanSpace, ways: Mapping[_Pair, _Way]
+) -> tuple[dict[_Pair, _Way], _Way | None]:
     """The nodes one step on that are off the diagonal; and the first mixture that breaks, if any.
 
     First is the one with the fewest robots after which no edge fits.
     """
-    below: dict[_Pair, _Came] = {}
-    broken: list[tuple[int, _Came]] = []
-    for x, y in layer:
+    below: dict[_Pair, _Way] = {}
+    broken: list[tuple[int, _Way]] = []
+    for (x, y), way in ways.items():
         bundles: dict[int, _Bundle] = {}
         for edge in space.out_edges(x):
             bundles.setdefault(space.target_of(edge), []).append(edge)
@@ -181,11 +180,11 @@ def _steps_in_same_states(
         for target in sorted(bundles):
             labels = zip(*map(space.labels_of, bundles[target]), strict=True)
             for mixed in product(*(sorted(set(own)) for own in labels)):
-                came = ((x, y), bundles[target], mixed)
+                longer = (way, bundles[target], mixed)
                 if mixed not in targets:
-                    broken.append((_fitting(mixed, targets), came))
+                    broken.append((_fitting(mixed, targets), longer))
                 elif targets[mixed] != target:
-                    below.setdefault((target, targets[mixed]), came)
+                    below.setdefault((target, targets[mixed]), longer)
     _, first = min(broken, key=lambda one: one[0], default=(0, None))
     return below, first
 
@@ -198,20 +197,13 @@ def _fitting(mixed: Labels, targets: Iterable[Labels]) -> int:
     )
 
 
-def _trail_in_same_states(
-    space: PlanSpace, history: Sequence[Mapping[_Pair, _Came | None]], broken: _Came
-) -> Trail:
+def _trail_in_same_states(space: PlanSpace, way: _Way) -> Trail:
     """The plans behind a break: from a start to where the mixture leaves them, and on."""
     steps: list[tuple[_Bundle, Labels]] = []
-    came: _Came | None = broken
-    for layer in reversed(history):
-        if came is None:
-            break
-        pair, edges, mixed = came
-        steps.append((edges, mixed))
-        came = layer[pair]
-    start, before = _way_to(space, pair[0])
-    steps.reverse()
+    while not isinstance(way, int):
+        way, edges, mixed = way
+        steps.insert(0, (edges, mixed))
+    start, before = _way_to(space, way)
 
     def plan_of(robots: Sequence[int]) -> list[int] | None:
         path = []
