@@ -97,7 +97,7 @@ def _terms(
     table = np.array(vectors, np.int64).reshape(len(vectors), len(features))
     domains = [np.unique(column) for column in table.T]
     columns = zip(domains, table.T, strict=True)
-    number = np.array([np.searchsorted(own, column) for own, column in columns])
+    number = np.array([np.searchsorted(own, column) for own, column in columns], np.int64)
     number = number.reshape(table.T.shape).T
     found = {}
     for name in words:
