@@ -42,13 +42,13 @@ if TYPE_CHECKING:
     from coordlang.commands.simulate import simulate as simulate
     from coordlang.commands.understand import understand as understand
     from coordlang.commands.verify import verify as verify
-    from coordlang.execution.fitting_plans import NoPlanFits as NoPlanFits
     from coordlang.execution.monitor import Monitor as Monitor
     from coordlang.execution.monitor import MonitorError as MonitorError
     from coordlang.execution.monitor import NotAllowed as NotAllowed
     from coordlang.execution.monitor import NotPossible as NotPossible
     from coordlang.execution.plan_sentence import NotAPlan as NotAPlan
     from coordlang.execution.plan_sentence import NotOptimal as NotOptimal
+    from coordlang.execution.task_language import NoPlanFits as NoPlanFits
     from coordlang.language.words import Language as Language
     from coordlang.required.miscoordination import Inseparable as Inseparable
     from planners.system.errors import BadInput as BadInput
@@ -74,7 +74,7 @@ _DEFINED_IN = {
     "coordlang.commands.inputs": ("load", "load_language"),
     "coordlang.language.words": ("Language",),
     "coordlang.execution.monitor": ("Monitor", "MonitorError", "NotAllowed", "NotPossible"),
-    "coordlang.execution.fitting_plans": ("NoPlanFits",),
+    "coordlang.execution.task_language": ("NoPlanFits",),
     "coordlang.execution.plan_sentence": ("NotAPlan", "NotOptimal"),
     "coordlang.required.miscoordination": ("Inseparable",),
     "planners.system.errors": (

@@ -13,7 +13,7 @@ from coordlang.language.sentences import Sentence
 from coordlang.simulation.floor import floor_of
 from coordlang.simulation.record import RunRecord, WishRecord
 from coordlang.simulation.run import runs_of
-from coordlang.simulation.settings import Settings
+from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Agreement, Mission, mission
 from coordlang.sites.coordinates import Point
 from planners.search.plans import Plan

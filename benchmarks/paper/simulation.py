@@ -24,7 +24,7 @@ from benchmarks.paper.warehouse import WAREHOUSES, deliveries, human_in, listed_
 from coordlang.execution.task_language import languages_in_tasks
 from coordlang.simulation.pace import PACES
 from coordlang.simulation.record import RunRecord, WishRecord
-from coordlang.simulation.settings import Settings as How
+from coordlang.simulation.simulator import Settings as How
 from coordlang.simulation.simulator import require_simulator
 from coordlang.simulation.team import Agreement
 from planners.search.plans import Plans

@@ -21,9 +21,8 @@ from coordlang.commands.options import File
 from coordlang.commands.records import ChoicesOptions
 from coordlang.commands.terminal import covered_code, echo, line_width, note
 from coordlang.commands.witness import witness_text
-from coordlang.execution.choices import MOST, SentenceChoices
+from coordlang.execution.choices import MOST, SentenceChoices, monitor, to_bytes, to_data
 from coordlang.execution.choices import choices as choices_under
-from coordlang.execution.choices_file import monitor, to_bytes, to_data
 from coordlang.execution.drawing import choices_dot
 from coordlang.execution.monitor import Answer, Monitor, MonitorError, NotAllowed
 from coordlang.execution.task_language import TaskLanguage

@@ -20,7 +20,7 @@ SCHEMAS = {
     "tasks": "coordlang.language.task_file",
     "certificate": "coordlang.verification.certificate_file",
     "lifted": "coordlang.lifted.file",
-    "choices": "coordlang.execution.choices_file",
+    "choices": "coordlang.execution.choices",
     "simulation": "coordlang.simulation.record",
     "plans": "planners.search.plan_file",
     "coordinates": "coordlang.sites.coordinates",

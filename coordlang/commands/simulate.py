@@ -29,8 +29,7 @@ from coordlang.simulation.record import (
 )
 from coordlang.simulation.recording import KINDS, recorded
 from coordlang.simulation.run import record_of, runs_of
-from coordlang.simulation.settings import Settings
-from coordlang.simulation.simulator import require_simulator
+from coordlang.simulation.simulator import Settings, require_simulator
 from coordlang.simulation.team import Agreement, Mission, mission
 from planners.system.errors import UsageError
 from planners.system.limits import reaching, run_until_stopped

@@ -104,15 +104,15 @@ class Automaton:
 
 
 def determinise(
-    space: PlanSpace, robot: int, truth: Mapping[int, int] | None = None, most: int | None = None
+    space: PlanSpace, robot: int, truth: Sequence[int] | None = None, most: int | None = None
 ) -> Automaton:
     """The least automaton of a robot's subplans over the plans of a plan space.
 
     Without ``truth`` it is the minimal deterministic automaton that accepts exactly the robot's
     subplans.  With ``truth`` it also gives for each state what is known there: the facts that have
-    one value in all joint states that plans with the same own beginning can be in.  Then it is the
-    least automaton that accepts the subplans and gives this output (a Moore machine: states are
-    merged that agree on the knowledge, now and after every continuation).
+    one value in all nodes that plans with the same own beginning can be in.  Then it is the least
+    automaton that accepts the subplans and gives this output (a Moore machine: states are merged
+    that agree on the knowledge, now and after every continuation).
 
     Three passes over the layers: nodes that behave alike are one (upwards), subset construction
     (downwards), equal futures are one (upwards).  Linear but for the subsets, of which there may be
@@ -125,7 +125,7 @@ def determinise(
     robot
         The robot's number.
     truth
-        For each state (its number in ``space.rows``) its true facts as bits.
+        For each node its true facts as bits.
     most
         The most members that all subsets together may have; None: as many as the memory holds.
 
@@ -136,56 +136,42 @@ def determinise(
         members.
     """
     layers, start = _quotient(space, robot, truth)
-    moves: list[list[dict[int, int]]] = []
-    known: list[list[Knowledge]] = []
+    states: list[list[_State]] = []
     subsets: list[tuple[int, ...]] = [(start,)]
     members = 0
     for depth, layer in enumerate(reversed(layers)):
-        known.append([_knowledge(layer, subset) for subset in subsets])
         following: dict[tuple[int, ...], int] = {}
-        here: list[dict[int, int]] = []
+        here: list[_State] = []
         for subset in subsets:
-            after = _after(layer, subset)
-            here.append(
-                {own: following.setdefault(to, len(following)) for own, to in after.items()}
-            )
+            true = [layer[member][0] for member in subset]
+            after = _after(layer, subset).items()
+            moves = {own: following.setdefault(to, len(following)) for own, to in after}
+            here.append((Knowledge(reduce(and_, true), reduce(or_, true)), moves))
             members += len(subset)
             if len(here) % 1024 == 0:
                 _check(space, robot, members, most, depth, len(layers) - 1)
-        moves.append(here)
+        states.append(here)
         subsets = list(following)
         _check(space, robot, members, most, depth, len(layers) - 1)
-    return minimised(moves, known)
+    return _least(states)
 
 
-#: A state of an automaton by what it is: what is known there, and its moves to states of the next
-#: layer by their labels.
+#: What is known in a state, and its moves to states of the next layer by their labels.
+_State = tuple[Knowledge, Mapping[int, int]]
+#: The same as what it is equal by: the moves as sorted pairs.
 _Behaviour = tuple[Knowledge, tuple[tuple[int, int], ...]]
 
 
-def minimised(
-    moves: Sequence[Sequence[Mapping[int, int]]], known: Sequence[Sequence[Knowledge]]
-) -> Automaton:
-    """The least automaton of a deterministic one given in layers.
-
-    States are merged that agree on what is known now and after every continuation.
-
-    Parameters
-    ----------
-    moves
-        ``moves[k][s]`` leads from state s of layer k by a label to a state of layer k + 1; layer 0
-        has one state.
-    known
-        ``known[k][s]`` is what is known in state s of layer k.
-    """
+def _least(states: Sequence[Sequence[_State]]) -> Automaton:
+    """The least automaton of a deterministic one in layers, the first of which has one state."""
     merged: list[list[_Behaviour]] = []
     class_below: list[int] = []
-    for here, knowledge in zip(reversed(moves), reversed(known), strict=True):
+    for layer in reversed(states):
         number: dict[_Behaviour, int] = {}
         class_here = []
-        for known_there, move in zip(knowledge, here, strict=True):
-            after = tuple(sorted((own, class_below[to]) for own, to in move.items()))
-            class_here.append(number.setdefault((known_there, after), len(number)))
+        for known, moves in layer:
+            after = tuple(sorted((own, class_below[to]) for own, to in moves.items()))
+            class_here.append(number.setdefault((known, after), len(number)))
         class_below = class_here
         merged.append(list(number))
     merged.reverse()
@@ -193,10 +179,7 @@ def minimised(
 
 
 def _numbered(merged: Sequence[Sequence[_Behaviour]]) -> Automaton:
-    """Number the states in the order in which a walk by layers and labels meets them.
-
-    The same automaton has the same numbers.
-    """
+    """Number the states in the order in which a walk by layers and labels meets them."""
     order = [0]
     bounds, first, label, target, known = [0], [0], [], [], []
     for layer in merged:
@@ -223,16 +206,12 @@ def _numbered(merged: Sequence[Sequence[_Behaviour]]) -> Automaton:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Layer:
-    """Classes of the nodes of one layer: their moves, label -> classes; their true facts."""
-
-    moves: list[dict[int, tuple[int, ...]]]
-    truth: list[int]
+#: Nodes of one layer in classes: their true facts, and the classes to which each label leads.
+_Layer = list[tuple[int, dict[int, tuple[int, ...]]]]
 
 
 def _quotient(
-    space: PlanSpace, robot: int, truth: Mapping[int, int] | None
+    space: PlanSpace, robot: int, truth: Sequence[int] | None
 ) -> tuple[list[_Layer], int]:
     """The layers in classes, the goal's first, and the class of the start.
 
@@ -252,29 +231,24 @@ def _quotient(
             moves[node].setdefault(label, []).append(to)
         classes: dict[tuple[int, tuple[tuple[int, tuple[int, ...]], ...]], int] = {}
         numbers = []
-        for state, move in zip(space.state[span].tolist(), moves, strict=True):
+        for node, move in enumerate(moves, span.start):
             after = tuple((label, tuple(to)) for label, to in move.items())
-            key = truth[state] if truth is not None else 0, after
+            key = truth[node] if truth is not None else 0, after
             numbers.append(classes.setdefault(key, len(classes)))
         class_of[span] = numbers
-        layers.append(_Layer([dict(after) for _, after in classes], [true for true, _ in classes]))
+        layers.append([(true, dict(after)) for true, after in classes])
     return layers, int(class_of[space.starts[0]])
 
 
 def _after(layer: _Layer, subset: tuple[int, ...]) -> dict[int, tuple[int, ...]]:
     """Where a subset of classes leads by each label."""
     if len(subset) == 1:
-        return layer.moves[subset[0]]
+        return layer[subset[0]][1]
     found: dict[int, set[int]] = {}
     for member in subset:
-        for own, classes in layer.moves[member].items():
+        for own, classes in layer[member][1].items():
             found.setdefault(own, set()).update(classes)
     return {own: tuple(sorted(classes)) for own, classes in sorted(found.items())}
-
-
-def _knowledge(layer: _Layer, subset: tuple[int, ...]) -> Knowledge:
-    truth = {layer.truth[member] for member in subset}
-    return Knowledge(reduce(and_, truth), reduce(or_, truth))
 
 
 def _check(

@@ -6,21 +6,37 @@ Whatever the others choose from theirs.
 The optimal plans with one sentence are RC-free, so every combination of one own subplan for each
 robot is an optimal plan. Robot i's subplans are therefore the own parts of those plans, no more and
 no fewer.
+
+Choices files have them as JSON (docs/formats.md).  `coordlang.execution.monitor` reads these
+without this module, because a robot may have Python's standard library only.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from functools import reduce
+from operator import or_
+from typing import Annotated, Any, Literal
 
-from coordlang.execution.automaton import Automaton, determinise
+import msgspec
+from msgspec import UNSET, Meta, UnsetType
+
+from coordlang.execution.automaton import Automaton, Knowledge, determinise
 from coordlang.execution.mixtures import Mixtures, walk_mixtures
-from coordlang.execution.own_facts import OwnFacts, with_own_facts
+from coordlang.execution.monitor import FORMAT, IDLE, VERSION, Monitor
 from coordlang.execution.task_language import TaskLanguage
+from coordlang.language.candidates import describe
+from coordlang.language.tolerance import tolerance_data
+from planners.grounding import GroundAction
+from planners.joint.model import JointModel
+from planners.pddl.lifted import TRUE
+from planners.search.plan_file import Count, json_count
 from planners.search.plan_space import PlanSpace
+from planners.search.plans import Plans
 from planners.system.errors import OutOfMemory
+from planners.system.files import FileFormat
 
 #: Combinations of the robots' moves beyond which exact knowledge is not tried by default.
 MOST = 2_000_000
@@ -34,14 +50,8 @@ Atoms = Literal["exact", "own"]
 class RobotChoices:
     """One robot's choices.
 
-    Parameters
-    ----------
-    robot
-        The robot's number.
-    automaton
-        Accepts its subplans, and has for each state what the robot knows there.
-    atoms
-        How this knowledge was found.
+    ``automaton`` accepts the subplans of the robot with this number, and has for each state what it
+    knows there; ``atoms`` says how this was found.
     """
 
     robot: int
@@ -122,15 +132,15 @@ def choices(
             raise
         mixtures = None
     robots = tuple(
-        _with_knowledge(task_language, automaton, robot, mixtures, most)
-        for robot, automaton in enumerate(subplans)
+        _with_knowledge(task_language, fits, robot, mixtures, most)
+        for robot in range(len(subplans))
     )
     return SentenceChoices(task_language, tuple(words), fits, robots, mixtures)
 
 
 def _with_knowledge(
     task_language: TaskLanguage,
-    automaton: Automaton,
+    fits: PlanSpace,
     robot: int,
     mixtures: Mixtures | None,
     most: int | None,
@@ -138,15 +148,212 @@ def _with_knowledge(
     """A robot's subplans with what it knows on the way."""
     if mixtures is not None and mixtures.space is not None:
         with suppress(OutOfMemory):  # the combinations are checked all the same
-            exact = determinise(mixtures.space, robot, _truth(mixtures.space), most)
+            exact = determinise(mixtures.space, robot, facts_at_nodes(mixtures.space), most)
             return RobotChoices(robot, exact, "exact")
-    own = OwnFacts.of(task_language.model, robot)
-    space = task_language.space
-    start = space.model.codec.fact_bits(space.rows[space.state[task_language.start]])
-    return RobotChoices(robot, with_own_facts(automaton, own, start), "own")
+    return knowing(fits, robot, own_facts(task_language.model, robot))
 
 
-def _truth(space: PlanSpace) -> dict[int, int]:
-    """The true facts of each state that the space passes through, as bits."""
-    codec = space.model.codec
-    return {state: codec.fact_bits(space.rows[state]) for state in set(space.state.tolist())}
+def knowing(fits: PlanSpace, robot: int, facts: int) -> RobotChoices:
+    """A robot's subplans in some plans; of these facts (bits) it knows the values, of no others.
+
+    In all nodes that plans with the same own beginning can be in the facts have one value.
+    """
+    others = ((1 << len(fits.model.codec.facts)) - 1) & ~facts
+    found = determinise(fits, robot, [true & facts for true in facts_at_nodes(fits)])
+    known = tuple(Knowledge(true, true | others) for true, _ in found.known)
+    return RobotChoices(robot, replace(found, known=known), "own")
+
+
+def facts_at_nodes(space: PlanSpace) -> list[int]:
+    """The true facts at each node, as bits."""
+    codec, states = space.model.codec, space.state.tolist()
+    bits = {state: codec.fact_bits(space.rows[state]) for state in set(states)}
+    return [bits[state] for state in states]
+
+
+def own_facts(model: JointModel, robot: int) -> int:
+    """The facts of which every change is certain from the robot's own label, as bits.
+
+    Found from the ground actions, without regard to what is reachable: no action without this robot
+    changes the fact, no conditional effect does, and two (joint) actions with the same own part
+    change it in the same way.
+    """
+    others = {*model.slack_facts}  # they change by themselves
+    of_part: dict[str | None, dict[int, bool]] = {}
+    for action in model.actions:
+        certain, uncertain = _changes(model, action)
+        others |= uncertain
+        if robot not in action.owners:
+            others |= certain.keys()
+            continue
+        first = of_part.setdefault(action.part_of(robot), certain)
+        others |= {f for f in first.keys() | certain.keys() if first.get(f) != certain.get(f)}
+    return sum(1 << fact for fact in range(len(model.codec.facts)) if fact not in others)
+
+
+def _changes(model: JointModel, action: GroundAction) -> tuple[dict[int, bool], set[int]]:
+    """The facts that an action certainly adds (True) or deletes, and those under a condition."""
+    certain: dict[int, bool] = {}
+    uncertain = set()
+    for effect in action.effects:
+        fact = model.codec.facts.index.get(effect.atom)
+        if fact is None:
+            continue
+        if effect.condition != TRUE:
+            uncertain.add(fact)
+        elif effect.adds or fact not in certain:  # what is both deleted and added counts as added
+            certain[fact] = effect.adds
+    return certain, uncertain
+
+
+# ---- the file
+
+_Facts = list[Annotated[int, Meta(ge=0)]]
+
+
+class StateRecord(msgspec.Struct, frozen=True):
+    """A state of a robot's automaton; state 0 is the start."""
+
+    step: Annotated[int, Meta(description="The number of steps done.", ge=0)]
+    left: Annotated[Count, Meta(description="The number of own subplans that lead on from it.")]
+    next: Annotated[
+        dict[str, int], Meta(description="What the robot may do now -> the state after that.")
+    ]
+    true: Annotated[_Facts, Meta(description="Numbers of facts that are certainly true.")]
+    unknown: Annotated[
+        _Facts, Meta(description="Numbers of facts that depend on the other robots.")
+    ]
+
+
+class RobotRecord(msgspec.Struct, frozen=True):
+    """The choices of one robot."""
+
+    robot: Annotated[str, Meta(description="The robot.")]
+    steps: Annotated[int, Meta(description="The number of steps of each plan.")]
+    subplans: Annotated[Count, Meta(description="The number of its own subplans.")]
+    atoms: Annotated[
+        Literal["exact", "own"],
+        Meta(
+            description="How 'true' and 'unknown' were found: over all combinations of the robots' "
+            "choices, or from the robot's own subactions alone."
+        ),
+    ]
+    facts: Annotated[
+        list[str], Meta(description="The atoms of which something is known in some state.")
+    ]
+    others: Annotated[list[str], Meta(description="The other atoms that can change.")]
+    states: Annotated[list[StateRecord], Meta(description="The states of the automaton.")]
+
+
+class ChoicesFile(msgspec.Struct, frozen=True):
+    """A choices file, version 1.  Keys that are not listed here are ignored by readers."""
+
+    format: Annotated[str, Meta(description="What kind of file this is.")]
+    version: Annotated[int, Meta(description="Readers refuse a version that they do not know.")]
+    domain: Annotated[
+        dict[str, Any], Meta(description="The language's domain, as in a language file.")
+    ]
+    robots: Annotated[list[str], Meta(description="All robots, in the order of joint actions.")]
+    task: Annotated[str, Meta(description="The task; for information.")]
+    sentence: Annotated[str, Meta(description="The sentence; for information.")]
+    plans: Annotated[Count, Meta(description="The number of plans with the sentence.")]
+    covered: Annotated[bool, Meta(description="Whether it is a candidate task of the language.")]
+    guaranteed: Annotated[
+        bool, Meta(description="Whether every combination of choices is an optimal plan.")
+    ]
+    combinations_walked: Annotated[
+        int | None,
+        Meta(description="Nodes that were walked to prove it; null if there were too many."),
+    ]
+    choices: Annotated[
+        list[RobotRecord], Meta(description="The choices of each robot that was asked for.")
+    ]
+    tolerance: Annotated[
+        dict[str, float] | UnsetType,
+        Meta(description="What the language tolerates, as in its file; missing: nothing."),
+    ] = UNSET
+
+
+CHOICES = FileFormat("choices", "choices file", ChoicesFile, FORMAT, VERSION)
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of choices files."""
+    return CHOICES.json_schema()
+
+
+def to_record(choices: SentenceChoices, robots: Sequence[int] | None = None) -> ChoicesFile:
+    """The content of a choices file, of all robots or of those with these numbers."""
+    task_language = choices.task_language
+    return ChoicesFile(
+        format=FORMAT,
+        version=VERSION,
+        domain=dict(task_language.language.provenance.domain) if task_language.language else {},
+        robots=list(task_language.model.robots),
+        task=describe(task_language.space, task_language.task),
+        sentence=task_language.text(choices.words),
+        plans=json_count(Plans.of(choices.fits).count),
+        covered=task_language.covered,
+        guaranteed=choices.guaranteed,
+        tolerance=tolerance_data(task_language.tolerance).get("tolerance", UNSET),
+        combinations_walked=choices.mixtures.nodes if choices.mixtures is not None else None,
+        choices=[_robot(task_language.model, own) for own in choices.of(robots)],
+    )
+
+
+def to_data(choices: SentenceChoices, robots: Sequence[int] | None = None) -> dict[str, Any]:
+    """The data of a choices file, of all robots or of those with these numbers."""
+    data: dict[str, Any] = msgspec.to_builtins(to_record(choices, robots))
+    return data
+
+
+def to_bytes(choices: SentenceChoices, robots: Sequence[int] | None = None) -> bytes:
+    """The text of a choices file: the same choices give the same bytes."""
+    return msgspec.json.encode(to_record(choices, robots)) + b"\n"
+
+
+def monitor(choices: SentenceChoices, robot: str) -> Monitor:
+    """A run-time monitor of one robot's choices."""
+    model = choices.task_language.model
+    own = choices.robots[model.robots.index(robot)]
+    return monitor_of(model, own, choices.task_language.text(choices.words))
+
+
+def monitor_of(model: JointModel, own: RobotChoices, sentence: str) -> Monitor:
+    """A run-time monitor of a robot's subplans under a sentence."""
+    entry = msgspec.to_builtins(_robot(model, own))
+    return Monitor({"format": FORMAT, "version": VERSION, "sentence": sentence, "choices": [entry]})
+
+
+def _robot(model: JointModel, own: RobotChoices) -> RobotRecord:
+    automaton, texts = own.automaton, model.codec.facts.texts
+    sometimes_known = reduce(or_, (known.true | ~known.possible for known in automaton.known))
+    facts = [fact for fact in range(len(texts)) if sometimes_known >> fact & 1]
+    return RobotRecord(
+        robot=model.robots[own.robot],
+        steps=automaton.steps,
+        subplans=json_count(automaton.count),
+        atoms=own.atoms,
+        facts=[texts[fact] for fact in facts],
+        others=[text for fact, text in enumerate(texts) if not sometimes_known >> fact & 1],
+        states=[
+            _state(model, own, facts, step, state)
+            for step, states in enumerate(automaton.layers)
+            for state in states
+        ],
+    )
+
+
+def _state(
+    model: JointModel, own: RobotChoices, facts: Sequence[int], step: int, state: int
+) -> StateRecord:
+    automaton = own.automaton
+    known = automaton.known[state]
+    moves = automaton.moves(state)
+    return StateRecord(
+        step=step,
+        left=json_count(automaton.left[state]),
+        next={model.label_text(own.robot, label) or IDLE: to for label, to in moves},
+        true=[number for number, fact in enumerate(facts) if known.true >> fact & 1],
+        unknown=[number for number, fact in enumerate(facts) if known.unknown >> fact & 1],
+    )

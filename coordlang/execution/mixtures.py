@@ -19,14 +19,12 @@ from coordlang.execution.task_language import TaskLanguage
 from coordlang.required.miscoordination import Miscoordination, Trail, describe_failure
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel
-from planners.joint.tables import Ints, spans, unique_tuples
+from planners.joint.tables import Ints, unique_tuples
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace, UnfoldingStep
 from planners.system.errors import OutOfMemory
 from planners.system.limits import memory_left, more_memory
 
-#: Joint moves handled at a time.
-_CHUNK = 1_000_000
 #: Up to so many bytes the free memory is not looked up.
 SMALL = 1 << 24
 
@@ -59,25 +57,11 @@ def walk_mixtures(
 ) -> Mixtures:
     """Walk all combinations of the robots' subplans in the task's optimal plans, layer by layer.
 
-    At most (product of the automata's layers) * (layer of the plan space) nodes.
+    At most (product of the automata's layers) * (layer of the plan space) nodes.  ``automata`` are
+    the robots' subplans in ``fits``, the plans with the sentence ``words``.
 
-    Parameters
-    ----------
-    task_language
-        The language and the task.
-    fits
-        The plans with the sentence.
-    automata
-        Each robot's subplans in them.
-    words
-        The word numbers of the sentence.
-    most
-        The most joint moves to hold; None: as many as the memory holds.
-
-    Raises
-    ------
-    OutOfMemory
-        With an estimate, before the joint moves fill the memory or beyond ``most`` of them.
+    Raises `OutOfMemory`, with an estimate, before the joint moves fill the memory, or beyond
+    ``most`` of them.
     """
     space = task_language.space
     index = EdgeIndex.of(space)
@@ -85,17 +69,18 @@ def walk_mixtures(
     table = np.array([[0] * robots + [task_language.start]])
     layers = [table[:, robots]]
     steps: list[UnfoldingStep] = []
-    taken: list[Labels] = []
+    taken: list[Labels] = []  # of each step the labels of its joint moves
     walked, held = 1, 0
     for step in range(automata[0].steps):
         _check(space.model, automata, table, step, held, most)
         source, labels, after = _moves(automata, table)
-        edge = _edges(index, table[source, robots], labels)
+        edge = table[source, robots]
+        for robot in range(robots):
+            edge = index.follow(robot, edge, labels[:, robot])
         broken = np.flatnonzero(edge < 0)
         if len(broken):
             last = int(source[broken[0]]), tuple(labels[broken[0]].tolist())
-            paths = _breaking_plans(fits, steps, taken, *last)
-            return Mixtures(None, _witness(task_language, paths, words), walked)
+            return Mixtures(None, _witness(task_language, fits, words, steps, taken, *last), walked)
         reached = np.column_stack((after, space.targets(edge)))
         table, number = unique_tuples(reached, [*(len(a) for a in automata), len(space)])
         steps.append(UnfoldingStep(source, edge, number))
@@ -108,10 +93,7 @@ def walk_mixtures(
 
 
 def _moves(automata: Sequence[Automaton], table: Ints) -> tuple[Ints, Labels, Ints]:
-    """All joint moves: (source, labels, next states of the automata).
-
-    Sorted by source and labels.
-    """
+    """All joint moves, sorted by source and labels: (source, labels, next automaton states)."""
     source = np.arange(len(table))
     labels: list[Ints] = []
     after: list[Ints] = []
@@ -123,52 +105,31 @@ def _moves(automata: Sequence[Automaton], table: Ints) -> tuple[Ints, Labels, In
     return source, np.stack(labels, axis=1).astype(np.int32), np.stack(after, axis=1)
 
 
-def _edges(index: EdgeIndex, node: Ints, labels: Labels) -> Ints:
-    """The optimal edge of each node with these labels; -1 where there is none."""
-    parts = []
-    for span in spans(np.ones(len(node)), _CHUNK):
-        prefix = node[span]
-        for robot in range(labels.shape[1]):
-            prefix = index.follow(robot, prefix, labels[span, robot])
-        parts.append(prefix)
-    return np.concatenate(parts)
-
-
-def _breaking_plans(
+def _witness(
+    task_language: TaskLanguage,
     fits: PlanSpace,
+    words: Sequence[int],
     steps: Sequence[UnfoldingStep],
     taken: Sequence[Labels],
     node: int,
     labels: tuple[int, ...],
-) -> list[list[tuple[int, ...]]]:
-    """For each robot a plan with the sentence, as labels; their mixture breaks.
-
-    It does so at ``node`` of the last layer walked, by the joint step ``labels``.  ``taken`` has
-    the labels of each step's joint moves.
-    """
+) -> Miscoordination:
+    """Plans with the sentence whose mixture breaks at a node of the last layer, by these labels."""
     done = [labels]
     for step, of_step in zip(reversed(steps), reversed(taken), strict=True):
         arrival = int(np.flatnonzero(step.target == node)[0])
         done.append(tuple(of_step[arrival].tolist()))
         node = int(step.source[arrival])
-    start, plans = int(fits.starts[0]), []
+    space, start, paths = task_language.space, task_language.start, []
     for robot in range(len(labels)):
         own = [[step[robot]] for step in reversed(done)]
-        path = fits.path_of_robots(start, [robot], own)
+        path = fits.path_of_robots(int(fits.starts[0]), [robot], own)
         assert path is not None, "the robot's automaton accepts its subplans only"
-        plans.append([fits.labels_of(edge) for edge in path])
-    return plans
-
-
-def _witness(
-    task_language: TaskLanguage, plans: Sequence[list[tuple[int, ...]]], words: Sequence[int]
-) -> Miscoordination:
-    """Plans whose mixture breaks, described in the task's own plan space."""
-    space, start = task_language.space, task_language.start
-    paths = [space.path_with(start, plan) for plan in plans]
-    edges = tuple(zip(*(path for path in paths if path is not None), strict=True))
+        plan = space.path_with(start, [fits.labels_of(edge) for edge in path])
+        assert plan is not None, "plans with the sentence are plans of the task"
+        paths.append(plan)
     names = tuple(task_language.partition.words[w] for w in words)
-    return describe_failure(space, Trail(start, edges), names)
+    return describe_failure(space, Trail(start, tuple(zip(*paths, strict=True))), names)
 
 
 def _check(

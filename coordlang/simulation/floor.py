@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The floor: where places lie in metres, and the walls between cells.
+"""The floor: where places lie in metres, the walls between cells, and a human who walks there.
 
 x to the right, y up; the place drawn lowest and furthest left has the coordinates 0.  Where places
 are the cells of a grid, there is a wall along every side of a cell that no link crosses.  Elsewhere
@@ -9,13 +9,15 @@ there are no walls.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from random import Random
 
 from coordlang.sites.coordinates import Point, from_names
 from coordlang.sites.world import World
 from planners.system.errors import BadInput, UsageError
+from planners.system.messages import echoed
 
 #: A wall: (x, y) of one end, (x, y) of the other, in metres.
 Wall = tuple[float, float, float, float]
@@ -23,7 +25,14 @@ Wall = tuple[float, float, float, float]
 #: The greatest radius of a robot, as a share of the shortest link.  Robots that move at once come
 #: as near as 0.707 of a link to each other: one leaves a place at a right angle to the one that
 #: comes, which has the other one's flank before it meanwhile, and must neither touch it nor stop.
-MOST_RADIUS = 0.25
+_MOST_RADIUS = 0.25
+
+#: What stands for a place in ``Settings.human``: a place drawn for each run, or one to walk from.
+_STANDING_SOMEWHERE, _WALKING = "random", "walking"
+#: Metres a second that a human walks, for places one metre apart.
+_SPEED = 0.5
+#: The share of a cell within which a human has reached a place.
+_REACHED = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +95,7 @@ def floor_of(world: World, known: Mapping[str, Point], cell: float) -> Floor:
 
 def require_room(floor: Floor, radius: float) -> None:
     """Raise `UsageError` if robots of this radius, in metres, are too large for the floor."""
-    most = MOST_RADIUS * floor.shortest
+    most = _MOST_RADIUS * floor.shortest
     if radius > most:
         raise UsageError(
             f"robots with a radius of {radius:g} m are too large for places {floor.shortest:g} m "
@@ -100,26 +109,15 @@ def outlines(walls: Sequence[Wall]) -> list[list[Point]]:
 
     A simulator looks at each thing in each tick, so that a few long ones are cheaper than many.
     """
-    ways: dict[Point, list[Point]] = {}
-    for x1, y1, x2, y2 in walls:
-        ways.setdefault((x1, y1), []).append((x2, y2))
-        ways.setdefault((x2, y2), []).append((x1, y1))
-    drawn: set[frozenset[Point]] = set()
+    import networkx as nx
+
+    graph = nx.DiGraph()
+    for x1, y1, x2, y2 in sorted(walls):
+        graph.add_edges_from([((x1, y1), (x2, y2)), ((x2, y2), (x1, y1))])
     found = []
-    for start in sorted(ways):
-        line, path = [start], [start]
-        while path:
-            here = path[-1]
-            left = [there for there in ways[here] if frozenset((here, there)) not in drawn]
-            if left:
-                drawn.add(frozenset((here, left[0])))
-                path.append(left[0])
-            else:
-                path.pop()
-            if path:
-                line.append(path[-1])
-        if len(line) > 1:
-            found.append(line)
+    for ends in sorted(nx.weakly_connected_components(graph), key=min):
+        circuit = nx.eulerian_circuit(graph.subgraph(ends), min(ends))
+        found.append([min(ends), *(end for _, end in circuit)])
     return found
 
 
@@ -192,3 +190,105 @@ def _runs(sides: Iterable[tuple[float, float]], cell: float) -> list[tuple[float
 def _round(metres: float) -> float:
     """Whole micrometres, so that equal lengths are equal numbers."""
     return round(metres, 6)
+
+
+@dataclass(slots=True)
+class Human:
+    """A human: where in the world, and where to next.
+
+    Attributes
+    ----------
+    place, before
+        The place that the human stands in, or walks to, and the one where the way began.
+    walks
+        Whether the human walks.
+    """
+
+    place: str
+    before: str
+    walks: bool
+    _floor: Floor
+    _ways: Mapping[str, Sequence[str]]
+    _cell: float
+    _random: Random
+
+    @classmethod
+    def of(
+        cls,
+        wanted: str,
+        floor: Floor,
+        starts: Collection[str],
+        goals: Collection[str],
+        cell: float,
+        random: Random,
+    ) -> Human:
+        """Put a human on the floor; where no robot starts or ends, unless the place is named.
+
+        Raises
+        ------
+        UsageError
+            If there is no such place, a robot starts there, or none is left.
+        """
+        places = sorted(set(floor.points) - {*starts, *goals})
+        if wanted in (_STANDING_SOMEWHERE, _WALKING):
+            if not places:
+                raise UsageError(
+                    "there is no place for a human: robots start or end in all of them",
+                    remedy="Leave out --human.",
+                )
+            place = random.choice(places)
+        elif wanted in starts:
+            raise UsageError(
+                f"--human {echoed(wanted)}: a robot starts in this place",
+                remedy=f"Say another place, or {_STANDING_SOMEWHERE}.",
+            )
+        elif wanted in floor.points:
+            place = wanted
+        else:
+            raise UsageError(
+                f"--human {echoed(wanted)}: there is no such place",
+                remedy=f"Say a place such as {min(floor.points)}, or {_STANDING_SOMEWHERE}, or "
+                f"{_WALKING}.",
+            )
+        ways: dict[str, list[str]] = {name: [] for name in floor.points}
+        for one, other in floor.links:
+            ways[one].append(other)
+            ways[other].append(one)
+        return cls(place, place, wanted == _WALKING, floor, ways, cell, random)
+
+    def velocity(self, at: Point, robots: Sequence[Point], clearance: float) -> tuple[float, float]:
+        """Return how the human walks, in metres a second to the right and up.
+
+        Parameters
+        ----------
+        at, robots
+            Where the human and the robots are.
+        clearance
+            The human turns back where a robot ahead is nearer, from middle to middle, and stands
+            still where that leads to another one.
+        """
+        if not self.walks:
+            return 0.0, 0.0
+        if self._meets(at, robots, clearance):
+            self.place, self.before = self.before, self.place
+            if self._meets(at, robots, clearance):
+                return 0.0, 0.0
+        target = self._floor.points[self.place]
+        if math.dist(at, target) < _REACHED * self._cell and self._ways[self.place]:
+            self.before = self.place
+            self.place = self._random.choice(self._ways[self.place])
+            target = self._floor.points[self.place]
+        way = target[0] - at[0], target[1] - at[1]
+        length = math.hypot(*way)
+        speed = min(_SPEED * self._cell, 4 * length) / length if length else 0.0
+        return way[0] * speed, way[1] * speed
+
+    def _meets(self, at: Point, robots: Iterable[Point], clearance: float) -> bool:
+        """Say whether a robot is near on the way ahead."""
+        target = self._floor.points[self.place]
+        way = target[0] - at[0], target[1] - at[1]
+        return any(
+            math.dist(at, robot) < clearance
+            and (robot[0] - at[0]) * way[0] + (robot[1] - at[1]) * way[1] > 0
+            for robot in robots
+        )

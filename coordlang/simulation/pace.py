@@ -38,17 +38,7 @@ class Message:
 
 
 class Pace:
-    """One robot's way to keep step with the others.
-
-    Parameters
-    ----------
-    way
-        One of `PACES`.
-    robots
-        All robots.
-    period
-        Seconds of a step by the clock.
-    """
+    """One robot's way to keep step with the others, one of `PACES`; a period is in seconds."""
 
     def __init__(self, way: str, robots: Iterable[str], period: float) -> None:
         self._way, self._period = way, period
@@ -62,17 +52,16 @@ class Pace:
     def hears(self, messages: Iterable[Message]) -> None:
         """Take in how far the others are."""
         for message in messages:
-            if message.sender in self._heard:
-                self._heard[message.sender] = max(self._heard[message.sender], message.number)
+            self._heard[message.sender] = max(self._heard[message.sender], message.number)
 
     def told(self, steps: int, words: int, is_further: bool) -> Sequence[tuple[Kind, int]]:
-        """Return what to tell all robots after a step, by which ``is_further`` in the sentence."""
+        """What to tell all robots after a step, by which ``is_further`` in the sentence."""
         if self._way == "barrier":
             return [("step", steps)]
         return [("word", words)] if self._way == "word" and is_further else []
 
     def may_begin(self, steps: int, words: int, begun: float, time: float) -> bool:
-        """Say whether the next step may begin.
+        """Whether the next step may begin.
 
         ``steps`` are done, and ``words`` of the sentence passed at most; the last step was begun at
         ``begun`` (seconds; negative before the first).  By the clock, who is late misses a

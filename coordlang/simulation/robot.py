@@ -16,38 +16,75 @@ from random import Random
 
 from coordlang.execution.monitor import IDLE, Monitor
 from coordlang.simulation.pace import Message, OwnWords, Pace
-from coordlang.simulation.tracking import (
-    ALIGNED,
-    ARRIVED,
-    STANDING,
-    Drive,
-    Pose,
-    Velocity,
-    bearing,
-    distance,
-    driven,
-    turned,
-)
+
+#: Metres x, metres y, heading in radians (0: to the right, counterclockwise).
+Pose = tuple[float, float, float]
+#: Metres a second ahead, radians a second to the left.
+Velocity = tuple[float, float]
+
+STANDING: Velocity = (0.0, 0.0)
+
+#: Gains in 1/s: velocity per metre or radian that is left.
+_GAIN = 4.0
+#: Headings are right within this, in radians, and places are reached within this share of the cell.
+_ALIGNED = 0.06
+ARRIVED = 0.05
+#: What turning and driving take longer than at full speed, in seconds: slowing down, and noise.
+_SLACK = 0.8
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """A differential drive: its greatest speed (m/s) and rate of turning (rad/s)."""
+
+    speed: float
+    turn: float
+
+    @property
+    def turning(self) -> float:
+        """Seconds in which every turn on the spot is done: half a turn, and some slack."""
+        return math.pi / self.turn + _SLACK
+
+    def period(self, metres: float) -> float:
+        """Seconds for a joint step whose longest way has this length: turn, then drive."""
+        return self.turning + (metres / self.speed + _SLACK)
+
+
+def distance(pose: Pose, target: tuple[float, float]) -> float:
+    """Metres to a point."""
+    return math.hypot(target[0] - pose[0], target[1] - pose[1])
+
+
+def _bearing(pose: Pose, target: tuple[float, float]) -> float:
+    """Radians to turn, from -pi to pi, until a point is straight ahead."""
+    angle = math.atan2(target[1] - pose[1], target[0] - pose[0]) - pose[2]
+    return math.remainder(angle, 2 * math.pi)
+
+
+def turned(pose: Pose, target: tuple[float, float], drive: Drive) -> Velocity:
+    """Turn on the spot towards a point."""
+    return 0.0, _bounded(_GAIN * _bearing(pose, target), drive.turn)
+
+
+def driven(pose: Pose, target: tuple[float, float], drive: Drive) -> Velocity:
+    """Drive towards a point, steering; slower where it is near or not straight ahead."""
+    angle = _bearing(pose, target)
+    ahead = _GAIN * distance(pose, target) * max(0.0, math.cos(angle))
+    return _bounded(ahead, drive.speed), _bounded(_GAIN * angle, drive.turn)
+
+
+def _bounded(value: float, most: float) -> float:
+    return max(-most, min(most, value))
 
 
 @dataclass(frozen=True, slots=True)
 class Body:
     """What a robot knows of itself and of the floor.
 
-    Attributes
-    ----------
-    drive
-        How fast it drives and turns.
-    points
-        Where each place is, (x, y) in metres.
-    leads
-        The place that each own subaction leads to; those that are not named here lead nowhere.
-    cell
-        The length that counts as one place, in metres.
-    clearance
-        It stands still where something is nearer straight ahead, in metres from its middle.
-    reaction
-        It drives so slowly that it would come as near as that in so many seconds.
+    ``points`` are the places in metres, ``leads`` the place that each own subaction leads to, if it
+    leads anywhere; ``cell`` is the length that counts as one place.  The robot stands still where
+    something is nearer than ``clearance`` straight ahead (metres from its middle), and drives so
+    slowly that it would come as near as that in ``reaction`` seconds.
     """
 
     drive: Drive
@@ -62,22 +99,11 @@ class Body:
 class Sensed:
     """What a robot is told in a tick.
 
-    Attributes
-    ----------
-    time
-        Seconds since the start.
-    pose
-        Where it believes to be.
-    ahead
-        How far from its middle the lidar sees the first thing in its way, in metres; infinite
-        where there is none, None where it did not look.
-    heard
-        The messages of the tick before.
-    strangers
-        What the lidar sees that is neither on the map nor a robot: (metres, radians from straight
-        ahead); looked for before a step is chosen.
-    wanted
-        Atoms that the robot is to visit, if it can, from now on.
+    ``time`` are seconds since the start, ``pose`` is where it believes to be.  ``ahead`` is how far
+    from its middle the lidar sees the first thing in its way, in metres: infinite where there is
+    none, None where it did not look.  ``heard`` are the messages of the tick before, ``strangers``
+    what the lidar sees that is neither on the map nor a robot: (metres, radians from straight
+    ahead).  ``wanted`` are atoms that it is to visit from now on, if it can.
     """
 
     time: float
@@ -90,16 +116,9 @@ class Sensed:
 
 @dataclass(frozen=True, slots=True)
 class Act:
-    """What a robot does in a tick.
+    """What a robot does in a tick: what its wheels are told, and what it tells all robots.
 
-    Attributes
-    ----------
-    velocity
-        What its wheels are told.
-    messages
-        What it tells all robots.
-    is_stopped
-        Whether something is in its way.
+    ``is_stopped``: something is in its way.
     """
 
     velocity: Velocity = STANDING
@@ -138,22 +157,9 @@ class Asked:
 class Robot:
     """One robot.
 
-    Parameters
-    ----------
-    name
-        Its name.
-    monitor
-        Its choices; it is followed and changed.
-    body
-        What it knows of itself and of the floor.
-    pace
-        How it keeps step with the others.
-    period
-        Seconds that a step takes at most where nothing comes in between.
-    random
-        Its own random numbers: it draws uniformly among its own subplans.
-    words
-        How far in the sentence own subactions may lead; None where no sentence is agreed.
+    It follows ``monitor``, its choices, and draws among them with ``random``; a step takes
+    ``period`` seconds at most where nothing comes in between.  ``words`` says how far in the
+    sentence own subactions may lead; None where no sentence is agreed.
     """
 
     def __init__(
@@ -191,7 +197,7 @@ class Robot:
         return self._is_underway and self.steps[-1].place is not None and not self._is_turning
 
     def subplan(self) -> list[str | None]:
-        """Return what it chose, and would choose in the steps that it has not begun."""
+        """What it chose, and would choose in the steps that it has not begun."""
         ahead, random = self._monitor.copy(), Random()
         random.setstate(self._random.getstate())
         chosen = [step.subaction for step in self.steps]
@@ -205,15 +211,21 @@ class Robot:
         self._pace.hears(sensed.heard)
         if not self._is_underway:
             self._look_around(sensed)
-            if self._monitor.finished or not self._may_begin(sensed.time):
+            begun = self.steps[-1].begin if self.steps else -1.0
+            if self._monitor.finished or not self._pace.may_begin(
+                self.done, self.words, begun, sensed.time
+            ):
                 return Act()
-            self._begin(sensed)
+            self._begin(sensed.time)
         step = self.steps[-1]
-        if self._is_done(step, sensed):
-            return Act(messages=self._finish(step, sensed))
         if step.place is None:
+            if self._pace.is_common or sensed.time >= step.begin + self._period:
+                return Act(messages=self._finish(step, sensed.time))
             return Act()
-        return self._drive(self._body.points[step.place], step, sensed)
+        target = self._body.points[step.place]
+        if distance(sensed.pose, target) < ARRIVED * self._body.cell:
+            return Act(messages=self._finish(step, sensed.time))
+        return self._drive(target, step, sensed)
 
     def _look_around(self, sensed: Sensed) -> None:
         """Commit to what is wanted, and to keep out of places that somebody stands in."""
@@ -223,10 +235,9 @@ class Robot:
                 self._monitor.commit(visit=atom)
             self.detours.append(Asked(atom, None, granted))
         met = {self._place_of(stranger, sensed.pose) for stranger in sensed.strangers}
-        for place in sorted(met):
-            known = {detour.avoid for detour in self.detours}
+        for place in sorted(met - {detour.avoid for detour in self.detours}):
             ways = [text for text, led in sorted(self._body.leads.items()) if led == place]
-            if place in known or not ways:
+            if not ways:
                 continue
             granted = bool(self._monitor.can(never=ways))
             if granted:
@@ -245,29 +256,19 @@ class Robot:
     def _is_underway(self) -> bool:
         return bool(self.steps) and self.steps[-1].end is None
 
-    def _begin(self, sensed: Sensed) -> None:
+    def _begin(self, time: float) -> None:
         subaction = drawn(self._monitor, self._random)
         place = self._body.leads.get(subaction) if subaction is not None else None
         self._monitor.did(subaction)
-        self.steps.append(OwnStep(self.done, subaction, place, sensed.time))
+        self.steps.append(OwnStep(self.done, subaction, place, time))
         self._is_turning = place is not None
 
-    def _is_done(self, step: OwnStep, sensed: Sensed) -> bool:
-        if step.place is not None:
-            near = ARRIVED * self._body.cell
-            return distance(sensed.pose, self._body.points[step.place]) < near
-        return self._pace.is_common or sensed.time >= step.begin + self._period
-
-    def _may_begin(self, time: float) -> bool:
-        begun = self.steps[-1].begin if self.steps else -1.0
-        return self._pace.may_begin(self.done, self.words, begun, time)
-
-    def _finish(self, step: OwnStep, sensed: Sensed) -> tuple[Message, ...]:
+    def _finish(self, step: OwnStep, time: float) -> tuple[Message, ...]:
         before, words = self.words, None
         if self._own_words is not None:
             self._word_state = self._own_words.moves[self._word_state][step.subaction or IDLE]
             words = self.words = max(before, self._own_words.words[self._word_state])
-        self.steps[-1] = replace(step, end=sensed.time, words=words)
+        self.steps[-1] = replace(step, end=time, words=words)
         self.done += 1
         told = self._pace.told(self.done, self.words, self.words > before)
         return tuple(Message(self.name, kind, number) for kind, number in told)
@@ -276,18 +277,18 @@ class Robot:
         """Turn on the spot, then drive: where all begin together, all drive off together."""
         drive, elapsed = self._body.drive, sensed.time - step.begin
         if self._is_turning:
-            aligned = abs(bearing(sensed.pose, target)) < ALIGNED
+            aligned = abs(_bearing(sensed.pose, target)) < _ALIGNED
             waits = self._pace.is_common and elapsed < drive.turning
             if waits or not aligned:
                 return Act(turned(sensed.pose, target, drive))
             self._is_turning = False
-        velocity = driven(sensed.pose, target, drive)
         if sensed.ahead is None:
             return Act()
+        ahead, turn = driven(sensed.pose, target, drive)
         room = (sensed.ahead - self._body.clearance) / self._body.reaction
         if room <= 0:
-            return Act((0.0, velocity[1]), is_stopped=True)
-        return Act((min(velocity[0], room), velocity[1]))
+            return Act((0.0, turn), is_stopped=True)
+        return Act((min(ahead, room), turn))
 
 
 def drawn(monitor: Monitor, random: Random) -> str | None:

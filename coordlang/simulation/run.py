@@ -8,10 +8,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, astuple
 from itertools import combinations
 from random import Random
+from typing import Any
 
 from coordlang.language.candidates import describe
-from coordlang.simulation.floor import Floor, require_room
-from coordlang.simulation.human import Human
+from coordlang.simulation.floor import Floor, Human, require_room
 from coordlang.simulation.pace import Message, Pace
 from coordlang.simulation.record import (
     FORMAT,
@@ -22,19 +22,17 @@ from coordlang.simulation.record import (
     StepRecord,
     WishRecord,
 )
-from coordlang.simulation.robot import Act, Body, Robot, Sensed
-from coordlang.simulation.settings import POSITION_NOISE, Settings
-from coordlang.simulation.simulator import Simulator, require_simulator
+from coordlang.simulation.robot import Act, Body, Pose, Robot, Sensed
+from coordlang.simulation.simulator import POSITION_NOISE, Settings, Simulator, require_simulator
 from coordlang.simulation.team import Mission
-from coordlang.simulation.tracking import Pose
 from coordlang.sites.coordinates import Point
 
 #: A run ends when no step has begun or ended for so many periods: nobody will move any more.
-PATIENCE = 4
+_PATIENCE = 4
 #: And with somebody walking about for so many.
-WITH_WALKER = 12
+_WITH_WALKER = 12
 #: Seconds between two poses of the record.
-INTERVAL = 0.2
+_INTERVAL = 0.2
 
 
 def runs_of(
@@ -121,7 +119,7 @@ def record_of(
 
 def _ticks_of_interval(settings: Settings) -> int:
     """How many ticks there are from one pose of the record to the next."""
-    return max(1, round(INTERVAL / settings.tick))
+    return max(1, round(_INTERVAL / settings.tick))
 
 
 class _Going:
@@ -137,10 +135,32 @@ class _Going:
     ) -> None:
         self.mission, self.settings, self.seed = mission, settings, seed
         self.period = settings.period(floor.longest)
-        self.robots = _robots(mission, floor, settings, seed)
+        self.robots = {
+            name: Robot(
+                name,
+                given.monitor,
+                Body(
+                    settings.drive,
+                    floor.points,
+                    mission.leads[name],
+                    settings.cell,
+                    settings.clearance,
+                    settings.reaction,
+                ),
+                Pace(settings.step, mission.robots, self.period),
+                self.period,
+                Random(f"{seed} choices {name}"),
+                given.words,
+            )
+            for name, given in mission.team(seed).items()
+        }
         self.sensing = {name: Random(f"{seed} sensors {name}") for name in self.robots}
         self.wishes = list(wishes)
-        self.human = _human(mission, floor, settings, seed)
+        self.human: Human | None = None
+        if settings.human is not None:
+            ends = list(mission.starts.values()), list(mission.goals.values())
+            drawn = Random(f"{seed} human")
+            self.human = Human.of(settings.human, floor, *ends, settings.cell, drawn)
         poses = {
             name: (
                 *floor.points[place],
@@ -176,7 +196,7 @@ class _Going:
     def has_ended(self) -> bool:
         """Whether all are there, or nobody will move any more."""
         walks = self.human is not None and self.human.walks
-        patience = (WITH_WALKER if walks else PATIENCE) * self.period
+        patience = (_WITH_WALKER if walks else _PATIENCE) * self.period
         return self.has_arrived or self.time - self.last_change > patience
 
     def tick(self) -> None:
@@ -194,8 +214,7 @@ class _Going:
         self.simulator.tick(velocities, self._walk())
         self.ticks += 1
         self._see_collisions()
-        middles = [self.simulator.pose(name)[:2] for name in self.robots]
-        apart = (math.dist(one, other) for one, other in combinations(middles, 2))
+        apart = (math.dist(one, other) for one, other in combinations(self._middles(), 2))
         self.nearest = min(self.nearest, *apart, math.inf)
 
     def record(self) -> RunRecord:
@@ -228,41 +247,35 @@ class _Going:
             steps=sorted(steps, key=lambda step: step.begin),
             events=self.events,
             human=self.human_at,
-            poses={
-                name: [(round(x, 3), round(y, 3), round(heading, 3)) for x, y, heading in poses]
-                for name, poses in self.poses.items()
-            },
+            poses=self.poses,
         )
 
     def _sensed(self, name: str, robot: Robot, heard: tuple[Message, ...]) -> Sensed:
+        """What a robot is told now."""
         spread, random = POSITION_NOISE * self.settings.noise, self.sensing[name]
         x, y, heading = (value + random.gauss(0, spread) for value in self.simulator.pose(name))
         ahead: float | None = math.inf
         if self.settings.lidar:
             ahead = self.simulator.ahead(name) if robot.looks_ahead else None
         strangers: tuple[tuple[float, float], ...] = ()
-        if self.human is not None and robot.looks_around:
-            strangers = self.simulator.strangers(name)
-        return Sensed(
-            self.time, (x, y, heading), ahead, heard, strangers, self._wanted(name, robot)
-        )
-
-    def _wanted(self, name: str, robot: Robot) -> tuple[str, ...]:
-        """What a robot comes to want now."""
-        if not robot.looks_around:
-            return ()
-        now = [wish for wish in self.wishes if wish.robot == name and wish.step <= robot.done]
-        self.wishes = [wish for wish in self.wishes if wish not in now]
-        return tuple(wish.visit for wish in now)
+        wanted: list[WishRecord] = []
+        if robot.looks_around:
+            strangers = self.simulator.strangers(name) if self.human is not None else ()
+            wanted = [one for one in self.wishes if one.robot == name and one.step <= robot.done]
+            self.wishes = [one for one in self.wishes if one not in wanted]
+        visits = tuple(wish.visit for wish in wanted)
+        return Sensed(self.time, (x, y, heading), ahead, heard, strangers, visits)
 
     def _walk(self) -> tuple[float, float]:
         """How the human walks."""
-        if self.human is None or not self.human.walks:
+        if self.human is None:
             return 0.0, 0.0
-        robots = [self.simulator.pose(name)[:2] for name in self.robots]
-        return self.human.velocity(
-            self.simulator.human(), robots, 2 * self.settings.radius + 0.3 * self.settings.cell
-        )
+        clearance = 2 * self.settings.radius + 0.3 * self.settings.cell
+        return self.human.velocity(self.simulator.human(), self._middles(), clearance)
+
+    def _middles(self) -> list[Point]:
+        """Where the robots are."""
+        return [self.simulator.pose(name)[:2] for name in self.robots]
 
     def _take(self, name: str, robot: Robot, act: Act) -> None:
         """Take in what a robot does: its messages, and what is worth an event."""
@@ -297,22 +310,23 @@ class _Going:
     def _keep_poses(self) -> None:
         if self.ticks % _ticks_of_interval(self.settings) == 0:
             for name, poses in self.poses.items():
-                poses.append(self.simulator.pose(name))
+                x, y, heading = self.simulator.pose(name)
+                poses.append((round(x, 3), round(y, 3), round(heading, 3)))
             if self.human is not None:
                 x, y = self.simulator.human()
                 self.human_at.append((round(x, 3), round(y, 3)))
 
-    def _event(self, kind: str, robots: list[str], **further: object) -> None:
+    def _event(self, kind: Any, robots: list[str], **further: Any) -> None:
         knows_words = self.mission.agreement != "nothing"
         self.events.append(
             EventRecord(
                 time=self.time,
-                kind=kind,  # type: ignore[arg-type]
+                kind=kind,
                 robots=robots,
                 steps={name: robot.done for name, robot in self.robots.items()},
                 words={n: robot.words for n, robot in self.robots.items()} if knows_words else {},
                 places={name: self._places(name) for name in self.robots},
-                **further,  # type: ignore[arg-type]
+                **further,
             )
         )
 
@@ -324,33 +338,3 @@ class _Going:
             if step.place is not None:
                 (been if step.end is not None else underway).append(step.place)
         return [been[-1], *underway]
-
-
-def _robots(mission: Mission, floor: Floor, settings: Settings, seed: int) -> dict[str, Robot]:
-    period = settings.period(floor.longest)
-    return {
-        name: Robot(
-            name,
-            given.monitor,
-            Body(
-                settings.drive,
-                floor.points,
-                mission.leads[name],
-                settings.cell,
-                settings.clearance,
-                settings.reaction,
-            ),
-            Pace(settings.step, mission.robots, period),
-            period,
-            Random(f"{seed} choices {name}"),
-            given.words,
-        )
-        for name, given in mission.team(seed).items()
-    }
-
-
-def _human(mission: Mission, floor: Floor, settings: Settings, seed: int) -> Human | None:
-    if settings.human is None:
-        return None
-    starts, goals = list(mission.starts.values()), list(mission.goals.values())
-    return Human.of(settings.human, floor, starts, goals, settings.cell, Random(f"{seed} human"))

@@ -13,13 +13,14 @@ import math
 import tempfile
 from collections.abc import Mapping
 from contextlib import redirect_stdout
+from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 from typing import Any
 
 from coordlang.simulation.floor import Floor, outlines
-from coordlang.simulation.settings import Settings
-from coordlang.simulation.tracking import Pose, Velocity
+from coordlang.simulation.pace import PACES
+from coordlang.simulation.robot import Drive, Pose, Velocity
 from coordlang.sites.coordinates import Point
 from planners.system.errors import UsageError
 from planners.system.signals import postponed_signals
@@ -32,10 +33,102 @@ _BEAMS, _ANGLE = 61, 2 * math.pi
 _SURFACE = 0.05
 #: What a lidar sees beside its robot's way within this many metres counts as in its way.
 _BESIDE = 0.02
+#: Noise of the position that a robot believes in, in metres for each unit of ``Settings.noise``.
+POSITION_NOISE = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How robots are built and keep step.
+
+    Attributes
+    ----------
+    step
+        The way to keep step: ``clock``, ``barrier`` or ``word``.
+    cell
+        Metres for one unit of the coordinates of places.
+    radius
+        The radius of a robot, in metres.
+    speed, turn
+        Its greatest speed (m/s) and rate of turning (rad/s).
+    noise
+        The standard deviation of what wheels do, as a share of what they are told, drawn anew in
+        each tick; a tenth of it, in metres and in radians, is that of where a robot believes to be.
+    lidar
+        Whether robots stop before what a lidar sees straight ahead.
+    human
+        The place of a human that nobody but a lidar knows of, ``random`` for a place drawn for each
+        run, ``walking`` for one who walks about; None for nobody.
+    tick
+        Seconds between two looks at sensors and commands to wheels.
+    """
+
+    step: str = "clock"
+    cell: float = 1.0
+    radius: float = 0.2
+    speed: float = 1.0
+    turn: float = 3.0
+    noise: float = 0.1
+    lidar: bool = True
+    human: str | None = None
+    tick: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Raise `UsageError` for what no robot can be built with."""
+        if self.step not in PACES:
+            raise UsageError(
+                f"--step {self.step}: there is no such way to keep step",
+                remedy=f"Say {', '.join(PACES[:-1])} or {PACES[-1]}.",
+            )
+        for name in ("cell", "radius", "speed", "turn", "tick"):
+            value = getattr(self, name)
+            if not 0 < value < math.inf:
+                raise UsageError(
+                    f"{name} {value:g}: expected a length, speed or time above 0",
+                    remedy="Leave it out for the usual value.",
+                )
+        if self.radius < self.speed * self.tick:
+            raise UsageError(
+                f"robots with a radius of {self.radius:g} m are too small: in a tick they drive "
+                f"{self.speed * self.tick:g} m, so that two could pass through each other unseen",
+                remedy="Use a larger --radius, and a larger --cell where it does not fit.",
+            )
+        if not 0 <= self.noise <= 1:
+            raise UsageError(
+                f"--noise {self.noise:g}: expected a share from 0 to 1",
+                remedy="Say 0 for wheels that do what they are told.",
+            )
+        if self.human is not None and not self.lidar:
+            raise UsageError(
+                "--human: without a lidar no robot sees a human", remedy="Leave out --no-lidar."
+            )
+
+    @property
+    def drive(self) -> Drive:
+        """The robots' wheels."""
+        return Drive(self.speed, self.turn)
+
+    @property
+    def clearance(self) -> float:
+        """How near to its middle a robot lets come what is straight ahead, in metres."""
+        return self.radius + 0.03 * self.cell
+
+    @property
+    def reaction(self) -> float:
+        """Seconds in which a robot would come as near as that to what is ahead.
+
+        Three ticks: two robots that come head on take at most two thirds of what is between them
+        in a tick, and so never touch.
+        """
+        return 3 * self.tick
+
+    def period(self, longest: float) -> float:
+        """Seconds that a joint step takes whose longest way has this length: whole ticks."""
+        return round(math.ceil(self.drive.period(longest) / self.tick) * self.tick, 6)
 
 
 def require_simulator() -> Any:
-    """Return the class of ir-sim's worlds.
+    """The class of ir-sim's worlds.
 
     Raises
     ------
@@ -60,18 +153,8 @@ def require_simulator() -> Any:
 class Simulator:
     """A world with robots, which time passes in tick by tick.
 
-    Parameters
-    ----------
-    floor
-        Its places and walls.
-    poses
-        Where each robot is at the start.
-    settings
-        Sizes, noise and the length of a tick.
-    seed
-        Of the noise on the wheels.
-    human
-        Where a human stands; None for nobody.
+    ``poses`` are those at the start, ``seed`` is that of the noise on the wheels; a human stands at
+    ``human``, if there is one.
     """
 
     def __init__(
@@ -98,18 +181,18 @@ class Simulator:
         self._environment.step(told)
 
     def human(self) -> Point:
-        """Return where the human is."""
+        """Where the human is."""
         assert self._human is not None, "nobody is there"
         x, y = self._human.state[:2, 0].tolist()
         return x, y
 
     def pose(self, robot: str) -> Pose:
-        """Return where a robot is, exactly."""
+        """Where a robot is, exactly."""
         x, y, heading = self._robots[robot].state[:3, 0].tolist()
         return x, y, heading
 
     def ahead(self, robot: str) -> float:
-        """Return how far ahead of a robot's middle its lidar sees something in its way."""
+        """How far ahead of a robot's middle its lidar sees something in its way."""
         found = math.inf
         for length, angle in self._scan(robot):
             beside = abs(length * math.sin(angle))
@@ -118,7 +201,7 @@ class Simulator:
         return found
 
     def strangers(self, robot: str) -> tuple[tuple[float, float], ...]:
-        """Return what a robot's lidar sees of the human: (metres, radians from straight ahead).
+        """What a robot's lidar sees of the human: (metres, radians from straight ahead).
 
         The map tells walls from it, and robots carry a mark.
         """
@@ -132,7 +215,7 @@ class Simulator:
         return tuple(found)
 
     def _scan(self, robot: str) -> list[tuple[float, float]]:
-        """Return the hits of a robot's lidar: (metres, radians from straight ahead)."""
+        """The hits of a robot's lidar: (metres, radians from straight ahead)."""
         own = self._robots[robot]
         own.lidar.step(own.state[0:3])
         scan = own.lidar.get_scan()
@@ -140,7 +223,7 @@ class Simulator:
         return [ray for ray, is_hit in zip(rays, scan["valid"], strict=True) if is_hit]
 
     def touching(self) -> set[tuple[str, str]]:
-        """Return the pairs that touch, in order: robots by name, `HUMAN` and ``the wall``."""
+        """The pairs that touch, in order: robots by name, `HUMAN` and ``the wall``."""
         found = set()
         for name, robot in self._robots.items():
             for other in robot.collision_obj:
@@ -150,7 +233,7 @@ class Simulator:
 
 
 def _environment(world: dict[str, Any], seed: int) -> Any:
-    """Return ir-sim's world; it reads one from a file only."""
+    """ir-sim's world; it reads one from a file only."""
     simulator = require_simulator()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "world.yaml")
@@ -166,8 +249,9 @@ def _environment(world: dict[str, Any], seed: int) -> Any:
 def _world(
     floor: Floor, poses: Mapping[str, Pose], settings: Settings, human: Point | None
 ) -> dict[str, Any]:
-    spread = settings.noise**2
-    drive = settings.drive
+    """The world as ir-sim reads it."""
+    spread, drive = settings.noise**2, settings.drive
+    disc = {"name": "circle", "radius": settings.radius}
     lidar = {
         "type": "lidar2d",
         "range_max": 2 * settings.cell,
@@ -182,7 +266,7 @@ def _world(
                 "noise": settings.noise > 0,
                 "alpha": [spread, 0, spread, spread],
             },
-            "shape": {"name": "circle", "radius": settings.radius},
+            "shape": disc,
             "state": list(pose),
             "vel_max": [drive.speed, drive.turn],
             "vel_min": [-drive.speed, -drive.turn],
@@ -190,7 +274,7 @@ def _world(
         }
         for name, pose in poses.items()
     ]
-    walls: list[dict[str, Any]] = [
+    others: list[dict[str, Any]] = [
         {
             "name": f"{WALL} {number}",
             "shape": {"name": "linestring", "vertices": [list(point) for point in outline]},
@@ -199,13 +283,7 @@ def _world(
         for number, outline in enumerate(outlines(floor.walls))
     ]
     if human is not None:
-        walls.append(
-            {
-                "name": HUMAN,
-                "kinematics": {"name": "omni"},
-                "shape": {"name": "circle", "radius": settings.radius},
-                "state": [*human, 0],
-            }
-        )
+        walker = {"name": HUMAN, "kinematics": {"name": "omni"}, "shape": disc}
+        others.append({**walker, "state": [*human, 0]})
     world = {"step_time": settings.tick, "collision_mode": "stop"}
-    return {"world": world, "robot": robots, "obstacle": walls}
+    return {"world": world, "robot": robots, "obstacle": others}

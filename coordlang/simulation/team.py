@@ -9,17 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from functools import partial
 from random import Random
-from typing import Any, Literal
+from typing import Literal
 
-from coordlang.execution.choices import choices
-from coordlang.execution.choices_file import to_data
-from coordlang.execution.monitor import FORMAT, IDLE, VERSION, Monitor
+import numpy as np
+
+from coordlang.execution.automaton import determinise
+from coordlang.execution.choices import choices, knowing, monitor, monitor_of
+from coordlang.execution.monitor import IDLE, Monitor
 from coordlang.execution.task_language import TaskLanguage
+from coordlang.explanation.demands import words_passed
 from coordlang.simulation.pace import OwnWords
 from coordlang.sites.world import World, find_world
-from planners.search.plan_space import PlanSpace
+from planners.search.plan_space import PlanSpace, UnfoldingStep
 from planners.search.plans import Plan, Plans
 from planners.system.errors import BadInput, UsageError, note
 from planners.system.messages import echoed
@@ -40,23 +43,10 @@ class Equipment:
 class Mission:
     """A task, what the robots have agreed on, and where they are.
 
-    Attributes
-    ----------
-    task_language
-        The language and the task.
-    agreement
-        What is agreed on.
-    sentence
-        The word numbers of the sentence, empty for another agreement.
-    world
-        Where things are, and what moves.
-    starts, goals
-        The place of each robot at the start and at the end of the plans; where plans differ, of
-        the first one.
-    leads
-        For each robot the place that each of its subactions leads to.
-    steps
-        The length of the plans in joint steps.
+    ``sentence`` holds word numbers, none for another agreement; ``starts`` and ``goals`` are the
+    place of each robot at the start and at the end of the plans (where they differ, of the first
+    one), ``leads`` for each robot the place that each of its subactions leads to.  Plans have so
+    many ``steps``.
     """
 
     task_language: TaskLanguage
@@ -79,12 +69,15 @@ class Mission:
         """Return what each robot is given in the run with this seed."""
         if self.agreement == "sentence":
             return {name: Equipment(g.monitor.copy(), g.words) for name, g in self._given.items()}
-        team = {}
+        agreed = self.agreement == "plan"
+        model, team = self.task_language.model, {}
         for robot, name in enumerate(self.robots):
-            agreed = self.agreement == "plan"
-            plan = self.agreed_plan(seed) if agreed else self._drawn(f"{seed} plan {name}")
-            own = [self.task_language.model.label_text(robot, step[robot]) for step in plan]
-            team[name] = self._following(name, own, self._words_on(plan) if agreed else None)
+            fits = self._only(
+                self.agreed_plan(seed) if agreed else self._drawn(f"{seed} plan {name}")
+            )
+            own = knowing(fits, robot, self._places_of(name))
+            words = own_words(fits, self.task_language, robot) if agreed else None
+            team[name] = Equipment(monitor_of(model, own, ""), words)
         return team
 
     def agreed_plan(self, seed: int) -> Plan:
@@ -121,50 +114,23 @@ class Mission:
             self._plans.space.path_with(self._plans.start, found) is not None
         )
 
-    def _following(
-        self, robot: str, subactions: Sequence[str | None], words: Sequence[int] | None = None
-    ) -> Equipment:
-        """What a robot is given that has one subplan: a choices file without a choice.
+    def _only(self, plan: Plan) -> PlanSpace:
+        """A plan as a plan space of its own."""
+        space, start, only = self._plans.space, self._plans.start, np.zeros(1, np.int64)
+        path = space.path_with(start, plan)
+        assert path is not None, "it was drawn from this space"
+        layers = [np.array([node]) for node in space.nodes_on(start, path)]
+        steps = [UnfoldingStep(only, np.array([edge]), only) for edge in path]
+        return PlanSpace.from_layers(space, layers, steps, self.task_language.task)
 
-        It knows in which place it is, and nothing else.
-        """
-        texts = self.task_language.model.codec.facts.texts
-        own = [text for text in texts if self.world.role(text)[:2] == ("at", robot)]
-        number = {self.world.role(text)[2]: fact for fact, text in enumerate(own)}
-        place, states = self.starts[robot], list[dict[str, Any]]()
-        for step, text in enumerate([*subactions, None]):
-            following = {text or IDLE: step + 1} if step < len(subactions) else {}
-            known: dict[str, Any] = {"true": [number[place]], "unknown": []}
-            states.append({"step": step, "left": 1, "next": following, **known})
-            place = self.leads[robot].get(text or IDLE, place)
-        entry = {
-            "robot": robot,
-            "steps": len(subactions),
-            "subplans": 1,
-            "atoms": "own",
-            "facts": own,
-            "others": [text for text in texts if text not in own],
-            "states": states,
-        }
-        data = {"format": FORMAT, "version": VERSION, "sentence": "", "choices": [entry]}
-        if words is None:
-            return Equipment(Monitor(data, robot), None)
-        moves = [dict(state["next"]) for state in states]
-        return Equipment(Monitor(data, robot), OwnWords(moves, words))
+    def _places_of(self, robot: str) -> int:
+        """The facts that say where a robot is, as bits."""
+        texts = enumerate(self.task_language.model.codec.facts.texts)
+        at = "at", robot
+        return sum(1 << fact for fact, text in texts if self.world.role(text)[:2] == at)
 
     def _drawn(self, seed: str) -> Plan:
         return self._plans.unrank(Random(seed).randrange(self._plans.count))
-
-    def _words_on(self, plan: Plan) -> tuple[int, ...]:
-        """Return how many words are passed before each step of a plan and at its end."""
-        space, start = self._plans.space, self._plans.start
-        path = space.path_with(start, plan)
-        assert path is not None, "it was drawn from this space"
-        word = self.task_language.word[space.nodes_on(start, path)].tolist()
-        passed = [0]
-        for before, after in pairwise(word):
-            passed.append(passed[-1] + (before != after))
-        return tuple(passed)
 
 
 def mission(
@@ -191,7 +157,7 @@ def mission(
         found = choices(task_language, sentence)
         for robot, name in enumerate(model.robots):
             words = own_words(found.fits, task_language, robot)
-            given[name] = Equipment(Monitor(to_data(found, [robot]), name), words)
+            given[name] = Equipment(monitor(found, name), words)
     return Mission(
         task_language,
         agreement,
@@ -207,30 +173,16 @@ def mission(
 
 
 def own_words(fits: PlanSpace, task_language: TaskLanguage, robot: int) -> OwnWords:
-    """How far in the sentence a robot may be after each of its own beginnings.
-
-    Subset construction over the plans with the sentence: a state is the set of nodes in which they
-    can be after the same own subactions.
-    """
-    model = task_language.model
+    """How far in the sentence a robot may be after each of its own beginnings."""
     word = task_language.partition.word_of(fits.rows)[fits.state]
-    passed = {int(fits.starts[0]): 0}
-    first = frozenset(passed)
-    numbers, order, moves, words = {first: 0}, [first], list[dict[str, int]](), []
-    for nodes in order:  # which grows meanwhile
-        targets: dict[str, set[int]] = {}
-        for node in sorted(nodes):
-            for edge in fits.out_edges(node):
-                text = model.label_text(robot, fits.labels_of(edge)[robot]) or IDLE
-                target = fits.target_of(edge)
-                passed[target] = passed[node] + int(word[target] != word[node])
-                targets.setdefault(text, set()).add(target)
-        words.append(max(passed[node] for node in nodes))
-        moves.append({})
-        for text, found in sorted(targets.items()):
-            moves[-1][text] = numbers.setdefault(frozenset(found), len(numbers))
-            order += [frozenset(found)] if len(numbers) > len(order) else []
-    return OwnWords(moves, words)
+    # As many bits as words are passed before: the most of them is what is possibly true.
+    passed = [(1 << number - 1) - 1 for number in words_passed(fits, word).tolist()]
+    found = determinise(fits, robot, passed)
+    text = partial(fits.model.label_text, robot)
+    moves = [
+        {text(label) or IDLE: to for label, to in found.moves(state)} for state in range(len(found))
+    ]
+    return OwnWords(moves, [known.possible.bit_length() for known in found.known])
 
 
 def _starts(world: World, robots: Sequence[str], state: Sequence[str]) -> dict[str, str]:

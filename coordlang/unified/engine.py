@@ -38,9 +38,8 @@ from unified_planning.model.metrics import MinimizeMakespan
 from unified_planning.model.problem_kind_versioning import LATEST_PROBLEM_KIND_VERSION
 from unified_planning.plans import PlanKind
 
-from coordlang.execution.fitting_plans import NoPlanFits
 from coordlang.execution.plan_sentence import NotAPlan, NotOptimal, sentence_of_plan
-from coordlang.execution.task_language import TaskLanguage, language_in_task
+from coordlang.execution.task_language import NoPlanFits, TaskLanguage, language_in_task
 from coordlang.unified import NAME
 from coordlang.unified.options import PLAN_KINDS, EngineOptions, in_parameters
 from coordlang.unified.plans import NoSteps, of_up, to_up

@@ -11,7 +11,7 @@ from coordlang.execution.task_language import TaskLanguage, language_in_task
 from coordlang.simulation.floor import Floor, floor_of
 from coordlang.simulation.record import SimulationRecord
 from coordlang.simulation.run import record_of, runs_of
-from coordlang.simulation.settings import Settings
+from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Agreement, Mission, mission
 from tests.support.domains import own_task, read
 

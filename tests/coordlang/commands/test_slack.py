@@ -14,7 +14,7 @@ from typing import Literal
 import pytest
 
 import coordlang as library
-from coordlang.execution.own_facts import OwnFacts
+from coordlang.execution.choices import own_facts
 from planners.system.errors import UsageError
 from tests.coordlang.commands.conftest import FILES, Shell
 
@@ -83,8 +83,8 @@ def test_robots_may_choose_for_themselves(made: Path, sentence: str) -> None:
     for robot in found.found.robots:
         assert robot.automaton.steps == 5
         # What is left of the slack changes without anybody's doing.
-        own = OwnFacts.of(found.found.task_language.model, robot.robot)
-        assert not any(own.mask >> fact & 1 for fact in found.found.task_language.model.slack_facts)
+        own = own_facts(found.found.task_language.model, robot.robot)
+        assert not any(own >> fact & 1 for fact in found.found.task_language.model.slack_facts)
 
 
 def test_monitors_of_robots_that_choose_by_themselves_end_in_the_goal(made: Path) -> None:

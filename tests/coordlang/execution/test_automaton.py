@@ -86,7 +86,7 @@ def test_least_automaton_of_any_graph(annotated: bool) -> None:
         beginnings = words(edges, depth)
         whole = beginnings[-1]
         steps = range(depth + 1 if annotated else 0)
-        automaton = determinise(space, 0, dict(enumerate(facts)) if annotated else None)
+        automaton = determinise(space, 0, facts if annotated else None)
         assert automaton.count == len(whole)
         futures: set[frozenset[object]] = set()
         subsets: set[frozenset[int]] = set()

@@ -14,9 +14,7 @@ import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.execution.automaton import Automaton, determinise
-from coordlang.execution.choices import RobotChoices, SentenceChoices, choices
-from coordlang.execution.choices_file import monitor
-from coordlang.execution.own_facts import OwnFacts
+from coordlang.execution.choices import RobotChoices, SentenceChoices, choices, monitor, own_facts
 from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
 from coordlang.language.candidates import from_problems
 from coordlang.language.partition import Partition
@@ -186,7 +184,7 @@ def check_own_atoms(
     task_language: TaskLanguage, own: RobotChoices, twin: Listed, seen: Counter[str]
 ) -> None:
     known = twin.knows(own.robot)
-    mask = OwnFacts.of(task_language.model, own.robot).mask
+    mask = own_facts(task_language.model, own.robot)
     facts = task_language.model.codec.facts.texts
     for part in twin.own[own.robot]:
         state = 0

@@ -10,9 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from coordlang.execution.fitting_plans import NoPlanFits
 from coordlang.execution.guided_search import ExpandedStates, a_star, plan_under_sentence
-from coordlang.execution.task_language import TaskLanguage
+from coordlang.execution.task_language import NoPlanFits, TaskLanguage
 from coordlang.language.candidates import Candidates
 from coordlang.language.listed import ground_task
 from planners.check.validate import validate

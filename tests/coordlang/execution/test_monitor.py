@@ -18,8 +18,7 @@ from typing import Any
 import pytest
 
 from coordlang.execution import monitor as monitor_module
-from coordlang.execution.choices import SentenceChoices, choices
-from coordlang.execution.choices_file import monitor, to_bytes, to_data
+from coordlang.execution.choices import SentenceChoices, choices, monitor, to_bytes, to_data
 from coordlang.execution.monitor import Detour, Monitor, MonitorError, NotAllowed, NotPossible
 from coordlang.execution.task_language import TaskLanguage
 from tests.support.naive_choices import Known, Listed, Own

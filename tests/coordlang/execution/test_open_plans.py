@@ -13,9 +13,8 @@ from xml.etree import ElementTree
 import pytest
 
 from coordlang.execution.drawing import COLOURS, cut_note, inks, plans_dot
-from coordlang.execution.fitting_plans import NoPlanFits
 from coordlang.execution.open_plans import OpenPlans, PlanDag, open_plans_data, plan_dag
-from coordlang.execution.task_language import TaskLanguage
+from coordlang.execution.task_language import NoPlanFits, TaskLanguage
 from planners.search.plan_file import texts
 from planners.search.plans import Plan
 from tests.support.command import Command

@@ -23,8 +23,7 @@ import pytest
 
 from coordlang.commands.build import build
 from coordlang.commands.explain import explain
-from coordlang.execution.fitting_plans import NoPlanFits
-from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
+from coordlang.execution.task_language import NoPlanFits, TaskLanguage, languages_in_tasks
 from coordlang.explanation.cover import Conjunction
 from coordlang.exports import membership as membership_module
 from coordlang.exports.ltlf import export_ltlf, symbols_of

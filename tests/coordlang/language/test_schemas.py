@@ -16,8 +16,7 @@ import pytest
 import coordlang as api
 from coordlang.commands.building import build_language
 from coordlang.commands.schema import SCHEMAS
-from coordlang.execution.choices import choices
-from coordlang.execution.choices_file import to_bytes
+from coordlang.execution.choices import choices, to_bytes
 from coordlang.execution.monitor import Monitor, MonitorError
 from coordlang.execution.task_language import languages_in_tasks
 from coordlang.language.file import read_language

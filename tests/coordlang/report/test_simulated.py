@@ -14,7 +14,7 @@ from coordlang.report import simulated
 from coordlang.report.page import Report, make_report
 from coordlang.report.simulated import simulated_data, summary
 from coordlang.simulation.record import SimulationRecord, to_bytes
-from coordlang.simulation.settings import Settings
+from coordlang.simulation.simulator import Settings
 from tests.coordlang.report.conftest import Opened, Opener, data_of, make_language
 from tests.support.command import Command
 from tests.support.domains import DOMAINS

@@ -11,7 +11,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.execution.fitting_plans import plans_with_sentence
+from coordlang.execution.task_language import plans_with_sentence
 from coordlang.language.sentences import sentence_counts
 from coordlang.required.failure import TooManyToCount, failure_of_sentence, failure_probability
 from coordlang.required.failures import estimated_failure

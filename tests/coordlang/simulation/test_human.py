@@ -8,10 +8,10 @@ from random import Random
 
 import pytest
 
-from coordlang.simulation.human import Human
+from coordlang.simulation.floor import Human
 from coordlang.simulation.record import EventRecord, RunRecord, WishRecord
 from coordlang.simulation.run import run
-from coordlang.simulation.settings import Settings
+from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Agreement
 from planners.system.errors import UsageError
 from tests.support.simulation import floor_for, mission_of

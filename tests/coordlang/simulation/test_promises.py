@@ -14,7 +14,7 @@ from coordlang.execution.task_language import language_in_task
 from coordlang.language.candidates import from_problems
 from coordlang.simulation.record import RunRecord
 from coordlang.simulation.run import run
-from coordlang.simulation.settings import Settings
+from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Mission, mission
 from coordlang.sites.movingai import planning_files, read_map
 from planners.pddl import read_domain, read_problem

@@ -16,7 +16,7 @@ import pytest
 from coordlang.simulation.record import SimulationRecord, event_text, read_simulation, to_bytes
 from coordlang.simulation.recording import ROBOTS, Scene, frames, new_figure, recorded
 from coordlang.simulation.run import record_of, runs_of
-from coordlang.simulation.settings import Settings
+from coordlang.simulation.simulator import Settings
 from planners.system.errors import BadInput, UsageError
 from tests.support.simulation import floor_for, mission_of
 

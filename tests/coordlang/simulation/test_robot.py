@@ -23,7 +23,6 @@ OWN = {
     "coordlang.execution.monitor",
     "coordlang.simulation.pace",
     "coordlang.simulation.robot",
-    "coordlang.simulation.tracking",
 }
 
 

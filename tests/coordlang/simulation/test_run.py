@@ -12,7 +12,7 @@ import pytest
 
 from coordlang.simulation.record import RunRecord
 from coordlang.simulation.run import run
-from coordlang.simulation.settings import Settings
+from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Agreement
 from tests.support.simulation import floor_for, mission_of
 

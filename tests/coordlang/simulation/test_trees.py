@@ -12,10 +12,9 @@ from py_trees.common import Status
 
 from coordlang.execution.choices import choices
 from coordlang.exports.behaviour_tree import behaviour_trees
-from coordlang.simulation.settings import Settings
-from coordlang.simulation.simulator import Simulator
+from coordlang.simulation.robot import ARRIVED, STANDING, Velocity, distance, driven, turned
+from coordlang.simulation.simulator import Settings, Simulator
 from coordlang.simulation.team import Mission
-from coordlang.simulation.tracking import ARRIVED, STANDING, Velocity, distance, driven, turned
 from tests.support.behaviour_trees import Leaf, read_tree
 from tests.support.simulation import floor_for, mission_of
 
