@@ -76,7 +76,9 @@ def best_sentence(
     while queue:
         _, words, _, prefix = heappop(queue)
         if prefix.plans is not None:
-            return BestSentence(words, prefix.plans, graph.values(prefix), prefixes)
+            values = graph.values(len(words), prefix.plans, prefix.grades)
+            told = tuple(abs(value) if isinstance(value, int) else value for value in values)
+            return BestSentence(words, prefix.plans, told, prefixes)
         same = graph.continuation(prefix)
         if same in seen:
             continue  # the one that was here before is as good, and shorter or smaller
@@ -142,18 +144,12 @@ class _Graph:
         for point in reversed(range(size)):
             if following[point]:
                 graph._bound_by_followers(point)
-            else:
-                graph._bound_at_end(point, automata, memories[point])
+                continue
+            graded = zip(automata, memories[point], strict=True)
+            graph.grades[point] = tuple(one.grade(memory) for one, memory in graded)
+            if graph.open:
+                graph.open[point][_END] = 1
         return graph
-
-    def _bound_at_end(
-        self, point: int, automata: Sequence[PlanPreference], memories: tuple[Memory, ...]
-    ) -> None:
-        """The bounds at a point where plans end."""
-        graded = zip(automata, memories, strict=True)
-        self.grades[point] = tuple(one.grade(memory) for one, memory in graded)
-        if self.open:
-            self.open[point][_END] = 1
 
     def _bound_by_followers(self, point: int) -> None:
         """The bounds at a point, from those of the points after it."""
@@ -199,37 +195,22 @@ class _Graph:
             found.append(_Prefix(prefix.words, {}, sum(ended.values()), grades))
         return found
 
-    def values(self, prefix: _Prefix) -> tuple[int | tuple[int, int], ...]:
-        """The value of a whole sentence in each preference."""
-        assert prefix.plans is not None
-        grades = iter(prefix.grades)
-        worth = {"shortest": len(prefix.words), "most-plans": prefix.plans}
-        return tuple(
-            worth[one] if isinstance(one, str) else next(grades) for one in self.preferences
-        )
+    def values(
+        self, length: int, plans: int, grades: Sequence[tuple[int, int]]
+    ) -> tuple[int | tuple[int, int], ...]:
+        """The value of a sentence in each preference; the smaller the better."""
+        left = iter(grades)
+        worth = {"shortest": length, "most-plans": -plans}
+        return tuple(worth[one] if isinstance(one, str) else next(left) for one in self.preferences)
 
     def bound(self, prefix: _Prefix) -> tuple[object, ...]:
-        """The best values that any sentence with this prefix can have.
-
-        The smaller the better; the length last.
-        """
-        if prefix.plans is not None:
-            signs = (
-                -value if one == "most-plans" and isinstance(value, int) else value
-                for one, value in zip(self.preferences, self.values(prefix), strict=True)
-            )
-            return (*signs, len(prefix.words))
-        length = len(prefix.words) + min(self.more[p] for p in prefix.counts)
-        grades = iter(self._best_grades(prefix))
-        result: list[object] = []
-        for one in self.preferences:
-            if one == "shortest":
-                result.append(length)
-            elif one == "most-plans":
-                result.append(-self._most_plans(prefix))
-            else:
-                result.append(next(grades))
-        return (*result, length)
+        """The best values that any sentence with this prefix can have; the length last."""
+        length, plans, grades = len(prefix.words), prefix.plans, prefix.grades
+        if plans is None:
+            length += min(self.more[p] for p in prefix.counts)
+            plans = self._most_plans(prefix) if self.open else 0
+            grades = self._best_grades(prefix)
+        return (*self.values(length, plans, grades), length)
 
     def _most_plans(self, prefix: _Prefix) -> int:
         total: dict[int, int] = {}
@@ -238,7 +219,7 @@ class _Graph:
                 total[word] = total.get(word, 0) + count * plans
         return max(total.values())
 
-    def _best_grades(self, prefix: _Prefix) -> list[tuple[int, int]]:
+    def _best_grades(self, prefix: _Prefix) -> tuple[tuple[int, int], ...]:
         """The (worst, best) grades at least.
 
         Some node's plans go on, and all that came to this node can go on in the same way.
@@ -249,7 +230,7 @@ class _Graph:
         best = map(min, zip(*(self.grades[p] for p in prefix.counts), strict=True))
         of_node = [tuple(map(max, zip(*grades, strict=True))) for grades in by_node.values()]
         worst = map(min, zip(*of_node, strict=True))
-        return list(zip(worst, best, strict=True))
+        return tuple(zip(worst, best, strict=True))
 
 
 def _points(

@@ -31,20 +31,9 @@ Node = tuple[int, int]
 class GuidedPlan:
     """What an A* search found, and its work.
 
-    Parameters
-    ----------
-    plan
-        The labels of its joint steps.
-    words
-        The plan's sentence (word numbers).
-    cost
-        Makespan and second component.
-    expanded
-        The number of nodes whose joint steps were looked at.
-    states
-        The number of different states among them.
-    generated
-        The number of nodes put into the queue.
+    ``plan`` are the labels of its joint steps, ``words`` its sentence (word numbers), ``cost``
+    makespan and second component.  ``expanded`` nodes were looked at, with so many different
+    ``states``; ``generated`` ones were put into the queue.
     """
 
     plan: Plan
@@ -60,16 +49,7 @@ class ExpandedStates:
     """States met by searches with one language over one model, with their words and joint steps.
 
     It only saves work: searches of many tasks, or with and without a sentence, expand the same
-    states.
-
-    Parameters
-    ----------
-    model
-        The joint model.
-    partition
-        The language as a partition of the states.
-    rows, word
-        The states met so far and their word numbers, by state number.
+    states.  ``rows`` and ``word`` are the states met so far and their word numbers, by number.
     """
 
     model: JointModel
@@ -193,18 +173,8 @@ def a_star(
     bound, second component), then least bound, then the largest index, then the one whose
     predecessor was expanded last, then the one with the smallest labels.
 
-    Parameters
-    ----------
-    states
-        What earlier searches with the same language and model have expanded.
-    init, goal
-        The task.
-    bound
-        An admissible, consistent lower bound on the joint steps left.
-    words
-        The word numbers of the sentence; any optimal plan for None.
-    count_words
-        Whether the number of words that are left bounds the steps that are left.
+    ``bound`` is an admissible, consistent lower bound on the joint steps left; for the rest see
+    `plan_under_sentence`.
     """
     [start] = states.numbers(init[None, :])
     if words is not None and (not words or states.word[start] != words[0]):
@@ -307,16 +277,13 @@ class _AStar:
         self.met[state] |= indices
         self.waiting[state] = self.waiting.get(state, 0) | indices
 
-    def _found(self, state: int, states: int) -> GuidedPlan:
-        plan, passed = self._path_to((state, self.last))
-        words = sentence(self.states.word[s] for s in passed)
-        return GuidedPlan(plan, words, self.best[state], self.expanded, states, self.generated)
-
-    def _path_to(self, node: Node) -> tuple[Plan, list[int]]:
-        """The labels and the states of the path found to a node."""
-        plan, states = [], [node[0]]
+    def _found(self, state: int, expanded_states: int) -> GuidedPlan:
+        """The path found to a goal state whose word is the sentence's last."""
+        node, plan, passed = (state, self.last), [], [self.states.word[state]]
         while node in self.before:
             node, labels = self.before[node]
             plan.append(labels)
-            states.append(node[0])
-        return tuple(reversed(plan)), states[::-1]
+            passed.append(self.states.word[node[0]])
+        words = sentence(reversed(passed))
+        work = self.expanded, expanded_states, self.generated
+        return GuidedPlan(tuple(reversed(plan)), words, self.best[state], *work)

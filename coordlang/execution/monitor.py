@@ -44,6 +44,7 @@ _SHOWN_TEXT = 200  # characters of a text that a message shows
 _AROUND_PARENTHESES = re.compile(r"\s*([()])\s*")
 _PDDL_TEXT = re.compile(r"\([^()]+\)")
 _KINDS = {str: "a text", int: "a whole number", list: "a list", dict: "an object"}
+_KNOWN = ("true", "unknown")  # the keys of what is known in a state
 _Kind = TypeVar("_Kind")
 
 #: One text or several; None is idling.
@@ -140,34 +141,40 @@ class _Walk:
         return range(self.first[node], self.first[node + 1])
 
 
-class _Facts:
-    """Sets of facts by state, as the sorted numbers ``state * facts + fact`` in one flat array."""
+class _Known:
+    """What is known in each state, as sorted numbers in one flat array.
 
-    def __init__(self, states: Sequence[Any], key: str, facts: int) -> None:
-        self._facts, self._pairs = facts, array("q")
-        for number, state in enumerate(states):
-            numbers = _get(state, key, list, f"state {number}")
-            for fact in numbers:
-                if not _is_number(fact) or not 0 <= fact < facts:
-                    raise _broken(
-                        f"state {number}: '{key}' has {_shown(fact)}; "
-                        f"facts are numbers below {facts}"
-                    )
-            self._pairs.extend(number * facts + fact for fact in sorted(set(numbers)))
+    The number of a fact in a state is ``2 * (state * facts + fact)``, and 1 more if the fact is
+    unknown there; a fact that does not occur is false.
+    """
 
-    def has(self, state: int, fact: int | None) -> bool:
-        """Whether a fact is in the set of a state; None never is."""
+    def __init__(self, states: Sequence[Any], facts: int) -> None:
+        self._facts, self._numbers = facts, array("q")
+        for state, record in enumerate(states):
+            true, unknown = (_fact_numbers(record, key, facts, state) for key in _KNOWN)
+            if both := true & unknown:
+                raise MonitorError(f"state {state} says that fact {min(both)} is true and unknown")
+            found = [2 * fact for fact in true] + [2 * fact + 1 for fact in unknown]
+            self._numbers.extend(2 * state * facts + number for number in sorted(found))
+
+    def value(self, state: int, fact: int | None) -> bool | None:
+        """Whether a fact is true in a state; None where it is unknown.  None always is."""
         if fact is None:
-            return False
-        pair = state * self._facts + fact
-        at = bisect_left(self._pairs, pair)
-        return at < len(self._pairs) and self._pairs[at] == pair
+            return None
+        number = 2 * (state * self._facts + fact)
+        at = bisect_left(self._numbers, number)
+        found = self._numbers[at] - number if at < len(self._numbers) else 2
+        return None if found == 1 else found == 0
 
-    def require_apart(self, other: _Facts) -> None:
-        """Raise `MonitorError` if a state has one fact in both."""
-        for pair in sorted({*self._pairs} & {*other._pairs})[:1]:
-            state, fact = divmod(pair, self._facts)
-            raise MonitorError(f"state {state} says that fact {fact} is true and unknown")
+
+def _fact_numbers(record: Any, key: str, facts: int, state: int) -> set[int]:
+    numbers = _get(record, key, list, f"state {state}")
+    for fact in numbers:
+        if not _is_number(fact) or not 0 <= fact < facts:
+            raise _broken(
+                f"state {state}: '{key}' has {_shown(fact)}; facts are numbers below {facts}"
+            )
+    return set(numbers)
 
 
 class _History:
@@ -247,8 +254,9 @@ class Monitor:
         facts, others = _atoms(entry, "facts", where), _atoms(entry, "others", where)
         if len({*facts, *others}) < len(facts) + len(others):
             raise _broken(f"{where}: an atom occurs twice in 'facts' and 'others'")
-        self._facts = {text: number for number, text in enumerate(facts)}
-        self._others = frozenset(others)
+        #: The number of each atom; None for one of which nothing is ever known.
+        self._facts: dict[str, int | None] = {text: n for n, text in enumerate(facts)}
+        self._facts |= dict.fromkeys(sorted(others))
         states = _get(entry, "states", list, where)
         _check_moves(states)
         labels = _labels(states)
@@ -257,9 +265,7 @@ class Monitor:
         self._numbers = {text: number for number, text in enumerate(self._texts)}
         self._walk = _read_walk(states, labels)
         _check_ends(entry, states, self._walk)
-        self._true = _Facts(states, "true", len(facts))
-        self._unknown = _Facts(states, "unknown", len(facts))
-        self._true.require_apart(self._unknown)
+        self._known = _Known(states, len(facts))
         self._most = max(MAX_NODES, _NODES_OF_STATE * len(states))
         self._here = 0
         self._history = _History()
@@ -337,28 +343,21 @@ class Monitor:
 
         Raises `NotAllowed`, and is then as it was before.
         """
-        if isinstance(subaction, str) and subaction in self._numbers:
-            label = self._numbers[subaction]
-        else:
-            label = self._numbers.get(_subaction(subaction), -1)
+        is_known = isinstance(subaction, str) and subaction in self._numbers
+        text = subaction if is_known else _subaction(subaction)
+        label = self._numbers.get(text, -1)
         edges = self._walk.edges(self._here)
         edge = bisect_left(self._walk.label, label, edges.start, edges.stop)
         if edge == edges.stop or self._walk.label[edge] != label:
-            raise NotAllowed(self.robot, _subaction(subaction), self.step, self.allowed())
+            raise NotAllowed(self.robot, text, self.step, self.allowed())
         self._history.add(label)
         self._here = self._walk.target[edge]
 
     def known(self, atom: str) -> bool | None:
         """Whether an atom is true now, whatever the others did; None if that depends on them."""
-        fact = self._facts.get(atom) if isinstance(atom, str) else None
-        if fact is None:
-            text = _plain(atom)
-            self._check_atom(text)
-            fact = self._facts.get(text)
-        state = self._walk.state[self._here]
-        if fact is None or self._unknown.has(state, fact):
-            return None
-        return self._true.has(state, fact)
+        text = atom if isinstance(atom, str) and atom in self._facts else _plain(atom)
+        self._check_atom(text)
+        return self._known.value(self._walk.state[self._here], self._facts[text])
 
     def can(self, detour: Detour | None = None, /, **wanted: Texts) -> Answer:
         """Whether all this can still be had at once, promises kept.
@@ -422,9 +421,8 @@ class Monitor:
     ) -> tuple[list[tuple[int, int]], list[list[tuple[int, int]]]]:
         """What can be reached from here by moves that a detour does not forbid, step by step.
 
-        The nodes, pairs of a node of the subplans that are left and of the parts of the detour that
-        are made already (bits: the visits, then the dos); the moves from each, pairs of a label and
-        a number of a node.
+        Nodes are pairs: one of the subplans that are left, and the parts of the detour that are
+        made by then (bits: the visits, then the dos).  Moves are pairs of a label and a node.
         """
         walk = self._walk
         by_label = [_made_by(detour, text) for text in self._texts]
@@ -455,28 +453,27 @@ class Monitor:
 
     def _made_in(self, detour: Detour, state: int) -> int | None:
         """The visits made in a state, as bits; None if the detour avoids it."""
-        for atom in detour.avoid:
-            fact = self._facts.get(atom)
-            if fact is None or self._true.has(state, fact) or self._unknown.has(state, fact):
-                return None
-        visited = (self._true.has(state, self._facts.get(atom)) for atom in detour.visit)
+        values = partial(self._known.value, state)
+        if any(values(self._facts[atom]) is not False for atom in detour.avoid):
+            return None
+        visited = (values(self._facts[atom]) for atom in detour.visit)
         return sum(1 << bit for bit, made in enumerate(visited) if made)
 
     def _check_atom(self, atom: str) -> None:
-        if atom not in self._facts and atom not in self._others:
-            raise MonitorError(f"{_shown(atom)} is no atom that can change: {self._similar(atom)}")
+        if atom in self._facts:
+            return
+        head = _head(atom)
+        alike = [text for text in self._facts if _head(text) == head]
+        if alike:
+            more = " .." if len(alike) > _SHOWN else ""
+            similar = f"there are {', '.join(alike[:_SHOWN])}{more}"
+        else:
+            similar = f"none is ({_shown(head)} ..)"
+        raise MonitorError(f"{_shown(atom)} is no atom that can change: {similar}")
 
-    def _similar(self, atom: str) -> str:
-        head = atom.strip("()").split(" ")[0]
-        alike = [
-            text
-            for text in (*self._facts, *sorted(self._others))
-            if text.strip("()").split(" ")[0] == head
-        ]
-        if not alike:
-            return f"none is ({_shown(head)} ..)"
-        more = " .." if len(alike) > _SHOWN else ""
-        return f"there are {', '.join(alike[:_SHOWN])}{more}"
+
+def _head(atom: str) -> str:
+    return atom.strip("()").split(" ")[0]
 
 
 def _walk_of(

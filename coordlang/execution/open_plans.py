@@ -21,17 +21,9 @@ from planners.search.plans import Plan, Plans, counts
 class OpenPlans:
     """The plans that a sentence leaves open in one task.
 
-    Parameters
-    ----------
-    task_language
-        The language and the task.
-    words
-        The word numbers of the sentence.
-    fits
-        The optimal plans with this sentence as a plan space of one task.  A node is a joint state
-        and the number of words passed; every node is on some plan.
-    plans
-        The same plans, counted and ranked.
+    ``words`` are the word numbers of the sentence.  ``fits`` are the plans as a plan space of one
+    task, whose nodes are a joint state and the number of words passed; ``plans`` are the same,
+    counted and ranked.
     """
 
     task_language: TaskLanguage
@@ -64,19 +56,9 @@ class OpenPlans:
 class DagNode:
     """A joint state on a plan, or several states of one step that are drawn as one.
 
-    Parameters
-    ----------
-    step
-        The joint steps done.
-    key, word
-        The state's key and word; empty for several states.
-    words
-        How many words of the sentence the plans have passed, this one included; 0 for several
-        states.
-    plans
-        The number of plans through it.
-    merged
-        The number of states that it stands for, if they are several; else 0.
+    ``step`` joint steps are done, and ``plans`` pass through it.  ``key`` and ``word`` are the
+    state's, ``words`` of the sentence are passed, this one included; empty and 0 for several
+    states.  ``merged`` is their number; 0 for a single one.
     """
 
     step: int
@@ -103,18 +85,9 @@ class DagEdge:
 class PlanDag:
     """The plans that a sentence leaves open as the paths of a layered graph.
 
-    Parameters
-    ----------
-    sentence, task, robots
-        The words, the task in words, the robots' names.
-    count
-        The number of plans.
-    nodes
-        Sorted by step, those on most plans first.
-    edges
-        Sorted by source and target.
-    cut
-        How many states were merged; 0: nothing is missing.
+    ``task`` is the task in words, ``count`` the number of plans.  Nodes are sorted by step, those
+    on most plans first; edges by source and target.  So many states were ``cut`` (merged); 0:
+    nothing is missing.
     """
 
     sentence: tuple[str, ...]

@@ -127,11 +127,11 @@ def _executed(task_language: TaskLanguage, plan: Sequence[Texts]) -> tuple[Plan,
         rows.append(steps.result[found[0]])
         second += int(steps.cost[found[0]])
         numbers.append(labels)
-    if not model.holds(_goal(task_language), rows[-1][None, :])[0]:
-        unmet = _unmet_goal(task_language, rows[-1])
+    goal = space.goals[space.goal[task_language.start]]
+    if not model.holds(goal, rows[-1][None, :])[0]:
         raise NotAPlan(
             len(plan),
-            f"after {_steps(len(plan))} {unmet}",
+            f"after {_steps(len(plan))} {_unmet(model, goal, rows[-1])}",
             remedy="Give the whole plan: it ends where the goal holds.",
         )
     return tuple(numbers), rows, second
@@ -167,12 +167,6 @@ def _spelling(text: str | None) -> str | None:
     return "(" + " ".join(re.findall(r"[^\s()]+", text.lower())) + ")"
 
 
-def _goal(task_language: TaskLanguage) -> Goal:
-    space = task_language.space
-    goal: Goal = space.goals[space.goal[task_language.start]]
-    return goal
-
-
 def _label_numbers(model: JointModel, step: Texts, number: int) -> tuple[int, ...]:
     found = model.numbers(step)
     if found is not None:
@@ -190,14 +184,11 @@ def _label_numbers(model: JointModel, step: Texts, number: int) -> tuple[int, ..
     )
 
 
-def _unmet_goal(task_language: TaskLanguage, row: Rows) -> str:
+def _unmet(model: JointModel, goal: Goal, row: Rows) -> str:
     """The first part of the goal that does not hold."""
-    goal = _goal(task_language)
     if isinstance(goal, FullState):
         return "the state is not the goal state"
-    part = next(
-        part for part in conjuncts(goal) if not task_language.model.holds(part, row[None, :])[0]
-    )
+    part = next(part for part in conjuncts(goal) if not model.holds(part, row[None, :])[0])
     return f"the goal is not reached: {formula_text(part)} does not hold"
 
 

@@ -21,20 +21,10 @@ Memory = tuple[int, ...]
 class PlanPreference:
     """A preference about single plans: an automaton that reads a plan and gives it a grade.
 
-    The lower the grade, the better.  A state is given by its number in the plan space's table.
-
-    Parameters
-    ----------
-    text
-        How it is written on the command line.
-    start
-        Gives the memory in the initial state.
-    step
-        Gives the memory after a joint step (labels) into a state.
-    grade
-        Gives the grade of a plan by the memory at its end.
-    grades
-        What each grade means, in words.
+    ``start`` gives the memory in the initial state, ``step`` that after a joint step (labels) into
+    a state, both by its number in the plan space's table; ``grade`` gives the grade by the memory
+    at the end, the lower the better.  ``text`` is the preference as it is written on the command
+    line, ``grades`` says in words what each grade means.
     """
 
     text: str

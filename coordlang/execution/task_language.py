@@ -41,17 +41,16 @@ class NoPlanFits(Refuted):
 
     def __init__(
         self,
+        task_language: TaskLanguage,
         sentence: Sequence[int],
         length: int,
         next_words: Sequence[int | None],
-        names: Sequence[str],
-        kept_plan: str,
     ) -> None:
-        text = " ".join(names[word] for word in sentence)
-        prefix = " ".join(names[word] for word in sentence[:length])
+        names, kept_plan = task_language.partition.words, task_language.model.kept_plan
         following = [f"say {echoed(names[w])}" if w is not None else "end" for w in next_words]
-        where = f'after "{prefix}"' if length else "at the beginning"
+        where = f'after "{task_language.text(sentence[:length])}"' if length else "at the beginning"
         wrong = f"says {echoed(names[sentence[length]])}" if length < len(sentence) else "ends"
+        text = task_language.text(sentence)
         super().__init__(
             f'no {kept_plan} has the sentence "{text}": {where} no plan {wrong}',
             remedy=f"There plans {' or '.join(following)}.",
@@ -145,8 +144,48 @@ class TaskLanguage:
         return tuple(number[word] for word in words)
 
     def plans_with(self, words: Sequence[int]) -> PlanSpace:
-        """The task's plans with the sentence ``words``; see `plans_with_sentence`."""
-        return plans_with_sentence(self.space, self.word, self.task, words, self.partition.words)
+        """The optimal plans of the task that have a sentence, as a plan space of one task.
+
+        Its nodes are pairs (node of `space`, number of words passed), each on some plan with the
+        sentence, so that `planners.search.plans.Plans.of` counts, ranks and samples exactly these
+        plans.  The table of states and the goals are those of `space`.  O(nodes * words of the
+        sentence), layer by layer.
+
+        Raises `NoPlanFits` if no optimal plan of the task has the sentence.
+        """
+        space, word, length = self.space, self.word, len(words)
+        if not length or word[self.start] != words[0]:
+            raise NoPlanFits(self, words, 0, [int(word[self.start])])
+        next_word = np.array([*words[1:], -1, -1])
+        #: For each layer the node of ``space`` and the index in the sentence of its word.
+        layers: list[tuple[Ints, Ints]] = [(np.array([self.start]), np.array([0]))]
+        steps: list[UnfoldingStep] = []
+        for _ in range(space.cost_of(self.task)[0]):
+            node, index = layers[-1]
+            source, edge = space.edges_from(node)
+            target, before = space.targets(edge), index[source]
+            changes = word[target] != word[node[source]]
+            fits = ~changes | (next_word[before] == word[target])
+            code = target * length + before + changes
+            reached, number = np.unique(code[fits], return_inverse=True)
+            layers.append((reached // length, reached % length))
+            steps.append(UnfoldingStep(source[fits], edge[fits], number.reshape(-1)))
+        ends = layers[-1][1] == length - 1
+        if not ends.any():
+            furthest = max(int(index.max()) for _, index in layers if len(index))
+            nodes = [n for node, index in layers for n in node[index == furthest].tolist()]
+            raise NoPlanFits(self, words, furthest + 1, self._next_words(nodes))
+        return PlanSpace.from_layers(space, [node for node, _ in layers], steps, self.task, ends)
+
+    def _next_words(self, nodes: Sequence[int]) -> list[int | None]:
+        """The words to which plans go on from some nodes, None where they may end."""
+        following: set[int | None] = set()
+        for node in nodes:
+            after = self.space.successors(node)
+            following |= set(self.word[after].tolist()) - {int(self.word[node])}
+            if not after:
+                following.add(None)
+        return sorted(following, key=lambda w: (w is None, w))
 
     def text(self, words: Sequence[int]) -> str:
         """A sentence as it is written."""
@@ -156,81 +195,6 @@ class TaskLanguage:
         """The language and the task, not the plan space."""
         task = describe(self.space, self.task)
         return f"TaskLanguage({self.language!r}, task={task!r}, covered={self.covered})"
-
-
-def plans_with_sentence(
-    space: PlanSpace, word: Ints, task: int, sentence: Sequence[int], names: Sequence[str]
-) -> PlanSpace:
-    """The optimal plans of a task that have a sentence, as a plan space of one task.
-
-    O(nodes * words of the sentence), layer by layer.
-
-    Parameters
-    ----------
-    space
-        The optimal plans of one or several tasks.
-    word
-        The word number of each of its nodes, (nodes).
-    task
-        The number of the task in ``space.starts``.
-    sentence
-        Word numbers, no two neighbours equal.
-    names
-        The words by number, for messages.
-
-    Returns
-    -------
-    PlanSpace
-        Its nodes are pairs (node of ``space``, number of words passed), each on some plan with the
-        sentence, so that `planners.search.plans.Plans.of` counts, ranks and samples exactly these
-        plans.  The table of states and the goals are those of ``space``.
-
-    Raises
-    ------
-    NoPlanFits
-        If no optimal plan of the task has the sentence.
-    """
-    start = int(space.starts[task])
-    length = len(sentence)
-    if not length or word[start] != sentence[0]:
-        raise NoPlanFits(sentence, 0, [int(word[start])], names, space.model.kept_plan)
-    next_word = np.array([*sentence[1:], -1, -1])
-    #: For each layer the node of ``space`` and the index in the sentence of its word.
-    layers: list[tuple[Ints, Ints]] = [(np.array([start]), np.array([0]))]
-    steps: list[UnfoldingStep] = []
-    for _ in range(space.cost_of(task)[0]):
-        node, index = layers[-1]
-        source, edge = space.edges_from(node)
-        target, before = space.targets(edge), index[source]
-        changes = word[target] != word[node[source]]
-        fits = ~changes | (next_word[before] == word[target])
-        reached, number = np.unique((target * length + before + changes)[fits], return_inverse=True)
-        layers.append((reached // length, reached % length))
-        steps.append(UnfoldingStep(source[fits], edge[fits], number.reshape(-1)))
-    ends = layers[-1][1] == length - 1
-    if not ends.any():
-        raise _no_plan(space, word, sentence, layers, names)
-    return PlanSpace.from_layers(space, [node for node, _ in layers], steps, task, ends)
-
-
-def _no_plan(
-    space: PlanSpace,
-    word: Ints,
-    sentence: Sequence[int],
-    layers: Sequence[tuple[Ints, Ints]],
-    names: Sequence[str],
-) -> NoPlanFits:
-    """The error that says how far plans follow the sentence, and which words they have then."""
-    furthest = max(int(index.max()) for _, index in layers if len(index))
-    following: set[int | None] = set()
-    for nodes, index in layers:
-        for node in nodes[index == furthest].tolist():
-            after = space.successors(node)
-            following |= set(word[after].tolist()) - {int(word[node])}
-            if not after:
-                following.add(None)
-    next_words = sorted(following, key=lambda w: (w is None, w))
-    return NoPlanFits(sentence, furthest + 1, next_words, names, space.model.kept_plan)
 
 
 def language_in_task(

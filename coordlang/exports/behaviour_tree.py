@@ -13,7 +13,7 @@ tree has no way back.  Its own nodes are those that BehaviorTree.CPP brings: ``S
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 from coordlang.execution.choices import RobotChoices, SentenceChoices
@@ -29,11 +29,9 @@ LEAVES = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class _Move:
+class _Move(NamedTuple):
     """What a robot may do in a state of its automaton."""
 
-    number: int
     state: int
     label: int
     target: int
@@ -84,12 +82,7 @@ def _tree(model: JointModel, own: RobotChoices) -> ET.Element:
         if own.robot in action.owners and not action.parts
     }
     for step, states in enumerate(own.automaton.layers[:-1]):
-        moves = [
-            _Move(number, state, label, target)
-            for number, (state, label, target) in enumerate(
-                (state, *move) for state in states for move in own.automaton.moves(state)
-            )
-        ]
+        moves = [_Move(state, *move) for state in states for move in own.automaton.moves(state)]
         here = ET.SubElement(steps, "Sequence", name=f"step {step}")
         ET.SubElement(here, "Action", ID="AwaitStep", step=str(step))
         here.append(_choosing(model, own, moves))
@@ -103,14 +96,14 @@ def _choosing(model: JointModel, own: RobotChoices, moves: Sequence[_Move]) -> E
     Nothing is done here, so that an action that fails is never followed by another choice.
     """
     choose = ET.Element("Fallback", name="choose")
-    last = {move.state: move.number for move in moves}
-    for move in moves:
+    last = {move.state: number for number, move in enumerate(moves)}
+    for number, move in enumerate(moves):
         branch = ET.SubElement(choose, "Sequence")
         ET.SubElement(branch, "ScriptCondition", code=f"state == {move.state}")
-        if last[move.state] != move.number:
+        if last[move.state] != number:
             text = model.label_text(own.robot, move.label) or IDLE
             ET.SubElement(branch, "Condition", ID="Chooses", subaction=text)
-        ET.SubElement(branch, "Script", code=f"move := {move.number}")
+        ET.SubElement(branch, "Script", code=f"move := {number}")
     return choose
 
 
@@ -123,9 +116,9 @@ def _acting(
     """Do the chosen move: of the branches only its own can succeed."""
     act = ET.Element("Fallback", name="act")
     index = model.codec.facts.index
-    for move in moves:
+    for number, move in enumerate(moves):
         branch = ET.SubElement(act, "Sequence")
-        ET.SubElement(branch, "ScriptCondition", code=f"move == {move.number}")
+        ET.SubElement(branch, "ScriptCondition", code=f"move == {number}")
         text = model.label_text(own.robot, move.label)
         if text is not None:
             known = own.automaton.known[move.state].true

@@ -34,25 +34,9 @@ def named_by_words(
 ) -> ClassicalTask:
     """The plain task in which states are named by their words and the sentence is followed.
 
-    Parameters
-    ----------
-    task_language
-        The language and the task.
-    words
-        The word numbers of the sentence.
-    plain
-        The task without the sentence.
-    labels
-        For each of its actions the labels that robots take in it.
-    tests
-        Which states belong to which word.
-    steps
-        The most joint steps; None: any number.
-
-    Returns
-    -------
-    ClassicalTask
-        The actions of ``plain`` in their order, then those that name and follow.
+    The actions of ``plain`` in their order, then those that name and follow.  ``labels`` are for
+    each action of ``plain`` those that robots take in it, ``tests`` say which states belong to
+    which word, and ``steps`` is the most joint steps; None: any number.
     """
     facts = _NamingFacts(task_language, words, plain, tests, steps)
     within = [

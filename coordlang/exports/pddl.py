@@ -30,7 +30,7 @@ it stays in states that the language maps.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from coordlang.execution.guided_search import plan_under_sentence
@@ -56,21 +56,10 @@ from planners.system.messages import echoed
 class PddlExport:
     """A task under a sentence for other planners.
 
-    Parameters
-    ----------
-    model
-        The joint model.
-    classical
-        The task as data.
-    domain, problem
-        The same as PDDL text.
-    labels
-        For each action, by its name in the PDDL, the labels that robots take in it: all robots
-        (explicit form), one, or none (bookkeeping).
-    cost
-        The total cost of an optimal plan.
-    terms
-        The number of terms that tell which word a state belongs to.
+    ``classical`` is the task as data, ``domain`` and ``problem`` the same as PDDL text, ``cost``
+    the total cost of an optimal plan.  ``labels`` are for each action, by its name in the PDDL, the
+    labels that robots take in it: all robots (explicit form), one, or none (bookkeeping).  So many
+    ``terms`` tell which word a state belongs to.
     """
 
     model: JointModel
@@ -82,17 +71,10 @@ class PddlExport:
     terms: int
 
     def joint_plan(self, names: Sequence[str]) -> Plan:
-        """The joint plan that a plan of the exported problem stands for.
+        """The joint plan that a plan of the exported problem stands for, given by its actions.
 
-        Parameters
-        ----------
-        names
-            The actions of the plan.
-
-        Raises
-        ------
-        BadInput
-            For an action that the problem does not have, or a plan that ends within a step.
+        Raises `BadInput` for an action that the problem does not have, or a plan that ends within a
+        step.
         """
         steps: list[dict[int, int]] = []
         for number, name in enumerate(names, 1):
@@ -101,17 +83,16 @@ class PddlExport:
                 steps.append({})
             steps[-1].update(labels)
         plan = [step for step in steps if step]
-        return tuple(self._whole_step(number, step) for number, step in enumerate(plan, 1))
-
-    def _whole_step(self, number: int, labels: Mapping[int, int]) -> tuple[int, ...]:
-        """The labels of all robots in a step."""
-        for robot, name in enumerate(self.model.robots):
-            if robot not in labels:
-                raise BadInput(
-                    f"in step {number} of the plan {name} chooses nothing: the plan is cut off",
-                    remedy="Give the whole plan that the planner wrote.",
-                )
-        return tuple(labels[robot] for robot in range(len(self.model.robots)))
+        robots = range(len(self.model.robots))
+        for number, step in enumerate(plan, 1):
+            for robot in robots:
+                if robot not in step:
+                    raise BadInput(
+                        f"in step {number} of the plan {self.model.robots[robot]} chooses nothing: "
+                        "the plan is cut off",
+                        remedy="Give the whole plan that the planner wrote.",
+                    )
+        return tuple(tuple(step[robot] for robot in robots) for step in plan)
 
     def _labels_of(self, number: int, name: str) -> tuple[RobotLabel, ...]:
         labels = self.labels.get(name.lower())

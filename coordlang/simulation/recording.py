@@ -110,13 +110,10 @@ class Scene:
 
         hue, places = ROBOTS[number % len(ROBOTS)], self.record.places
         if (goal := self.record.goals.get(name)) in places:
-            look: dict[str, Any] = {
-                "fill": False,
-                "edgecolor": hue,
-                "linewidth": 1.5,
-                "linestyle": (0, (3, 2)),
-            }
-            self.axes.add_patch(Circle(places[goal], 1.25 * self.record.radius, **look))
+            dashes: Any = (0, (3, 2))
+            look: dict[str, Any] = {"fill": False, "edgecolor": hue, "linewidth": 1.5}
+            ring = Circle(places[goal], 1.25 * self.record.radius, linestyle=dashes, **look)
+            self.axes.add_patch(ring)
         (way,) = self.axes.plot([], [], color=hue, linewidth=1.4, alpha=0.55, zorder=3)
         (front,) = self.axes.plot([], [], color=hue, linewidth=2.5, zorder=4)
         return *self._disc(hue, name, 0.8), front, way
@@ -248,12 +245,10 @@ def _timeline(axes: Axes, record: SimulationRecord, run: RunRecord, times: Seque
     for event in run.events:
         if event.kind in ("collision", "stopped", "missed", "detour"):
             bad = event.kind == "collision"
-            look: dict[str, Any] = {
-                "marker": "X" if bad else "v",
-                "color": _ALARM if bad else "black",
-            }
+            marker, colour = ("X", _ALARM) if bad else ("v", "black")
+            look: dict[str, Any] = {"marker": marker, "color": colour, "linestyle": "none"}
             rows = [row[name] for name in event.robots]
-            axes.plot([event.time] * len(rows), rows, markersize=6, linestyle="none", **look)
+            axes.plot([event.time] * len(rows), rows, markersize=6, **look)
     for time in times:
         axes.axvline(time, color="#999999", linewidth=0.6, linestyle=":")
     axes.set_yticks(range(len(record.robots)), record.robots)

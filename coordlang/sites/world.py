@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What of a domain can be drawn: places, the things in them, and what each atom says about them.
 
-It is found from the actions and the static atoms of the model alone, see `find_locations`.
+It is found from the actions and the static atoms of the model alone, see `_locations`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import combinations, product
 
@@ -65,7 +65,7 @@ class World:
             return ()
         found = []
         for action in model.actions:
-            if _own_label(action, robot) != text:
+            if action.part_of(robot) != text:
                 continue
             brought = set(self._brought(action))
             if action.parts:  # a joint action also moves the other robots
@@ -82,13 +82,6 @@ class World:
                     yield role[1], role[2]
 
 
-def _own_label(action: GroundAction, robot: int) -> str | None:
-    """The label that a robot chooses in a ground action."""
-    if action.parts:
-        return action.parts[robot]
-    return action.label if robot in action.owners else None
-
-
 def find_world(model: JointModel, states: Sequence[Sequence[str]]) -> World:
     """Find what of a model can be drawn.
 
@@ -98,8 +91,8 @@ def find_world(model: JointModel, states: Sequence[Sequence[str]]) -> World:
         Known states, as the texts of their true atoms: what puts a thing into two places in one of
         them does not say where it is.
     """
-    locations = find_locations(model)
-    roles = _without_ambiguous(_location_roles(model, locations), states)
+    predicates, known = _locations(model)
+    roles = _without_ambiguous(_location_roles(model, predicates, known), states)
     located = {role[1] for _, role in roles.values()}
     places = frozenset(role[2] for _, role in roles.values())
     for atom in model.codec.facts.atoms:
@@ -111,25 +104,33 @@ def find_world(model: JointModel, states: Sequence[Sequence[str]]) -> World:
     return World(
         things=(*model.robots, *others),
         places=tuple(sorted(places, key=natural)),
-        links=tuple(_links(model, locations.predicates, places)),
+        links=tuple(_links(model, predicates, places)),
         roles={text: role for text, (_, role) in roles.items()},
     )
 
 
-def _location_roles(model: JointModel, locations: Locations) -> dict[str, tuple[Atom, Role]]:
-    """The atoms that say where a thing is, by their texts, with their roles."""
-    names = {p: _owner(p, model) for p in locations.predicates if p.thing is None}
+def _location_roles(
+    model: JointModel, predicates: Sequence[_Location], places: Set[str]
+) -> dict[str, tuple[Atom, Role]]:
+    """The atoms that say where a thing is, by their texts, with their roles.
+
+    The first predicate that reads an atom says it.
+    """
+    names = {p: _owner(p, model) for p in predicates if p.thing is None}
     roles: dict[str, tuple[Atom, Role]] = {}
     for atom in model.codec.facts.atoms:
-        thing, place = locations.thing_and_place(atom, names)
-        if thing:
-            roles[show(atom)] = atom, ("at", thing, place)
+        for predicate in predicates:
+            thing, place = predicate.read(atom) or (None, "")
+            if place in places and thing not in places:
+                owner = names[predicate] if thing is None else thing
+                roles[show(atom)] = atom, ("at", owner, place)
+                break
     return roles
 
 
-def _owner(predicate: LocationPredicate, model: JointModel) -> str:
+def _owner(predicate: _Location, model: JointModel) -> str:
     """Name what moves without a name: the only robot that moves it, else a thing of its own."""
-    owners = {action.owners for action in model.actions if predicate.moves_in(action)}
+    owners = {action.owners for action in model.actions if any(predicate.changes(action))}
     if len(owners) == 1 and not model.is_joint_action:
         (team,) = owners
         if len(team) == 1:
@@ -179,7 +180,7 @@ def _other_role(atom: Atom, places: frozenset[str], things: set[str]) -> Role:
 
 
 def _links(
-    model: JointModel, predicates: Sequence[LocationPredicate], places: frozenset[str]
+    model: JointModel, predicates: Sequence[_Location], places: frozenset[str]
 ) -> Iterator[Link]:
     """What moves join, and what static atoms relate."""
     moved = {
@@ -200,17 +201,11 @@ def _links(
 
 
 @dataclass(frozen=True, slots=True)
-class LocationPredicate:
+class _Location:
     """A predicate read as "a thing is in a place".
 
-    Attributes
-    ----------
-    predicate, arity
-        Its name and number of arguments.
-    place
-        The argument that is the place.
-    thing
-        The argument that is the thing; None if it has none, as ``(stops floor)``.
+    ``place`` is the argument that is the place, ``thing`` the one that is the thing; None if it has
+    none, as ``(stops floor)``.
     """
 
     predicate: str
@@ -241,65 +236,44 @@ class LocationPredicate:
             if thing == other and source != target:
                 yield source, target
 
-    def moves_in(self, action: GroundAction) -> bool:
-        """Say whether an action moves a thing from a place to another."""
-        return any(True for _ in self.changes(action))
 
+def _locations(model: JointModel) -> tuple[list[_Location], set[str]]:
+    """The location predicates of a model, and the places.
 
-@dataclass(frozen=True, slots=True)
-class Locations:
-    """The location predicates of a model, and the places."""
-
-    predicates: tuple[LocationPredicate, ...]
-    places: frozenset[str]
-
-    def thing_and_place(self, atom: Atom, names: dict[LocationPredicate, str]) -> tuple[str, str]:
-        """Return what the first predicate that reads an atom says; ``("", "")`` if none does.
-
-        ``names`` are the things of predicates that have none of their own.
-        """
-        for predicate in self.predicates:
-            found = predicate.read(atom)
-            if found is not None and found[1] in self.places and found[0] not in self.places:
-                thing, place = found
-                return names[predicate] if thing is None else thing, place
-        return "", ""
-
-
-def find_locations(model: JointModel) -> Locations:
-    """Find location predicates: places are what some action moves a thing from and to.
-
-    An action moves a thing if it makes ``(at r1 a)`` false and ``(at r1 b)`` true.  Predicates
-    whose places are all known and that actions make true and false (``(lies box a)``, which is
-    picked up here and dropped there) are location predicates, too.
+    Places are what some action moves a thing from and to: it makes ``(at r1 a)`` false and
+    ``(at r1 b)`` true.  Predicates whose places are all known and that actions make true and false
+    (``(lies box a)``, which is picked up here and dropped there) are location predicates, too.
     """
     atoms = model.codec.facts.atoms
     candidates = _candidates(atoms)
-    moving = [p for p in candidates if any(map(p.moves_in, model.actions))]
+    moving = [p for p in candidates if any(any(p.changes(action)) for action in model.actions)]
     kept, places = _consistent(moving, atoms, model.robots)
     further = [
         p
         for p in candidates
-        if p not in kept and _is_in_places(p, atoms, places) and _comes_and_goes(p, model.actions)
+        if p not in kept
+        and p.thing is not None
+        and all(place in places and thing not in places for thing, place in p.read_all(atoms))
+        and _comes_and_goes(p, model.actions)
     ]
-    return Locations((*kept, *further), frozenset(places))
+    return [*kept, *further], places
 
 
-def _candidates(atoms: Iterable[Atom]) -> list[LocationPredicate]:
+def _candidates(atoms: Iterable[Atom]) -> list[_Location]:
     """Every reading of every predicate with one or two arguments."""
     found = set()
     for atom in atoms:
         if len(atom.args) == 1:
-            found.add(LocationPredicate(atom.predicate, 1, 0, None))
+            found.add(_Location(atom.predicate, 1, 0, None))
         elif len(atom.args) == 2:
-            found.add(LocationPredicate(atom.predicate, 2, 1, 0))
-            found.add(LocationPredicate(atom.predicate, 2, 0, 1))
+            found.add(_Location(atom.predicate, 2, 1, 0))
+            found.add(_Location(atom.predicate, 2, 0, 1))
     return sorted(found, key=lambda p: (p.thing is None, p.predicate, -p.place))
 
 
 def _consistent(
-    moving: Sequence[LocationPredicate], atoms: Sequence[Atom], robots: Sequence[str]
-) -> tuple[list[LocationPredicate], set[str]]:
+    moving: Sequence[_Location], atoms: Sequence[Atom], robots: Sequence[str]
+) -> tuple[list[_Location], set[str]]:
     """Keep the predicates whose places are neither robots nor things, and collect their places.
 
     Parcels are handed over between robots, and blocks stand on blocks: these are no places.  What
@@ -319,14 +293,7 @@ def _consistent(
     return kept, places
 
 
-def _is_in_places(predicate: LocationPredicate, atoms: Iterable[Atom], places: set[str]) -> bool:
-    """Say whether all its places are known places, and its things are none."""
-    return predicate.thing is not None and all(
-        place in places and thing not in places for thing, place in predicate.read_all(atoms)
-    )
-
-
-def _comes_and_goes(predicate: LocationPredicate, actions: Iterable[GroundAction]) -> bool:
+def _comes_and_goes(predicate: _Location, actions: Iterable[GroundAction]) -> bool:
     """Say whether actions make it true and false."""
     signs = {
         effect.adds

@@ -11,7 +11,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.execution.task_language import plans_with_sentence
+from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.sentences import sentence_counts
 from coordlang.required.failure import TooManyToCount, failure_of_sentence, failure_probability
 from coordlang.required.failures import estimated_failure
@@ -99,7 +99,8 @@ def test_failures_of_one_sentence_make_up_those_of_all() -> None:
     said = sentence_counts(space, word)[int(space.starts[0])]
     failures = []
     for words, plans in sorted(said.items()):
-        fits = plans_with_sentence(space, word, 0, words, ("w0", "w1"))
+        used = TaskLanguage(None, None, space, 0, word, True)  # type: ignore[arg-type]
+        fits = used.plans_with(words)
         failure = failure_of_sentence(space, int(space.starts[0]), fits)
         failures.append(Fraction(plans, said.total()) * failure)
     assert len(failures) > 1
