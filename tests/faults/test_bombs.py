@@ -6,7 +6,8 @@ from __future__ import annotations
 import gzip
 import subprocess
 import tracemalloc
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from itertools import combinations
 from pathlib import Path
 
@@ -33,59 +34,55 @@ from tests.support.forks import fork_command
 MIB = 2**20
 
 
-@pytest.fixture(scope="module")
-def built() -> Built:
-    return build_language(all_tasks("grid", "gw1-2x2"), "minimal")
+@contextmanager
+def at_most(mib: int) -> Iterator[None]:
+    """The block allocates no more."""
+    tracemalloc.start()
+    try:
+        yield
+        assert tracemalloc.get_traced_memory()[1] < mib * MIB
+    finally:
+        tracemalloc.stop()
 
 
-@pytest.fixture(scope="module")
-def certificate(built: Built) -> Certificate:
-    return built.certificate()
+def bomb(folder: Path, mib: int) -> Path:
+    """A file of gzip that holds so many MiB."""
+    path = folder / "bomb.json.gz"
+    path.write_bytes(gzip.compress(b" " * MIB) * mib)
+    return path
 
 
 # Sizes
 
 
-def bomb(path: Path, mib: int) -> Path:
-    """A file of gzip that holds so many MiB."""
-    path.write_bytes(gzip.compress(b" " * MIB) * mib)
-    return path
+def test_a_gzip_bomb_is_refused_before_it_takes_memory(tmp_path: Path) -> None:
+    path = bomb(tmp_path, 65)
+    with at_most(16), pytest.raises(BadInput, match="more than 64 MiB"):
+        read_bytes(path, most=64 * MIB)
 
 
 @pytest.mark.slow
 def test_a_large_gzip_bomb_is_refused(tmp_path: Path) -> None:
-    path = bomb(tmp_path / "bomb.json.gz", 1025)
+    path = bomb(tmp_path, 1025)
     assert path.stat().st_size < 2 * MIB
     with pytest.raises(BadInput, match=r"bomb\.json\.gz: the file holds more than 1,024 MiB"):
         read_language(path)
 
 
-def test_a_gzip_bomb_is_refused_before_it_takes_memory(tmp_path: Path) -> None:
-    path = bomb(tmp_path / "bomb.json.gz", 65)
-    tracemalloc.start()
-    try:
-        with pytest.raises(BadInput, match="more than 64 MiB"):
-            read_bytes(path, most=64 * MIB)
-        assert tracemalloc.get_traced_memory()[1] < 16 * MIB
-    finally:
-        tracemalloc.stop()
-
-
 def test_a_file_without_end_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match="more than 2 MiB"):
-        read_bytes("/dev/zero", most=2 * MIB)
-    with pytest.raises(BadInput, match="more than 2 MiB"):
-        read_bytes(bomb(tmp_path / "b.gz", 3), most=2 * MIB)
-    assert len(read_bytes(bomb(tmp_path / "b.gz", 2), most=2 * MIB)) == 2 * MIB
+    for path in (Path("/dev/zero"), bomb(tmp_path, 3)):
+        with pytest.raises(BadInput, match="more than 2 MiB"):
+            read_bytes(path, most=2 * MIB)
+    assert len(read_bytes(bomb(tmp_path, 2), most=2 * MIB)) == 2 * MIB
 
 
 def test_what_would_not_fit_is_out_of_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("planners.system.files.memory_left", lambda: 64 * MIB)
-    assert read_bytes(bomb(tmp_path / "fits.gz", 16))
-    with pytest.raises(OutOfMemory, match=r"bomb\.gz: reading 17 MiB takes 68 MiB.* 64 MiB are"):
-        read_bytes(bomb(tmp_path / "bomb.gz", 17))
+    assert read_bytes(bomb(tmp_path, 16))
+    with pytest.raises(OutOfMemory, match=r"bomb.*\.gz: reading 17 MiB takes 68 MiB.* 64 MiB are"):
+        read_bytes(bomb(tmp_path, 17))
 
 
 @pytest.mark.parametrize(
@@ -99,12 +96,14 @@ def test_what_would_not_fit_is_out_of_memory(
         lambda data: data + b"x",
     ],
 )
-def test_other_gzip_is_read_as_before(change: Callable[[bytes], bytes], tmp_path: Path) -> None:
+def test_other_gzip_is_read_as_python_reads_it(
+    change: Callable[[bytes], bytes], tmp_path: Path
+) -> None:
     data = change(gzip.compress(bytes(range(256)) * 20_000))
     (tmp_path / "f.gz").write_bytes(data)
     try:
         expected = gzip.decompress(data)
-    except Exception:  # whatever Python's own reader refuses
+    except Exception:
         with pytest.raises(BadInput, match="cannot be read"):
             read_bytes(tmp_path / "f.gz")
     else:
@@ -113,113 +112,125 @@ def test_other_gzip_is_read_as_before(change: Callable[[bytes], bytes], tmp_path
 
 # Nesting
 
-SHELLS = {
-    "language": '{"format": "coordlang/language", "version": 1, "words": ["a"], "default": "a", '
-    '"states": {}, "producer": {"x": %s}}',
-    "certificate": '{"format": "coordlang/certificate", "version": 1, "domain": "grid", '
-    '"robots": ["r1", "r2"], "refuted": 0, "reasons": [], "producer": {"x": %s}}',
-    "tasks": '{"format": "coordlang/tasks", "version": 1, "x": %s, '
-    '"tasks": [{"init": ["(p)"], "goal": ["(q)"]}]}',
-    "plans": '{"x": %s, "plans": [{"actions": [[null, null]]}]}',
-}
-READERS: dict[str, Callable[[Path], object]] = {
-    "language": read_language,
-    "certificate": read_certificate,
-    "tasks": read_task_file,
-    "plans": lambda path: read_plans(path, all_tasks("grid", "gw1-2x2").model),
+SHELLS: dict[str, tuple[Callable[[Path], object], str]] = {
+    "language": (
+        read_language,
+        '{"format": "coordlang/language", "version": 1, "words": ["a"], "default": "a", '
+        '"states": {}, "producer": {"x": %s}}',
+    ),
+    "certificate": (
+        read_certificate,
+        '{"format": "coordlang/certificate", "version": 1, "domain": "grid", '
+        '"robots": ["r1", "r2"], "refuted": 0, "reasons": [], "producer": {"x": %s}}',
+    ),
+    "tasks": (
+        read_task_file,
+        '{"format": "coordlang/tasks", "version": 1, "x": %s, '
+        '"tasks": [{"init": ["(p)"], "goal": ["(q)"]}]}',
+    ),
+    "plans": (
+        lambda path: read_plans(path, all_tasks("grid", "gw1-2x2").model),
+        '{"x": %s, "plans": [{"actions": [[null, null]]}]}',
+    ),
 }
 
 
-@pytest.mark.parametrize("brackets", ["[]", "{}"])
+@pytest.mark.parametrize(("opening", "inside", "closing"), [("[", "", "]"), ('{"k":', "0", "}")])
 @pytest.mark.parametrize("kind", SHELLS)
-def test_deep_nesting_is_refused(kind: str, brackets: str, tmp_path: Path) -> None:
-    depth = 100_000
-    inside = {"[]": "[" * depth + "]" * depth, "{}": '{"k":' * depth + "0" + "}" * depth}[brackets]
+def test_deep_nesting_is_refused(
+    kind: str, opening: str, inside: str, closing: str, tmp_path: Path
+) -> None:
+    read, shell = SHELLS[kind]
     path = tmp_path / "deep.json"
-    path.write_text(SHELLS[kind] % inside)
+    path.write_text(shell % (opening * 100_000 + inside + closing * 100_000))
     with pytest.raises(BadInput, match=r"deep\.json: this is no JSON, or it is cut off: "):
-        READERS[kind](path)
-    path.write_text(SHELLS[kind] % ("[" * 150 + "]" * 150))
-    assert READERS[kind](path)
+        read(path)
+    path.write_text(shell % ("[" * 150 + "]" * 150))
+    assert read(path)
 
 
 # Certificates
 
 
-def test_a_large_claim_is_refused_before_it_takes_memory(
-    built: Built, certificate: Certificate
+@pytest.fixture(scope="module")
+def built() -> Built:
+    return build_language(all_tasks("grid", "gw1-2x2"), "minimal")
+
+
+@pytest.fixture(scope="module")
+def certificate(built: Built) -> Certificate:
+    return built.certificate()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"refuted": 1_000_000}, "leave languages with 1000000 words"),
+        ({"refuted": 10**30}, f"leave languages with {10**30} words"),
+        ({"refuted": 12}, "leave languages with 12 words"),  # there are 12 states
+        ({"refuted": 11}, "leave languages with 11 words"),
+        ({"reasons": [], "refuted": 1_000_000}, "0 reasons leave languages with 1000000 words"),
+        ({"domain": "t-map"}, "about the domain 't-map', not 'grid'"),
+    ],
+)
+def test_a_false_claim_is_refuted_before_it_takes_memory(
+    change: dict[str, object], said: str, built: Built, certificate: Certificate
 ) -> None:
-    large = msgspec.structs.replace(certificate, refuted=1_000_000)
-    tracemalloc.start()
-    try:
-        with pytest.raises(Refuted, match="leave languages with 1000000 words"):
-            check(large, built.job.candidates)
-        assert tracemalloc.get_traced_memory()[1] < 16 * MIB
-    finally:
-        tracemalloc.stop()
-    for refuted in (10**30, 12, 11):  # 12 states
-        with pytest.raises(Refuted, match=f"leave languages with {refuted} words"):
-            check(msgspec.structs.replace(certificate, refuted=refuted), built.job.candidates)
+    claim = msgspec.structs.replace(certificate, **change)
+    with at_most(16), pytest.raises(Refuted, match=said):
+        check(claim, built.job.candidates)
 
 
-def test_nothing_is_said_of_no_states(built: Built, certificate: Certificate) -> None:
-    empty = msgspec.structs.replace(certificate, reasons=[], refuted=1_000_000)
-    with pytest.raises(Refuted, match="0 reasons leave languages with 1000000 words"):
-        check(empty, built.job.candidates)
-
-
-def test_a_formula_that_would_not_fit_is_not_made(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("coordlang.verification.certificate_clauses.memory_left", lambda: 60 * MIB)
-    clauses = [frozenset({two}) for two in combinations(range(80), 2)]
-    tracemalloc.start()
-    try:
-        with pytest.raises(OutOfMemory, match=r"79 words for 80 states has [\d,]+ clauses"):
-            encode(clauses, 79)
-        assert tracemalloc.get_traced_memory()[1] < 32 * MIB
-        cnf = encode(clauses, 20)
-        made = tracemalloc.get_traced_memory()[0]
-    finally:
-        tracemalloc.stop()
-    # The estimate has room for the solver, and is of the right size.
-    monkeypatch.setattr("coordlang.verification.certificate_clauses.memory_left", lambda: made)
-    with pytest.raises(OutOfMemory, match="20 words for 80 states"):
-        encode(clauses, 20)
-    monkeypatch.setattr("coordlang.verification.certificate_clauses.memory_left", lambda: 4 * made)
-    assert encode(clauses, 20) == cnf
-
-
-def test_another_domain_and_keys_that_occur_twice(
-    built: Built, certificate: Certificate, tmp_path: Path
-) -> None:
-    other = msgspec.structs.replace(certificate, domain="t-map")
-    with pytest.raises(Refuted, match="about the domain 't-map', not 'grid'"):
-        check(other, built.job.candidates)
-    text = msgspec.json.encode(certificate).decode()
-    for before, twice, key in (
+@pytest.mark.parametrize(
+    ("before", "twice", "key"),
+    [
         ('"refuted":2', '"refuted":1,"refuted":2', "refuted"),
         ('"init":', '"init":[],"init":', "init"),
         ('"producer":{}', '"producer":{"a":1,"a":2}', "a"),
-    ):
-        assert before in text
-        path = tmp_path / "twice.json"
-        path.write_text(text.replace(before, twice, 1))
-        with pytest.raises(BadInput, match=rf"twice\.json: the key '{key}' occurs twice"):
-            read_certificate(path)
+    ],
+)
+def test_keys_that_occur_twice(
+    before: str, twice: str, key: str, certificate: Certificate, tmp_path: Path
+) -> None:
+    text, path = msgspec.json.encode(certificate).decode(), tmp_path / "twice.json"
+    assert before in text
+    path.write_text(text.replace(before, twice, 1))
+    with pytest.raises(BadInput, match=rf"twice\.json: the key '{key}' occurs twice"):
+        read_certificate(path)
+
+
+def test_a_formula_that_would_not_fit_is_not_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The estimate has room for the solver, and is of the right size."""
+    left = 60 * MIB
+    monkeypatch.setattr("coordlang.verification.certificate_clauses.memory_left", lambda: left)
+    clauses = [frozenset({two}) for two in combinations(range(80), 2)]
+    with at_most(32):
+        with pytest.raises(OutOfMemory, match=r"79 words for 80 states has [\d,]+ clauses"):
+            encode(clauses, 79)
+        cnf = encode(clauses, 20)
+        made = tracemalloc.get_traced_memory()[0]
+    left = made
+    with pytest.raises(OutOfMemory, match="20 words for 80 states"):
+        encode(clauses, 20)
+    left = 4 * made
+    assert encode(clauses, 20) == cnf
 
 
 # PDDL
 
-ACTION = "(:action act :parameters () :effect (p))"
+
+def typed(types: str, predicates: str = "(p)") -> Source:
+    action = "(:action act :parameters () :effect (p))"
+    return Source("d", f"(define (domain d) (:types {types}) (:predicates {predicates}) {action})")
 
 
 def test_ten_thousand_types_one_below_the_other() -> None:
     types = " ".join(f"t{n} - t{n + 1}" for n in range(10_000))
-    text = f"(define (domain chain) (:types {types}) (:predicates (p) (q ?x - t10000)) {ACTION})"
     with time_limit(15):  # with a look at all types above each type: minutes
-        domain = parse_domain(Source("domain", text))
+        domain = parse_domain(typed(types, "(p) (q ?x - t10000)"))
         assert len(domain.supertypes("t0")) == 10_002
         with pytest.raises(BadInput, match="the types form a cycle: t4000 - t4001 - "):
-            parse_domain(Source("domain", text.replace("t9999 - t10000", "t9999 - t4000")))
+            parse_domain(typed(types.replace("t9999 - t10000", "t9999 - t4000")))
 
 
 @pytest.mark.parametrize(
@@ -232,15 +243,15 @@ def test_ten_thousand_types_one_below_the_other() -> None:
     ],
 )
 def test_cycles_of_types(types: str, cycle: str | None) -> None:
-    text = f"(define (domain d) (:types {types}) (:predicates (p)) {ACTION})"
     if cycle is None:
-        assert parse_domain(Source("d", text))
+        assert parse_domain(typed(types))
     else:
         with pytest.raises(BadInput, match=rf"the types form a cycle: {cycle}(\n|$)"):
-            parse_domain(Source("d", text))
+            parse_domain(typed(types))
 
 
 DOMAIN = """(define (domain d) (:requirements :typing :multi-agent) (:types robot thing)
+  (:constants o1 - thing)
   (:predicates (done ?r - robot) (linked ?a ?b - thing) (p ?a ?b ?c ?d ?e ?f - thing))
   (:action finish :agent ?r - robot :parameters () :effect (done ?r))
   (:action act :agent ?r - robot :parameters (%s) :precondition (and %s) :effect (and %s)))"""
@@ -259,19 +270,16 @@ LARGE = {
 
 
 def large(name: str, folder: Path) -> list[str]:
-    """The files of a domain with two hundred objects."""
-    names = [f"o{n}" for n in range(80 if name == "join" else 200)]
-    links = " ".join(
-        f"(linked {a} {b})"
-        for m, a in enumerate(names)
-        for n, b in enumerate(names)
-        if m % 8 < n % 8
-    )
+    """The files of a domain with many objects."""
+    number = 80 if name == "join" else 200
+    names = " ".join(f"o{n}" for n in range(number))
+    pairs = [(m, n) for m in range(number) for n in range(number) if m % 8 < n % 8]
+    links = " ".join(f"(linked o{m} o{n})" for m, n in pairs) if name == "join" else ""
     domain, problem = folder / "domain.pddl", folder / "problem.pddl"
-    domain.write_text(LARGE[name].replace("(:predicates", "(:constants o1 - thing) (:predicates"))
+    domain.write_text(LARGE[name])
     problem.write_text(
-        f"(define (problem large) (:domain d) (:objects r1 r2 - robot {' '.join(names)} - thing) "
-        f"(:init {links if name == 'join' else ''}) (:goal (and (done r1) (done r2))))"
+        f"(define (problem large) (:domain d) (:objects r1 r2 - robot {names} - thing) "
+        f"(:init {links}) (:goal (and (done r1) (done r2))))"
     )
     return [str(domain), str(problem)]
 
@@ -289,7 +297,7 @@ def test_six_parameters_and_two_hundred_objects_in_memory(
     done = coordlang("plans", *large("instances", tmp_path), "--count", "--time-limit", 100)
     assert done.code == 22
     assert "action 'act' has 128,000,000,000,000 instances: they take" in done.err
-    assert done.err.startswith(f"coordlang: {tmp_path}/domain.pddl:4:3: ")
+    assert done.err.startswith(f"coordlang: {tmp_path}/domain.pddl:5:3: ")
 
 
 @pytest.mark.slow
@@ -308,13 +316,12 @@ def test_six_parameters_and_two_hundred_objects_under_a_limit(
 @pytest.mark.slow
 def test_ten_thousand_types_for_every_command(coordlang: Command, tmp_path: Path) -> None:
     """The grid, its cells at the foot of ten thousand types."""
-    text = (DOMAINS / "grid" / "domain.pddl").read_text()
     chain = " ".join(f"t{n} - t{n + 1}" for n in range(10_000))
-    assert "cell" in text
-    domain = tmp_path / "domain.pddl"
+    text = (DOMAINS / "grid" / "domain.pddl").read_text()
+    domain, language = tmp_path / "domain.pddl", tmp_path / "l.json"
     domain.write_text(text.replace("(:types", f"(:types cell - t0 {chain}", 1))
     files = domain, DOMAINS / "grid" / "gw1-2x2.pddl"
     for command in ("inspect", "plans", "coordination", "check"):
         assert coordlang(command, *files).code == 0
-    assert coordlang("build", *files, "--method", "greedy", "-o", tmp_path / "l.json").code == 0
-    assert coordlang("verify", tmp_path / "l.json", *files).code == 0
+    assert coordlang("build", *files, "--method", "greedy", "-o", language).code == 0
+    assert coordlang("verify", language, *files).code == 0

@@ -1,34 +1,48 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Each fault ends with the documented exit code (docs/cli.md): 1 means *refuted*, nothing else."""
+"""Odd surroundings, and faults of the streams: the documented exit code (docs/cli.md)."""
 
 from __future__ import annotations
 
 import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
 from pathlib import Path
 
 import pytest
 
 from tests.support.command import Command, in_shell
-from tests.support.domains import DOMAINS
+from tests.support.domains import DOMAINS, ROOT
+from tests.support.forks import fork_command, fresh_command
 
 CELLS = [str(DOMAINS / "three-cells" / name) for name in ("domain.pddl", "problem.pddl")]
 COUNT = ("plans", *CELLS, "--count")
+BUILD = ("build", *CELLS, "--method", "minimal", "-o", "-")
 
 
 @pytest.mark.parametrize(
-    ("redirection", "arguments", "code"),
-    [("2>&-", ("plans", "missing", "x"), 31), ("2>/dev/full", ("plans", "--missing"), 2)],
+    ("redirection", "arguments", "code", "said"),
+    [
+        # Without stderr an error keeps its code.
+        ("2>&-", ("plans", "missing", "x"), 31, ""),
+        ("2>/dev/full", ("plans", "--missing"), 2, ""),
+        (">/dev/full 2>/dev/full", COUNT, 2, ""),
+        (">/dev/full", COUNT, 2, "coordlang: the output cannot be written"),
+        (">&-", COUNT, 2, "coordlang: stdout is closed"),
+        (">&-", BUILD, 2, "coordlang: stdout is closed"),
+        ("<&-", ("plans", "-", CELLS[1]), 31, "coordlang: -: cannot be read: stdin is closed"),
+        ("<&-", ("verify", "-", *CELLS), 31, "coordlang: -: cannot be read: stdin is closed"),
+    ],
 )
-def test_without_stderr_an_error_keeps_its_code(
-    redirection: str, arguments: tuple[str, ...], code: int
+def test_streams_that_are_closed_or_full(
+    redirection: str, arguments: tuple[str, ...], code: int, said: str
 ) -> None:
     done = in_shell(f"exec COORDLANG {redirection}", *arguments)
-    assert (done.returncode, done.stdout, done.stderr) == (code, "", "")
-
-
-@pytest.mark.parametrize("redirection", [">/dev/full", ">/dev/full 2>/dev/full"])
-def test_a_full_stdout(redirection: str) -> None:
-    assert in_shell(f"exec COORDLANG {redirection}", *COUNT).returncode == 2
+    assert (done.returncode, done.stdout) == (code, "")
+    assert done.stderr.startswith(said)
+    assert bool(done.stderr) == bool(said)
 
 
 def test_an_answer_needs_no_stderr(tmp_path: Path) -> None:
@@ -59,3 +73,76 @@ def test_robots_of_a_language_file_that_contradict_the_domain(
     outcome = coordlang("verify", path, *files)
     assert outcome.code == 31, outcome.err
     assert "--robots" not in outcome.err
+
+
+UNICODE = "ünïcödé"
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "fresh"),
+    [
+        *((name, {}, False) for name in ("two words", "two\nlines", "-o", "--help", "'\"$(x)`*")),
+        (UNICODE, {"HOME": None}, False),
+        (UNICODE, {"HOME": "/no/such/home"}, False),
+        (UNICODE, {"TMPDIR": "/no/such/folder"}, False),
+        pytest.param(UNICODE, {"HOME": None}, True, marks=pytest.mark.slow),
+        pytest.param(UNICODE, {"TMPDIR": "/no/such/folder"}, True, marks=pytest.mark.slow),
+        pytest.param(
+            UNICODE,
+            {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+            True,
+            marks=pytest.mark.thorough,
+        ),
+    ],
+)
+def test_names_of_files_and_the_environment(
+    name: str, changes: dict[str, str | None], fresh: bool, tmp_path: Path
+) -> None:
+    """All files have names that begin with ``name``."""
+    domain, problem, language, page = (f"{name}{end}" for end in (".d", ".p", ".json", ".html"))
+    shutil.copy(DOMAINS / "grid" / "domain.pddl", tmp_path / domain)
+    shutil.copy(DOMAINS / "grid" / "gw1-2x2.pddl", tmp_path / problem)
+
+    def before() -> None:
+        os.chdir(tmp_path)
+        tempfile.tempdir = None
+        for variable, value in changes.items():
+            os.environ.pop(variable, None)
+            os.environ |= {} if value is None else {variable: value}
+
+    for arguments in (
+        ("build", f"--output={language}", "--", domain, problem),
+        ("verify", "--", language, domain, problem),
+        ("report", f"--output={page}", "--", language, domain, problem),
+    ):
+        ended = (fresh_command if fresh else fork_command)(*arguments, before=before).join()
+        assert ended.code == 0, ended
+    found = {path.name for path in tmp_path.iterdir()}
+    assert found == {domain, problem, language, page}
+
+
+@pytest.mark.parametrize(
+    "system",
+    ["sys.platform = 'win32'", "sys.modules['resource'] = None; sys.modules['fcntl'] = None"],
+    ids=["win32", "no resource"],
+)
+@pytest.mark.parametrize(
+    ("program", "code", "before"),
+    [
+        ("from coordlang.__main__ import main; main()", 32, "coordlang: "),
+        ("import coordlang; coordlang.plans('d.pddl', 'p.pddl')", 1, "OSError: "),
+    ],
+    ids=["command line", "library"],
+)
+def test_a_system_without_posix_limits_is_refused(
+    system: str, program: str, code: int, before: str
+) -> None:
+    """One clear message, no ImportError."""
+    command = [sys.executable, "-c", f"import sys; {system}; {program}"]
+    env = dict(os.environ, PYTHONPATH=str(ROOT))
+    done = subprocess.run(command, env=env, text=True, capture_output=True)
+    assert (done.returncode, done.stdout) == (code, "")
+    assert f"{before}coordlang runs on Linux and macOS, not on this system" in done.stderr
+    assert "\n  On Windows use WSL" in done.stderr
+    assert "ImportError" not in done.stderr
+    assert "ModuleNotFoundError" not in done.stderr

@@ -4,15 +4,14 @@
 from __future__ import annotations
 
 import resource
-import subprocess
-import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from coordlang.commands.inputs import load
-from planners.classical import LONGEST, ClassicalTask, compile_classical, fast_downward, to_pddl
-from planners.classical.fast_downward import SEARCH, FastDownwardFailed, answered, total_cost
+from planners.classical import LONGEST, ClassicalTask, compile_classical, fast_downward
+from planners.classical.fast_downward import FastDownwardFailed, answered, total_cost
 from tests.support.domains import DOMAINS
 from tests.support.forks import fork_command
 
@@ -66,57 +65,16 @@ def test_a_plan_that_is_none_is_no_answer(plan: str, task: ClassicalTask, tmp_pa
         answered(task, tmp_path, 0)
 
 
-@pytest.mark.slow
-def test_its_translated_task_is_cut_off_at_every_length(
-    task: ClassicalTask, tmp_path: Path
-) -> None:
-    """The file ``output.sas`` between its translator and its search."""
-    import up_fast_downward
-
-    for name, text in zip(("domain", "problem"), to_pddl(task), strict=True):
-        (tmp_path / f"{name}.pddl").write_text(text)
-    home = Path(up_fast_downward.__file__).parent / "downward"
-    translate = [sys.executable, str(home / "fast-downward.py"), "--translate"]
-    subprocess.run(
-        [*translate, "domain.pddl", "problem.pddl"], cwd=tmp_path, check=True, capture_output=True
-    )
-    sas = (tmp_path / "output.sas").read_bytes()
-    plan = tmp_path / "plan"
-    search = [str(home / "builds/release/bin/downward"), "--search", SEARCH]
-    answers = set()
-    for size in range(len(sas) + 1):
-        plan.unlink(missing_ok=True)
-        ended = subprocess.run(
-            [*search, "--internal-plan-file", str(plan)], input=sas[:size], capture_output=True
-        )
-        text = plan.read_text() if plan.exists() else ""
-        answers.add((ended.returncode, "; cost = 2" in text))
-    assert answers == {(33, False), (0, True)}  # 33: bad input
-
-
-def at_most(size: int) -> None:
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-
-
-@pytest.mark.parametrize("size", [0, 700, 4_000])
-def test_a_disk_that_is_full_at_some_length(size: int, tmp_path: Path) -> None:
-    check_on_a_full_disk(size)
-
-
-@pytest.mark.slow
-def test_a_disk_that_is_full_at_many_lengths() -> None:
-    codes = [check_on_a_full_disk(size) for size in range(0, 12_000, 50)]
-    print({code: codes.count(code) for code in set(codes)})
-    assert set(codes) == {0, 3}
-
-
-def check_on_a_full_disk(size: int) -> int:
-    ended = fork_command("check", *CELLS, before=lambda: at_most(size)).join()
+@pytest.mark.parametrize(
+    "size",
+    [0, 700, 4_000, *(pytest.param(n, marks=pytest.mark.slow) for n in range(50, 12_000, 50))],
+)
+def test_a_disk_that_is_full_at_some_length(size: int) -> None:
+    limit = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (size, size))
+    ended = fork_command("check", *CELLS, before=limit).join()
+    assert "internal error" not in ended.err
     if ended.code == 0:
         assert ended.out.startswith("coordlang      makespan 2\nFast Downward  makespan 2 ")
     else:
-        assert ended.code == 3, ended
-        assert ended.out == ""
+        assert (ended.code, ended.out) == (3, ""), ended
         assert ended.err.startswith("coordlang: ")
-        assert "internal error" not in ended.err
-    return ended.code

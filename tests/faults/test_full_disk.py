@@ -11,8 +11,7 @@ import re
 import resource
 import sys
 import tempfile
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,19 +19,18 @@ import pytest
 
 from planners.system.errors import UsageError
 from planners.system.writing import copy_folders
-from tests.support.command import Outcome
 from tests.support.domains import DOMAINS
 from tests.support.forks import fork, fork_command
-from tests.support.writing_commands import OLD, WRITING, Writing, given, normal
+from tests.support.writing import OLD, WRITING, Stage, given
 
-QUICK = ("certificate", "tasks", "export")
-GRID = DOMAINS / "grid"
 TWO = ("t-map", "three-cells")
+QUICK = ("certificate", "tasks", "export")
+SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in WRITING if name not in QUICK]
+Fault = Callable[[], object]
 
 
 @pytest.fixture(scope="module")
 def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """A language, its certificate and a sentence; what commands use is loaded then."""
     return given(tmp_path_factory.mktemp("given"))
 
 
@@ -74,89 +72,65 @@ class FullDisk:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-def run(
-    writing: Writing, said: dict[str, str], folder: Path, limit: Callable[[], object]
-) -> tuple[Outcome, dict[str, bytes], set[str]]:
-    """Run a command on old outputs: how it ended, its outputs, and the names of other files."""
-    work, other = folder / "work", folder / "tmp"
-    work.mkdir(parents=True)
-    other.mkdir()
-    for name in writing.outputs:
-        (work / name).write_bytes(OLD)
-
-    def before() -> None:
-        os.chdir(work)
-        os.environ["TMPDIR"] = str(other)
-        tempfile.tempdir = str(other)  # by itself Python looks for another one with space
-        limit()
-
-    arguments = [said.get(argument, argument) for argument in writing.arguments]
-    ended = fork_command(*arguments, before=before).join(300)
-    found = {str(p.relative_to(root)) for root in (work, other) for p in root.rglob("*")}
-    outputs = {name: (work / name).read_bytes() for name in writing.outputs if name in found}
-    return ended, outputs, found - {*outputs}
-
-
-def check(
-    name: str, said: dict[str, str], folder: Path, limit: Callable[[], object], whole: Outputs
-) -> int:
-    """Run it under a limit; its exit code."""
-    ended, outputs, others = run(WRITING[name], said, folder, limit)
-    if ended.code == 0:
-        assert {at: normal(at, held) for at, held in outputs.items()} == whole
-    else:
-        assert ended.code == (3 if name == "check" else 2), ended
-        assert ended.err.startswith("coordlang: ")
-        assert re.search("No space left on device|File too large|is full", ended.err), ended
-        assert "Traceback" not in ended.err
-        for at, held in outputs.items():
-            assert held == OLD or normal(at, held) == whole[at]
-        replaced = {*WRITING[name].outputs}
-        if name == "certificate":  # the old one never stands beside a new language
-            assert {at for at, held in outputs.items() if held == OLD} in (replaced, set())
-            assert replaced - {*outputs} <= {"c.json.gz"}
+def ends(name: str, said: dict[str, str], folder: Path, faults: Iterator[Fault]) -> Iterator[int]:
+    """The exit code of a command on old outputs under each fault; everything else is checked."""
+    undisturbed = Stage(name, folder / "whole", said)
+    assert undisturbed.start().join(300).code == 0
+    whole = undisturbed.outputs()
+    for number, fault in enumerate(faults):
+        stage = Stage(name, folder / f"{number}", said)
+        for output in WRITING[name][1]:
+            stage.make_old(output)
+        ended, found = stage.start(fault).join(300), stage.outputs()
+        assert stage.others() == set()
+        if ended.code == 0:
+            assert found == whole
         else:
-            assert replaced <= {*outputs}
-            assert OLD in outputs.values() or not replaced
-    assert others == set()
-    return ended.code
+            assert ended.code == (3 if name == "check" else 2), ended
+            assert re.match(
+                "coordlang: .*(No space left on device|File too large|is full)", ended.err
+            )
+            assert "Traceback" not in ended.err
+            assert all(held in (OLD, whole[output]) for output, held in found.items())
+            if name == "certificate":  # the old one never stands beside a new language
+                assert (OLD in found.values()) == ([*found.values()] == [OLD, OLD])
+                assert "l.json.gz" in found
+            else:
+                assert [*found] == [*WRITING[name][1]]
+                assert OLD in found.values() or not found
+        yield ended.code
 
 
-Outputs = dict[str, bytes]
-
-
-def fill_at_every_change(name: str, said: dict[str, str], folder: Path) -> int:
-    """The number of runs that met the full disk."""
-    ended, outputs, _ = run(WRITING[name], said, folder / "whole", lambda: None)
-    assert ended.code == 0, ended
-    whole = {at: normal(at, held) for at, held in outputs.items()}
-    for number in range(1, 1000):
-        disk = FullDisk(number, folder)
-        if check(name, said, folder / str(number), disk.begin, whole) == 0:
-            return number - 1
-    raise AssertionError("more than 1,000 changes")
-
-
-def fill_at_every_length(name: str, said: dict[str, str], folder: Path, steps: int) -> int:
-    """The number of runs that met the limit on the size of a file."""
-    ended, outputs, _ = run(WRITING[name], said, folder / "whole", lambda: None)
-    assert ended.code == 0, ended
-    whole = {at: normal(at, held) for at, held in outputs.items()}
-    most = max(map(len, outputs.values()))
+@pytest.mark.parametrize("name", [*QUICK, *SLOW])
+def test_the_disk_is_full_at_every_change(name: str, said: dict[str, str], tmp_path: Path) -> None:
+    faults = (FullDisk(number, tmp_path).begin for number in range(1, 1000))
     met = 0
-    for number in range(steps):
-        size = most * number // steps
-
-        def limit(size: int = size) -> None:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-
-        met += check(name, said, folder / str(number), limit, whole) != 0
-    return met
+    for code in ends(name, said, tmp_path, faults):
+        if code == 0:
+            break
+        met += 1
+    assert 3 <= met < 999
 
 
-@pytest.mark.parametrize("name", QUICK)
-def test_the_disk_is_full_at_a_change(name: str, said: dict[str, str], tmp_path: Path) -> None:
-    assert fill_at_every_change(name, said, tmp_path) >= 3
+@pytest.mark.parametrize(
+    ("name", "steps"),
+    [
+        *((name, 5) for name in QUICK[:2]),
+        *(pytest.param(n, 50, marks=pytest.mark.slow) for n, (_, made) in WRITING.items() if made),
+    ],
+)
+def test_an_output_is_whole_or_none_at_every_length(
+    name: str, steps: int, said: dict[str, str], tmp_path: Path
+) -> None:
+    whole = Stage(name, tmp_path / "once", said)
+    assert whole.start().join(300).code == 0
+    most = max((tmp_path / "once" / "work" / output).stat().st_size for output in WRITING[name][1])
+
+    def at_most(size: int) -> Fault:
+        return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+    sizes = (at_most(most * number // steps) for number in range(steps))
+    assert sum(code != 0 for code in ends(name, said, tmp_path, sizes)) >= 5
 
 
 def test_domains_are_copied_whole_or_not_at_all(tmp_path: Path) -> None:
@@ -164,34 +138,23 @@ def test_domains_are_copied_whole_or_not_at_all(tmp_path: Path) -> None:
     for number in range(1, 1000):
         folder = tmp_path / str(number)
         folder.mkdir()
-        disk = FullDisk(number, folder)
-        ended = fork(partial(copied_until, disk, folder)).join()
-        found = sorted(p.relative_to(folder) for p in folder.rglob("*"))
-        if ended.code == 0:
+
+        def copy(number: int = number, folder: Path = folder) -> None:
+            FullDisk(number, folder).begin()
+            try:
+                copy_folders([DOMAINS / name for name in TWO], folder)
+            except UsageError as error:
+                sys.exit(2 if "No space left on device" in str(error) else 1)
+
+        code = fork(copy).join().code
+        found = {str(p.relative_to(folder)): p for p in folder.rglob("*")}
+        if code == 0:
             break
-        assert (ended.code, "No space left on device" in ended.err) == (2, True), ended
-        assert found == []
-    whole = [
-        p.relative_to(DOMAINS) for name in TWO for p in [DOMAINS / name, *DOMAINS.glob(f"{name}/*")]
-    ]
-    assert found == sorted(whole)
-    assert all((folder / p).read_bytes() == (DOMAINS / p).read_bytes() for p in found if p.suffix)
-    assert number > 2 * (len(whole) - 2)  # each is opened and flushed
-
-
-def copied_until(disk: FullDisk, folder: Path) -> None:
-    """Copy domains to a disk that gets full."""
-    disk.begin()
-    try:
-        copy_folders([DOMAINS / name for name in TWO], folder)
-    except UsageError as error:
-        print(error, file=sys.stderr)
-        sys.exit(2)
-
-
-@pytest.mark.parametrize("name", QUICK[:2])
-def test_an_output_is_whole_or_none(name: str, said: dict[str, str], tmp_path: Path) -> None:
-    assert fill_at_every_length(name, said, tmp_path, 5) == 5
+        assert (code, found) == (2, {})
+    whole = {str(p.relative_to(DOMAINS)): p for name in TWO for p in DOMAINS.glob(f"{name}/*")}
+    assert found.keys() == whole.keys() | {*TWO}
+    assert all(found[name].read_bytes() == whole[name].read_bytes() for name in whole)
+    assert number > 2 * len(whole)  # each is opened and flushed
 
 
 @pytest.mark.usefixtures("said")
@@ -203,26 +166,6 @@ def test_plans_write_nothing(problem: str, count: int, tmp_path: Path) -> None:
         os.environ["TMPDIR"] = tempfile.tempdir = str(tmp_path / "none")
         resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
 
-    files = GRID / "domain.pddl", GRID / f"{problem}.pddl"
+    files = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / f"{problem}.pddl"
     ended = fork_command("plans", *files, "--count", before=before).join()
     assert (ended.code, ended.out) == (0, f"{count}\n"), ended
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", WRITING)
-def test_the_disk_is_full_at_every_change_of_every_command(
-    name: str, said: dict[str, str], tmp_path: Path
-) -> None:
-    met = fill_at_every_change(name, said, tmp_path)
-    print(f"{name}: {met} changes")
-    assert met >= 3
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in WRITING if WRITING[name].outputs])
-def test_the_disk_is_full_at_fifty_lengths_of_every_output(
-    name: str, said: dict[str, str], tmp_path: Path
-) -> None:
-    met = fill_at_every_length(name, said, tmp_path, 50)
-    print(f"{name}: {met} lengths")
-    assert met >= 5

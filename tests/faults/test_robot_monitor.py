@@ -254,23 +254,14 @@ def refusal(data: Any, robot: str | None = "r1") -> str:
 
 STATES = ["states"]
 MALFORMED: dict[str, tuple[Callable[[dict[str, Any]], None], str]] = {
-    "no states": (changed(STATES, []), "no state 0"),
     "states are an object": (changed(STATES, {"0": {}}), "'states' is a dict, not a list"),
-    "a state is a number": (changed([*STATES, 1], 7), "state 1 is 7, not an object"),
     "step is a float": (changed([*STATES, 0, "step"], 0.0), "'step' is 0.0, not a whole number"),
     "step is true": (changed([*STATES, 1, "step"], True), "'step' is True, not a whole number"),
-    "step is NaN": (changed([*STATES, 1, "step"], float("nan")), "'step' is nan"),
-    "step is huge": (changed([*STATES, 1, "step"], 10**5000), "does not lead to a state of step"),
     "a cycle": (changed([*STATES, 3, "next"], {"idle": 1}), "state 3 does not lead"),
-    "a loop": (changed([*STATES, 3, "next"], {"idle": 3}), "state 3 does not lead"),
     "beyond the end": (changed([*STATES, 0, "next", "idle"], 7), "state 0 does not lead"),
-    "negative": (changed([*STATES, 0, "next", "idle"], -1), "state 0 does not lead"),
-    "huge": (changed([*STATES, 0, "next", "idle"], 10**5000), "state 0 does not lead"),
     "to a float": (changed([*STATES, 0, "next", "idle"], 1.0), "state 0 does not lead"),
-    "to a text": (changed([*STATES, 0, "next", "idle"], "1"), "state 0 does not lead"),
     "two steps on": (changed([*STATES, 0, "next", "idle"], 3), "state 0 does not lead"),
     "unreachable": (changed([*STATES, 0, "next"], {"idle": 1}), "state 2 cannot be reached"),
-    "next is a list": (changed([*STATES, 0, "next"], [1, 2]), "'next' is a list, not an object"),
     "no subaction": (changed([*STATES, 5, "next"], {"x": 6}), "state 5 does not lead|has x in"),
     "not plain": (
         lambda data: entry_of(data)["states"][0]["next"].update({"(Fly R1)": 1}),
@@ -279,20 +270,14 @@ MALFORMED: dict[str, tuple[Callable[[dict[str, Any]], None], str]] = {
     "ends early": (changed([*STATES, 3, "next"], {}), "3 ends after|state 5 cannot be reached"),
     "left is false": (changed([*STATES, 1, "left"], 2), "state 1 says 2 subplans are left, but th"),
     "left is true": (changed([*STATES, 1, "left"], True), "state 1 says True"),
-    "left is a float": (changed([*STATES, 1, "left"], 1.0), r"state 1 says 1\.0"),
-    "left is null": (changed([*STATES, 1, "left"], None), "state 1 says None"),
     "left is long": (changed([*STATES, 1, "left"], "9" * 10**6), r"state 1 says 9+\.\. \(1,000,"),
     "left is no number": (changed([*STATES, 1, "left"], "¹"), "state 1 says ¹"),
     "facts beyond": (changed([*STATES, 0, "true"], [50]), "'true' has 50; facts are numbers below"),
-    "facts negative": (changed([*STATES, 0, "unknown"], [-1]), "'unknown' has -1"),
     "facts as text": (changed([*STATES, 0, "true"], "0"), "'true' is 0, not a list"),
-    "facts of facts": (changed([*STATES, 0, "true"], [[0]]), "'true' has a list"),
     "true and unknown": (changed([*STATES, 0, "unknown"], [0]), "fact 0 is true and unknown"),
     "atoms twice": (changed(["others"], ["(at r1 c0)"]), "an atom occurs twice"),
-    "no atom": (changed(["facts", 3], "at r1 c3"), "'facts' has at r1 c3 in place"),
     "an atom is null": (changed(["others"], [None]), "'others' has None in place"),
     "atoms is odd": (changed(["atoms"], "all"), "'atoms' is all, not exact or own"),
-    "robot is null": (changed(["robot"], None), "'robot' is None, not a text"),
     "robot with escapes": (changed(["robot"], "r1\x1b[2J"), r"control characters: r1\\x1b\[2J"),
     "steps": (changed(["steps"], 4), "'steps' is 4, but the states have 3"),
     "subplans": (changed(["subplans"], 5), "says 5 subplans are left, but there are 4"),
@@ -300,7 +285,6 @@ MALFORMED: dict[str, tuple[Callable[[dict[str, Any]], None], str]] = {
     "a robot twice": (lambda data: data["choices"].append(entry_of(data)), "choices of r1 twice"),
     "choices is an object": (lambda data: data.update(choices={"r1": 1}), "'choices' is a dict"),
     "choices is empty": (lambda data: data["choices"].clear(), "it has those of no robot"),
-    "sentence is a list": (lambda data: data.update(sentence=["w0"]), "'sentence' is a list"),
     "version is a float": (lambda data: data.update(version=1.0), r"version 1\.0; this program"),
 }
 
@@ -365,24 +349,17 @@ def test_deep_data_in_every_place() -> None:
 TEXT = json.dumps(choices_file(3))
 FILES: dict[str, tuple[bytes, str]] = {
     "empty": (b"", "this is no JSON, or it is cut off"),
-    "blanks": (b" \n\n ", "this is no JSON"),
     "cut off": (TEXT.encode()[:-30], "cut off"),
     "two values": (TEXT.encode() * 2, "Extra data"),
-    "null": (b"null", "expected a choices file"),
     "a list": (b"[]", "expected a choices file"),
-    "zeros": (b"\0" * 1000, "this is no JSON"),
     "not UTF-8": (TEXT.replace("w0", "wé").encode("latin-1").replace(b"\\", b""), "byte|no JSON"),
-    "latin 1": (b'{"format": "\xe9"}', "byte 12 is no UTF-8"),
     "UTF-16": (TEXT.encode("utf-16"), "byte 0 is no UTF-8"),
-    "deep lists": (b"[" * DEEP + b"]" * DEEP, "nested too deeply"),
     "deep lists, cut off": (b"[" * DEEP, "nested too deeply"),
-    "deep objects": (b'{"a":' * DEEP + b"1" + b"}" * DEEP, "nested too deeply"),
     "deep in an ignored key": (
         TEXT[:-1].encode() + b', "x": ' + b"[" * DEEP + b"]" * DEEP + b"}",
         "nested too deeply",
     ),
     "NaN": (TEXT.replace('"step": 0', '"step": NaN').encode(), "NaN is no number in JSON"),
-    "infinity": (TEXT[:-1].encode() + b', "x": -Infinity}', "-Infinity is no number in JSON"),
     "1e999": (TEXT.replace('"step": 0', '"step": 1e999').encode(), "'step' is inf"),
     "huge number": (
         TEXT.replace('"step": 0', '"step": ' + "9" * 10**5).encode(),
@@ -398,11 +375,8 @@ FILES: dict[str, tuple[bytes, str]] = {
     ),
     "gzip cut off": (gzip.compress(TEXT.encode())[:-20], "cut off"),
     "gzip spoilt": (gzip.compress(TEXT.encode())[:40] + b"\xff" * 40, "cut off"),
-    "gzip head alone": (b"\x1f\x8b", "cut off"),
-    "gzip of nothing": (gzip.compress(b""), "this is no JSON"),
     "gzip in gzip": (gzip.compress(gzip.compress(TEXT.encode())), "byte 1 is no UTF-8"),
     "a bomb": (gzip.compress(b" " * (1 << 20) + b"{}"), r"more than 1,000,000 bytes"),
-    "gigantic": (b" " * (1 << 20) + TEXT.encode(), r"more than 1,000,000 bytes"),
 }
 
 

@@ -9,7 +9,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
@@ -21,6 +20,7 @@ from planners.system.signals import ENDING, Interrupted, postponed_signals
 from planners.system.writing import write_atomically
 from tests.support.command import own_process
 from tests.support.domains import DOMAINS
+from tests.support.processes import until
 
 FILES = [str(DOMAINS / "grid" / name) for name in ("domain.pddl", "gw1-2x2.pddl")]
 #: Runs the command line, and sends itself a signal when a module of this name is imported, or the
@@ -48,29 +48,21 @@ main()
 """
 #: Before the first line of `coordlang.__main__` it is Python that hears the signal.  1: the first
 #: module of all that is looked for after it.
-_MODULES = (
-    "1",
-    "click",
-    "coordlang.commands.main",
-    "coordlang.commands.plans",
-    "msgspec",
-    "numpy",
-    "clingo",
-)
+_MODULES = ("1", "click", "coordlang.commands.main", "msgspec", "numpy", "clingo")
 
 
-def ended_at(number: int, at: object) -> subprocess.CompletedProcess[str]:
-    """Count plans, and send the signal at an import."""
-    program = [sys.executable, "-c", _AT_IMPORT, str(number), str(at)]
-    return subprocess.run([*program, "plans", *FILES, "--count"], capture_output=True, text=True)
+def ended_at(number: int, at: object) -> int:
+    """Count plans, and send the signal at an import; the exit code."""
+    program = [sys.executable, "-c", _AT_IMPORT, str(number), str(at), "plans", *FILES, "--count"]
+    ended = subprocess.run(program, capture_output=True, text=True)
+    assert "Traceback" not in ended.stderr
+    return ended.returncode
 
 
 @pytest.mark.parametrize("module", _MODULES)
 def test_signals_while_modules_are_imported(module: str) -> None:
     number = ENDING[_MODULES.index(module) % len(ENDING)]
-    ended = ended_at(number, module)
-    assert ended.returncode == 128 + number, ended.stderr
-    assert "Traceback" not in ended.stderr
+    assert ended_at(number, module) == 128 + number
 
 
 @pytest.mark.slow
@@ -79,11 +71,10 @@ def test_signals_at_every_import(number: int) -> None:
     """A signal at the last import of all may come when the work is done."""
     codes = []
     for at in range(1, 2000, 7):
-        ended = ended_at(number, at)
-        assert "Traceback" not in ended.stderr, at
-        if ended.returncode == 0:
+        code = ended_at(number, at)
+        if code == 0:
             break
-        codes.append(ended.returncode)
+        codes.append(code)
     assert set(codes) == {128 + number}
     assert len(codes) > 40
 
@@ -97,37 +88,36 @@ def test_fast_downward_leaves_nothing(number: signal.Signals, tmp_path: Path) ->
         stderr=subprocess.PIPE,
         text=True,
     )
-    while not list(tmp_path.glob("coordlang-*/problem.pddl")):
-        assert process.poll() is None, process.communicate()
-        time.sleep(0.005)
+    until(lambda: list(tmp_path.glob("coordlang-*/problem.pddl")))
     process.send_signal(number)
     out, err = process.communicate(timeout=60)
-    assert process.returncode == 128 + number, err
+    assert (process.returncode, out) == (128 + number, "")
     assert err.strip() == f"coordlang: interrupted by {number.name}"
-    assert out == ""
     assert [*tmp_path.iterdir()] == []
 
 
-def test_a_signal_that_is_ignored_stays_so() -> None:
-    """So start ``nohup`` and shells what is to go on."""
-    code = (
-        "import os, signal\nfor n in (1, 2, 15): signal.signal(n, signal.SIG_IGN)\n"
-        "from planners.system.signals import Interruptions\nfound = Interruptions()\n"
-        "for n in (1, 2, 15): os.kill(os.getpid(), n)\nprint(found.first)"
-    )
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [
+        (  # so start ``nohup`` and shells what is to go on
+            "import os, signal\nfor n in (1, 2, 15): signal.signal(n, signal.SIG_IGN)\n"
+            "from planners.system.signals import Interruptions\nfound = Interruptions()\n"
+            "for n in (1, 2, 15): os.kill(os.getpid(), n)\nprint(found.first)",
+            "None\n",
+        ),
+        (
+            "import os, time\nfrom planners.system.signals import Interrupted, Interruptions\n"
+            "Interruptions()\n"
+            "class Loses:\n    def __del__(self): os.kill(os.getpid(), 15)\n"
+            "try:\n    Loses()\n    time.sleep(30)\nexcept Interrupted as end:\n    print(end.number)",
+            "15\n",
+        ),
+    ],
+    ids=["what is ignored stays so", "what a finalizer lost is sent again"],
+)
+def test_signals_of_a_process(code: str, said: str) -> None:
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert (ended.returncode, ended.stdout) == (0, "None\n")
-
-
-def test_a_signal_that_a_finalizer_lost_is_sent_again() -> None:
-    code = (
-        "import os, time\nfrom planners.system.signals import Interrupted, Interruptions\n"
-        "Interruptions()\n"
-        "class Loses:\n    def __del__(self): os.kill(os.getpid(), 15)\n"
-        "try:\n    Loses()\n    time.sleep(30)\nexcept Interrupted as end:\n    print(end.number)"
-    )
-    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "15\n", "")
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, said, "")
 
 
 @pytest.fixture

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import signal
 import time
-from collections import Counter
 from contextlib import suppress
 from itertools import combinations
 from pathlib import Path
 from random import Random
 from typing import get_args
 
+import pysolvers
 import pytest
 
 from coordlang.commands.building import build_language
@@ -20,11 +20,11 @@ from planners.search.sat import SolverName, propagates, sat_solver, solve_slice
 from planners.system.errors import OutOfTime
 from planners.system.limits import time_left, time_limit
 from planners.system.signals import Interruptions
-from tests.support.command import Outcome
 from tests.support.domains import DOMAINS, all_tasks
 from tests.support.forks import fork, fork_command
 
 HANDOVER = [str(DOMAINS / "handover" / name) for name in ("domain.pddl", "exchange.pddl")]
+OURS = ("cadical153", "glucose42", "maplesat")
 
 
 def colouring(size: int, solver: SolverName) -> PartitionProblem:
@@ -62,36 +62,28 @@ def _all_is_loaded() -> None:
     build_language(all_tasks("grid", "gw1-2x2"), "minimal")
 
 
-def interrupted(solver: SolverName, wait: float, again: float | None) -> Outcome:
-    process = fork(lambda: solve_until_interrupted(solver))
-    time.sleep(wait)
-    process.send(signal.SIGINT)
-    if again is not None:
-        time.sleep(again)
-        with suppress(ProcessLookupError):
-            process.send(signal.SIGINT)
-    return process.join(30)
-
-
-def interrupt_often(solver: SolverName, times: int) -> None:
-    choice, codes = Random(solver), Counter[int]()
+@pytest.mark.parametrize(
+    ("solver", "times"),
+    [
+        *((solver, 5) for solver in OURS[:2]),
+        *(pytest.param(solver, 400, marks=pytest.mark.slow) for solver in OURS),
+    ],
+)
+def test_interrupts_while_solvers_work(solver: SolverName, times: int) -> None:
+    """One, or two soon after each other; 70: the second one came after the first was caught."""
+    choice = Random(solver)
     for turn in range(times):
         again = choice.uniform(0.0, 0.05) if turn % 2 else None
-        ended = interrupted(solver, choice.uniform(0.03, 0.25), again)
-        codes[ended.code] += 1
+        process = fork(lambda: solve_until_interrupted(solver))
+        time.sleep(choice.uniform(0.03, 0.25))
+        process.send(signal.SIGINT)
+        if again is not None:
+            time.sleep(again)
+            with suppress(ProcessLookupError):
+                process.send(signal.SIGINT)
+        ended = process.join(30)
+        assert ended.code in (0, 70)
         assert ended.code == 0 or "planners.system.signals.Interrupted: SIGINT" in ended.err, ended
-    assert set(codes) <= {0, 70}  # 70: the second signal came after the first was caught
-
-
-@pytest.mark.parametrize("solver", ["cadical153", "glucose42"])
-def test_interrupts_while_solvers_work(solver: SolverName) -> None:
-    interrupt_often(solver, 5)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("solver", ["cadical153", "glucose42", "maplesat"])
-def test_many_interrupts_while_solvers_work(solver: SolverName) -> None:
-    interrupt_often(solver, 400)
 
 
 @pytest.mark.parametrize("solver", get_args(SolverName))
@@ -113,16 +105,24 @@ def test_a_time_limit_is_heard_after_a_solver(solver: SolverName) -> None:
     assert ended.code == 0, ended
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGALRM])
-@pytest.mark.parametrize("solver", ["cadical153", "glucose42", "maplesat"])
+def called(solver: SolverName, what: str) -> str:
+    """The function of python-sat's extension that does something with a solver."""
+    return f"{'glucose421' if solver == 'glucose42' else solver}_{what}"
+
+
+@pytest.mark.parametrize(
+    ("number", "said"),
+    [
+        (signal.SIGINT, "Interrupted: SIGINT"),
+        (signal.SIGALRM, "OutOfTime: the time limit of"),
+    ],
+)
+@pytest.mark.parametrize("solver", OURS)
 def test_a_solver_is_freed_once(
-    solver: SolverName, number: signal.Signals, monkeypatch: pytest.MonkeyPatch
+    solver: SolverName, number: signal.Signals, said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The signal comes when the solver has been freed, and python-sat has not noted it yet."""
-    import pysolvers
-
-    name = {"glucose42": "glucose421"}.get(solver, solver) + "_del"
-    free = getattr(pysolvers, name)
+    free = getattr(pysolvers, called(solver, "del"))
 
     def freed(*arguments: object) -> None:
         free(*arguments)
@@ -133,50 +133,35 @@ def test_a_solver_is_freed_once(
         with time_limit(100):
             sat = sat_solver(solver, [[1, 2], [-1]])
             assert solve_slice(sat, 10) is True
-            monkeypatch.setattr(pysolvers, name, freed)
+            monkeypatch.setattr(pysolvers, called(solver, "del"), freed)
             sat.delete()
 
     ended = fork(work).join()
-    assert ended.code == 70, ended
-    said = {signal.SIGINT: "Interrupted: SIGINT", signal.SIGALRM: "OutOfTime: the time limit of"}
-    assert said[number] in ended.err
+    assert (ended.code, said in ended.err) == (70, True), ended
 
 
-@pytest.mark.parametrize("solver", ["cadical153", "glucose42", "maplesat"])
-def test_no_solver_is_left_by_longjmp(solver: SolverName, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its third argument says whether it takes SIGINT."""
-    import pysolvers
-
-    name = {"glucose42": "glucose421"}.get(solver, solver) + "_solve_lim"
-    solve, given = getattr(pysolvers, name), []
-
-    def noted(*arguments: object) -> object:
-        given.append(arguments[2])
-        return solve(*arguments)
-
-    monkeypatch.setattr(pysolvers, name, noted)
-    with sat_solver(solver, [[1, 2], [-1]]) as sat:
-        assert solve_slice(sat, 10) is True
-        assert solve_slice(sat, 10, [-2]) is False
-    assert given == [0, 0]
-
-
-def test_no_solver_is_left_by_longjmp_from_unit_propagation(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize(
+    ("solver", "what", "place"),
+    [*((solver, "solve_lim", 2) for solver in OURS), ("glucose42", "propagate", 3)],
+)
+def test_no_solver_is_left_by_longjmp(
+    solver: SolverName, what: str, place: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its fourth argument says whether it takes SIGINT."""
-    import pysolvers
-
-    propagate, given = pysolvers.glucose421_propagate, []
+    """One of its arguments says whether it takes SIGINT."""
+    real, given = getattr(pysolvers, called(solver, what)), []
 
     def noted(*arguments: object) -> object:
-        given.append(arguments[3])
-        return propagate(*arguments)
+        given.append(arguments[place])
+        return real(*arguments)
 
-    monkeypatch.setattr(pysolvers, "glucose421_propagate", noted)
-    with sat_solver("glucose42", [[1, 2], [-1, 3], [-1, -3, 4]]) as sat:
-        assert propagates(sat, [1])
-        assert not propagates(sat, [1, -4])
+    monkeypatch.setattr(pysolvers, called(solver, what), noted)
+    with sat_solver(solver, [[1, 2], [-1, 3], [-1, -3, 4]]) as sat:
+        if what == "propagate":
+            assert propagates(sat, [1])
+            assert not propagates(sat, [1, -4])
+        else:
+            assert solve_slice(sat, 10) is True
+            assert solve_slice(sat, 10, [1, -4]) is False
     assert given == [0, 0]
 
 
@@ -199,5 +184,4 @@ def test_many_interrupts_of_a_search_for_the_minimum(tmp_path: Path) -> None:
         files = [path.name for path in folder.iterdir()]
         assert files == (["l.json"] if "is written" in ended.err else [])
         written += len(files)
-    print(f"of 200 interrupted builds {written} wrote the best language")
     assert written > 50

@@ -17,8 +17,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from tests.fuzz.judge import fuzz
-from tests.fuzz.sources import pairs
+from tests.fuzz.run import fuzz, pairs
 
 
 def main() -> int:

@@ -24,19 +24,20 @@ _OTHER_TEXTS = {
 
 def edits(data: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[Place, Any]]:
     """Each place with the data in which it is left out or has another value of its type."""
-    for place, value in _places(data):
+    for place, value in places(data):
         for other in _others(place, value, words):
-            yield place, _changed(data, place, other)
+            yield place, changed(data, place, other)
         if place and isinstance(place[-1], str):
             yield place, _without(data, place)
 
 
-def _places(data: Any, place: Place = ()) -> Iterator[tuple[Place, Any]]:
+def places(data: Any, place: Place = ()) -> Iterator[tuple[Place, Any]]:
+    """Where everything inside is."""
     if place:
         yield place, data
     inner = dict(enumerate(data)) if isinstance(data, list) else data
     for key, value in inner.items() if isinstance(inner, dict) else ():
-        yield from _places(value, (*place, key))
+        yield from places(value, (*place, key))
 
 
 def _others(place: Place, value: Any, words: tuple[str, ...]) -> Iterator[Any]:
@@ -64,7 +65,8 @@ def _texts(value: str) -> list[str]:
     return [swapped, value[::-1], value[:-1], f"{value}x", value.replace("r1", "r2")]
 
 
-def _changed(data: Any, place: Place, value: Any) -> Any:
+def changed(data: Any, place: Place, value: Any) -> Any:
+    """The data with another value there."""
     data = deepcopy(data)
     _at(data, place[:-1])[place[-1]] = deepcopy(value)
     return data
