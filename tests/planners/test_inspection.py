@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 
 import pytest
 
@@ -12,14 +11,11 @@ from planners.inspection import inspect
 from planners.joint.composition import ComposingStepper
 from planners.loading import PlanningInstance, build, load
 from planners.pddl import parse_domain, parse_problem
-from planners.pddl.formula_tree import formula_text
-from planners.pddl.formulas import read_formula
 from planners.pddl.model_options import ModelOptions
-from planners.pddl.names import Names
-from planners.pddl.sexpr import Source, parse
+from planners.pddl.sexpr import Source
 from planners.search.reachable import explore
 from tests.support.domains import DOMAINS
-from tests.support.random_pddl import KINDS, Kind, random_model
+from tests.support.random_pddl import random_model
 
 PUSHING = """(define (domain pushing) (:types robot place heavy light)
   (:predicates (at ?r - robot ?p - place) (in ?x - (either heavy light) ?p - place) (glows ?p - place) (seen ?p - place))
@@ -147,19 +143,3 @@ def test_a_clash_that_never_meets_has_no_example() -> None:
     found = inspect(made(shifts, task))
     assert found.interfering > 0
     assert found.example is None
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_unparsed_formulas_read_as_they_were(kind: Kind) -> None:
-    read = 0
-    for seed in range(40):
-        domain = parse_domain(Source("d.pddl", random_model(seed, kind).domain))
-        for schema in domain.schemas:
-            document = parse(Source("f", formula_text(schema.precondition)))
-            actions = {s.name: len(s.parameters) for s in domain.schemas}
-            names = replace(
-                Names.of(document, domain), actions=actions, objects=domain.constants
-            ).with_variables(schema.parameters)
-            assert read_formula(names, document.root) == schema.precondition
-            read += 1
-    assert read >= 40

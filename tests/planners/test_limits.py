@@ -7,33 +7,30 @@ import gc
 import math
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from coordlang.language.partition import Partition
-from coordlang.required.choices import Choices, LabelSets
-from coordlang.required.composition_walk import moves
+from coordlang.required.choices import Choices
 from coordlang.required.miscoordination import miscoordination
 from coordlang.verification.by_definition import verify
-from coordlang.verification.walk import Walk
 from planners import grounding
-from planners.grounding import instantiate
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import Options, Stepper, Steps
 from planners.joint.tables import Rows
 from planners.loading import PlanningInstance, load
-from planners.search.edge_index import EdgeIndex
 from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PieceSizes, count, explore
 from planners.system.errors import OutOfMemory, OutOfTime
 from planners.system.limits import (
+    address_space,
     limited_memory,
     little_time_after,
+    memory_left,
     reaching,
     run_until_stopped,
     time_left,
@@ -50,6 +47,9 @@ def late() -> OutOfTime:
                 pass
     except OutOfTime as error:
         return error
+
+
+# What is said
 
 
 def test_the_innermost_block_speaks() -> None:
@@ -77,15 +77,15 @@ def test_memory_that_is_used_up_is_an_error_with_a_code() -> None:
     assert "Use a larger --memory-limit, or fewer parts." in str(caught.value)
 
 
-def test_an_estimate_keeps_its_own_remedy() -> None:
+def test_an_estimate_keeps_its_own_remedy_and_other_errors_pass() -> None:
     with pytest.raises(OutOfMemory) as caught, reaching(lambda: "half of it", "fewer parts"):
         raise OutOfMemory("this would need 9 GiB", remedy="Use fewer robots.")
     assert str(caught.value) == "this would need 9 GiB\n  Reached: half of it.\n  Use fewer robots."
-
-
-def test_other_errors_pass() -> None:
     with pytest.raises(KeyError), reaching(lambda: "half of it", "fewer parts"):
         raise KeyError
+
+
+# The clock
 
 
 class Finalized:
@@ -129,13 +129,6 @@ def test_other_lost_errors_are_told_as_before(monkeypatch: pytest.MonkeyPatch) -
     assert told == [KeyError]
 
 
-def test_time_left() -> None:
-    assert time_left() == float("inf")
-    with time_limit(100):
-        assert 50 < time_left() <= 100
-    assert time_left() == float("inf")
-
-
 def test_limits_within_limits() -> None:
     """The one that is over first rings; leaving the inner block gives the outer its time back."""
     with time_limit(100):
@@ -145,7 +138,7 @@ def test_limits_within_limits() -> None:
         with time_limit(200):
             assert 75 < time_left() <= 100
         assert 75 < time_left() <= 100
-    assert time_left() == float("inf")
+    assert time_left() == math.inf
     with pytest.raises(OutOfTime, match=r"limit of 0\.05 s"), time_limit(0.05), time_limit(10):
         time.sleep(2)
 
@@ -156,6 +149,26 @@ def test_limits_within_limits() -> None:
 
     with pytest.raises(OutOfTime, match=r"limit of 0\.3 s"), time_limit(0.3):
         inner_then_outer()
+
+
+def test_what_follows_on_stopped_work_is_stopped_soon() -> None:
+    def work() -> None:
+        raise OutOfTime("the time limit of the test is over")
+
+    def busy() -> None:
+        while True:
+            pass
+
+    with time_limit(60):
+        stopped = run_until_stopped(work)
+        assert isinstance(stopped, OutOfTime)
+        with pytest.raises(OutOfTime, match="limit of the test"), little_time_after(stopped):
+            busy()
+        with little_time_after(None):
+            assert time_left() == math.inf  # the clock is stopped
+
+
+# How far work got
 
 
 @dataclass(frozen=True)
@@ -186,15 +199,20 @@ def corners(problem: str = "corners-3x3") -> PlanningInstance:
     return load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / f"{problem}.pddl"])
 
 
-def stopped(loaded: PlanningInstance, after: int, error: BaseException) -> PlanningInstance:
-    return replace(
-        loaded, model=replace(loaded.model, stepper=Stopping(loaded.model.stepper, error, [after]))
-    )
+def plans(problem: str) -> PlanSpace:
+    loaded = corners(problem)
+    return search(loaded.model, loaded.tasks[0])
+
+
+def stopped(after: int, error: BaseException) -> PlanningInstance:
+    loaded = corners()
+    stepper = Stopping(loaded.model.stepper, error, [after])
+    return replace(loaded, model=replace(loaded.model, stepper=stepper))
 
 
 @pytest.mark.parametrize("error", [late(), MemoryError()], ids=["time", "memory"])
 def test_search_says_how_far_it_got(error: BaseException) -> None:
-    loaded = stopped(corners(), 4, error)  # two tables of states to choose a bound
+    loaded = stopped(4, error)  # two tables of states to choose a bound
     with pytest.raises((OutOfTime, OutOfMemory)) as caught:
         search(loaded.model, loaded.tasks[0])
     # Within four steps every step leads nearer: 2 * 2 states after one, and after two both robots
@@ -206,7 +224,7 @@ def test_search_says_how_far_it_got(error: BaseException) -> None:
 
 
 def test_exploring_says_how_far_it_got() -> None:
-    loaded = stopped(corners(), 1, late())
+    loaded = stopped(1, late())
     with pytest.raises(OutOfTime, match=r"time limit") as caught:
         explore(loaded.model, loaded.tasks[0].init[None, :])
     assert caught.value.reached == (
@@ -220,97 +238,75 @@ def test_the_goals_done_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     groups = [(loaded.tasks[0].goal, None)] * 3
     batches = plan_spaces(space, groups, PieceSizes(pairs=len(space)))
     next(batches)
-
-    def fail(*_: object) -> None:
-        raise MemoryError
-
-    monkeypatch.setattr("planners.search.optimal_plans.distances", fail)
-    with pytest.raises(OutOfMemory) as caught:
+    monkeypatch.setattr("planners.search.optimal_plans.distances", failing)
+    with pytest.raises(OutOfTime, match="the optimal plans to 1 of 3 goals, over 72 states"):
         next(batches)
-    assert "the optimal plans to 1 of 3 goals, over 72 states" in str(caught.value)
 
 
-def test_grounding_says_how_far_it_got(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(*_: object) -> None:
-        raise late()
-
-    with monkeypatch.context() as patched:
-        patched.setattr(instantiate, "reachable_arguments", fail)
-        with pytest.raises(OutOfTime) as caught:
-            corners()
-    assert "looking for the applicable instances of 1 action schemas over 11 objects" in str(
-        caught.value
-    )
-    assert grounding.FEWER in str(caught.value)
-    monkeypatch.setattr(instantiate._Grounder, "action", fail)
-    with pytest.raises(OutOfTime, match="time limit") as caught:
-        corners()
-    assert "0 of at most 48 ground actions" in str(caught.value)
+def failing(*_: object, **__: object) -> None:
+    raise late()
 
 
-def plans(problem: str) -> PlanSpace:
-    loaded = corners(problem)
-    return search(loaded.model, loaded.tasks[0])
+def unspoken(space: PlanSpace) -> Partition:
+    """One word for all states."""
+    width = space.rows.shape[1]
+    return Partition(("w0",), np.zeros((0, width), np.uint64), np.zeros(0, np.int64), 0)
 
 
-def test_required_coordination_says_how_far_it_got(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(*_: object) -> None:
-        raise late()
-
-    space = plans("three-robots-3x3")
-    monkeypatch.setattr(LabelSets, "unions", fail)
-    with pytest.raises(OutOfTime) as caught:
-        Choices(space)
-    assert f"choices in 1 sets, over {len(space):,} states on optimal plans" in str(caught.value)
-
-
-def test_a_size_that_nobody_can_wait_for() -> None:
-    space = plans("three-robots-3x3")
-    every = np.repeat(np.arange(len(space))[:, None], space.robots + 1, axis=1)
-    walked = moves(space, EdgeIndex.of(space), every, most=1000.0)
-    with pytest.raises(
-        OutOfMemory,
-        match=r"nodes of one layer of the walk have .* combinations of 3 plans' next steps",
-    ):
-        next(walked)
-
-
-def test_verification_and_the_search_for_a_break_say_how_far_they_got(
+@pytest.mark.parametrize(
+    ("fails", "problem", "work", "said"),
+    [
+        (
+            "planners.grounding.instantiate.reachable_arguments",
+            None,
+            lambda _: corners(),
+            "looking for the applicable instances of 1 action schemas over 11 objects",
+        ),
+        (
+            "planners.grounding.instantiate._Grounder.action",
+            None,
+            lambda _: corners(),
+            "0 of at most 48 ground actions",
+        ),
+        (
+            "coordlang.required.choices.LabelSets.unions",
+            "three-robots-3x3",
+            Choices,
+            "choices in 1 sets, over {nodes:,} states on optimal plans",
+        ),
+        (
+            "coordlang.verification.walk.Walk._children",
+            "corners-3x3",
+            lambda space: verify(unspoken(space), [space]),
+            "layer 1 of 5 of the verification, 1 nodes of its walk",
+        ),
+        (
+            "coordlang.required.choices.Choices.edges_of",
+            "corners-3x3",
+            lambda space: miscoordination(space, 0),
+            "0 of 4 steps to the first break of a mixture, 1 nodes",
+        ),
+    ],
+)
+def test_other_work_says_how_far_it_got(
+    fails: str,
+    problem: str | None,
+    work: Callable[[PlanSpace | None], object],
+    said: str,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    space = plans("corners-3x3")
-    table = Partition(
-        ("w0",), np.zeros((0, space.rows.shape[1]), np.uint64), np.zeros(0, np.int64), 0
-    )
-
-    def fail(*_: object, **__: object) -> None:
-        raise late()
-
-    monkeypatch.setattr(Walk, "_children", fail)
+    space = None if problem is None else plans(problem)
+    monkeypatch.setattr(fails, failing)
     with pytest.raises(OutOfTime) as caught:
-        verify(table, [space])
-    assert "layer 1 of 5 of the verification, 1 nodes of its walk" in str(caught.value)
-    monkeypatch.setattr(Choices, "edges_of", fail)
-    with pytest.raises(OutOfTime) as caught:
-        miscoordination(space, 0)
-    assert "0 of 4 steps to the first break of a mixture, 1 nodes" in str(caught.value)
+        work(space)
+    assert said.format(nodes=space and len(space)) in str(caught.value)
+    assert space is not None or grounding.FEWER in str(caught.value)
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    "problem", ["corners-4x4", pytest.param("three-robots-3x3", marks=pytest.mark.slow)]
-)
-def test_work_in_pieces_is_the_same_work(problem: str) -> None:
-    loaded = corners(problem)
+def test_exploring_in_pieces_is_the_same_work() -> None:
+    loaded, small = corners("corners-4x4"), PieceSizes(states=7, steps=40)
     init = loaded.tasks[0].init[None, :]
-    whole, space = search(loaded.model, loaded.tasks[0]), explore(loaded.model, init)
-    assert isinstance(loaded.model.stepper, ComposingStepper)
-    loaded.model.stepper.piece = 11
-    small = PieceSizes(states=7, steps=40)
-    for kept in (8_000_000, 100, 0):
-        pieces = search(loaded.model, loaded.tasks[0], replace(small, kept=kept))
-        for name in ("rows", "state", "layer", "first", "target", "labels", "cost", "starts"):
-            assert (getattr(pieces, name) == getattr(whole, name)).all(), name
+    space = explore(loaded.model, init)
     assert count(loaded.model, init, small) == (len(space), len(space.target))
     again = explore(loaded.model, init, small)
     for name in ("rows", "first", "target", "labels", "cost"):
@@ -331,33 +327,8 @@ def test_combinations_that_do_not_fit_are_not_made() -> None:
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
-def test_what_linux_says_of_memory_is_what_psutil_says(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_linux_says_of_memory_is_what_psutil_says() -> None:
     import psutil
 
-    from planners.system import limits as module
-
-    assert module.address_space() == pytest.approx(psutil.Process().memory_info().vms, rel=0.02)
-    left = psutil.virtual_memory().available
-    assert module._machine_memory_left() == pytest.approx(left, rel=0.1)
-    for name in ("_MEMORY_OF_MACHINE", "_MEMORY_OF_PROCESS"):
-        monkeypatch.setattr(module, name, Path("/nowhere"))
-    assert module.address_space() == pytest.approx(psutil.Process().memory_info().vms, rel=0.02)
-    assert module._machine_memory_left() == pytest.approx(left, rel=0.1)
-
-
-def test_what_follows_on_stopped_work_is_stopped_soon() -> None:
-    def busy() -> None:
-        while True:
-            pass
-
-    with time_limit(60):
-        stopped = run_until_stopped(lambda: _raise(OutOfTime("the time limit of the test is over")))
-        assert isinstance(stopped, OutOfTime)
-        with pytest.raises(OutOfTime, match="limit of the test"), little_time_after(stopped):
-            busy()
-        with little_time_after(None):
-            assert time_left() == math.inf  # the clock is stopped
-
-
-def _raise(error: BaseException) -> None:
-    raise error
+    assert address_space() == pytest.approx(psutil.Process().memory_info().vms, rel=0.02)
+    assert memory_left() <= psutil.virtual_memory().available * 1.1

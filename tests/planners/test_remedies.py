@@ -26,15 +26,14 @@ def tree(path: Path) -> ast.Module:
 def errors() -> dict[str, bool]:
     """The classes of the one error tree, and whether they have a constructor of their own."""
     found = {BASE: False}
+    nodes = [node for path in FILES for node in ast.walk(tree(path))]
+    classes = [node for node in nodes if isinstance(node, ast.ClassDef)]
     for _ in range(4):  # as deep as the tree is
-        for path in FILES:
-            for node in ast.walk(tree(path)):
-                bases = (
-                    {ast.unparse(b) for b in node.bases} if isinstance(node, ast.ClassDef) else ()
-                )
-                if isinstance(node, ast.ClassDef) and found.keys() & bases:
-                    own = any(getattr(part, "name", "") == "__init__" for part in node.body)
-                    found[node.name] = own or any(found[b] for b in bases if b in found)
+        for node in classes:
+            bases = {ast.unparse(base) for base in node.bases} & found.keys()
+            if bases:
+                own = any(getattr(part, "name", "") == "__init__" for part in node.body)
+                found[node.name] = own or any(found[base] for base in bases)
     return found
 
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planners.search.questions import Questions
-from planners.search.sat import propagates, sat_solver, simplified, split_clauses
+from planners.search.sat import propagates, sat_solver, simplified
 
 VARIABLES = 6
 literal = st.integers(1, VARIABLES).flatmap(lambda v: st.sampled_from((v, -v)))
@@ -47,22 +47,10 @@ def test_simplified_clauses_allow_the_same_values_of_kept_variables(
             assert solver.solve(assumptions=asked) == (values in expected)
 
 
-def test_what_must_be_true_of_a_kept_variable_is_still_said() -> None:
-    """A unit clause is kept as a clause, and not only as a value that the simplifier knows."""
-    found = simplified(flat([[1], [-1, 2], [2, 3], [-3, 4, 5]]), [1, 2, 3])
-    assert [1] in found
-    assert [2] in found
-
-
 def test_variables_that_are_not_kept_go() -> None:
     chain = [[-k, k + 1] for k in range(1, 50)]
     found = simplified(flat(chain), [1, 50])
     assert {abs(lit) for clause in found for lit in clause} == {1, 50}
-
-
-@given(st.lists(st.lists(literal, max_size=4), max_size=9), st.integers(1, 4))
-def test_clauses_are_split_at_zeros(clauses: list[list[int]], block: int) -> None:
-    assert list(split_clauses(flat(clauses), block)) == clauses
 
 
 @given(formula)
@@ -75,15 +63,6 @@ def test_clauses_that_are_added_at_once_say_the_same_as_one_by_one(
         many.add_all(flat(clauses))
         assert many.clauses == one.clauses
         assert many.holds([]) == one.holds([]) == bool(kept_values(clauses, []))
-
-
-def test_a_simplified_formula_is_as_python_sat_writes_it() -> None:
-    """Without its `Processor`, which copies all clauses."""
-    from pysat.process import Processor
-
-    chain = [[-k, k + 1, 60] for k in range(1, 50)]
-    found = Processor(bootstrap_with=chain).process(rounds=3, freeze=[1, 50])
-    assert simplified(flat(chain), [1, 50]) == found.clauses
 
 
 def test_only_the_thread_that_solves_is_deaf() -> None:

@@ -6,29 +6,27 @@ Downward, which read the exported problem (`pip install '.[oracles]'`).
 from __future__ import annotations
 
 import json
-import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from coordlang.commands.building import build_language
 from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
 from coordlang.exports.pddl import PddlExport, export_pddl, plan_names
-from coordlang.language.candidates import from_problems
 from coordlang.language.sentences import sentence, task_sentences
 from coordlang.required.miscoordination import Inseparable
 from planners.classical.fast_downward import total_cost
-from planners.pddl import read_domain, read_problem
 from planners.pddl.model_options import ModelOptions
 from planners.search.plans import Plans
 from planners.system.errors import CoordlangError, OutOfMemory
 from planners.system.limits import time_limit
-from tests.support.domains import DOMAINS
+from tests.support.domains import DOMAINS, own_task
 
-#: More plans than this are not listed, neither by us nor by others.
+#: More plans than this are not listed by others; 40 times as many not by us.
 MOST = 5_000
 #: A search for invariants among facts without arguments takes seconds and gains nothing.
 TRANSLATE = ("--translate-options", "--invariant-generation-max-time", "0", "--search-options")
@@ -36,19 +34,16 @@ TRANSLATE = ("--translate-options", "--invariant-generation-max-time", "0", "--s
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One sentence of one problem, exported in one form; None: no answer."""
+    """The answers for one sentence of one problem, exported in one form; None: no answer."""
 
     problem: str
-    sentence: str
     form: str
-    actions: int
-    plans: int
     graph: int
     listing: int | None
-    kstar: int | None
-    symk: int | None
     cost: int
-    fast_downward: int | None
+    kstar: int | None = None
+    symk: int | None = None
+    fast_downward: int | None = None
 
     @property
     def agrees(self) -> bool:
@@ -58,38 +53,31 @@ class Row:
 
 
 def rows(folder: str, seconds: float, *, other: bool = True) -> Iterator[Row]:
-    """The rows of every problem in a folder whose plans can be told apart."""
+    """Two sentences, in both forms, of every problem in a folder whose plans can be told apart."""
     for path in sorted((DOMAINS / folder).glob("*.pddl")):
-        if path.name != "domain.pddl":
-            try:
-                yield from problem_rows(path, seconds, other=other)
-            except (Inseparable, OutOfMemory):
+        with suppress(Inseparable, OutOfMemory):
+            if path.name == "domain.pddl":
                 continue
+            spoken = _spoken(folder, path.stem)
+            for words in _two_sentences(spoken):
+                exports = [export_pddl(spoken, words, limit) for limit in (0, 2000)]
+                for exported in {e.classical.form: e for e in exports}.values():
+                    row = _ours(path.stem, spoken, words, exported)
+                    yield _with_others(row, exported, seconds) if other else row
 
 
-def problem_rows(path: Path, seconds: float, *, other: bool) -> Iterator[Row]:
-    """Two sentences of a problem in both forms."""
-    domain = read_domain(path.parent / "domain.pddl")
-    problem = read_problem(path, domain)
+def _spoken(folder: str, stem: str) -> TaskLanguage:
+    """The greedy language; if no state tells plans apart, the last actions do."""
     try:
-        candidates = from_problems(domain, [problem])
+        candidates = own_task(folder, stem)
         language = build_language(candidates, "greedy").language
-    except Inseparable:  # no state tells its plans apart; the last actions do
-        candidates = from_problems(domain, [problem], ModelOptions(remember_actions=True))
+    except Inseparable:
+        candidates = own_task(folder, stem, ModelOptions(remember_actions=True))
         language = build_language(candidates, "greedy").language
-    spoken = next(languages_in_tasks(language, candidates))
-    for words in two_sentences(spoken):
-        last = None
-        for limit in (2000, 0):
-            exported = export_pddl(spoken, words, limit)
-            if exported.classical.form != last:
-                yield row(
-                    f"{path.parent.name}/{path.stem}", spoken, words, exported, seconds, other=other
-                )
-            last = exported.classical.form
+    return next(languages_in_tasks(language, candidates))
 
 
-def two_sentences(spoken: TaskLanguage) -> list[tuple[int, ...]]:
+def _two_sentences(spoken: TaskLanguage) -> list[tuple[int, ...]]:
     """The sentence of most and that of fewest plans.
 
     Those of the first and the last plan where there are too many sentences to compare.
@@ -105,49 +93,27 @@ def two_sentences(spoken: TaskLanguage) -> list[tuple[int, ...]]:
     return list(dict.fromkeys(found))
 
 
-def row(
-    name: str,
-    spoken: TaskLanguage,
-    words: tuple[int, ...],
-    exported: PddlExport,
-    seconds: float,
-    *,
-    other: bool,
-) -> Row:
-    """All answers for one exported problem."""
-    plans = Plans.of(spoken.space, spoken.task)
+def _ours(stem: str, spoken: TaskLanguage, words: tuple[int, ...], exported: PddlExport) -> Row:
+    """By the graph, and by definition: all plans are listed."""
+    plans, listing = Plans.of(spoken.space, spoken.task), None
+    if plans.count <= 40 * MOST:
+        word = spoken.partition.word_of(plans.space.rows).tolist()
+        listing = sum(sentence(word[s] for s in plans.states(plan)) == words for plan in plans)
     fits = Plans.of(spoken.plans_with(words)).count
-    found: dict[str, int | None] = dict.fromkeys(("kstar", "symk", "fast_downward"))
-    if other:
-        with tempfile.TemporaryDirectory(prefix="coordlang-") as directory:
-            folder = Path(directory)
-            (folder / "domain.pddl").write_text(exported.domain)
-            (folder / "problem.pddl").write_text(exported.problem)
-            if fits <= MOST:
-                found["kstar"] = by_kstar(folder, exported, seconds)
-                found["symk"] = by_symk(folder, exported, seconds)
-            found["fast_downward"] = by_fast_downward(exported, seconds)
-    return Row(
-        name,
-        spoken.text(words),
-        exported.classical.form,
-        len(exported.classical.actions),
-        plans.count,
-        fits,
-        by_listing(spoken, plans, words),
-        found["kstar"],
-        found["symk"],
-        exported.cost,
-        found["fast_downward"],
-    )
+    return Row(stem, exported.classical.form, fits, listing, exported.cost)
 
 
-def by_listing(spoken: TaskLanguage, plans: Plans, words: tuple[int, ...]) -> int | None:
-    """The number of optimal plans with the sentence, by definition: all plans are listed."""
-    if plans.count > 40 * MOST:
-        return None
-    word = spoken.partition.word_of(plans.space.rows).tolist()
-    return sum(sentence(word[state] for state in plans.states(plan)) == words for plan in plans)
+def _with_others(row: Row, exported: PddlExport, seconds: float) -> Row:
+    with tempfile.TemporaryDirectory(prefix="coordlang-") as directory:
+        folder = Path(directory)
+        (folder / "domain.pddl").write_text(exported.domain)
+        (folder / "problem.pddl").write_text(exported.problem)
+        if row.graph <= MOST:
+            row = replace(row, kstar=by_kstar(folder, exported, seconds))
+            row = replace(row, symk=by_symk(folder, exported, seconds))
+    with suppress(CoordlangError), time_limit(seconds):
+        row = replace(row, fast_downward=total_cost(exported.classical))
+    return row
 
 
 def by_kstar(folder: Path, exported: PddlExport, seconds: float) -> int | None:
@@ -158,8 +124,7 @@ def by_kstar(folder: Path, exported: PddlExport, seconds: float) -> int | None:
         return None
     search = (
         f"kstar(blind(transform=undo_to_origin()), q=1.0, k={10 * MOST}, max_time={seconds}, "
-        "find_unordered_plans=false, "
-        "dump_plan_files=false, json_file_to_dump=PLANS_JSON_NAME)"
+        "find_unordered_plans=false, dump_plan_files=false, json_file_to_dump=PLANS_JSON_NAME)"
     )
     files = [str(folder / "domain.pddl"), str(folder / "problem.pddl")]
     limit = ["--sas-file", str(folder / "kstar.sas"), "--overall-time-limit", f"{int(seconds)}s"]
@@ -169,11 +134,8 @@ def by_kstar(folder: Path, exported: PddlExport, seconds: float) -> int | None:
         return None
     if answer["timeout_triggered"] or "search exit code: 0" not in answer["planner_output"]:
         return None
-    found = [
-        exported.joint_plan([name.strip() for name in plan["actions"]]) for plan in answer["plans"]
-    ]
     assert all(plan["cost"] == exported.cost for plan in answer["plans"])
-    return _distinct(found)
+    return _different(exported, [[a.strip() for a in p["actions"]] for p in answer["plans"]])
 
 
 def by_symk(folder: Path, exported: PddlExport, seconds: float) -> int | None:
@@ -186,37 +148,19 @@ def by_symk(folder: Path, exported: PddlExport, seconds: float) -> int | None:
         "symq_bd(simple=false,plan_selection=top_k(num_plans=infinity,dump_plans=false),"
         "bound=infinity,quality=1.0)"
     )
-    command = [
-        sys.executable,
-        get_resource_path(),
-        "--plan-file",
-        "plan",
-        "--overall-time-limit",
-        f"{int(seconds)}s",
-    ]
+    limit = ["--plan-file", "plan", "--overall-time-limit", f"{int(seconds)}s"]
+    command = [sys.executable, get_resource_path(), *limit, "domain.pddl", "problem.pddl"]
     done = subprocess.run(
-        [*command, "domain.pddl", "problem.pddl", *TRANSLATE, "--search", search],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
+        [*command, *TRANSLATE, "--search", search], cwd=folder, capture_output=True, text=True
     )
     if done.returncode != 0:
         return None
     texts = [path.read_text() for path in folder.glob("plan*")]
-    assert all(re.search(r"; cost = (\d+)", text)[1] == str(exported.cost) for text in texts)  # type: ignore[index]
-    return _distinct([exported.joint_plan(plan_names(text)) for text in texts])
+    assert all(f"; cost = {exported.cost} " in text for text in texts)
+    return _different(exported, [plan_names(text) for text in texts])
 
 
-def by_fast_downward(exported: PddlExport, seconds: float) -> int | None:
-    """The optimal cost by Fast Downward."""
-    try:
-        with time_limit(seconds):
-            return total_cost(exported.classical)
-    except CoordlangError:
-        return None
-
-
-def _distinct(plans: list[tuple[tuple[int, ...], ...]]) -> int:
-    assert len(set(plans)) == len(plans), "one plan in two guises"
-    return len(plans)
+def _different(exported: PddlExport, plans: Sequence[list[str]]) -> int:
+    found = [exported.joint_plan(names) for names in plans]
+    assert len(set(found)) == len(found), "one plan in two guises"
+    return len(found)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from random import Random
+from typing import get_args
 
 from planners.loading import PlanningInstance, build
 from planners.pddl.model_options import Cost, ModelOptions
@@ -16,7 +17,7 @@ from tests.support.texts import parsed
 
 
 def random_instance(seed: int, cost: Cost | None = None) -> PlanningInstance | None:
-    """The model of a seed, with ``cost`` in place of a random one; None where it is refused."""
+    """The model of a seed, under ``cost`` or a random one; None where it is refused."""
     random = Random(seed)
     try:
         if seed % 2:
@@ -25,7 +26,8 @@ def random_instance(seed: int, cost: Cost | None = None) -> PlanningInstance | N
             text = random_pddl(seed, random.choice(["agent", "plain", "joint"]))
             domain, problem = parsed(text.domain, text.problem)
             options = ModelOptions(unowned=text.unowned, remember_actions=random.random() < 0.3)
-        return build(domain, [problem], replace(options, cost=cost or options.cost))
+        chosen = random.choice(get_args(Cost)) if cost is None else cost
+        return build(domain, [problem], replace(options, cost=chosen))
     except BadInput:
         return None
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import product
+from math import prod
 from random import Random
 from typing import Literal
 
@@ -18,16 +19,15 @@ from planners.pddl.model_options import Unowned
 Kind = Literal["agent", "plain", "joint"]
 KINDS: tuple[Kind, ...] = ("agent", "plain", "joint")
 _FLUENTS = 7
-_SIGNATURES = (
-    (),
-    ("robot",),
-    ("place",),
-    ("robot", "place"),
-    ("place", "place"),
-    ("robot", "robot"),
+Signature = tuple[str, ...]
+_SIGNATURES: tuple[Signature, ...] = (
+    *((), ("robot",), ("place",), ("robot", "place"), ("place", "place"), ("robot", "robot")),
 )
 #: Types that a variable may have, and how often.
 _TYPES = ("robot", "robot", "place", "place", "place", "hub", "object", "(either robot hub)")
+_FORMULAS = ("literal", "equal", "step", "and", "or", "not", "imply", "forall", "exists")
+#: Variables and their types.
+Scope = dict[str, str]
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,8 @@ def random_model(seed: int, kind: Kind) -> RandomModel:
     return _Writer(Random(f"{kind} {seed}"), kind).model()
 
 
-Scope = dict[str, str]
+def _listed(scope: Scope) -> str:
+    return " ".join(f"{name} - {kind}" for name, kind in scope.items())
 
 
 @dataclass
@@ -53,20 +54,19 @@ class _Writer:
     kind: Kind
     robots: list[str] = field(default_factory=list)
     places: list[str] = field(default_factory=list)
-    fluents: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    statics: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    fluents: dict[str, Signature] = field(default_factory=dict)
+    statics: dict[str, Signature] = field(default_factory=dict)
     actions: dict[str, Scope] = field(default_factory=dict)
     unowned: Unowned = "error"
 
     def model(self) -> RandomModel:
         self._choose_names()
         # What no effect mentions would be static.
-        bodies = [self._schema(name, scope) for name, scope in self.actions.items()]
+        bodies = [self._schema(scope) for scope in self.actions.values()]
         missing = [p for p in self.fluents if not any(f"({p}" in effect for _, effect in bodies)]
         first = self.actions["a0"]
-        bodies[0][1] += "".join(
-            f" ({name}{self._terms(self.fluents[name], first)})" for name in missing
-        )
+        more = "".join(f" ({name}{self._terms(self.fluents[name], first)})" for name in missing)
+        bodies[0] = bodies[0][0], bodies[0][1] + more
         texts = [
             self._action(name, scope, precondition, f"(and{effect})" if effect else "()")
             for (name, scope), (precondition, effect) in zip(
@@ -86,18 +86,19 @@ class _Writer:
         return RandomModel(domain, self._problem(), self.unowned)
 
     # -- what there is
-    # ---------------------------------------------------------------------------------------
 
     def _choose_names(self) -> None:
         pick = self.random
         self.robots = [f"r{i + 1}" for i in range(pick.choice((2, 2, 2, 3)))]
         self.places = [f"p{i + 1}" for i in range(pick.choice((1, 2, 2, 3, 3)))]
+        sizes = {"robot": len(self.robots), "place": len(self.places)}
+        atoms = {s: prod(sizes[kind] for kind in s) for s in _SIGNATURES}
         left = _FLUENTS
         for number in range(pick.randint(1, 3)):
-            fitting = [s for s in _SIGNATURES if self._ground_atoms(s) <= left and (s or number)]
+            fitting = [s for s in _SIGNATURES if atoms[s] <= left and (s or number)]
             if fitting:
                 self.fluents[f"f{number}"] = signature = pick.choice(fitting)
-                left -= self._ground_atoms(signature)
+                left -= atoms[signature]
         if not self.fluents:
             self.fluents["f0"] = ("robot",)
         for number in range(pick.randint(0, 2)):
@@ -107,20 +108,11 @@ class _Writer:
         for number in range(pick.choice((1, 2, 2, 3, 3, 4))):
             self.actions[f"a{number}"] = self._parameters()
 
-    def _ground_atoms(self, signature: tuple[str, ...]) -> int:
-        sizes = {"robot": len(self.robots), "place": len(self.places)}
-        count = 1
-        for kind in signature:
-            count *= sizes[kind]
-        return count
-
     def _parameters(self) -> Scope:
-        pick = self.random
+        pick, types = self.random, ("place", "place", "hub", "robot")
         if self.kind == "joint":
             number = pick.choice((0, 1, 2, 2, 3, 4))
-            return {
-                f"?x{i}": pick.choice(("place", "place", "hub", "robot")) for i in range(number)
-            }
+            return {f"?x{i}": pick.choice(types) for i in range(number)}
         scope = {"?r": "robot"}
         if self.kind == "plain":
             if self.unowned != "error" and pick.random() < 0.4:
@@ -130,14 +122,13 @@ class _Writer:
         extra = pick.choice((0, 1, 2, 2)) if len(scope) < 2 else pick.choice((0, 0, 1))
         for number in range(extra):
             # Another robot as argument would make a plain action a shared one.
-            types = ("place", "hub") if self.kind == "plain" else ("place", "place", "hub", "robot")
-            scope[f"?x{number}"] = pick.choice(types)
+            plain = self.kind == "plain"
+            scope[f"?x{number}"] = pick.choice(("place", "hub") if plain else types)
         return scope
 
     # -- schemas
-    # ---------------------------------------------------------------------------------------------
 
-    def _schema(self, name: str, scope: Scope) -> list[str]:
+    def _schema(self, scope: Scope) -> tuple[str, str]:
         """Precondition and the effects (not yet joined) of an action; one in six has no effect at
         all.
         """
@@ -155,19 +146,16 @@ class _Writer:
         if not parts and pick.random() < 0.5:
             precondition = "()"
         if pick.random() < 1 / 6:
-            return [precondition, ""]
-        return [
-            precondition,
-            "".join(f" {self._effect(scope, 2)}" for _ in range(pick.randint(1, 3))),
-        ]
+            return precondition, ""
+        effects = [self._effect(scope, 2) for _ in range(pick.randint(1, 3))]
+        return precondition, "".join(f" {effect}" for effect in effects)
 
-    def _wait(self, scope: Scope) -> list[str]:
+    def _wait(self, scope: Scope) -> tuple[str, str]:
         """An action that does nothing: always possible, or wherever one fact holds."""
         name, types = self.random.choice(list(self.fluents.items()))
-        where = self.random.choice(("()", f"({name}{self._terms(types, scope)})"))
-        return [where, ""]
+        return self.random.choice(("()", f"({name}{self._terms(types, scope)})")), ""
 
-    def _move(self, scope: Scope) -> list[str] | None:
+    def _move(self, scope: Scope) -> tuple[str, str] | None:
         """``(f .. ?x)`` becomes ``(f .. ?y)``: chains of such steps make plans of some length."""
         pick = self.random
         changing = [(f, types) for f, types in self.fluents.items() if types]
@@ -183,23 +171,19 @@ class _Writer:
         more = [self._about_the_step(scope)] if self.kind != "joint" and pick.random() < 0.4 else []
         more += [f"(not {there})"] if pick.random() < 0.4 else []
         more += [self._literal(scope)] if pick.random() < 0.2 else []
-        effect = f" (not {here}) {there}" + (
-            f" {self._effect(scope, 2)}" if pick.random() < 0.3 else ""
-        )
-        return [f"(and {' '.join((here, *more))})", effect]
+        effect = f" {self._effect(scope, 2)}" if pick.random() < 0.3 else ""
+        return f"(and {' '.join((here, *more))})", f" (not {here}) {there}{effect}"
 
     def _action(self, name: str, scope: Scope, precondition: str, effect: str) -> str:
-        lines = [f"  (:action {name}"]
-        listed = [f"{v} - {t}" for v, t in scope.items()]
+        lines, parameters = [f"  (:action {name}"], {**scope}
         if self.kind == "agent" and self.random.random() < 0.7:
-            lines.append(f"    :agent {listed.pop(0)}")
+            lines.append(f"    :agent ?r - {parameters.pop('?r')}")
         elif self.kind == "agent":
             lines.append("    :agent ?r")
-        lines.append(f"    :parameters ({' '.join(listed)})")
+        lines.append(f"    :parameters ({_listed(parameters)})")
         if self.kind == "joint":
             lines += self._comments(scope)
-        lines += [f"    :precondition {precondition}", f"    :effect {effect})"]
-        return "\n".join(lines)
+        return "\n".join([*lines, f"    :precondition {precondition}", f"    :effect {effect})"])
 
     def _comments(self, scope: Scope) -> list[str]:
         """The robots' parts.  Mostly all parameters are named, so that the parts determine the
@@ -211,11 +195,8 @@ class _Writer:
             terms = [v for v in scope if pick.random() < 0.8]
             if pick.random() < 0.1:
                 terms.append(self.places[0])
-            part = (
-                "idle"
-                if pick.random() < 0.25
-                else f"({' '.join((pick.choice(('go', 'do')), *terms))})"
-            )
+            idle = pick.random() < 0.25
+            part = "idle" if idle else f"({' '.join((pick.choice(('go', 'do')), *terms))})"
             lines.append(f"    ; subaction {robot} {part}")
         # A missing line means idle; the first robot is always named.
         return [
@@ -225,7 +206,6 @@ class _Writer:
         ]
 
     # -- formulas
-    # --------------------------------------------------------------------------------------------
 
     def _term(self, kind: str, scope: Scope) -> str:
         """Mostly a variable of the type, sometimes a constant or a variable of any type."""
@@ -237,7 +217,7 @@ class _Writer:
             return pick.choice(list(scope))
         return pick.choice(self.robots) if kind == "robot" else self.places[0]
 
-    def _terms(self, types: tuple[str, ...], scope: Scope) -> str:
+    def _terms(self, types: Signature, scope: Scope) -> str:
         return "".join(f" {self._term(t, scope)}" for t in types)
 
     def _literal(self, scope: Scope) -> str:
@@ -254,42 +234,33 @@ class _Writer:
 
     def _formula(self, scope: Scope, depth: int, *, step: bool = True) -> str:
         pick = self.random
-        kind = pick.choice(
-            ("literal", "equal", "step", "and", "or", "not", "imply", "forall", "exists")
-        )
+        kind = pick.choice(_FORMULAS)
         if depth == 0:
             kind = pick.choice(("literal", "literal", "literal", "equal", "step"))
         if kind == "step" and (self.kind == "joint" or not step):
             kind = "literal"
-        inner = depth - 1
+
+        def inner(scope: Scope = scope) -> str:
+            return self._formula(scope, depth - 1, step=step)
+
         match kind:
             case "equal":
                 terms = [*scope, *self.robots, self.places[0]]
                 return f"(= {pick.choice(terms)} {pick.choice(terms)})"
             case "step":
-                return self._step_atom(scope)
+                name = pick.choice(list(self.actions))
+                return f"({name}{self._terms(tuple(self.actions[name].values()), scope)})"
             case "and" | "or":
-                parts = [
-                    self._formula(scope, inner, step=step) for _ in range(pick.choice((1, 2, 2, 3)))
-                ]
+                parts = [inner() for _ in range(pick.choice((1, 2, 2, 3)))]
                 return f"({kind} {' '.join(parts)})"
             case "not":
-                return f"(not {self._formula(scope, inner, step=step)})"
+                return f"(not {inner()})"
             case "imply":
-                return f"(imply {self._formula(scope, inner, step=step)} {self._formula(scope, inner, step=step)})"
+                return f"(imply {inner()} {inner()})"
             case "forall" | "exists":
-                return self._quantified(kind, self._variables(), scope, inner, step=step)
+                own = self._variables()
+                return f"({kind} ({_listed(own)}) {inner({**scope, **own})})"
         return self._literal(scope)
-
-    def _quantified(
-        self, kind: str, variables: Scope, scope: Scope, depth: int, *, step: bool
-    ) -> str:
-        listed = " ".join(f"{v} - {t}" for v, t in variables.items())
-        return f"({kind} ({listed}) {self._formula({**scope, **variables}, depth, step=step)})"
-
-    def _step_atom(self, scope: Scope) -> str:
-        name = self.random.choice(list(self.actions))
-        return f"({name}{self._terms(tuple(self.actions[name].values()), scope)})"
 
     def _about_the_step(self, scope: Scope) -> str:
         """The forms that domains use: nobody does .., somebody else does .., nobody does .. unless
@@ -312,29 +283,24 @@ class _Writer:
         return f"(exists (?o - robot) (and {other}{atom}))"
 
     def _effect(self, scope: Scope, depth: int) -> str:
-        pick = self.random
-        kind = (
-            pick.choice(("literal", "literal", "literal", "when", "forall")) if depth else "literal"
-        )
+        pick, kind = self.random, "literal"
+        if depth:
+            kind = pick.choice(("literal", "literal", "literal", "when", "forall"))
         if kind == "when":
-            about_step = self.kind != "joint" and pick.random() < 0.3
-            condition = (
-                self._about_the_step(scope)
-                if about_step
-                else self._formula(scope, pick.choice((0, 0, 1, 2)))
-            )
+            if self.kind != "joint" and pick.random() < 0.3:
+                condition = self._about_the_step(scope)
+            else:
+                condition = self._formula(scope, pick.choice((0, 0, 1, 2)))
             return f"(when {condition} {self._effect(scope, depth - 1)})"
         if kind == "forall":
-            variables = self._variables()
-            listed = " ".join(f"{v} - {t}" for v, t in variables.items())
-            return f"(forall ({listed}) {self._effect({**scope, **variables}, depth - 1)})"
+            own = self._variables()
+            return f"(forall ({_listed(own)}) {self._effect({**scope, **own}, depth - 1)})"
         name = pick.choice(list(self.fluents))
         atom = f"({name}{self._terms(self.fluents[name], scope)})"
         literal = atom if pick.random() < 0.55 else f"(not {atom})"
         return literal if pick.random() < 0.85 else f"(and {literal} {self._effect(scope, 0)})"
 
     # -- the problem
-    # -----------------------------------------------------------------------------------------
 
     def _problem(self) -> str:
         pick = self.random
@@ -345,23 +311,19 @@ class _Writer:
             for args in product(*(things[t] for t in types))
             if pick.random() < 0.5
         ]
-        names = list(self.fluents)
         goals = []
         for _ in range(pick.choice((1, 2, 2, 3))):
-            name = pick.choice(names)
+            name = pick.choice(list(self.fluents))
             args = [pick.choice(things[t]) for t in self.fluents[name]]
             atom = f"({' '.join((name, *args))})"
             # What already holds makes no goal: mostly ask for a change.
-            now = atom in true
-            wanted = not now if pick.random() < 0.8 else now
+            wanted = (atom in true) != (pick.random() < 0.8)
             goals.append(atom if wanted else f"(not {atom})")
         if pick.random() < 0.2:
             goals.append(self._formula(dict.fromkeys(self.robots, "robot"), 2, step=False))
         rest = " ".join(self.places[1:])
         objects = f"{rest} - {pick.choice(('place', 'place', 'hub'))}" if rest else ""
         return (
-            "(define (problem random-1) (:domain random)\n"
-            f"  (:objects {objects})\n"
-            f"  (:init {' '.join(true)})\n"
-            f"  (:goal (and {' '.join(goals)})))\n"
+            f"(define (problem random-1) (:domain random)\n  (:objects {objects})\n"
+            f"  (:init {' '.join(true)})\n  (:goal (and {' '.join(goals)})))\n"
         )

@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Both plain forms of a joint model have the optimal cost of the joint model."""
+"""The optimal plans of both plain forms stand one to one for the optimal joint plans, and cost as
+much.
+"""
 
 from __future__ import annotations
 
-import heapq
+from contextlib import suppress
 from dataclasses import replace
 
 import pytest
-from hypothesis import event, given, reject, settings
+from hypothesis import event, example, given, reject, settings
 from hypothesis import strategies as st
 
-from planners import classical as plain_module
-from planners.classical import ClassicalTask, compile_classical, to_pddl
+from planners.classical import compile_classical, to_pddl
 from planners.joint.model import JointModel, PlanningTask
 from planners.pddl.model_options import Cost, ModelOptions
 from planners.search.optimal_plans import search
+from planners.search.plans import Plans
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, ProvedImpossible
 from tests.support.classical_models import (
@@ -25,138 +27,169 @@ from tests.support.classical_models import (
     JOINT,
     JOINT_TASK,
     MODELS,
-    PARTNERS,
-    PARTNERS_TASK,
-    TOOL,
-    TOOL_TASK,
     WAYS,
     random_state,
     read,
     written,
 )
-from tests.support.naive_classical import holds, successors
+from tests.support.naive_classical import optimal_plans
 from tests.support.random_pddl import KINDS, Kind, random_model
+from tests.support.random_threes import random_threes
 from tests.support.texts import model_of, parsed
 
-
-def ours(model: JointModel, task: PlanningTask) -> tuple[int, int] | None:
-    try:
-        return search(model, task).cost_of(0)
-    except ProvedImpossible:
-        return None
-
-
-def solved(plain: ClassicalTask) -> tuple[int, int] | None:
-    """The optimal cost of a plain task by Dijkstra's algorithm."""
-    total = dijkstra(plain)
-    if total is None:
-        return None
-    cost = plain.cost(total)
-    assert cost is not None
-    return cost
-
-
-def dijkstra(plain: ClassicalTask) -> int | None:
-    return min(
-        (cost for state, cost in reached(plain).items() if holds(plain.goal, state)), default=None
-    )
-
-
-def reached(plain: ClassicalTask) -> dict[frozenset[int], int]:
-    """The least total cost of every plain state."""
-    best = {plain.init: 0}
-    steps = successors(plain)
-    queue: list[tuple[int, int, frozenset[int]]] = [(0, 0, plain.init)]
-    while queue:
-        cost, _, state = heapq.heappop(queue)
-        if cost > best[state]:
-            continue
-        for _, step, after in steps(state):
-            if cost + step < best.get(after, 10**9):
-                best[after] = cost + step
-                heapq.heappush(queue, (best[after], len(best), after))
-    return best
+#: Two ground actions of joint-action PDDL with the same parts: where both are possible they are one
+#: joint action.
+TWICE = """
+(define (domain twice)
+  (:types lamp)
+  (:constants b - lamp)
+  (:predicates (lit ?l - lamp) (far) (done))
+  (:functions (total-cost) (price ?l - lamp))
+  (:action walk
+    ; subaction r1 (walk)
+    ; subaction r2 idle
+    :parameters (?l - lamp) :precondition (lit ?l) :effect (and (far) (increase (total-cost) (price ?l))))
+  (:action stop
+    ; subaction r1 idle
+    ; subaction r2 (stop)
+    :parameters () :precondition (far) :effect (done))
+  (:action break-b
+    ; subaction r1 (walk)
+    ; subaction r2 (break)
+    :parameters () :precondition () :effect (and (far) (not (lit b)))))
+"""
+TWICE_TASK = """(define (problem p) (:domain twice) (:objects a - lamp)
+  (:init (lit a) (lit b) (= (price a) 2) (= (price b) 1)) (:goal (done)))"""
+#: A goal in disjunctions, several of which hold at the end.
+ANYWAY = """
+(define (domain anyway) (:types robot)
+  (:predicates (done ?r - robot) (warm))
+  (:action work :agent ?r - robot :parameters ()
+    :precondition (or (not (done ?r)) (warm) (exists (?o - robot) (and (not (= ?o ?r)) (not (done ?o)))))
+    :effect (and (done ?r) (when (or (warm) (not (done ?r)) (exists (?o - robot) (done ?o))) (warm)))))
+"""
+ANYWAY_TASK = """(define (problem p) (:domain anyway) (:objects r1 r2 - robot) (:init)
+  (:goal (or (and (done r1) (or (done r2) (warm))) (warm) (and (done r2) (warm)))))"""
+TEXTS = {**MODELS, "twice": (TWICE, TWICE_TASK), "anyway": (ANYWAY, ANYWAY_TASK)}
 
 
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("cost", COSTS)
-@pytest.mark.parametrize("name", MODELS)
-def test_both_forms_have_the_optimal_cost_of_the_joint_model(
-    name: str, cost: Cost, form: str
-) -> None:
-    loaded = read(*MODELS[name], cost)
-    expected = ours(loaded.model, loaded.tasks[0])
-    assert expected is not None
-    plain = compile_classical(loaded.model, loaded.tasks[0], FORMS[form])
-    assert plain.form == form
-    assert solved(plain) == expected
+def every_plan_once(model: JointModel, task: PlanningTask) -> tuple[tuple[int, int] | None, int]:
+    """All forms have the plans of a task, and as cheap ones; their cost, and how many there are."""
+    expected: tuple[tuple[int, int] | None, int] = (None, 0)
+    with suppress(ProvedImpossible):
+        space = search(model, task)
+        expected = (space.cost_of(0), Plans.of(space).count)
+    for form, ways in (("explicit", WAYS[:1]), ("select-then-apply", WAYS)):
+        for way in ways:
+            with written(way):
+                plain = compile_classical(model, task, FORMS[form])
+            found = optimal_plans(plain)
+            cost = None if found.cost is None else plain.cost(found.cost)
+            assert plain.form == form
+            assert (cost, found.count()) == expected, (way, form)
+    return expected
 
 
-def test_the_models_are_not_trivial() -> None:
-    read_all = {name: read(*texts, "makespan+actions") for name, texts in MODELS.items()}
-    assert {name: ours(loaded.model, loaded.tasks[0]) for name, loaded in read_all.items()} == {
-        "tool": (3, 3),
-        "solo": (2, 2),
-        "corridor": (6, 6),
-        "partners": (6, 11),
-        "relay": (2, 3),
-        "blink": (1, 2),
-        "lift": (2, 2),
-        "joint-action": (3, 3),
-        "basin": (1, 3),
-    }
+@pytest.mark.parametrize("cost", [*COSTS, "makespan+cost"])
+@pytest.mark.parametrize("name", TEXTS)
+def test_every_plan_once(name: str, cost: Cost) -> None:
+    loaded = read(*TEXTS[name], cost)
+    found, number = every_plan_once(loaded.model, loaded.tasks[0])
+    if cost == "makespan+actions" and name in MODELS:  # they are not trivial
+        assert (
+            found
+            == {
+                "tool": (3, 3),
+                "solo": (2, 2),
+                "corridor": (6, 6),
+                "partners": (6, 11),
+                "relay": (2, 3),
+                "blink": (1, 2),
+                "lift": (2, 2),
+                "joint-action": (3, 3),
+                "basin": (1, 3),
+            }[name]
+        )
+    if name == "twice" and cost != "makespan+actions":  # one joint action in two guises
+        assert number == (1 if cost == "makespan+cost" else 2)
 
 
-@pytest.mark.parametrize("form", FORMS)
-def test_a_goal_that_is_a_full_state(form: str) -> None:
+@pytest.mark.parametrize(
+    ("goal", "cost"),
+    [
+        ("(or (at r1 a) (at r1 b))", (0, 0)),
+        ("(and (at r1 c) (at r2 c))", None),
+        ("(and (at r1 a) (or (next a d) (at r1 b)) (not (at r1 a)))", None),
+    ],
+)
+def test_goals_that_hold_at_the_start_or_never(goal: str, cost: tuple[int, int] | None) -> None:
+    loaded = read(CORRIDOR, CORRIDOR_TASK.replace("(and (at r1 c) (at r2 a))", goal))
+    assert every_plan_once(loaded.model, loaded.tasks[0])[0] == cost
+
+
+def test_full_states_as_goals_and_remembered_actions() -> None:
+    loaded = model_of(CORRIDOR, CORRIDOR_TASK, ModelOptions(remember_actions=True))
+    plain = compile_classical(loaded.model, loaded.tasks[0], 0)
+    assert plain.cost(optimal_plans(plain).cost or 0) == (6, 0)
     loaded = read(CORRIDOR, CORRIDOR_TASK)
     model, task = loaded.model, loaded.tasks[0]
-    space = search(model, task)
-    last = space.rows[space.state[0]]
-    full = replace(task, goal=model.full_state(last))
-    assert solved(compile_classical(model, full, FORMS[form])) == ours(model, full)
-    back = replace(task, init=last, goal=model.full_state(task.init))
-    assert solved(compile_classical(model, back, FORMS[form])) == ours(model, back)
+    last = search(model, task)
+    row = last.rows[last.state[0]]
+    every_plan_once(model, replace(task, goal=model.full_state(row)))
+    every_plan_once(model, replace(task, init=row, goal=model.full_state(task.init)))
 
 
-@pytest.mark.parametrize("form", FORMS)
-def test_a_goal_that_holds_at_the_start_costs_nothing(form: str) -> None:
-    loaded = read(
-        CORRIDOR, CORRIDOR_TASK.replace("(and (at r1 c) (at r2 a))", "(or (at r1 a) (at r1 b))")
-    )
-    assert solved(compile_classical(loaded.model, loaded.tasks[0], FORMS[form])) == (0, 0)
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 100_000), kind=st.sampled_from(KINDS), cost=st.sampled_from(COSTS))
+def test_every_plan_of_random_models_once(seed: int, kind: Kind, cost: Cost) -> None:
+    text = random_model(seed, kind)
+    try:
+        loaded = read(text.domain, text.problem, cost, text.unowned)
+        space = explore(loaded.model, random_state(loaded, seed)[None, :])
+    except BadInput:  # one label tuple, two results
+        reject()
+    last = space.model.full_state(space.rows[seed % len(space)])
+    task = replace(loaded.tasks[0], init=random_state(loaded, seed), goal=last)
+    event(f"plans: {min(every_plan_once(loaded.model, task)[1], 3)}")
 
 
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize(
-    "goal",
-    ["(and (at r1 c) (at r2 c))", "(and (at r1 a) (or (next a d) (at r1 b)) (not (at r1 a)))"],
-)
-def test_an_unsolvable_task_stays_unsolvable(goal: str, form: str) -> None:
-    loaded = read(CORRIDOR, CORRIDOR_TASK.replace("(and (at r1 c) (at r2 a))", goal))
-    assert ours(loaded.model, loaded.tasks[0]) is None
-    assert solved(compile_classical(loaded.model, loaded.tasks[0], FORMS[form])) is None
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 100_000), cost=st.sampled_from(COSTS))
+@example(seed=82, cost="makespan").via("a third action makes one delete what another adds")
+@example(seed=331, cost="makespan+actions").via("the same, and no plan was left")
+def test_every_plan_once_where_a_third_robot_decides(seed: int, cost: Cost) -> None:
+    text = random_threes(seed)
+    loaded = read(text.domain, text.problem, cost)
+    every_plan_once(loaded.model, loaded.tasks[0])
 
 
-@pytest.mark.parametrize("form", FORMS)
-def test_remembered_actions_change_no_cost(form: str) -> None:
-    loaded = model_of(CORRIDOR, CORRIDOR_TASK, ModelOptions(remember_actions=True))
-    assert solved(compile_classical(loaded.model, loaded.tasks[0], FORMS[form])) == (6, 0)
+def test_what_is_applied_at_once_takes_fewer_states() -> None:
+    """In the corridor all is, in the relay what is handed over is not."""
+    for name in ("corridor", "relay"):
+        loaded = read(*MODELS[name])
+        states = []
+        for way in ("usual", "tidied", "nothing at once"):
+            with written(way):
+                plain = compile_classical(loaded.model, loaded.tasks[0], 0)
+            states.append(len(optimal_plans(plain).edges))
+        assert states == sorted(set(states)), name
 
 
-@pytest.mark.parametrize("form", FORMS)
-def test_without_its_conflicts_a_model_is_cheaper(
-    form: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    loaded = read(TOOL, TOOL_TASK)
-    monkeypatch.setattr(
-        plain_module.selectors, "clashes", lambda actions: (frozenset(),) * len(actions)
-    )
-    assert solved(compile_classical(loaded.model, loaded.tasks[0], FORMS[form])) == (1, 0)
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("name", MODELS)
+def test_what_the_form_says_of_a_step_ends_only_where_it_is_known_true(name: str, way: str) -> None:
+    """Else planners without conditional effects could not read it: "if true, false"."""
+    loaded = read(*MODELS[name])
+    with written(way):
+        plain = compile_classical(loaded.model, loaded.tasks[0], 0)
+    own = set(range(len(loaded.model.codec.facts), len(plain.facts)))
+    for action in plain.actions:
+        true = {fact for fact, positive in action.preconditions if positive}
+        assert own & {*action.deletes} <= true, action.name
 
 
 def test_few_joint_actions_are_written_explicitly_and_many_are_not() -> None:
-    loaded = read(TOOL, TOOL_TASK)
+    loaded = read(*MODELS["tool"])
     plain = compile_classical(loaded.model, loaded.tasks[0], 5)
     assert sorted(action.name for action in plain.actions) == [
         "(release r1) idle",
@@ -168,31 +201,24 @@ def test_few_joint_actions_are_written_explicitly_and_many_are_not() -> None:
     assert compile_classical(loaded.model, loaded.tasks[0], 4).form == "select-then-apply"
 
 
-def test_actions_without_effects_survive() -> None:
-    loaded = read(PARTNERS, PARTNERS_TASK)
-    names = {action.name for action in compile_classical(loaded.model, loaded.tasks[0], 0).actions}
-    assert {"choose r1 (press r1)", "choose r2 (press r2)"} <= names
-
-
 def test_joint_actions_with_one_label_tuple_and_one_meaning_are_written_once() -> None:
     twice = JOINT.replace("(:action first", "(:action again", 1)
     again = twice[twice.index("(:action again") :]
     loaded = read(JOINT.rstrip().removesuffix(")") + again, JOINT_TASK)
     once = read(JOINT, JOINT_TASK)
     assert len(loaded.model.actions) > len(once.model.actions)
-    assert len(compile_classical(loaded.model, loaded.tasks[0]).actions) == len(
-        compile_classical(once.model, once.tasks[0]).actions
-    )
+    written_once = compile_classical(once.model, once.tasks[0]).actions
+    assert len(compile_classical(loaded.model, loaded.tasks[0]).actions) == len(written_once)
 
 
 def test_a_second_cost_that_outgrows_the_step_cost_is_noticed() -> None:
     loaded = read(CORRIDOR, CORRIDOR_TASK, "makespan+actions")
     plain = compile_classical(loaded.model, loaded.tasks[0], 0, longest=2)
-    total = dijkstra(plain)
+    total = optimal_plans(plain).cost
     assert total is not None
     assert plain.cost(total) is None
     enough = compile_classical(loaded.model, loaded.tasks[0], 0, longest=total // plain.step_cost)
-    assert solved(enough) == (6, 6)
+    assert enough.cost(optimal_plans(enough).cost or 0) == (6, 6)
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -203,71 +229,8 @@ def test_the_pddl_says_the_same(name: str, form: str) -> None:
     domain_text, problem_text = to_pddl(plain)
     domain, problem = parsed(domain_text, problem_text)
     assert len(domain.predicates) == len(plain.facts)
-    assert len(domain.schemas) == len(plain.actions)
     assert len(problem.init) == len(plain.init)
-    for action, schema in zip(plain.actions, domain.schemas, strict=True):
-        assert (len(action.adds) + len(action.deletes), action.cost) == (
-            len(schema.effects),
-            schema.cost,
-        )
+    changed = [(len(a.adds) + len(a.deletes), a.cost) for a in plain.actions]
+    assert [(len(schema.effects), schema.cost) for schema in domain.schemas] == changed
     for user_name in (*plain.facts, *(action.name for action in plain.actions)):
         assert f"; {user_name}\n" in domain_text
-
-
-def test_equal_names_after_cleaning_stay_apart() -> None:
-    names = plain_module.task._safe_names(
-        ["(at r_1 a)", "(at r 1_a)", "(at r 1 a)", "and", "9", "(#)"]
-    )
-    assert len(set(names)) == len(names)
-    assert all(name[0].isalpha() for name in names)
-
-
-def distances(model: JointModel, task: PlanningTask) -> dict[frozenset[str], tuple[int, int]]:
-    """The cost of reaching each joint state from the initial one, by the state's true facts."""
-    space = explore(model, task.init[None, :])
-    keys = [frozenset(model.codec.decode(row)) for row in space.rows]
-    costs = {int(space.numbers(task.init[None, :])[0]): (0, 0)}
-    layer = [*costs]
-    while layer:
-        fresh: dict[int, tuple[int, int]] = {}
-        for state in layer:
-            makespan, second = costs[state]
-            for edge in range(space.first[state], space.first[state + 1]):
-                target = int(space.target[edge])
-                cost = (makespan + 1, second + int(space.cost[edge]))
-                if target not in costs:
-                    fresh[target] = min(cost, fresh.get(target, cost))
-        costs |= fresh
-        layer = [*fresh]
-    return {keys[state]: cost for state, cost in costs.items()}
-
-
-def plain_distances(
-    plain: ClassicalTask, facts: int
-) -> dict[frozenset[str], tuple[int, int] | None]:
-    """The same of a plain task; between two steps what is new in it is as at the beginning."""
-    own = set(range(facts, len(plain.facts)))
-    found = {}
-    for state, total in reached(plain).items():
-        if (plain.between is None or plain.between in state) and state & own == plain.init & own:
-            found[frozenset(plain.facts[fact] for fact in state - own)] = plain.cost(total)
-    return found
-
-
-@pytest.mark.thorough
-@settings(max_examples=40, deadline=None, derandomize=True)
-@given(seed=st.integers(0, 100_000), kind=st.sampled_from(KINDS), cost=st.sampled_from(COSTS))
-def test_every_state_of_random_models_costs_the_same(seed: int, kind: Kind, cost: Cost) -> None:
-    text = random_model(seed, kind)
-    try:
-        loaded = read(text.domain, text.problem, cost, text.unowned)
-        task = replace(loaded.tasks[0], init=random_state(loaded, seed))
-        expected = distances(loaded.model, task)
-    except BadInput:  # one label tuple, two results
-        reject()
-    event(f"{kind}: farthest state {max(expected.values())[0]}")
-    for form, way in (("explicit", "usual"), *(("select-then-apply", way) for way in WAYS)):
-        with written(way):
-            plain = compile_classical(loaded.model, task, FORMS[form])
-        assert plain.form == form
-        assert plain_distances(plain, len(loaded.model.codec.facts)) == expected, way

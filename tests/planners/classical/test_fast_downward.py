@@ -24,7 +24,7 @@ from planners.pddl.model_options import Cost
 from planners.search.optimal_plans import search
 from planners.system.errors import OutOfMemory, OutOfTime
 from planners.system.limits import time_limit
-from tests.support.classical_models import CORRIDOR, CORRIDOR_TASK, FORMS, MODELS, read
+from tests.support.classical_models import FORMS, MODELS, read
 from tests.support.domains import ROOT
 from tests.support.processes import until
 
@@ -117,20 +117,6 @@ def test_a_wrong_model_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
         plain_module.selectors, "clashes", lambda actions: (frozenset(),) * len(actions)
     )
     assert optimal_cost(loaded.model, loaded.tasks[0], limit=0).cost == (1, 0)
-
-
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize(
-    ("goal", "cost"),
-    [("(and (at r1 c) (at r2 c))", None), ("(or (at r1 a) (at r1 b))", (0, 0))],
-    ids=["unsolvable", "at the start"],
-)
-def test_goals_that_are_not_or_at_once_reached(
-    goal: str, cost: tuple[int, int] | None, form: str
-) -> None:
-    text = CORRIDOR_TASK.replace("(and (at r1 c) (at r2 a))", goal)
-    loaded = read(CORRIDOR, text, "makespan+actions")
-    assert optimal_cost(loaded.model, loaded.tasks[0], limit=FORMS[form]).cost == cost
 
 
 def test_a_step_cost_that_was_too_small_is_raised() -> None:

@@ -1,26 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Quantifiers that look up static facts give the formulas that trying every object gives, in the
-same order.
+"""Quantifiers that look up facts and possible subactions: the joint steps are those that trying
+every object gives, and few instances are tried.
 """
 
 from __future__ import annotations
-
-from collections.abc import Sequence
-from dataclasses import replace
 
 import pytest
 
 import planners.grounding.bindings
 from planners.grounding import ground_actions
-from planners.grounding.actions import GroundAction
-from planners.grounding.bindings import Bindings
-from planners.grounding.instantiate import _Grounder
 from planners.pddl.formula_tree import literals
-from planners.pddl.lifted import FALSE, Formula, StepAtom
-from planners.pddl.model_options import ModelOptions, Unowned
+from planners.pddl.model_options import ModelOptions
 from planners.pddl.robots import find_team
-from tests.support.naive_grounding import NaiveGrounding, without_impossible
-from tests.support.random_pddl import random_model
+from planners.system.limits import time_limit
+from tests.support.joint_twin import check_model
+from tests.support.random_pddl import RandomModel
 from tests.support.texts import model_of, parsed
 
 DOMAIN = """(define (domain halls) (:types robot place - thing hall - place)
@@ -33,7 +27,7 @@ PROBLEM = """(define (problem p) (:domain halls) (:objects r1 r2 - robot p10 p2 
   (:init (at r1 p1) (at r2 home) (way p1 p2) (way p2 p1) (way p2 p10) (way p1 home) (way home h) (way p1 r2) (way p2 p2)
          (way r1 p1) (way p10) (way home) (loop p1 p1 p2) (loop p1 p1 p1) (loop h home h))
   (:goal (lit home)))"""
-
+#: As the domain has it, and where robots act anywhere from where there is a way home.
 CONDITIONS = [
     "(exists (?x - place) (and (way ?p ?x) (lit ?x)))",
     "(exists (?x) (and (lit ?x) (way ?x ?p)))",
@@ -60,53 +54,6 @@ CONDITIONS = [
     "(forall (?o - robot ?x - place) (or (= ?o ?r) (not (way ?x ?p)) (not (act ?o ?x))))",
     "(exists (?o - robot ?x - place) (and (not (= ?o ?r)) (way ?p ?x) (act ?o ?x)))",
     "(exists (?x) (and (at ?r ?p) (way home ?x) (not (= ?x home))))",
-]
-
-
-def grounded(domain: str, problem: str, unowned: Unowned = "error") -> tuple[GroundAction, ...]:
-    lifted, read = parsed(domain, problem)
-    return ground_actions(lifted, read, find_team(lifted, read, ModelOptions(unowned=unowned)))
-
-
-def both(
-    domain: str, problem: str, unowned: Unowned = "error"
-) -> tuple[tuple[GroundAction, ...], tuple[GroundAction, ...]]:
-    """The ground actions, and the same ones with preconditions and effects by definition."""
-    lifted, read = parsed(domain, problem)
-    team = find_team(lifted, read, ModelOptions(unowned=unowned))
-    twin = NaiveGrounding(lifted, read, team)
-    schemas = {schema.name: schema for schema in lifted.schemas}
-    fast = ground_actions(lifted, read, team)
-    return fast, tuple(
-        replace(
-            action,
-            precondition=twin.precondition(schemas[action.schema], action.args),
-            effects=twin.effects(schemas[action.schema], action.args),
-        )
-        for action in fast
-    )
-
-
-@pytest.mark.parametrize("condition", CONDITIONS)
-def test_the_same_formulas_by_hand(condition: str) -> None:
-    fast, slow = both(DOMAIN.format(condition=condition), PROBLEM)
-    assert fast == slow
-
-
-def test_random_models() -> None:
-    for seed in range(25):
-        text = random_model(seed, ("agent", "plain")[seed % 2])
-        fast, slow = both(text.domain, text.problem, text.unowned)
-        assert fast == slow
-
-
-def test_actions_share_their_atoms() -> None:
-    text = DOMAIN.format(condition="(not (lit ?p)) (or (lit home) (exists (?x) (lit ?x)))")
-    leaves = [leaf for a in grounded(text, PROBLEM) for leaf, _ in literals(a.precondition)]
-    assert len({*map(id, leaves)}) == len({*leaves}) < len(leaves)
-
-
-STEP_CONDITIONS = [
     "(forall (?o - robot ?x - place) (not (act ?o ?x)))",
     "(forall (?x - place) (not (act ?r ?x)))",
     "(forall (?o - robot ?x) (or (= ?o ?r) (not (way ?p ?x)) (not (act ?o ?x))))",
@@ -119,66 +66,54 @@ STEP_CONDITIONS = [
 ]
 
 
-@pytest.mark.parametrize("condition", STEP_CONDITIONS)
-def test_only_possible_subactions_are_tried_where_there_are_many(
+def anywhere(condition: str) -> str:
+    """The domain in which robots act anywhere from where there is a way home."""
+    return DOMAIN.format(condition=f"(way ?p home) {condition}").replace("(at ?r ?p)", "")
+
+
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_the_same_joint_steps_as_by_definition(
     condition: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # Not every subaction is possible: from some places there is no way.
-    domain = DOMAIN.format(condition=f"(way ?p home) {condition}").replace("(at ?r ?p)", "")
-    _, slow = both(domain, PROBLEM)
+    """Also where there are many subactions, of which only the possible ones are tried."""
+    met: list[str] = []
+    check_model(RandomModel(DOMAIN.format(condition=condition), PROBLEM), met.append)
+    check_model(RandomModel(anywhere(condition), PROBLEM), met.append)
     monkeypatch.setattr(planners.grounding.bindings, "_MANY", 0)
-    fast, _ = both(domain, PROBLEM)
-    possible = frozenset(StepAtom(action.schema, action.args) for action in slow)
-
-    def simplified(actions: Sequence[GroundAction]) -> dict[str, Formula]:
-        found = {a.label: without_impossible(a.precondition, possible) for a in actions}
-        return {label: formula for label, formula in found.items() if formula != FALSE}
-
-    assert simplified(fast) == simplified(slow)
-    assert [a.label for a in fast] == [a.label for a in slow if a.label in simplified(fast)]
-    assert [a.effects for a in fast] == [a.effects for a in slow if a.label in simplified(fast)]
+    check_model(RandomModel(anywhere(condition), PROBLEM), met.append)
+    assert "too large" not in met
 
 
-def test_what_is_possible_is_looked_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of 9,000 subactions that a precondition forbids, the few that can be done are looked at."""
-    asked: list[str] = []
-    original = _Grounder._step_atom
+def test_conditions_with_constants_repeated_variables_and_more_types() -> None:
+    domain = """(define (domain d) (:types robot place - thing) (:constants hub - place)
+        (:predicates (at ?x - thing ?y - place) (way ?a ?b ?c) (seen ?a ?b) (lit))
+        (:action go :agent ?r - robot :parameters (?x - (either robot place) ?p - place ?q)
+         :precondition (and (and (at ?r ?p) (way ?p ?x ?p)) (way hub ?q ?q) (not (lit)))
+         :effect (and (forall (?z - place) (when (and (seen ?z ?z) (lit)) (at ?r ?z)))
+                      (lit) (seen ?q ?x) (not (at ?r ?p)))))"""
+    problem = """(define (problem p) (:domain d) (:objects r1 r2 - robot a b - place)
+        (:init (at r1 a) (at r2 b) (way a b a) (way a r2 a) (way b a a) (way hub b b) (way hub r1 r1)
+               (seen a a) (seen hub b)) (:goal (lit)))"""
+    labels = {action.label for action in model_of(domain, problem).model.actions}
+    assert labels == {f"(go r1 {x} a {q})" for x in ("b", "r2") for q in ("b", "r1")}
 
-    def counting(self: _Grounder, name: str, *rest: object) -> object:
-        asked.append(name)
-        return original(self, name, *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(_Grounder, "_step_atom", counting)
+def test_few_instances_are_tried() -> None:
+    """Of 9,000 subactions that a precondition forbids those that can be done; of 3,000 places those
+    to which there is a way.  Looking at all takes minutes.
+    """
     places = " ".join(f"q{n}" for n in range(3000))
     problem = PROBLEM.replace("p1 - place", f"p1 {places} - place")
-    domain = DOMAIN.format(
-        condition="(way ?p home) (forall (?o - robot ?x - place) (not (act ?o ?x)))"
-    ).replace("(at ?r ?p)", "")
-    actions = grounded(domain, problem)
-    assert actions
-    assert 0 < asked.count("act") < 100
+    forbidding = anywhere("(forall (?o - robot ?x - place) (not (act ?o ?x)))")
+    nested = "(forall (?x ?y - place) (or (not (way ?p ?x)) (not (way ?x ?y)) (lit ?y)))"
+    with time_limit(30):
+        for domain in (forbidding, DOMAIN.format(condition=nested)):
+            assert {a.label for a in model_of(domain, problem).model.actions} >= {"(act r1 p1)"}
 
 
-def test_the_facts_are_looked_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Few instances are tried: one for each way, not one for each object."""
-    tried = 0
-    original = _Grounder._state_literal
-
-    def counting(self: _Grounder, *arguments: object) -> object:
-        nonlocal tried
-        tried += 1
-        return original(self, *arguments)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(_Grounder, "_state_literal", counting)
-    places = " ".join(f"q{n}" for n in range(200))
-    problem = PROBLEM.replace("p1 - place", f"p1 {places} - place")
-    grounded(DOMAIN.format(condition=CONDITIONS[0]), problem)
-    few, tried = tried, 0
-    monkeypatch.setattr(Bindings, "_known", lambda *_: ())
-    grounded(DOMAIN.format(condition=CONDITIONS[0]), problem)
-    assert 20 * few < tried
-
-
-def test_it_is_used_by_the_model() -> None:
-    loaded = model_of(DOMAIN.format(condition=CONDITIONS[0]), PROBLEM)
-    assert {a.label for a in loaded.model.actions} >= {"(act r1 p1)"}
+def test_actions_share_their_atoms() -> None:
+    text = DOMAIN.format(condition="(not (lit ?p)) (or (lit home) (exists (?x) (lit ?x)))")
+    lifted, read = parsed(text, PROBLEM)
+    actions = ground_actions(lifted, read, find_team(lifted, read, ModelOptions()))
+    leaves = [leaf for action in actions for leaf, _ in literals(action.precondition)]
+    assert len({*map(id, leaves)}) == len({*leaves}) < len(leaves)

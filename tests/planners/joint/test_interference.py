@@ -11,9 +11,8 @@ from planners.check.rules import Rules
 from planners.check.validate import validate
 from planners.classical import compile_classical
 from planners.classical.selectors import clashes
-from planners.joint.interference import conflict, footprint
+from planners.joint.interference import conflict
 from planners.loading import PlanningInstance
-from planners.pddl.lifted import StepAtom
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from planners.system.errors import ProvedImpossible
@@ -108,20 +107,6 @@ def test_an_effect_that_needs_a_third_robot_counts_for_no_pair_without_it() -> N
     assert search(loaded.model, loaded.tasks[0]).cost_of(0) == (1, 0)
 
 
-def test_random_models_have_pairs_that_this_rule_allows() -> None:
-    """The comparisons of random models with the twin say something of the rule."""
-    changed = 0
-    for seed in range(60):
-        actions = built(random_model(seed, "agent")).model.actions
-        for a in actions:
-            for b in actions:
-                pair = frozenset(StepAtom(x.schema, x.args) for x in (a, b))
-                changed += not set(a.owners) & set(b.owners) and (
-                    footprint(a, pair) != footprint(a)
-                )
-    assert changed >= 20
-
-
 def test_tables_of_random_models_are_the_rule_for_each_pair() -> None:
     """All labels of all pairs of robots, shared subactions and idling included."""
     seen = dict.fromkeys(((shared, allowed) for shared in (0, 1) for allowed in (False, True)), 0)
@@ -156,15 +141,3 @@ def test_an_unreachable_goal_comes_with_the_interference_met_most_often() -> Non
         "deleted anything.\n  Of pairs of actions that cannot share a step, the one met most "
         "often (1 of 1 states looked at): (lift r1) deletes (level), which (lift r2) needs."
     )
-
-
-@pytest.mark.parametrize("static", [True, False])
-def test_an_action_whose_effects_vanish_is_no_idling(static: bool) -> None:
-    loaded = model_of(
-        """(define (domain d) (:types robot) (:predicates (way) (there ?r - robot) (done))
-        (:action look :agent ?r - robot :parameters () :effect (when (way) (there ?r)))
-        (:action work :agent ?r - robot :parameters () :effect (done)))""",
-        "(define (problem p) (:domain d) (:objects r1 r2 - robot) "
-        f"(:init {'(way)' if static else ''}) (:goal (done)))",
-    )
-    assert {action.schema for action in loaded.model.actions} == {"look", "work"}

@@ -59,7 +59,6 @@ def test_same_joint_steps_where_a_third_robot_decides(number: int) -> None:
 
 
 # -- by hand: rules that random models meet rarely
-# ---------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -89,7 +88,6 @@ def test_formulas_about_the_joint_step(effect: str) -> None:
 
 
 # -- by hand: which actions are idling
-# ---------------------------------------------------------------------------
 
 _ROOMS = """(define (domain rooms) (:types robot place) (:predicates (at ?r - robot ?p - place) (ok ?r - robot))
   (:action move :agent ?r - robot :parameters (?from ?to - place) :precondition (at ?r ?from)

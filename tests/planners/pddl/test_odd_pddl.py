@@ -10,7 +10,6 @@ way.
 from __future__ import annotations
 
 from contextlib import nullcontext
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
@@ -32,418 +31,331 @@ PROBLEM = """(define (problem two) (:domain hall)
   (:init (at r1 a) (at r2 b) (door a b) (door b a) (door b c) (door c b))
   (:goal (and (at r1 c) (at r2 a))))
 """
-GOAL = "(and (at r1 c) (at r2 a))"
+DOORS = "(door a b) (door b a) (door b c) (door c b)"
+PREDICATE = "(door ?x ?y - room)"
 AGENT = ":agent ?r - robot :parameters (?x ?y - room)"
 OBJECTS = "r1 r2 - robot a b c - room"
 EFFECT = "(and (at ?r ?y) (not (at ?r ?x)))"
+#: A case: the number of optimal plans, or the exit code and a piece of the message; the domain, the
+#: problem, options.
+Case = tuple[int | tuple[int, str], str, str, tuple[str, ...]]
 
 
-def change(text: str, *pairs: tuple[str, str]) -> str:
-    for old, new in pairs:
+def case(
+    expected: int | tuple[int, str],
+    domain: str = DOMAIN,
+    problem: str = PROBLEM,
+    options: str = "",
+) -> Case:
+    return expected, domain, problem, tuple(options.split())
+
+
+def change(text: str, *words: str) -> str:
+    """Each word with the one after it in its place."""
+    for old, new in zip(words[::2], words[1::2], strict=True):
         assert old in text, old
         text = text.replace(old, new)
     return text
 
 
-def domain(*pairs: tuple[str, str]) -> str:
-    return change(DOMAIN, *pairs)
+def d(*words: str) -> str:
+    return change(DOMAIN, *words)
 
 
-def problem(*pairs: tuple[str, str]) -> str:
-    return change(PROBLEM, *pairs)
+def p(*words: str) -> str:
+    return change(PROBLEM, *words)
+
+
+def where(condition: str, *words: str) -> str:
+    """The domain with one more conjunct in the precondition."""
+    return d("(door ?x ?y))\n", f"(door ?x ?y) {condition})\n", *words)
 
 
 def with_action(action: str, text: str = DOMAIN) -> str:
     return text.rstrip()[:-1] + f"(:action {action}))"
 
 
-def where(condition: str) -> str:
-    """The domain with one more conjunct in the precondition."""
-    return domain(("(door ?x ?y))\n", f"(door ?x ?y) {condition})\n"))
+def goal(formula: str, *words: str) -> str:
+    return p("(and (at r1 c) (at r2 a))", formula, *words)
 
 
-def goal(formula: str) -> str:
-    return problem((GOAL, formula))
-
-
-@dataclass(frozen=True)
-class Case:
-    """``expected``: the number of optimal plans, or the exit code and a piece of the message."""
-
-    expected: int | tuple[int, str]
-    domain: str = DOMAIN
-    problem: str = PROBLEM
-    options: tuple[str, ...] = field(default=())
-
-
-ENVIRONMENT = ("--unowned", "environment")
-PLAIN = domain((AGENT, ":parameters (?r - robot ?x ?y - room)"))
-BELL = with_action(
-    "ring :parameters () :effect (rung)",
-    domain(("(door ?x ?y - room)", "(door ?x ?y - room) (rung)")),
-)
+PLAIN = d(AGENT, ":parameters (?r - robot ?x ?y - room)")
+BELL = with_action("ring :parameters () :effect (rung)", d(PREDICATE, f"{PREDICATE} (rung)"))
+RUNG = goal("(rung)")
 UNTYPED = """(define (domain hall) (:predicates (robot ?r) (at ?r ?x) (door ?x ?y))
   (:action go :agent ?r :parameters (?x ?y)
     :precondition (and (robot ?r) (at ?r ?x) (door ?x ?y)) :effect (and (at ?r ?y) (not (at ?r ?x)))))"""
-UNTYPED_PROBLEM = problem((OBJECTS, "r1 r2 a b c"), ("(:init", "(:init (robot r1) (robot r2)"))
-COSTLY = domain(
-    (
-        "(door ?x ?y - room))",
-        "(door ?x ?y - room)) (:functions (total-cost) - number (far ?x ?y - room) - number)",
+COSTLY = d(
+    *(
+        f"{PREDICATE})",
+        f"{PREDICATE}) (:functions (total-cost) - number (far ?x ?y - room) - number)",
     ),
-    (EFFECT, "(and (at ?r ?y) (not (at ?r ?x)) (increase (total-cost) (far ?x ?y)))"),
+    *(EFFECT, "(and (at ?r ?y) (not (at ?r ?x)) (increase (total-cost) (far ?x ?y)))"),
 )
 VALUES = "(= (far a b) 3) (= (far b a) 1) (= (far b c) 1) (= (far c b) 1)"
-COSTLY_PROBLEM = problem(("(:init", f"(:init (= (total-cost) 0) {VALUES}"))
+PRICED = p("(:init", f"(:init (= (total-cost) 0) {VALUES}")
+COST = "--cost makespan+cost"
 MOBILE = with_action(
-    "fly :agent ?d - drone :parameters (?x ?y - room) :precondition (and (at ?d ?x) (not (= ?x ?y))) :effect "
-    "(and (at ?d ?y) (not (at ?d ?x)))",
-    domain(
-        ("(:types robot room)", "(:types robot drone - mobile mobile room - object)"),
-        ("(at ?r - robot ", "(at ?r - mobile "),
+    "fly :agent ?d - drone :parameters (?x ?y - room) :precondition (and (at ?d ?x) (not (= ?x ?y)))"
+    " :effect (and (at ?d ?y) (not (at ?d ?x)))",
+    d(
+        *("(:types robot room)", "(:types robot drone - mobile mobile room - object)"),
+        *("(at ?r - robot ", "(at ?r - mobile "),
     ),
 )
 MEET = with_action(
-    "meet :parameters (?p ?q - robot ?x - room) :precondition (and (at ?p ?x) (at ?q ?x) (not (= ?p ?q))) "
-    ":effect (met ?p ?q)",
-    change(PLAIN, ("(door ?x ?y - room)", "(door ?x ?y - room) (met ?p ?q - robot)")),
+    "meet :parameters (?p ?q - robot ?x - room) :precondition (and (at ?p ?x) (at ?q ?x) "
+    "(not (= ?p ?q))) :effect (met ?p ?q)",
+    change(PLAIN, PREDICATE, f"{PREDICATE} (met ?p ?q - robot)"),
 )
+THREE = p(
+    "r1 r2 -", "r1 r2 r3 -", "(at r2 b)", "(at r2 b) (at r3 b)", "(at r2 a)", "(at r2 a) (at r3 a)"
+)
+LONG = "9" * 400
+HUGE = f"{9 * 10**18}"
 
-CASES = {
-    "as it is": Case(2),
+CASES: dict[str, Case] = {
+    "as it is": case(2),
     # who acts
-    "no agent": Case(2, PLAIN),
-    "agent inside the parameters": Case(
-        2, domain((AGENT, ":parameters (:agent ?r - robot ?x ?y - room)"))
+    "no agent": case(2, PLAIN),
+    "agent inside the parameters": case(
+        2, d(AGENT, ":parameters (:agent ?r - robot ?x ?y - room)")
     ),
-    "agent at the end of the parameters": Case(
-        2, domain((AGENT, ":parameters (?x ?y - room :agent ?r - robot)"))
+    "agent at their end": case(2, d(AGENT, ":parameters (?x ?y - room :agent ?r - robot)")),
+    "agent again in them": case(2, d(AGENT, ":agent ?r :parameters (?r - robot ?x ?y - room)")),
+    "agent in parentheses": case(2, d(":agent ?r - robot", ":agent (?r - robot)")),
+    "agent behind them": case(2, d(AGENT, ":parameters (?x ?y - room) :agent ?r - robot")),
+    "untyped agent": case(
+        2, UNTYPED, p(OBJECTS, "r1 r2 a b c", "(:init", "(:init (robot r1) (robot r2)")
     ),
-    "agent again in the parameters": Case(
-        2, domain((AGENT, ":agent ?r :parameters (?r - robot ?x ?y - room)"))
+    "untyped agent before typed parameters": case(2, d(":agent ?r - robot", ":agent ?r")),
+    "two variables behind :agent": case(
+        (31, "d.pddl:5"), d(":agent ?r - robot", ":agent ?r ?q - robot")
     ),
-    "agent in parentheses": Case(2, domain((":agent ?r - robot", ":agent (?r - robot)"))),
-    "agent behind the parameters": Case(
-        2, domain((AGENT, ":parameters (?x ?y - room) :agent ?r - robot"))
+    "several types of agents": case(3, MOBILE, p(OBJECTS, "r1 - robot r2 - drone a b c - room")),
+    "--robots in upper case": case(2, PLAIN, PROBLEM, "--robots R1,R2"),
+    "--robots without a name": case((2, "--robots"), options="--robots ,"),
+    "a shared action": case(2, MEET, goal("(met r1 r2)")),
+    "one robot": case(1, DOMAIN, p("r1 r2 -", "r1 -", "(at r2 b)", "", "(at r2 a)", "")),
+    "three robots": case(4, DOMAIN, THREE),
+    "nobody's action": case((31, "d.pddl:7:47: action (ring) names no robot"), BELL),
+    "of the environment": case(6, BELL, RUNG, "--unowned environment"),
+    "of it, fewest actions": case(1, BELL, RUNG, "--unowned environment --cost makespan+actions"),
+    "of all together": case(1, BELL, RUNG, "--unowned shared"),
+    "--robot-type of others": case((2, "--robot-type"), options="--robot-type room"),
+    "--robot-type that is nothing": case((2, "--robot-type"), options="--robot-type nonsense"),
+    "a robot called environment": case(
+        (2, "environment"), BELL, change(RUNG, "r1", "environment"), "--unowned environment"
     ),
-    "untyped agent": Case(2, UNTYPED, UNTYPED_PROBLEM),
-    "several types of agents": Case(
-        3, MOBILE, problem((OBJECTS, "r1 - robot r2 - drone a b c - room"))
-    ),
-    "--robots in upper case": Case(2, PLAIN, options=("--robots", "R1,R2")),
-    "a shared action": Case(2, MEET, goal("(met r1 r2)")),
-    "one robot": Case(
-        1, problem=problem(("r1 r2 -", "r1 -"), ("(at r2 b)", ""), ("(at r2 a)", ""))
-    ),
-    "three robots": Case(
-        4,
-        problem=problem(
-            ("r1 r2 -", "r1 r2 r3 -"),
-            ("(at r2 b)", "(at r2 b) (at r3 b)"),
-            ("(at r2 a)", "(at r2 a) (at r3 a)"),
-        ),
-    ),
-    "nobody's action": Case((31, "d.pddl:7:47: action (ring) names no robot"), BELL),
-    "nobody's action, environment": Case(6, BELL, goal("(rung)"), ENVIRONMENT),
-    "nobody's action, fewest actions": Case(
-        1, BELL, goal("(rung)"), (*ENVIRONMENT, "--cost", "makespan+actions")
-    ),
-    "nobody's action, shared": Case(1, BELL, goal("(rung)"), ("--unowned", "shared")),
-    "--robot-type of others than the agents": Case(
-        (2, "--robot-type"), options=("--robot-type", "room")
-    ),
-    "--robot-type that is nothing": Case((2, "--robot-type"), options=("--robot-type", "nonsense")),
-    "a robot called environment": Case(
-        (2, "environment"), BELL, change(goal("(rung)"), ("r1", "environment")), ENVIRONMENT
+    "types robot and agent": case(
+        (31, "Several types"),
+        change(PLAIN, "robot room)", "robot room agent)"),
+        p("a b c - room", "a b c - room x - agent"),
     ),
     # types and objects
-    "supertypes forward and undeclared": Case(
-        2, domain(("(:types robot room)", "(:types robot - mobile mobile - thing room - place)"))
+    "supertypes forward and undeclared": case(
+        2, d("(:types robot room)", "(:types robot - mobile mobile - thing room - place)")
     ),
-    "two parents": Case(
-        2, domain(("(:types robot room)", "(:types robot - m robot - n room m n - object)"))
+    "two parents": case(2, d("robot room)", "robot - m robot - n room m n - object)")),
+    "either parents": case(2, d("robot room)", "robot - (either m n) room m n)")),
+    "object among the types": case(2, d("robot room)", "object - thing robot room - object)")),
+    "either in a parameter": case(
+        2, d(AGENT, ":agent ?r - robot :parameters (?x ?y - (either room robot))")
     ),
-    "either parents": Case(
-        2, domain(("(:types robot room)", "(:types robot - (either m n) room m n)"))
+    "an object of either type": case(2, DOMAIN, p("c - room", "c - (either room robot)")),
+    "a parameter of type object": case(
+        2, d(AGENT, ":agent ?r - robot :parameters (?x ?y - object)")
     ),
-    "object among the types": Case(
-        2, domain(("(:types robot room)", "(:types object - thing robot room - object)"))
+    "a cycle": case(
+        (31, "d.pddl:3:11: the types form a cycle"), d("robot room)", "robot - room room - robot)")
     ),
-    "either in a parameter": Case(
-        2, domain(("?x ?y - room)\n    :pre", "?x ?y - (either room robot))\n    :pre"))
+    "constants before the predicates": case(
+        2, d("(:pred", "(:constants a - room) (:pred"), p("a b c", "b c")
     ),
-    "an object of either type": Case(
-        2, problem=problem(("a b c - room", "a b c - (either room robot)"))
+    "constants at the end": case(
+        2, DOMAIN.rstrip()[:-1] + "(:constants a - room))", p("a b c", "b c")
     ),
-    "a parameter of type object": Case(
-        2, domain(("?x ?y - room)\n    :pre", "?x ?y - object)\n    :pre"))
+    "a constant is an object again": case(
+        2, d("(:pred", "(:constants a - room) (:pred"), p(OBJECTS, "r1 r2 - robot b c - room a")
     ),
-    "a cycle": Case(
-        (31, "d.pddl:3:11: the types form a cycle"),
-        domain(("robot room)", "robot - room room - robot)")),
+    "constants only": case(
+        2, d("(:pred", f"(:constants {OBJECTS}) (:pred"), p(f"(:objects {OBJECTS})", "")
     ),
-    "constants before the predicates": Case(
-        2, domain(("(:pred", "(:constants a - room) (:pred")), problem(("a b c", "b c"))
+    "no space before variables": case(
+        2, d("(at ?r - robot ?x", "(at?r - robot?x", "(door ?x ?y))", "(door?x?y))")
     ),
-    "constants at the end": Case(
-        2, DOMAIN.rstrip()[:-1] + "(:constants a - room))", problem(("a b c", "b c"))
-    ),
-    "a constant is an object again": Case(
+    "private predicates": case(
         2,
-        domain(("(:pred", "(:constants a - room) (:pred")),
-        problem((OBJECTS, "r1 r2 - robot b c - room a")),
+        d("(:predicates (at", "(:predicates (:private ?r - robot (at", "?x - room)", "?x - room))"),
     ),
-    "constants only": Case(
-        2,
-        domain(("(:pred", f"(:constants {OBJECTS}) (:pred")),
-        problem((f"(:objects {OBJECTS})", "")),
-    ),
-    "no space before variables": Case(
-        2, domain(("(at ?r - robot ?x", "(at?r - robot?x"), ("(door ?x ?y))", "(door?x?y))"))
-    ),
-    "private predicates": Case(
-        2,
-        domain(
-            (
-                "(:predicates (at ?r - robot ?x - room)",
-                "(:predicates (:private ?r - robot (at ?r - robot ?x - room))",
-            )
-        ),
-    ),
-    "private objects": Case(
-        2, problem=problem((OBJECTS, "r2 - robot a b c - room (:private r1 - robot)"))
-    ),
+    "private objects": case(2, DOMAIN, p(OBJECTS, "r2 - robot a b c - room (:private r1 - robot)")),
     # sections
-    "no requirements": Case(2, domain(("(:requirements :typing)", ""))),
-    "requirements of others": Case(
-        2, domain((":typing", ":typing :foo :durative-actions :numeric-fluents"))
+    "no requirements": case(2, d("(:requirements :typing)", "")),
+    "requirements of others": case(
+        2, d(":typing", ":typing :foo :durative-actions :numeric-fluents")
     ),
-    "all sections of a problem": Case(
+    "all sections of a problem": case(
         2,
-        problem=problem(
-            (
-                "(:objects",
-                "(:requirements :typing) (:metric minimize (total-cost)) (:length (:serial 5)) (:objects",
-            )
+        DOMAIN,
+        p(
+            "(:objects",
+            "(:requirements :typing) (:metric minimize (total-cost)) (:length (:serial 5)) (:objects",
         ),
     ),
-    "two object sections": Case(
-        2, problem=problem((OBJECTS, "r1 r2 - robot) (:objects a b c - room"))
-    ),
-    "no initial state": Case(
+    "two object sections": case(2, DOMAIN, p(OBJECTS, "r1 r2 - robot) (:objects a b c - room")),
+    "no initial state": case(
         (11, "task two: the goal cannot be reached"),
-        problem=problem(
-            ("(:init (at r1 a) (at r2 b) (door a b) (door b a) (door b c) (door c b))", "")
-        ),
+        DOMAIN,
+        p(f"(:init (at r1 a) (at r2 b) {DOORS})", ""),
     ),
-    "init with and, not": Case(
+    "init with and, not": case(
         2,
-        problem=problem(
-            (
-                "(:init (at r1 a) (at r2 b)",
-                "(:init (and (at r1 a) (at r2 b)) (not (at r1 b)) (at r1 a)",
-            )
+        DOMAIN,
+        p(
+            "(:init (at r1 a) (at r2 b)",
+            "(:init (and (at r1 a) (at r2 b)) (not (at r1 b)) (at r1 a)",
         ),
     ),
     # preconditions and effects that are not there
-    "an empty action": Case(2, with_action("wait :agent ?r - robot")),
-    "empty parentheses": Case(
+    "an empty action": case(2, with_action("wait :agent ?r - robot")),
+    "empty parentheses": case(
         2, with_action("wait :agent ?r - robot :parameters () :precondition () :effect ()")
     ),
-    "keywords alone": Case(
+    "keywords alone": case(
         2, with_action("wait :agent ?r - robot :parameters () :precondition :effect")
     ),
     # formulas
-    "an empty goal": Case(1, problem=goal("()")),
-    "a goal without conjuncts": Case(1, problem=goal("(and)")),
-    "a goal that holds already": Case(1, problem=goal("(and (at r1 a) (at r2 b))")),
-    "a negative goal": Case(3, problem=goal("(not (at r1 a))")),
-    "imply in the goal": Case(3, problem=goal("(imply (at r1 a) (at r1 b))")),
-    "or in the goal": Case(4, problem=goal("(or (at r1 b) (at r2 c))")),
-    "shadowing in the goal": Case(
-        1, problem=goal("(exists (?x - room) (and (at r1 ?x) (exists (?x - room) (at r2 ?x))))")
+    "an empty goal": case(1, DOMAIN, goal("()")),
+    "a goal without conjuncts": case(1, DOMAIN, goal("(and)")),
+    "a goal that holds already": case(1, DOMAIN, goal("(and (at r1 a) (at r2 b))")),
+    "a negative goal": case(3, DOMAIN, goal("(not (at r1 a))")),
+    "imply in the goal": case(3, DOMAIN, goal("(imply (at r1 a) (at r1 b))")),
+    "or in the goal": case(4, DOMAIN, goal("(or (at r1 b) (at r2 c))")),
+    "shadowing in the goal": case(
+        1, DOMAIN, goal("(exists (?x - room) (and (at r1 ?x) (exists (?x - room) (at r2 ?x))))")
     ),
-    "a goal that no action changes": Case((11, "cannot be reached"), problem=goal("(door a c)")),
-    "an action in the goal": Case(
-        (31, "p.pddl:4:10: unknown predicate 'go'"), problem=goal("(go r1 a b)")
+    "a goal that no action changes": case((11, "cannot be reached"), DOMAIN, goal("(door a c)")),
+    "an action in the goal": case(
+        (31, "p.pddl:4:10: unknown predicate 'go'"), DOMAIN, goal("(go r1 a b)")
     ),
-    "two goals": Case(
-        (31, "expected one '(:goal FORMULA)'"),
-        problem=problem((GOAL + ")", "(at r1 c)) (:goal (at r2 a))")),
+    "two goals": case(
+        (31, "expected one '(:goal FORMULA)'"), DOMAIN, goal("(at r1 c)) (:goal (at r2 a)")
     ),
-    "imply": Case(2, where("(imply (= ?x ?x) (door ?x ?y))")),
-    "equality of objects": Case(2, where("(not (= ?x ?y)) (= ?r ?r)")),
-    "a parameter shadowed": Case(2, where("(exists (?x - room) (at ?r ?x))")),
-    "a quantifier shadowed": Case(2, where("(forall (?x - room) (exists (?x - room) (at ?r ?x)))")),
-    "quantifier without variables": Case(2, where("(forall () (and))")),
-    "forall over nothing": Case(
+    "imply": case(2, where("(imply (= ?x ?x) (door ?x ?y))")),
+    "equality of objects": case(2, where("(not (= ?x ?y)) (= ?r ?r)")),
+    "= among the predicates": case(2, where("(= ?r ?r)", PREDICATE, f"{PREDICATE} (= ?x ?y)")),
+    "a parameter shadowed": case(2, where("(exists (?x - room) (at ?r ?x))")),
+    "a quantifier shadowed": case(2, where("(forall (?x - room) (exists (?x - room) (at ?r ?x)))")),
+    "quantifier without variables": case(2, where("(forall () (and))")),
+    "forall over nothing": case(
+        2, where("(forall (?g - ghost) (not (= ?g ?g)))", "robot room)", "robot room ghost)")
+    ),
+    "exists over nothing": case(
+        (11, ""), where("(exists (?g - ghost) (and))", "robot room)", "robot room ghost)")
+    ),
+    "an empty or": case((11, ""), where("(or)")),
+    "effects under forall and when": case(
         2,
-        change(
-            where("(forall (?g - ghost) (not (= ?g ?g)))"), ("robot room)", "robot room ghost)")
+        d(
+            EFFECT,
+            "(and (at ?r ?y) (forall (?x - room) "
+            "(when (and (at ?r ?x) (not (= ?x ?y))) (not (at ?r ?x)))))",
         ),
     ),
-    "exists over nothing": Case(
-        (11, ""), change(where("(exists (?g - ghost) (and))"), ("robot room)", "robot room ghost)"))
-    ),
-    "an empty or": Case((11, ""), where("(or)")),
-    "effects under forall and when": Case(
+    "when inside when": case(
         2,
-        domain(
-            (
-                EFFECT,
-                "(and (at ?r ?y) (forall (?x - room) "
-                "(when (and (at ?r ?x) (not (= ?x ?y))) (not (at ?r ?x)))))",
-            )
+        d(
+            EFFECT,
+            "(forall (?p - room) (and (when (= ?p ?y) (at ?r ?p)) "
+            "(when (at ?r ?p) (when (not (= ?p ?y)) (not (at ?r ?p))))))",
         ),
     ),
-    "when inside when": Case(
+    "forall shadowing forall in effects": case(
         2,
-        domain(
-            (
-                EFFECT,
-                "(forall (?p - room) (and (when (= ?p ?y) (at ?r ?p)) "
-                "(when (at ?r ?p) (when (not (= ?p ?y)) (not (at ?r ?p))))))",
-            )
+        d(
+            EFFECT,
+            "(and (at ?r ?y) (forall (?p - room) "
+            "(forall (?p - room) (when (= ?p ?x) (not (at ?r ?p))))))",
         ),
     ),
-    "forall shadowing forall in effects": Case(
-        2,
-        domain(
-            (
-                EFFECT,
-                "(and (at ?r ?y) (forall (?p - room) "
-                "(forall (?p - room) (when (= ?p ?x) (not (at ?r ?p))))))",
-            )
-        ),
-    ),
-    "an atom both deleted and added": Case(
-        2, domain((EFFECT, "(and (not (at ?r ?y)) (at ?r ?y) (not (at ?r ?x)))"))
+    "an atom both deleted and added": case(
+        2, d(EFFECT, "(and (not (at ?r ?y)) (at ?r ?y) (not (at ?r ?x)))")
     ),
     # names
-    "a predicate named like the action": Case(
-        (11, ""),
-        change(
-            where("(go ?r ?x ?y)"), ("(door ?x ?y - room)", "(door ?x ?y - room) (go ?r ?x ?y)")
+    "a predicate named like the action": case(
+        (11, ""), where("(go ?r ?x ?y)", PREDICATE, f"{PREDICATE} (go ?r ?x ?y)")
+    ),
+    "objects named like predicates and actions": case(
+        2,
+        DOMAIN,
+        p(
+            *("a b c", "at go door", "r1 a)", "r1 at)", "r2 b)", "r2 go)"),
+            *(DOORS, "(door at go) (door go at) (door go door) (door door go)"),
+            *("(at r1 c) (at r2 a)", "(at r1 door) (at r2 at)"),
         ),
     ),
-    "objects named like predicates and actions": Case(
-        2,
-        problem=problem(
-            ("a b c", "at go door"),
-            ("r1 a)", "r1 at)"),
-            ("r2 b)", "r2 go)"),
-            (
-                "(door a b) (door b a) (door b c) (door c b)",
-                "(door at go) (door go at) (door go door) (door door go)",
-            ),
-            ("(at r1 c) (at r2 a)", "(at r1 door) (at r2 at)"),
-        ),
-    ),
-    "a predicate named like a type": Case(
-        2, DOMAIN.replace("(door", "(room"), PROBLEM.replace("(door", "(room")
-    ),
-    "names with all kinds of signs": Case(2, problem=problem(("r1", "1r.1_+@x,'"))),
-    "numbers as names": Case(
-        2,
-        problem=problem(("r1 r2 - robot", "1 2 - robot"), ("(at r1", "(at 1"), ("(at r2", "(at 2")),
-    ),
-    "upper case": Case(2, DOMAIN.upper(), PROBLEM.upper()),
-    # layout
-    "CRLF": Case(2, DOMAIN.replace("\n", "\r\n"), PROBLEM.replace("\n", "\r\n")),
-    "CR": Case(
-        2,
-        DOMAIN.replace("(:types", "; x\n(:types").replace("\n", "\r"),
-        PROBLEM.replace("\n", "\r"),
-    ),
-    "tabs": Case(2, DOMAIN.replace(" ", "\t"), PROBLEM.replace(" ", "\t")),
-    "byte order mark": Case(2, "\ufeff" + DOMAIN, "\ufeff" + PROBLEM),
-    "comments everywhere": Case(2, DOMAIN.replace(" ", ";x)(\n"), PROBLEM.replace(" ", ";x)(\n")),
-    "no spaces that are not needed": Case(2, DOMAIN.replace(" (", "("), PROBLEM.replace(" (", "(")),
-    # costs
-    "costs do not count by themselves": Case(2, COSTLY, COSTLY_PROBLEM),
-    "costs that count": Case(2, COSTLY, COSTLY_PROBLEM, ("--cost", "makespan+cost")),
-    "a cost with a point": Case(
-        2, COSTLY, change(COSTLY_PROBLEM, (" 3)", " 3.0)")), ("--cost", "makespan+cost")
-    ),
-    "a cost that is missing": Case(
-        (31, "the cost (far a b) has no whole value"),
-        COSTLY,
-        change(COSTLY_PROBLEM, ("(= (far a b) 3)", "")),
-        ("--cost", "makespan+cost"),
-    ),
-    "a cost that is a fraction": Case(
-        (31, "the cost (far a b) has no whole value"),
-        COSTLY,
-        change(COSTLY_PROBLEM, (" 3)", " 3.5)")),
-        ("--cost", "makespan+cost"),
-    ),
-    # once wrong
-    "untyped agent before typed parameters": Case(2, domain((":agent ?r - robot", ":agent ?r"))),
-    "= among the predicates": Case(
-        2, change(where("(= ?r ?r)"), ("(door ?x ?y - room)", "(door ?x ?y - room) (= ?x ?y)"))
-    ),
-    "costs whose sum passes 2^63": Case(
-        (31, "cost"),
-        COSTLY,
-        change(COSTLY_PROBLEM, (" 3)", f" {9 * 10**18})"), ("b a) 1", f"b a) {9 * 10**18}")),
-        ("--cost", "makespan+cost"),
-    ),
-    "a cost above 2^63": Case(
-        (31, "cost"),
-        COSTLY,
-        change(COSTLY_PROBLEM, (" 3)", f" {10**20})")),
-        ("--cost", "makespan+cost"),
-    ),
-    "a cost of 400 digits": Case(
-        (31, "cost"),
-        COSTLY,
-        change(COSTLY_PROBLEM, (" 3)", f" {'9' * 400})")),
-        ("--cost", "makespan+cost"),
-    ),
-    "a constant cost of 400 digits": Case(
-        (34, "d.pddl"),
-        change(COSTLY, ("(far ?x ?y)))", f"{'9' * 400}))")),
-        options=("--cost", "makespan+cost"),
-    ),
-    "a constant cost of 400 digits that is ignored": Case(
-        2, change(COSTLY, ("(far ?x ?y)))", f"{'9' * 400}))"))
-    ),
-    "a superscript as a name": Case(2, problem=problem(("r1", "\u00b2"))),
-    "a name of 5000 digits": Case(2, problem=problem(("r1", "9" * 5000))),
-    "--robots without a name": Case((2, "--robots"), options=("--robots", ",")),
-    "two variables behind :agent": Case(
-        (31, "d.pddl:5"), domain((":agent ?r - robot", ":agent ?r ?q - robot"))
-    ),
-    "a comment about subactions": Case(
-        2, domain((":precondition", "; subactions of one robot\n :precondition"))
-    ),
-    "a predicate called last": Case(
+    "a predicate named like a type": case(2, d("(door", "(room"), p("(door", "(room")),
+    "a predicate called last": case(
         (2, "has a predicate 'last'"),
-        DOMAIN.replace("(at ", "(last "),
-        PROBLEM.replace("(at ", "(last "),
-        options=("--remember-actions",),
+        d("(at ", "(last "),
+        p("(at ", "(last "),
+        "--remember-actions",
     ),
-    "types robot and agent": Case(
-        (31, "Several types"),
-        change(PLAIN, ("robot room)", "robot room agent)")),
-        problem(("a b c - room", "a b c - room x - agent")),
+    "names with all kinds of signs": case(2, DOMAIN, p("r1", "1r.1_+@x,'")),
+    "numbers as names": case(
+        2, DOMAIN, p("r1 r2 - robot", "1 2 - robot", "(at r1", "(at 1", "(at r2", "(at 2")
     ),
-    "a value with the wrong number of arguments": Case(
-        (31, "p.pddl:3"), COSTLY, problem(("(:init", "(:init (= (far a) 3)"))
+    "a superscript as a name": case(2, DOMAIN, p("r1", "\u00b2")),
+    "a name of 5000 digits": case(2, DOMAIN, p("r1", "9" * 5000)),
+    "upper case": case(2, DOMAIN.upper(), PROBLEM.upper()),
+    # layout
+    "CRLF": case(2, d("\n", "\r\n"), p("\n", "\r\n")),
+    "CR": case(2, d("(:types", "; x\n(:types", "\n", "\r"), p("\n", "\r")),
+    "tabs": case(2, d(" ", "\t"), p(" ", "\t")),
+    "byte order mark": case(2, "\ufeff" + DOMAIN, "\ufeff" + PROBLEM),
+    "comments everywhere": case(2, d(" ", ";x)(\n"), p(" ", ";x)(\n")),
+    "a comment about subactions": case(
+        2, d(":precondition", "; subactions of one robot\n :precondition")
+    ),
+    "no spaces that are not needed": case(2, d(" (", "("), p(" (", "(")),
+    # costs
+    "costs do not count by themselves": case(2, COSTLY, PRICED),
+    "costs that count": case(2, COSTLY, PRICED, COST),
+    "a cost with a point": case(2, COSTLY, change(PRICED, " 3)", " 3.0)"), COST),
+    "a cost that is missing": case(
+        (31, "the cost (far a b) has no whole value"),
+        COSTLY,
+        change(PRICED, "(= (far a b) 3)", ""),
+        COST,
+    ),
+    "a cost that is a fraction": case(
+        (31, "the cost (far a b) has no whole value"), COSTLY, change(PRICED, " 3)", " 3.5)"), COST
+    ),
+    "costs whose sum passes 2^63": case(
+        (31, "cost"), COSTLY, change(PRICED, " 3)", f" {HUGE})", "b a) 1", f"b a) {HUGE}"), COST
+    ),
+    "a cost above 2^63": case((31, "cost"), COSTLY, change(PRICED, " 3)", f" {10**20})"), COST),
+    "a cost of 400 digits": case((31, "cost"), COSTLY, change(PRICED, " 3)", f" {LONG})"), COST),
+    "a constant cost of 400 digits": case(
+        (34, "d.pddl"), change(COSTLY, "(far ?x ?y)))", f"{LONG}))"), PROBLEM, COST
+    ),
+    "one that is ignored": case(2, change(COSTLY, "(far ?x ?y)))", f"{LONG}))")),
+    "a value with the wrong number of arguments": case(
+        (31, "p.pddl:3"), COSTLY, p("(:init", "(:init (= (far a) 3)")
     ),
 }
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_odd(name: str, coordlang: Command, tmp_path: Path) -> None:
-    case, d, p = CASES[name], tmp_path / "d.pddl", tmp_path / "p.pddl"
-    d.write_bytes(case.domain.encode())
-    p.write_bytes(case.problem.encode())
-    outcome = coordlang("plans", d, p, "--count", *case.options)
-    if isinstance(case.expected, int):
-        assert (outcome.code, outcome.out) == (0, f"{case.expected}\n"), outcome.err
+    expected, domain, problem, options = CASES[name]
+    (tmp_path / "d.pddl").write_bytes(domain.encode())
+    (tmp_path / "p.pddl").write_bytes(problem.encode())
+    outcome = coordlang("plans", tmp_path / "d.pddl", tmp_path / "p.pddl", "--count", *options)
+    if isinstance(expected, int):
+        assert (outcome.code, outcome.out) == (0, f"{expected}\n"), outcome.err
     else:
-        code, message = case.expected
+        code, message = expected
         assert outcome.code == code, outcome
         assert message in outcome.err
 

@@ -1,45 +1,48 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heuristics against the true distances: admissible, consistent, zero exactly at the goals."""
+"""Heuristics against the true distances: admissible, consistent, zero exactly at the goals; and the
+state variables that they are made of.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
+from itertools import product
 
 import numpy as np
 import pytest
 
-from planners.joint.model import Goal, JointModel
-from planners.joint.tables import Rows
-from planners.loading import PlanningInstance, build, load
+from planners.joint.tables import Ints
+from planners.loading import PlanningInstance, load
 from planners.search.goals import FAR
 from planners.search.heuristics import HEURISTICS, heuristic
+from planners.search.mutexes import mutexes
 from planners.search.reachable import Space, explore
+from planners.search.state_variables import StateVariable, state_variables
 from planners.system.errors import UsageError
 from tests.support.domains import DOMAINS
-from tests.support.random_models import random_model
+from tests.support.random_instances import explored, random_instance
+from tests.support.texts import model_of
 
 
-def check(name: str, model: JointModel, goal: Goal, init: Rows, space: Space) -> Counter[int]:
-    """How far below the true distance the bounds are."""
-    true = distances(space, model.holds(goal, space.rows).tolist())
-    bound = heuristic(name, model, goal, init)(space.rows)
+def check(name: str, loaded: PlanningInstance, space: Space) -> Counter[int]:
+    """How far below the true distance the bounds are; -1: it is said that there is no way."""
+    model, task = loaded.model, loaded.tasks[0]
+    true = distances(space, model.holds(task.goal, space.rows).tolist())
+    bound = heuristic(name, model, task.goal, task.init)(space.rows)
     assert (bound[true >= 0] <= true[true >= 0]).all()
     assert ((bound == 0) == (true == 0)).all()
-    source = np.repeat(np.arange(len(space)), np.diff(space.first))
-    assert (bound[source] <= bound[space.target] + 1).all()
-    return Counter((true - bound)[(true >= 0) & (bound < FAR)].tolist()) + Counter(
-        {-1: int((bound >= FAR).sum())}
-    )
+    assert (bound[space.sources] <= bound[space.target] + 1).all()
+    gaps = Counter((true - bound)[(true >= 0) & (bound < FAR)].tolist())
+    return gaps + Counter({-1: int((bound >= FAR).sum())})
 
 
-def distances(space: Space, goals: list[bool]) -> np.ndarray:
+def distances(space: Space, goals: list[bool]) -> Ints:
     """The least joint steps from every state to a goal, -1 where there is no way: layer by layer,
     backward.
     """
     before: dict[int, set[int]] = {}
-    for state in range(len(space)):
-        for target in space.target[space.first[state] : space.first[state + 1]].tolist():
-            before.setdefault(target, set()).add(state)
+    for source, target in zip(space.sources.tolist(), space.target.tolist(), strict=True):
+        before.setdefault(target, set()).add(source)
     found = {state: 0 for state, reached in enumerate(goals) if reached}
     layer, steps = set(found), 0
     while layer:
@@ -49,61 +52,103 @@ def distances(space: Space, goals: list[bool]) -> np.ndarray:
     return np.array([found.get(state, -1) for state in range(len(space))])
 
 
-def of(loaded: PlanningInstance) -> tuple[JointModel, Goal, Rows, Space]:
-    task = loaded.tasks[0]
-    return loaded.model, task.goal, task.init, explore(loaded.model, task.init[None, :])
+def variables_of(loaded: PlanningInstance, space: Space) -> list[StateVariable]:
+    """The variables, each with exactly one value in every reachable state."""
+    variables = state_variables(loaded.model, loaded.tasks[0].init)
+    truth = loaded.model.codec.truth(space.rows)
+    for variable in variables:
+        assert (truth[:, list(variable.facts)].sum(axis=1) == 1).all()
+    return variables
 
 
-@pytest.mark.parametrize("name", ["blind", "projections", "relaxed"])
-def test_random_models(name: str) -> None:
-    seen: Counter[int] = Counter()
-
+def test_random_models() -> None:
+    seen: Counter[object] = Counter()
     for seed in range(120):
-        domain, problem, options = random_model(seed, 2 + seed % 2)
-        seen.update(check(name, *of(build(domain, [problem], options))))
-    assert seen[1] > 5
-    assert name == "blind" or seen[-1] > 5, "no dead end was found"
+        loaded = random_instance(seed)
+        if loaded is None or (space := explored(loaded)) is None or len(space) > 3_000:
+            continue
+        for name in ("blind", "projections", "relaxed"):
+            seen += Counter({(name, gap): n for gap, n in check(name, loaded, space).items()})
+        seen["with variables" if variables_of(loaded, space) else "without"] += 1
+    assert seen["with variables"] >= 20
+    assert seen["without"] >= 5
+    assert all(seen[name, 1] > 5 for name in ("blind", "projections", "relaxed"))
+    assert min(seen["projections", -1], seen["relaxed", -1]) > 5, "no dead end was found"
 
 
 @pytest.mark.parametrize(
     "problem",
     [
-        "grid/corners-3x3",
-        "grid/gwb5-3x3",
-        "grid-joint/corners-3x3",
-        "corridor/problem",
-        "push-box/around",
-        "charger/queue",
-        "elevator/two-calls",
-        "handover/exchange",
-        "vans/one-van",
-        "two-arms/exchange",
-        "lock/let-in",
-        "tray/serve",
+        *("grid/corners-3x3", "grid/gwb5-3x3", "grid-joint/corners-3x3", "corridor/problem"),
+        *("push-box/around", "charger/queue", "elevator/two-calls", "handover/exchange"),
+        *("vans/one-van", "two-arms/exchange", "lock/let-in", "tray/serve"),
     ],
 )
 def test_shipped_domains(problem: str) -> None:
     folder = DOMAINS / problem.split("/")[0]
     loaded = load(folder / "domain.pddl", [DOMAINS / f"{problem}.pddl"])
+    space = explore(loaded.model, loaded.tasks[0].init[None, :])
     for name in HEURISTICS:
-        try:
-            gaps = check(name, *of(loaded))
-        except UsageError:
-            assert name == "manhattan"
-            assert folder.name not in ("grid", "grid-joint", "corridor")
+        if name == "manhattan" and folder.name not in ("grid", "grid-joint", "corridor"):
+            with pytest.raises(UsageError):
+                check(name, loaded, space)
             continue
+        gaps = check(name, loaded, space)
         if name == "relaxed" and problem.startswith("grid"):
-            assert gaps[0] > sum(gaps.values()) / 2, (
-                "on an open map robots are seldom in each other's way"
-            )
+            # On an open map robots are seldom in each other's way.
+            assert gaps[0] > sum(gaps.values()) / 2
+
+
+@pytest.mark.parametrize(
+    ("folder", "problem", "variables", "facts"),
+    [
+        ("grid", "corners-4x4", 2, 32),  # where each robot is
+        ("handover", "exchange", 4, 12),  # and who has a parcel
+        ("push-box", "around", 2, 8),  # not the box: two robots push it together
+    ],
+)
+def test_variables_of_domains(folder: str, problem: str, variables: int, facts: int) -> None:
+    loaded = load(DOMAINS / folder / "domain.pddl", [DOMAINS / folder / f"{problem}.pddl"])
+    found = variables_of(loaded, explore(loaded.model, loaded.tasks[0].init[None, :]))
+    assert (len(found), sum(len(variable.facts) for variable in found)) == (variables, facts)
+
+
+def test_what_is_held_is_not_near() -> None:
+    """Facts of different variables that are never true together."""
+    loaded = model_of(
+        """(define (domain hands) (:requirements :typing :multi-agent) (:types hand thing)
+        (:predicates (empty ?h - hand) (holds ?h - hand ?t - thing) (lies ?t - thing)
+          (near ?t - thing))
+        (:action take :agent ?h - hand :parameters (?t - thing)
+          :precondition (and (empty ?h) (lies ?t))
+          :effect (and (holds ?h ?t) (not (empty ?h)) (not (lies ?t)) (not (near ?t))))
+        (:action put :agent ?h - hand :parameters (?t - thing) :precondition (holds ?h ?t)
+          :effect (and (empty ?h) (lies ?t) (near ?t) (not (holds ?h ?t)))))""",
+        """(define (problem two) (:domain hands) (:objects l r - hand a b - thing)
+        (:init (empty l) (empty r) (lies a) (lies b) (near a)) (:goal (near b)))""",
+    )
+    texts, init = loaded.model.codec.facts.texts, loaded.tasks[0].init
+    found = mutexes(loaded.model, init)
+    named = {frozenset((texts[p], texts[q])) for p, q in found}
+    assert named >= {frozenset((f"(holds {h} {t})", f"(near {t})")) for h, t in product("lr", "ab")}
+    truth = loaded.model.codec.truth(explore(loaded.model, init[None, :]).rows)
+    assert not any((truth[:, p] & truth[:, q]).any() for p, q in found)
+    assert mutexes(loaded.model, init, most=3) == []
+    assert mutexes(loaded.model, init, block=1) == found
 
 
 def test_manhattan_is_the_distance_on_the_map() -> None:
     loaded = load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "corners-4x4.pddl"])
-    bound = heuristic("manhattan", loaded.model, loaded.tasks[0].goal, loaded.tasks[0].init)
-    assert bound(loaded.tasks[0].init[None, :]).tolist() == [6]
+    assert manhattan(loaded) == 6
     row = loaded.model.codec.parse_key("(at r1 c3-3) (at r2 c1-0)")
+    bound = heuristic("manhattan", loaded.model, loaded.tasks[0].goal, loaded.tasks[0].init)
     assert bound(row[None, :]).tolist() == [1]
+
+
+def manhattan(loaded: PlanningInstance) -> int:
+    """At the start."""
+    task = loaded.tasks[0]
+    return int(heuristic("manhattan", loaded.model, task.goal, task.init)(task.init[None, :])[0])
 
 
 JUMPS = """(define (domain jumps) (:types robot place) (:predicates (at ?r - robot ?x - place) (way ?x ?y - place))
@@ -118,21 +163,10 @@ def test_manhattan_is_admissible_where_robots_jump() -> None:
     """Three cells a step: seven cells are three steps; and nothing is known of a robot that turns
     up anywhere.
     """
-    from planners.pddl import parse_domain, parse_problem
-    from planners.pddl.sexpr import Source
-
-    for more, expected in [
-        ("", 3),
-        ("(:action beam :agent ?r - robot :parameters (?x - place) :effect (at ?r ?x))", None),
-    ]:
-        domain = parse_domain(Source("d", JUMPS.format(more=more)))
-        loaded = build(domain, [parse_problem(Source("p", AROUND), domain)])
-        model, goal, init, space = of(loaded)
-        if expected is None:
-            with pytest.raises(UsageError, match="Manhattan"):
-                heuristic("manhattan", model, goal, init)
-            continue
-        check("manhattan", model, goal, init, space)
-        assert heuristic("manhattan", model, goal, init)(
-            loaded.tasks[0].init[None, :]
-        ).tolist() == [expected]
+    loaded = model_of(JUMPS.format(more=""), AROUND)
+    check("manhattan", loaded, explore(loaded.model, loaded.tasks[0].init[None, :]))
+    assert manhattan(loaded) == 3
+    beam = "(:action beam :agent ?r - robot :parameters (?x - place) :effect (at ?r ?x))"
+    anywhere = model_of(JUMPS.format(more=beam), AROUND)
+    with pytest.raises(UsageError, match="Manhattan"):
+        manhattan(anywhere)

@@ -143,29 +143,6 @@ def test_what_changes_plans_changes_the_key() -> None:
     assert key_of(model_digest(again.model), state) not in keys
 
 
-def test_a_damaged_entry_is_ignored_said_and_replaced(folder: Store, searches: list[str]) -> None:
-    """Cut off, with another byte, or that of another task."""
-    world = loaded()
-    other = loaded(problem=PROBLEM.replace("(at r1 c0-0)", "(at r1 c0-1)", 1))
-    with keeping_plans(folder):
-        found = search(world.model, world.tasks[0])
-        (path,) = entries(folder)
-        whole = path.read_bytes()
-        search(other.model, other.tasks[0])
-        (foreign,) = set(entries(folder)) - {path}
-        half = len(whole) // 2
-        changed = whole[:half] + bytes([whole[half] ^ 1]) + whole[half + 1 :]
-        for number, data in enumerate((b"", whole[:half], changed, foreign.read_bytes()), 1):
-            path.write_bytes(data)
-            with pytest.warns(Note, match="damaged: it is ignored, and its result is worked out"):
-                assert same(found, search(world.model, world.tasks[0]))
-            assert len(searches) == 2 + number
-            assert path.read_bytes() == whole
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            search(world.model, world.tasks[0])
-
-
 def test_the_oldest_entries_go(tmp_path: Path) -> None:
     table = {"numbers": np.arange(1000)}
     folder = Store(tmp_path / "cache" / "plans-2")

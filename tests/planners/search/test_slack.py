@@ -3,27 +3,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from planners.joint.model import JointModel, PlanningTask
+from planners.classical import ClassicalAction, ClassicalTask, compile_classical, to_pddl
 from planners.loading import PlanningInstance, build, load
 from planners.pddl.model_options import ModelOptions
 from planners.search.optimal_plans import plan_spaces, search
-from planners.search.plan_space import PlanSpace
-from planners.search.plans import Plan, Plans
+from planners.search.plans import Plans
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, ProvedImpossible, UsageError
 from tests.support.domains import DOMAINS
 from tests.support.naive_slack import Sequences, TooMany
 from tests.support.random_models import random_model
-from tests.support.slack_counts import SLACK_COUNTS
+
+#: Problems, their least makespans, and their numbers of plans within slack 0, 1 and 2.
+COUNTS = [
+    ("t-map/problem", 4, (2, 18, 114)),
+    ("three-cells/problem", 2, (4, 20, 104)),
+    ("grid/gw1-2x2", 2, (2, 18, 140)),
+    ("grid/corners-3x3", 4, (18, 514, 11554)),
+    ("grid/corners-4x4", 6, (236, 12860, 500744)),
+    ("corridor/problem", 10, (32, 1920, 70680)),
+    ("handover/exchange", 10, (128, 3392, 55904)),
+]
 
 
 def loaded(folder: str, stem: str, slack: int, **options: object) -> PlanningInstance:
@@ -34,92 +41,104 @@ def loaded(folder: str, stem: str, slack: int, **options: object) -> PlanningIns
     )
 
 
-def listed(space: PlanSpace) -> set[Plan]:
-    return set(Plans.of(space))
-
-
-def nodes_are_states_and_steps_left(space: PlanSpace) -> bool:
-    """No node of a task's graph stands for the same state and the same steps left twice."""
-    pairs = np.column_stack((space.goal, space.state, space.layer))
-    return len(np.unique(pairs, axis=0)) == len(space)
-
-
-def random_task(seed: int, robots: int, slack: int) -> tuple[JointModel, PlanningTask] | None:
-    domain, problem, options = random_model(seed, robots)
-    sees, remembers = seed % 2 == 0, seed % 3 == 0
-    options = replace(options, slack=slack, words_see_slack=sees, remember_actions=remembers)
-    try:
-        found = build(domain, [problem], options)
-    except BadInput:
-        return None
-    return found.model, found.tasks[0]
-
-
-def compared(seeds: range, robots: int) -> Iterator[tuple[set[Plan], PlanSpace]]:
-    """The plans of random tasks by the definition, and their graphs; those that can wait."""
-    for seed in seeds:
-        for slack in (1, 2):
-            found = random_task(seed, robots, slack)
-            if found is None:
+@pytest.mark.parametrize(
+    ("robots", "seeds"),
+    [
+        (2, range(8)),
+        (3, range(3)),
+        pytest.param(2, range(8, 250), marks=pytest.mark.thorough),
+        pytest.param(3, range(3, 80), marks=pytest.mark.thorough),
+    ],
+)
+def test_random_tasks_have_the_plans_that_the_definition_lists(robots: int, seeds: range) -> None:
+    """And no node of a task's graph stands for the same state and the same steps left twice."""
+    several = 0
+    for seed, slack in product(seeds, (1, 2)):
+        domain, problem, options = random_model(seed, robots)
+        sees, remembers = seed % 2 == 0, seed % 3 == 0
+        options = replace(options, slack=slack, words_see_slack=sees, remember_actions=remembers)
+        try:
+            found = build(domain, [problem], options)
+            naive = Sequences(found.model, found.tasks[0]).within(slack)
+            if naive is None:
                 continue
-            model, task = found
-            try:
-                naive = Sequences(model, task).within(slack)
-                if naive is None:
-                    continue
-                yield naive, search(model, task)
-            except (TooMany, ProvedImpossible, UsageError):
-                continue
+            space = search(found.model, found.tasks[0])
+        except (BadInput, TooMany, ProvedImpossible, UsageError):
+            continue
+        assert {*Plans.of(space)} == naive
+        nodes = np.column_stack((space.goal, space.state, space.layer))
+        assert len(np.unique(nodes, axis=0)) == len(space)
+        several += len(naive) > 1
+    assert several > len(seeds) // 20
 
 
-def agree(seeds: range, robots: int) -> int:
-    number = 0
-    for naive, space in compared(seeds, robots):
-        assert listed(space) == naive
-        assert nodes_are_states_and_steps_left(space)
-        number += len(naive) > 1
-    return number
-
-
-def test_random_tasks_have_the_plans_that_the_definition_lists() -> None:
-    assert agree(range(8), 2) > 0
-    assert agree(range(3), 3) > 0
-
-
-@pytest.mark.thorough
-def test_more_random_tasks_have_them() -> None:
-    assert agree(range(8, 250), 2) > 20
-    assert agree(range(3, 80), 3) > 5
-
-
-@pytest.mark.thorough
-@settings(max_examples=40, deadline=None)
-@given(st.integers(1000, 5000))
-def test_hypothesis_finds_no_task_with_others(seed: int) -> None:
-    agree(range(seed, seed + 1), 2)
-
-
-@pytest.mark.parametrize(("folder", "stem", "makespan", "counts"), SLACK_COUNTS[:3])
-def test_counts_of_shipped_problems(
-    folder: str, stem: str, makespan: int, counts: tuple[int, ...]
-) -> None:
-    compare_counts(folder, stem, makespan, counts)
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(("folder", "stem", "makespan", "counts"), SLACK_COUNTS[3:])
-def test_counts_of_larger_problems(
-    folder: str, stem: str, makespan: int, counts: tuple[int, ...]
-) -> None:
-    compare_counts(folder, stem, makespan, counts)
-
-
-def compare_counts(folder: str, stem: str, makespan: int, counts: tuple[int, ...]) -> None:
+@pytest.mark.parametrize(
+    ("name", "makespan", "counts"),
+    [pytest.param(*row, marks=[pytest.mark.thorough] * (n > 2)) for n, row in enumerate(COUNTS)],
+)
+def test_counts_of_shipped_problems(name: str, makespan: int, counts: tuple[int, ...]) -> None:
+    folder, stem = name.split("/")
     for slack, count in enumerate(counts):
         found = loaded(folder, stem, slack)
         plans = Plans.of(search(found.model, found.tasks[0]))
         assert plans.count == count
         assert plans.space.least_makespan(0) == makespan
+
+
+def ticking(task: ClassicalTask) -> ClassicalTask:
+    """The same plans, one to one, of actions that change something: each makes a fact true, or
+    false again.
+
+    The translator that K* uses drops operators without effects, as a step in which all wait is.
+    """
+    tick = len(task.facts)
+
+    def twice(action: ClassicalAction) -> tuple[ClassicalAction, ...]:
+        on = (*action.preconditions, (tick, False)), (*action.adds, tick), action.deletes
+        off = (*action.preconditions, (tick, True)), action.adds, (*action.deletes, tick)
+        return tuple(
+            replace(action, name=f"{action.name} {name}", preconditions=p, adds=a, deletes=d)
+            for name, (p, a, d) in (("tick", on), ("tock", off))
+        )
+
+    actions = tuple(both for action in task.actions for both in twice(action))
+    return replace(task, facts=(*task.facts, "(tick)"), actions=actions)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("slack", [0, 1, 2])
+@pytest.mark.parametrize(("name", "makespan", "counts"), COUNTS)
+def test_k_star_counts_the_same_plans(
+    name: str,
+    makespan: int,
+    counts: tuple[int, ...],
+    slack: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """An independent planner, in its top-quality mode (``pip install '.[oracles]'``).
+
+    It counts every sequence of actions within the bound that ends in the goal: the sum of ours over
+    the slacks up to this one.
+    """
+    planners = pytest.importorskip(
+        "kstar_planner.planners", reason="K* is not installed (extra oracles)"
+    )
+    wanted = sum(counts[: slack + 1])
+    if wanted > 100_000:
+        pytest.skip("more plans than K* lists in reasonable time")
+    folder, stem = name.split("/")
+    found = loaded(folder, stem, 0)
+    plain = ticking(compile_classical(found.model, found.tasks[0], limit=100_000))
+    assert plain.form == "explicit"
+    domain, problem = tmp_path / "d.pddl", tmp_path / "p.pddl"
+    for path, text in zip((domain, problem), to_pddl(plain), strict=True):
+        path.write_text(text)
+    monkeypatch.chdir(tmp_path)
+    bound = (makespan + slack + 0.001) / makespan  # a little more: it compares floats
+    answer = planners.plan_topq(domain, problem, quality_bound=bound, timeout=600)
+    assert "search exit code: 0" in answer["planner_output"]
+    assert len({tuple(plan["actions"]) for plan in answer["plans"]}) == wanted
 
 
 def test_one_pass_over_an_explored_space_finds_what_searches_find() -> None:
@@ -133,7 +152,7 @@ def test_one_pass_over_an_explored_space_finds_what_searches_find() -> None:
             model.codec.clear(row[None, :], slice(None), model.slack_facts)
             own = search(model, replace(task, init=row))
             one = every.with_tasks(np.array([node]), np.zeros(1, np.int64))
-            assert listed(one) == listed(own)
+            assert {*Plans.of(one)} == {*Plans.of(own)}
             assert len(one) == len(own)
 
 
@@ -174,28 +193,29 @@ def test_the_cheapest_within_the_bound_under_a_second_cost() -> None:
     assert [second for _, second in costs] == sorted((s for _, s in costs), reverse=True)
 
 
-def test_robots_that_cannot_wait_in_the_goal_are_refused(tmp_path: Path) -> None:
-    found = loaded("grid-joint", "corners-3x3", 1)
-    with pytest.raises(UsageError, match="must be able to wait") as error:
-        search(found.model, found.tasks[0])
-    assert error.value.exit_code == 2
-
-
-@pytest.mark.parametrize("slack", [-1, True, "1"])
-def test_what_is_no_slack_is_refused(slack: object) -> None:
-    with pytest.raises(UsageError, match="--slack"):
-        ModelOptions(slack=slack)  # type: ignore[arg-type]
-
-
-def test_seeing_slack_needs_some() -> None:
-    with pytest.raises(UsageError, match="belongs to --slack"):
-        ModelOptions(words_see_slack=True)
-
-
 BEEPING = """(define (domain beeping) (:types robot) (:predicates (on ?r - robot))
 (:action light :agent ?r - robot :parameters () :precondition () :effect (on ?r))
 (:action wait :agent ?r - robot :parameters () :precondition () :effect (and))
 (:action beep :agent ?r - robot :parameters () :precondition () :effect (and)))"""
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"slack": -1}, "--slack"),
+        ({"slack": True}, "--slack"),
+        ({"slack": "1"}, "--slack"),
+        ({"slack": 1_000_001}, "more than 1,000,000 joint steps"),
+        ({"slack": 10**30}, "more than 1,000,000 joint steps"),
+        ({"words_see_slack": True}, "belongs to --slack"),
+    ],
+)
+def test_what_is_no_slack_is_refused(options: dict[str, object], message: str) -> None:
+    with pytest.raises(UsageError, match=message):
+        ModelOptions(**options)  # type: ignore[arg-type]
+    robots_cannot_wait = loaded("grid-joint", "corners-3x3", 1)
+    with pytest.raises(UsageError, match="must be able to wait"):
+        search(robots_cannot_wait.model, robots_cannot_wait.tasks[0])
 
 
 def test_different_plans_stay_different_without_their_rest(tmp_path: Path) -> None:
@@ -211,9 +231,3 @@ def test_different_plans_stay_different_without_their_rest(tmp_path: Path) -> No
     assert len(short) == plans.count > 10
     assert {len(plan) for plan in short} == {1, 2, 3}
     assert {plans.padded(plan) for plan in short} == set(plans)
-
-
-@pytest.mark.parametrize("slack", [1_000_001, 10**30])
-def test_slack_beyond_any_memory_is_refused(slack: int) -> None:
-    with pytest.raises(UsageError, match="more than 1,000,000 joint steps"):
-        ModelOptions(slack=slack)
