@@ -4,12 +4,10 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import replace
 from fractions import Fraction
 from itertools import combinations, product
 from random import Random
 
-import numpy as np
 import pytest
 
 from benchmarks.paper import delays
@@ -72,17 +70,6 @@ def test_without_delays_plans_and_coordination_languages_never_fail() -> None:
                 runs, well, late = trials.sample(0.0, yields, 20, Random(1))
                 assert well == runs
                 assert late <= runs * used[0].model.slack
-
-
-@pytest.mark.thorough
-def test_silence_within_slack_fails_as_often_as_counted() -> None:
-    used = [replace(one, word=np.zeros(len(one.space), np.int64)) for one in languages("slack")]
-    trials = DelayTrials(used)
-    space = used[0].space
-    for number in (3, 40):
-        alone = space.with_tasks(space.starts[[number]], space.second[[number]])
-        exact = failure_probability([alone], [None])
-        assert failing_share(trials, number, used[number]) == exact.mean
 
 
 def swap() -> tuple[Execution, PlanningTask, list[list[tuple[int, ...]]]]:
@@ -168,15 +155,6 @@ def test_no_plan_of_a_swap_on_the_three_cells_survives_one_delay() -> None:
     assert len(plans) == 4
     assert all(fails_late(loaded.model, loaded.tasks[0], plan, 1) for plan in plans)
     assert not any(fails_late(loaded.model, loaded.tasks[0], plan, 0) for plan in plans)
-
-
-def test_robots_that_wait_for_each_other_for_ever_fail() -> None:
-    execution, task, [_parts] = swap()
-    other = tuple(execution._model.labels[0].index(text) for text in ["(move r1 a b)"])
-    back = tuple(execution._model.labels[1].index(text) for text in ["(move r2 b a)"])
-    # Each is in the other's way, and swapping is no joint step.
-    assert execution.run(task.init, [other, back], 0.0, True, Random(0)) is None
-    assert execution.run(task.init, [other, back], 0.5, True, Random(0)) is None
 
 
 def test_units_are_reproducible_and_the_section_shows_them() -> None:

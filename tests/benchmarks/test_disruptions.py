@@ -7,14 +7,7 @@ from random import Random
 
 import pytest
 
-from benchmarks.paper.disruptions import (
-    Trial,
-    Trials,
-    subaction_trials,
-    success_rates,
-    warehouse_trials,
-)
-from benchmarks.paper.scenario import subplans
+from benchmarks.paper.disruptions import subaction_trials, success_rates, warehouse_trials
 from benchmarks.paper.suite import language_for
 from benchmarks.paper.task_choices import Disruption, TaskChoices
 from benchmarks.paper.warehouse import LAYOUTS, WAREHOUSES, deliveries, human_in, listed_tasks
@@ -92,26 +85,6 @@ def test_three_cells_by_hand() -> None:
     assert not TaskChoices(one).succeeds(0, (1, 2, 0), disruptions[1])
 
 
-def test_plans_are_drawn_with_their_sentences() -> None:
-    one = task_languages("grid", "gw2-2x3")[100]
-    choices, said = TaskChoices(one), groups(one)
-    random = Random(2)
-    for _ in range(50):
-        plan, words = choices.draw(one.task, random)
-        assert plan in said[words]
-    first, words = choices.first(one.task)
-    assert first == naive.listed(one.space, one.task, 10_000)[0]
-    assert first in said[words]
-
-
-def test_optimal_choices_are_the_parts_of_all_plans() -> None:
-    one = task_languages("grid", "gw2-2x3")[50]
-    plans = naive.listed(one.space, one.task, 10_000)
-    for robot in range(2):
-        parts = {tuple(step[robot] for step in plan) for plan in plans}
-        assert sorted(subplans(TaskChoices(one).optimal_choices(one.task, robot))) == sorted(parts)
-
-
 def test_deliveries() -> None:
     for rows, columns in ((3, 3), (3, 5)):
         for layout in LAYOUTS:
@@ -183,15 +156,3 @@ def test_subactions_that_fail_are_needed_by_some_plan() -> None:
         }
         names = {f"{model.robots[r]} {model.labels[r][n]}" for r, n in used}
         assert by_task.get(task, set()) == names
-
-
-def test_a_plan_succeeds_without_what_it_does_not_need() -> None:
-    one = three_cells()
-    nobody = Disruption("nothing", (frozenset(), frozenset()))
-    trials = Trials(
-        TaskChoices(one), (nobody, human_in(one.model, "c")), (Trial((0,), 0), Trial((0,), 1))
-    )
-    assert trials.exact() == {"plan": 0.5, "sentence": 0.5, "possible": 0.5}
-    runs = trials.sample(200, Random(0))
-    assert runs["plan"] == runs["sentence"]
-    assert 70 < runs["plan"] < 130

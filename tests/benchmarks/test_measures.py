@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from fractions import Fraction
 from random import Random
 
@@ -71,31 +70,6 @@ def test_means_are_over_the_right_tasks() -> None:
     assert savings["saving"] == round(1 / 3, 6)
     plans = flexibility.measures(tasks)
     assert (plans["open"], plans["several"], plans["open_several"], plans["plans"]) == (3, 1, 5, 3)
-
-
-@pytest.mark.parametrize(
-    ("folder", "stem"), [("t-map", "problem"), ("tray", "serve"), ("grid", "gw2-2x3")]
-)
-def test_sentences_against_listed_plans(folder: str, stem: str) -> None:
-    tasks = task_languages(folder, stem)
-    lengths = set()
-    for one, counted in zip(
-        tasks[:150], task_statistics(tasks[0].space, tasks[0].word), strict=False
-    ):
-        of_state = dict(zip(one.space.state.tolist(), one.word.tolist(), strict=True))
-        plans = naive.listed(one.space, one.task, 10_000)
-        sentences = [
-            naive.sentence([of_state[s] for s in naive.states(one.space, one.task, plan)])
-            for plan in plans
-        ]
-        assert Counter(sentences) == counted.plans
-        assert (sentences[0], sentences[-1]) == (counted.first, counted.last)
-        assert counted.expected_open == Fraction(
-            sum(sentences.count(s) for s in sentences), len(plans)
-        )
-        assert counted.steps == len(plans[0])
-        lengths |= set(map(len, sentences))
-    assert len(lengths) > 1
 
 
 def test_the_same_as_the_library_measures() -> None:

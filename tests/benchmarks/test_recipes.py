@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.paper import planning_cost, scenario, table1
 from benchmarks.paper.__main__ import RECIPES
-from benchmarks.paper.grid import cell_position, entered_cells, is_cell, task_cells
+from benchmarks.paper.grid import cell_position, entered_cells, task_cells
 from benchmarks.paper.recipe import Record, Settings, Unit
 from benchmarks.paper.reported import (
     DIFFERING,
@@ -26,7 +26,6 @@ from coordlang.execution.task_language import languages_in_tasks
 from coordlang.vocabulary.sat import PartitionProblem
 from planners.search.plans import Plans
 from planners.system.errors import OutOfTime
-from tests.support.domains import all_tasks
 from tests.support.task_languages import task_languages, three_cells
 
 
@@ -107,33 +106,6 @@ def test_the_detour_is_optimal_and_nobody_else_moves_otherwise() -> None:
     parts = {tuple(step[0] for step in plan) for plan in Plans.of(one.space, one.task)}
     assert found["parts"] == sum(bool(wanted & set(part)) for part in parts)
     assert 0 < found["ways"] <= found["parts_that_fit"] <= found["parts"]
-
-
-def test_freedom_on_three_cells() -> None:
-    """Agreed: r1 a..a..b with one move, r2 b..c..a with two.  Under b c a r1 may as well move
-    first: the same subaction.
-    """
-    one = three_cells()
-    found = scenario.freedom([one])
-    assert found == {
-        "plan": 3,
-        "sentence": 0,
-        "optimal": 3,
-    }  # r1 could go through c, and r2 straight
-
-
-def test_cells() -> None:
-    assert is_cell("c2-11")
-    assert not is_cell("b")
-    assert cell_position("c2-11") == (2, 11)
-    with pytest.raises(ValueError, match="unpack"):
-        cell_position("kitchen")
-    model = all_tasks("grid", "gw1-2x2").model
-    assert dict(zip(model.labels[0], entered_cells(model, 0), strict=True)) == {
-        text: text.strip("()").split()[-1] if text.startswith("(move") else None
-        for text in model.labels[0]
-    }
-    assert set(entered_cells(three_cells().model, 0)) == {None}  # called a, b and c
 
 
 def test_unfinished_languages_are_not_measured(monkeypatch: pytest.MonkeyPatch) -> None:

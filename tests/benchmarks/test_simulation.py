@@ -16,7 +16,6 @@ from benchmarks.paper.recipe import Record, Settings, Unit
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.simulation.record import EventRecord, RunRecord
 from planners.search.plans import Plans
-from tests.support.domains import DOMAINS
 
 
 def record(**changed: Any) -> RunRecord:
@@ -87,27 +86,6 @@ def test_tasks_are_drawn_the_same_each_time() -> None:
     first, again = (tasks_of(floor, 0) for _ in range(2))
     assert dict(first[0].states) == dict(again[0].states)
     assert len(first[1]) == 10 < DRAWS
-
-
-def test_three_robots_on_the_t_map_need_no_word() -> None:
-    """Which is why they are not simulated: by the definition, on every task."""
-    from coordlang.language.candidates import all_pairs
-    from coordlang.required.choices import Choices
-    from coordlang.sites.movingai import grid_problem_text
-    from planners.pddl import parse_problem, read_domain
-    from planners.pddl.sexpr import Source
-
-    domain = read_domain(DOMAINS / "grid" / "domain.pddl")
-    rows = [["c0-1"], ["c1-0", "c1-1", "c1-2"]]
-    near = {name: ["c1-1"] for row in rows for name in row} | {"c1-1": ["c0-1", "c1-0", "c1-2"]}
-    starts, goals = ("c0-1", "c1-0", "c1-2"), ("c1-1", "c1-0", "c1-2")
-    text = grid_problem_text(
-        "t", domain.name, rows, near.__getitem__, starts, goals, written_by="a test"
-    )
-    every = all_pairs(domain, [parse_problem(Source("t", text), domain)])
-    assert every.count > 0
-    for space in every.spaces:
-        assert not Choices(space).requires[space.starts].any()
 
 
 def done(unit: Unit, result: dict[str, Any]) -> Record:

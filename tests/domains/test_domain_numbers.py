@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the shipped domains contain: the paper's numbers, the numbers in the README files, and both
-styles equal.
-"""
+"""What the maps contain: the paper's numbers, the rules of the grid, and both styles equal."""
 
 from __future__ import annotations
 
@@ -24,7 +22,6 @@ from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
 from planners.search.reachable import Space, explore
 from tests.support.domains import DOMAINS, Worlds
-from tests.support.readme_tables import Row, tables
 
 #: Table 1 of the paper: problem, tasks, states.
 ALL_TASKS = [
@@ -44,7 +41,6 @@ FILTERED = [
     ("gwb8-4x4", 956, 132, 6),
 ]
 STYLES = ("grid", "grid-joint")
-MAPS = (*STYLES, "three-cells", "t-map", "corridor")
 
 
 def to_every_state(space: Space) -> PlanSpace:
@@ -54,12 +50,9 @@ def to_every_state(space: Space) -> PlanSpace:
     return plans
 
 
-@pytest.mark.parametrize("style", STYLES)
 @pytest.mark.parametrize(("problem", "tasks", "states"), ALL_TASKS)
-def test_table_1_all_tasks(
-    world: Worlds, style: str, problem: str, tasks: int, states: int
-) -> None:
-    space = world(style, problem).space
+def test_table_1_all_tasks(world: Worlds, problem: str, tasks: int, states: int) -> None:
+    space = world("grid", problem).space
     assert len(space) == states
     assert len(to_every_state(space).starts) == tasks
 
@@ -91,12 +84,6 @@ def farthest(init: tuple[str, ...], goal: tuple[str, ...]) -> int:
         for a, b in zip(numbers[0], numbers[1], strict=True)
         if a[0] == b[0]
     )
-
-
-@pytest.mark.parametrize("style", STYLES)
-@pytest.mark.parametrize(("size", "plans"), [(3, 18), (4, 236), (5, 3090)])
-def test_trading_opposite_corners(world: Worlds, style: str, size: int, plans: int) -> None:
-    assert Plans.of(world(style, f"corners-{size}x{size}").plans).count == plans
 
 
 @pytest.mark.parametrize(
@@ -198,25 +185,6 @@ def test_the_grid_domain_against_its_rules(grid: GridMap, starts: tuple[str, ...
         assert Counter(after) == Counter(naive_steps(grid, state))
 
 
-def test_a_full_ring_can_only_turn() -> None:
-    """Following in a cycle: with no free cell all robots move at once, or none does."""
-    assert naive_steps(three_cells(), ("a", "b", "c")) == {
-        ("a", "b", "c"),
-        ("b", "c", "a"),
-        ("c", "a", "b"),
-    }
-
-
-def test_three_cells(world: Worlds) -> None:
-    space = world("three-cells", "problem").space
-    assert len(space) == 6
-    assert to_every_state(space).layer.max() == 2
-
-
-def test_t_map(world: Worlds) -> None:
-    assert len(world("t-map", "problem").space) == 12
-
-
 def test_who_uses_the_passing_place_of_the_corridor(world: Worlds) -> None:
     here = world("corridor", "problem")
     aside = Counter(
@@ -228,38 +196,6 @@ def test_who_uses_the_passing_place_of_the_corridor(world: Worlds) -> None:
         for texts in [[here.loaded.model.texts(labels) for labels in plan]]
     )
     assert aside == {(True, False): 16, (False, True): 16}
-
-
-README = [
-    (readme.parent.name, row)
-    for readme in sorted(DOMAINS.glob("*/README.md"))
-    for row in tables(readme.parent.name, "problem")
-]
-
-
-def test_every_problem_is_in_a_readme() -> None:
-    told = {(folder, row["problem"]) for folder, row in README}
-    there = {(p.parent.name, p.stem) for p in DOMAINS.glob("*/*.pddl") if p.stem != "domain"}
-    assert told == there
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    ("folder", "row"),
-    [
-        pytest.param(
-            *(folder, row),
-            id=f"{folder}-{row['problem']}",
-            marks=[pytest.mark.slow] if int(row["states"]) > 4000 else [],
-        )
-        for folder, row in README
-        if folder in MAPS  # the other worlds: test_robot_worlds
-    ],
-)
-def test_the_numbers_in_the_readme_files(world: Worlds, folder: str, row: Row) -> None:
-    here = world(folder, row["problem"])
-    seen = (len(here.space), here.plans.cost_of(0)[0], Plans.of(here.plans).count)
-    assert seen == tuple(int(row[key]) for key in ("states", "makespan", "optimal plans"))
 
 
 @pytest.mark.parametrize(

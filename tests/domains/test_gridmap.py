@@ -109,12 +109,5 @@ def test_maps_that_others_wrote() -> None:
     assert {
         name: sizes[name]
         for name in ("6x6", "empty-8-8", "tree", "loop-chain", "lacam-2x1", "corners")
-    } == {
-        "6x6": 36,
-        "empty-8-8": 64,
-        "tree": 7,
-        "loop-chain": 9,
-        "lacam-2x1": 2,
-        "corners": 12,
-    }
+    } == {"6x6": 36, "empty-8-8": 64, "tree": 7, "loop-chain": 9, "lacam-2x1": 2, "corners": 12}
     assert all(sizes.values())

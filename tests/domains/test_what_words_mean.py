@@ -11,7 +11,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import pytest
 
@@ -20,18 +19,9 @@ from coordlang.language.candidates import Candidates
 from coordlang.language.words import Language
 from coordlang.verification.by_definition import Verdict, verify
 from planners.joint.states import split_atoms
-from tests.support.console import run_command
 from tests.support.domains import DOMAINS
-from tests.support.foreign_tasks import (
-    Feature,
-    Plan,
-    agreement,
-    exactly,
-    who,
-    who_does_what,
-)
-from tests.support.pages import blocks, commands
-from tests.support.readme_tables import Row, candidates, tables
+from tests.support.foreign_tasks import Feature, Plan, agreement, exactly, who, who_does_what
+from tests.support.readme_tables import Row, candidates
 
 #: Says of a state, given as its atoms, whether it belongs to a word.
 Word = Callable[[frozenset[str]], bool]
@@ -202,45 +192,6 @@ def test_what_the_sentences_tell(
     assert figures["different"] > 0
     assert figures["told"] == figures["different"]
     assert (figures["left"] > 0) == leaves
-
-
-#: The maps; the READMEs of the other worlds are read in test_robot_worlds.
-MAPS = [
-    (folder, row)
-    for folder in ("three-cells", "t-map", "corridor", "grid")
-    for row in tables(folder, "language for")
-]
-
-
-@pytest.mark.parametrize(
-    ("folder", "row"), [pytest.param(f, r, id=f"{f}-{r['language for']}") for f, r in MAPS]
-)
-def test_the_languages_of_the_maps(folder: str, row: Row) -> None:
-    tasks = candidates(folder, row)
-    assert tasks.count == int(row["tasks"])
-    for method in ("greedy", "minimal"):
-        built = build_language(tasks, method)
-        assert built.first_differences.requiring == int(row["requiring coordination"])
-        assert built.language.guarantee.size == int(row[f"{method} words"])
-        assert built.verdict.holds
-        assert built.language.guarantee.proved_minimal or method == "greedy"
-
-
-@pytest.mark.parametrize("folder", ["corridor"])
-def test_the_commands_of_the_maps(
-    folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "domains").symlink_to(DOMAINS)
-    monkeypatch.chdir(tmp_path)
-    run = [
-        c
-        for block in blocks(DOMAINS / folder / "README.md")
-        if block.kind == "console"
-        for c in commands(block)
-    ]
-    assert {command.text.split()[1] for command in run} == {"build", "verify"}
-    for command in run:
-        run_command(command, folder, monkeypatch)
 
 
 def test_every_readme_says_what_words_mean() -> None:

@@ -203,12 +203,7 @@ def test_language_files(coordlang: Command, tmp_path: Path, made: str) -> None:
         said = coordlang("say", edited, *files, steps)
         require_true_use(other, CELLS, said, lambda told: told[plan])
         understood = coordlang("understand", edited, *files, sentence, "--count")
-        require_true_use(
-            other,
-            CELLS,
-            understood,
-            lambda told: list(told.values()).count(sentence),
-        )
+        require_true_use(other, CELLS, understood, lambda told: list(told.values()).count(sentence))
         explained = coordlang("explain", edited, *files)
         assert "needed" not in explained.out
         if place[-1] != "method":  # any text, told as what the file claims

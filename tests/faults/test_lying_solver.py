@@ -53,11 +53,7 @@ def files(world: str) -> tuple[Path, Path]:
 @pytest.mark.parametrize("certified", [True, False])
 @pytest.mark.parametrize("world", _WORLDS)
 def test_a_false_refutation_is_not_told(
-    coordlang: Command,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    world: str,
-    certified: bool,
+    coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, world: str, certified: bool
 ) -> None:
     """Exit code 0 with a certificate that holds, or an error with every file as it was.
 

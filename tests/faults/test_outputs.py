@@ -53,12 +53,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 )
 @pytest.mark.parametrize(
     "command",
-    [
-        (*BUILD, "-o"),
-        (*BUILD, "-o", "l.json", "--certificate"),
-        ("tasks", *CELLS, "-o"),
-        None,
-    ],
+    [(*BUILD, "-o"), (*BUILD, "-o", "l.json", "--certificate"), ("tasks", *CELLS, "-o"), None],
     ids=["build", "certificate", "tasks", "Python"],
 )
 @pytest.mark.usefixtures("no_work")

@@ -530,9 +530,7 @@ def test_mutated_data(mutations: list[tuple[int, str, Any]]) -> None:
 )
 @example(packed=True, changes=[(20, 3, b"\xff\xff")])
 def test_mutated_bytes(
-    tmp_path_factory: pytest.TempPathFactory,
-    packed: bool,
-    changes: list[tuple[int, int, bytes]],
+    tmp_path_factory: pytest.TempPathFactory, packed: bool, changes: list[tuple[int, int, bytes]]
 ) -> None:
     """Replace, insert or drop bytes anywhere, also in a compressed file."""
     path = tmp_path_factory.getbasetemp() / "mutated.json"

@@ -112,10 +112,7 @@ def called(solver: SolverName, what: str) -> str:
 
 @pytest.mark.parametrize(
     ("number", "said"),
-    [
-        (signal.SIGINT, "Interrupted: SIGINT"),
-        (signal.SIGALRM, "OutOfTime: the time limit of"),
-    ],
+    [(signal.SIGINT, "Interrupted: SIGINT"), (signal.SIGALRM, "OutOfTime: the time limit of")],
 )
 @pytest.mark.parametrize("solver", OURS)
 def test_a_solver_is_freed_once(

@@ -201,8 +201,7 @@ _DRIVEN = who_does_what("board-truck", "load-truck", "unload-truck", "drive-truc
 _STACKED = who_does_what("pick-up", "put-down", "stack", "unstack")
 _LOADED = all_of(who_does_what("load", "unload", "drive"), in_which_order("load"))
 _LIFTED = who_does_what(
-    *("lift-pallet", "examine-pallet", "enter-forklift", "drive-forklift", "unlock"),
-    "press-switch",
+    *("lift-pallet", "examine-pallet", "enter-forklift", "drive-forklift", "unlock"), "press-switch"
 )
 _PLACES = ("(inroom a0 ?)", "(inroom a1 ?)"), ("(examined p0)", "(inroom a0 ?)")
 _CRATES = (), ("(on crate0 ?)", "(on crate1 ?)")

@@ -8,10 +8,12 @@ search.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
-from math import prod
+from math import inf, prod
 
 from planners.check.validate import Moment, Rules, State
 from planners.pddl.lifted import (
@@ -31,6 +33,8 @@ from planners.pddl.robots import Team
 Labels = tuple[str | None, ...]
 Step = tuple[Labels, State]
 Plan = tuple[Labels, ...]
+#: The second component of the cost of a joint step.
+Price = Callable[[Labels], int]
 
 
 class TooLarge(Exception):
@@ -44,11 +48,7 @@ class Twin:
     """
 
     def __init__(
-        self,
-        domain: Domain,
-        problem: Problem,
-        team: Team,
-        budget: int = 1_000_000,
+        self, domain: Domain, problem: Problem, team: Team, budget: int = 1_000_000
     ) -> None:
         self._budget = budget
         self.rules = Rules(domain, problem, team)
@@ -125,76 +125,51 @@ class Twin:
         formulas = [f for s in schemas for f in (s.precondition, *(e.condition for e in s.effects))]
         return schema.name not in {name for f in formulas for name in _actions_named(f)} | bound
 
-    def optimal(self, goal: Formula | None = None, *, actions: bool = False) -> Optimal | None:
-        """The optimal plans under ``makespan`` or ``makespan+actions``; None if the goal cannot be
-        reached.
-        """
-        wanted = self.rules.problem.goal if goal is None else goal
+    def optimal(self, goal: Formula, price: Price = lambda _: 0) -> Optimal | None:
+        """The plans of least length, of these those of least price; None if there is none."""
 
+        @cache
         def is_goal(state: State) -> bool:
-            return self.rules.meaning.holds(wanted, {}, True, Moment(state))
+            return self.rules.meaning.holds(goal, {}, True, Moment(state))
 
-        layers = [{self.init}]
-        seen = set(layers[0])
-        while not any(map(is_goal, layers[-1])):
-            after = {t for s in layers[-1] for _, t in self.successors(s)} - seen
-            if not after:
+        @cache
+        def rest(state: State, left: int) -> tuple[float, int]:
+            """The least price of the ways from here that end in the goal, and their number."""
+            if left == 0:
+                return (0, 1) if is_goal(state) else (inf, 0)
+            found = Counter[float]()
+            for labels, after in self.successors(state):
+                least, number = rest(after, left - 1)
+                found[price(labels) + least] += number
+            return min(found.items(), default=(inf, 0))
+
+        def plans(state: State, left: int) -> Iterator[Plan]:
+            if left == 0:
+                yield ()
+                return
+            for labels, after in self.successors(state):
+                if price(labels) + rest(after, left - 1)[0] == rest(state, left)[0]:
+                    yield from ((labels, *more) for more in plans(after, left - 1))
+
+        layer, seen, makespan = {self.init}, {self.init}, 0
+        while not any(map(is_goal, layer)):
+            layer = {after for state in layer for _, after in self.successors(state)} - seen
+            seen |= layer
+            makespan += 1
+            if not layer:
                 return None
-            seen |= after
-            layers.append(after)
-        # From behind: the least second component at the least makespan, and the steps that keep to
-        # it.
-        best = {s: 0 for s in layers[-1] if is_goal(s)}
-        edges: list[dict[State, list[Step]]] = []
-        for layer in reversed(layers[:-1]):
-            value: dict[State, int] = {}
-            kept: dict[State, list[Step]] = {}
-            for state in layer:
-                costs = {
-                    (labels, after): best[after] + (self.actions(labels) if actions else 0)
-                    for labels, after in self.successors(state)
-                    if after in best
-                }
-                if costs:
-                    value[state] = min(costs.values())
-                    kept[state] = [step for step, cost in costs.items() if cost == value[state]]
-            best = value
-            edges.insert(0, kept)
-        return Optimal(self.init, len(edges), best[self.init], tuple(edges))
+        second, count = rest(self.init, makespan)
+        return Optimal(makespan, int(second), count, plans(self.init, makespan))
 
 
 @dataclass(frozen=True)
 class Optimal:
-    """The optimal plans: their cost, and for each step the joint steps that lie on one."""
+    """The optimal plans: their cost, their number, and all of them, one by one."""
 
-    init: State
     makespan: int
     second: int
-    edges: tuple[dict[State, list[Step]], ...]
-
-    def count(self) -> int:
-        """The number of different sequences of joint actions."""
-        counts = {
-            state: 1 for layer in self.edges[-1:] for steps in layer.values() for _, state in steps
-        }
-        for layer in reversed(self.edges):
-            counts = {
-                state: sum(counts[after] for _, after in steps) for state, steps in layer.items()
-            }
-        return counts[self.init] if self.edges else 1
-
-    def plans(self) -> Iterator[Plan]:
-        """All of them, one by one."""
-
-        def walk(state: State, depth: int) -> Iterator[Plan]:
-            if depth == self.makespan:
-                yield ()
-                return
-            for labels, after in self.edges[depth][state]:
-                for rest in walk(after, depth + 1):
-                    yield (labels, *rest)
-
-        return walk(self.init, 0)
+    count: int
+    plans: Iterator[Plan]
 
 
 def _actions_named(formula: Formula) -> Iterator[str]:

@@ -25,10 +25,7 @@ def language_of_task(folder: str, stem: str = "problem", method: str = "greedy")
 
 @cache
 def mission_of(
-    folder: str,
-    stem: str = "problem",
-    agreement: Agreement = "sentence",
-    method: str = "greedy",
+    folder: str, stem: str = "problem", agreement: Agreement = "sentence", method: str = "greedy"
 ) -> Mission:
     """A mission in a shipped problem; a sentence is the one that leaves most plans open."""
     used = language_of_task(folder, stem, method)

@@ -88,11 +88,7 @@ def test_plans(setting: World, plan: list[Labels]) -> None:
         ([], 0, ("goal", "(at r1 b) is false")),
         # The first broken step is named.
         (
-            [
-                ["(move r1 a b)", None],
-                ["(move r1 b a)", "(move r2 a b)"],
-                ["(move r1 b c)", None],
-            ],
+            [["(move r1 a b)", None], ["(move r1 b a)", "(move r2 a b)"], ["(move r1 b c)", None]],
             1,
             ("r2", "(move r2 a b)", "(at r2 a) is false"),
         ),

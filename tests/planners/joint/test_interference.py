@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import pytest
 
 from planners.check.rules import Rules
@@ -16,9 +14,7 @@ from planners.loading import PlanningInstance
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from planners.system.errors import ProvedImpossible
-from tests.support.joint_twin import built
 from tests.support.naive_classical import optimal_plans
-from tests.support.random_pddl import random_model
 from tests.support.texts import model_of
 
 LIFT = """(define (domain tables) (:types robot) (:predicates (level) (up ?r - robot) (spilled))
@@ -105,24 +101,6 @@ def test_an_effect_that_needs_a_third_robot_counts_for_no_pair_without_it() -> N
     )
     assert judged(loaded, "(lift r1 r2 r3)", "(hold r2)")
     assert search(loaded.model, loaded.tasks[0]).cost_of(0) == (1, 0)
-
-
-def test_tables_of_random_models_are_the_rule_for_each_pair() -> None:
-    """All labels of all pairs of robots, shared subactions and idling included."""
-    seen = dict.fromkeys(((shared, allowed) for shared in (0, 1) for allowed in (False, True)), 0)
-    for seed in range(40):
-        model = built(random_model(seed, ("agent", "plain")[seed % 2])).model
-        own = [
-            [None, *(a for a in model.actions if robot in a.owners)]
-            for robot in range(len(model.robots))
-        ]
-        for (i, j), table in model.stepper.tables.items():  # type: ignore[attr-defined]
-            for (row, a), (column, b) in product(enumerate(own[i]), enumerate(own[j])):
-                shared = bool((a and j in a.owners) or (b and i in b.owners))
-                allowed = a == b if shared else not (a and b and conflict(a, b))
-                assert table[row, column] == allowed
-                seen[shared, allowed] += 1
-    assert min(seen.values()) > 10
 
 
 def test_an_unreachable_goal_comes_with_the_interference_met_most_often() -> None:

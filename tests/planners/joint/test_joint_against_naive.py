@@ -97,68 +97,50 @@ _TASK = """(define (problem p) (:domain rooms) (:objects r1 r2 - robot a b - pla
   (:init (at r1 a) (at r2 b) (ok r1)) (:goal (and (at r1 b) (at r2 b))))"""
 
 
-_WAIT = "(:action wait :agent ?r - robot :parameters () {precondition} :effect ())"
+#: An action that does nothing, where its precondition holds; actions that name it.
+_WAIT = "(:action wait :agent ?r - robot :parameters ()"
+_WATCH = "(:action watch :agent ?r - robot :parameters (?o - robot)"
 
 
 @pytest.mark.parametrize(
     ("more", "is_left_out"),
     [
-        (_WAIT.format(precondition=""), True),
+        (f"{_WAIT} :effect ())", True),
         (
             "(:action wait :agent ?r - robot :parameters (?p - place) :precondition (at ?r ?p))",
             True,
         ),
         # Whether its precondition ever holds does not count: idling is always possible.
-        (_WAIT.format(precondition=":precondition (ok ?r)"), True),
-        (_WAIT.format(precondition=":precondition (not (ok ?r))"), True),
+        (f"{_WAIT} :precondition (ok ?r))", True),
+        (f"{_WAIT} :precondition (not (ok ?r)))", True),
         # Nor does who owns it.
         ("(:action wait :parameters (?r ?q - robot))", True),
         # What it asks of others makes it no other action; what others ask of it does.
         (
-            "(:action wait :agent ?r - robot :parameters () "
-            ":precondition (forall (?o - robot) (not (move ?o nowhere nowhere))))",
+            f"{_WAIT} :precondition (forall (?o - robot) (not (move ?o nowhere nowhere))))",
             True,
         ),
-        (
-            _WAIT.format(precondition="")
-            + "(:action watch :agent ?r - robot :parameters (?o - robot) :precondition (wait ?o) :effect (ok ?r))",
-            False,
-        ),
-        (
-            _WAIT.format(precondition="")
-            + "(:action watch :agent ?r - robot :parameters (?o - robot) "
-            ":effect (when (not (wait ?o)) (ok ?r)))",
-            False,
-        ),
+        (f"{_WAIT}) {_WATCH} :precondition (wait ?o) :effect (ok ?r))", False),
+        (f"{_WAIT}) {_WATCH} :effect (when (not (wait ?o)) (ok ?r)))", False),
         (
             "(:action wait :agent ?r - robot :parameters (?p - place)) "
             "(:concurrency-constraint v :parameters (?p - place) :bounds (1 2) :actions ((wait 1)))",
             False,
         ),
         # Effects as written count, those that never come about among them.
-        (_WAIT.format(precondition="").replace(":effect ()", ":effect (ok ?r)"), False),
-        (
-            _WAIT.format(precondition="").replace(
-                ":effect ()", ":effect (when (at ?r nowhere) (ok ?r))"
-            ),
-            False,
-        ),
+        (f"{_WAIT} :effect (ok ?r))", False),
+        (f"{_WAIT} :effect (when (at ?r nowhere) (ok ?r)))", False),
     ],
 )
 def test_an_action_that_is_idling_is_left_out(more: str, is_left_out: bool) -> None:
-    text = RandomModel(
-        _ROOMS.format(more=more).replace(
-            "(:predicates", "(:constants nowhere - place) (:predicates"
-        ),
-        _TASK,
-    )
+    domain = _ROOMS.format(more=more).replace("(:pred", "(:constants nowhere - place) (:pred")
+    text = RandomModel(domain, _TASK)
     loaded = built(text)
+    expected = {"wait"} if is_left_out else set()
     assert any("wait" in label for own in loaded.model.labels for label in own) != is_left_out
-    assert idling_schemas(loaded.domain) == ({"wait"} if is_left_out else set())
+    assert idling_schemas(loaded.domain) == expected
     rules = twin_of(loaded, text).rules
-    assert {s.name for s in loaded.domain.schemas if rules.is_idling(s)} == (
-        {"wait"} if is_left_out else set()
-    )
+    assert {s.name for s in loaded.domain.schemas if rules.is_idling(s)} == expected
     check_model(text, note=lambda _: None)
 
 

@@ -192,26 +192,6 @@ def test_a_worker_is_waited_for_and_said(tmp_path: Path) -> None:
     assert "no worker has connected" in note
 
 
-@pytest.mark.thorough
-def test_killed_workers_cost_their_jobs_only(tmp_path: Path) -> None:
-    with (
-        running_cluster(tmp_path, 2) as cluster,
-        opened(scheduler=str(cluster.file), packages=PACKAGES) as found,
-    ):
-        until(lambda: len(client_of(found).scheduler_info()["workers"]) == 2)
-        tables: list[dict[str, Any]] = []
-        waiting = found.tables(batch(jobs.waits, str(tmp_path), range(5)))
-        thread = threading.Thread(target=lambda: tables.extend(waiting))
-        thread.start()
-        until(lambda: len(workers(tmp_path)) == 2)
-        cluster.workers[0].kill(signal.SIGKILL)
-        cluster.add_worker()
-        until(lambda: len(workers(tmp_path)) >= 3)
-        (tmp_path / "go").touch()
-        thread.join(60)
-    assert [int(table["values"][0]) for table in tables] == list(range(5))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("begun", [True, False])
 def test_a_scheduler_that_goes_is_an_error(begun: bool, tmp_path: Path) -> None:

@@ -100,7 +100,7 @@ def test_no_worker_is_left_when_time_is_over(tmp_path: Path) -> None:
     assert not any(map(runs, workers(tmp_path)))
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_one_worker_is_ended_and_its_job_done_by_another(
     number: signal.Signals, tmp_path: Path
 ) -> None:

@@ -130,25 +130,8 @@ def test_objects_are_not_read(tmp_path: Path) -> None:
 
 def test_digests_tell_values_apart() -> None:
     values: list[object] = [
-        (1,),
-        1,
-        True,
-        1.0,
-        "1",
-        b"1",
-        None,
-        (1, 2),
-        (12,),
-        range(2),
-        np.arange(2),
-        (np.arange(2),),
-        np.arange(2.0),
-        np.arange(2)[None],
-        ((1,), 2),
-        (1, (2,)),
-        "",
-        b"",
-        (),
+        *((1,), 1, True, 1.0, "1", b"1", None, (1, 2), (12,), ((1,), 2), (1, (2,)), "", b"", ()),
+        *(range(2), np.arange(2), (np.arange(2),), np.arange(2.0), np.arange(2)[None]),
     ]
     assert len({digest(value) for value in values}) == len(values)
     assert digest("a", "b") != digest("ab")

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from planners.pddl.formula_tree import (
     conjuncts,
-    fold,
     forbidden_steps,
     formula_text,
     joined,
@@ -108,22 +107,6 @@ def test_a_literal_matters_only_with_its_sign(formula: Formula) -> None:
                 for values in VALUES:
                     if true(formula, values):
                         assert true(formula, {**values, leaf: positive})
-
-
-def test_the_fold_goes_from_left_to_right_and_takes_what_is_asked_for() -> None:
-    looked: list[Formula] = []
-
-    def leaf(found: Formula) -> bool:
-        looked.append(found)
-        return found == B
-
-    formula = Or((And((A, B)), B, C))
-    truth = fold(
-        formula, leaf, lambda kind, parts: all(parts) if isinstance(kind, And) else any(parts)
-    )
-    assert truth
-    assert looked == [A, B]
-    assert literals(And((A, Not(Or((B, Not(STEP))))))) == ((A, True), (B, False), (STEP, True))
 
 
 @pytest.mark.parametrize(

@@ -42,10 +42,7 @@ Case = tuple[int | tuple[int, str], str, str, tuple[str, ...]]
 
 
 def case(
-    expected: int | tuple[int, str],
-    domain: str = DOMAIN,
-    problem: str = PROBLEM,
-    options: str = "",
+    expected: int | tuple[int, str], domain: str = DOMAIN, problem: str = PROBLEM, options: str = ""
 ) -> Case:
     return expected, domain, problem, tuple(options.split())
 

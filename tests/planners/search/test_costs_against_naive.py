@@ -14,7 +14,7 @@ from random import Random
 
 import pytest
 
-from planners.check.validate import Moment, State, validate
+from planners.check.validate import validate
 from planners.classical import compile_classical
 from planners.joint.model import show
 from planners.loading import PlanningInstance, build, task_of
@@ -29,7 +29,7 @@ from planners.search.reachable import explore
 from planners.search.state_variables import state_variables
 from planners.system.errors import BadInput
 from tests.support.naive_classical import optimal_plans
-from tests.support.naive_joint_steps import TooLarge, Twin
+from tests.support.naive_joint_steps import Labels, TooLarge, Twin
 from tests.support.random_pddl import Kind, random_model
 
 Price = Callable[[str], int]
@@ -75,47 +75,25 @@ def priced(seed: int, kind: Kind) -> tuple[PlanningInstance, Price]:
     return loaded, price
 
 
-def idling_prices(twin: Twin, price: Price) -> list[int]:
-    """What idling costs each robot: as much as its cheapest action that is idling, else nothing."""
+def step_price(twin: Twin, price: Price) -> Callable[[Labels], int]:
+    """What a joint step costs: each subaction once, and the robots that idle.
+
+    Idling costs as much as the robot's cheapest action that is idling, else nothing.
+    """
     rules = twin.rules
     found: list[list[int]] = [[] for _ in rules.team.robots]
-    for schema in rules.domain.schemas:
-        if not twin.is_idling(schema):
-            continue
+    for schema in filter(twin.is_idling, rules.domain.schemas):
         for args in product(*(rules.meaning.objects(v.types) for v in schema.parameters)):
             owners = rules.bind(schema, args).owners
             if len(owners) == 1:
                 found[owners[0]].append(price(f"({' '.join((schema.name, *args))})"))
-    return [min(own, default=0) for own in found]
+    idling = [min(own, default=0) for own in found]
 
+    def of_step(labels: Labels) -> int:
+        chosen = sum(price(label) for label in {*labels} - {None} if label)
+        return chosen + sum(own for own, label in zip(idling, labels, strict=True) if not label)
 
-def brute_force(twin: Twin, goal: Formula, price: Price) -> tuple[int, int, int]:
-    """(makespan, cost, number of plans): all sequences of joint steps, of least length, then of
-    least price.
-    """
-    twin_idling = idling_prices(twin, price)
-    paths: dict[State, Counter[int]] = {twin.init: Counter({0: 1})}
-    for makespan in range(len(twin.reachable(128))):
-        done = [
-            costs
-            for state, costs in paths.items()
-            if twin.rules.meaning.holds(goal, {}, True, Moment(state))
-        ]
-        if done:
-            total = sum(done, Counter())
-            return makespan, min(total), total[min(total)]
-        following: dict[State, Counter[int]] = {}
-        for state, costs in paths.items():
-            for labels, after in twin.successors(state):
-                step = sum(price(label) for label in {label for label in labels if label})
-                step += sum(
-                    idling for idling, label in zip(twin_idling, labels, strict=True) if not label
-                )
-                into = following.setdefault(after, Counter())
-                for cost, number in costs.items():
-                    into[cost + step] += number
-        paths = following
-    raise AssertionError("the goal is one of the reachable states")
+    return of_step
 
 
 @pytest.mark.thorough
@@ -133,10 +111,12 @@ def test_the_same_cost_and_the_same_number_of_plans(kind: Kind) -> None:
                 *(Not(a) for a in sorted(twin.init - last, key=str)),
             )
             goal = And(parts)
-            wanted = brute_force(twin, goal, price)
+            found = twin.optimal(goal, step_price(twin, price))
+            assert found is not None
         except TooLarge:
             seen["too large"] += 1
             continue
+        wanted = (found.makespan, found.second, found.count)
         task = task_of(model, loaded.domain, replace(loaded.problems[0], goal=goal))
         space = search(model, task)
         assert (*space.cost_of(0), Plans.of(space).count) == wanted, seed

@@ -9,7 +9,7 @@ import pytest
 from coordlang.commands.inspect import feasibility
 from planners.joint.model import JointModel
 from planners.joint.tables import Rows, find_rows, unique_rows
-from planners.loading import PlanningInstance, build, load
+from planners.loading import PlanningInstance, build
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.model_options import ModelOptions
 from planners.pddl.sexpr import Source
@@ -17,7 +17,6 @@ from planners.search.optimal_plans import search
 from planners.search.reachable import explore
 from planners.search.search_estimate import estimate
 from planners.system.errors import BadInput, ProvedImpossible
-from tests.support.domains import DOMAINS
 from tests.support.random_pddl import random_model
 
 MANY = 10**9
@@ -147,11 +146,3 @@ def test_what_is_said() -> None:
     assert unknown["this task"] == (
         "makespan 2 at least; whether plans ends is not known: set a --time-limit"
     )
-
-
-def test_the_estimate_of_a_grid_is_not_far_off() -> None:
-    loaded = load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "corners-8x8.pddl"])
-    found, _ = estimate(loaded.model, loaded.tasks[0], states=500)
-    whole, _ = estimate(loaded.model, loaded.tasks[0], MANY, MANY)
-    assert found.expected is not None
-    assert whole.states / 10 < found.expected < whole.states * 100
