@@ -61,6 +61,14 @@ def variables_of(loaded: PlanningInstance, space: Space) -> list[StateVariable]:
     return variables
 
 
+def mutexes_of(loaded: PlanningInstance, space: Space) -> list[tuple[int, int]]:
+    """Pairs of facts that are true together in no reachable state."""
+    truth = loaded.model.codec.truth(space.rows)
+    found = mutexes(loaded.model, loaded.tasks[0].init)
+    assert not any((truth[:, p] & truth[:, q]).any() for p, q in found)
+    return found
+
+
 def test_random_models() -> None:
     seen: Counter[object] = Counter()
     for seed in range(120):
@@ -70,8 +78,11 @@ def test_random_models() -> None:
         for name in ("blind", "projections", "relaxed"):
             seen += Counter({(name, gap): n for gap, n in check(name, loaded, space).items()})
         seen["with variables" if variables_of(loaded, space) else "without"] += 1
+        if not loaded.model.is_joint_action:
+            seen["mutexes"] += len(mutexes_of(loaded, space))
     assert seen["with variables"] >= 20
     assert seen["without"] >= 5
+    assert seen["mutexes"] >= 20
     assert all(seen[name, 1] > 5 for name in ("blind", "projections", "relaxed"))
     assert min(seen["projections", -1], seen["relaxed", -1]) > 5, "no dead end was found"
 
@@ -128,11 +139,9 @@ def test_what_is_held_is_not_near() -> None:
         (:init (empty l) (empty r) (lies a) (lies b) (near a)) (:goal (near b)))""",
     )
     texts, init = loaded.model.codec.facts.texts, loaded.tasks[0].init
-    found = mutexes(loaded.model, init)
+    found = mutexes_of(loaded, explore(loaded.model, init[None, :]))
     named = {frozenset((texts[p], texts[q])) for p, q in found}
     assert named >= {frozenset((f"(holds {h} {t})", f"(near {t})")) for h, t in product("lr", "ab")}
-    truth = loaded.model.codec.truth(explore(loaded.model, init[None, :]).rows)
-    assert not any((truth[:, p] & truth[:, q]).any() for p, q in found)
     assert mutexes(loaded.model, init, most=3) == []
     assert mutexes(loaded.model, init, block=1) == found
 
