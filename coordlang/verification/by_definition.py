@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Verification of a partition by definition, in code of its own.
 
-It shares the joint model and the plan spaces with the builders, nothing else.  A violation is a
-walk of `coordlang.verification.walk`: n plans with one sentence whose mixture is no optimal plan.
+It shares the joint model and the plan spaces with the builders, nothing else.  A violation are n
+plans with one sentence whose mixture is no optimal plan.  They are looked for by walking n plans in
+step (`coordlang.verification.walk`), and where that walk grows over the sets of what robots can do
+and say (`coordlang.verification.sets`).
 Every walk is that of one goal, so of many tasks the goals are cut into portions, each a job, and
 the verdict is that of all portions together.
 """
@@ -19,16 +21,17 @@ from coordlang.language.candidates import Candidates
 from coordlang.language.partition import Partition
 from coordlang.language.sentences import sentence
 from coordlang.required.miscoordination import Miscoordination, describe_failure
-from coordlang.verification.walk import Walk
+from coordlang.verification.sets import SetWalk
+from coordlang.verification.walk import Grown, Walk
 from planners.parallel.batch import Batch, Table, digest
 from planners.parallel.workers import Workers
 from planners.search.plan_space import PlanSpace
 from planners.search.portions import PORTION, Source, cut
 from planners.system.limits import reaching
 
-#: Nodes off the diagonal, for each node of the plan space, with which a walk begins to be cut off.
-#: The robots' continuations take about as long as the walk of so many.
-GROWTH = 1.0
+#: Moves, for each node of the plan space, with which a walk of plans is given up.  A node of the
+#: walk over sets takes as long as some hundred moves, and on grids there are a fifth as many.
+GROWTH = 300.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,23 +52,29 @@ def verify(partition: Partition, spaces: Sequence[PlanSpace], growth: float = GR
     """Check a partition against the definition, for all tasks of ``spaces``.
 
     Every plan has a sentence under a partition, so RC-freeness of the plans of each sentence is all
-    there is to check.  ``growth`` says when walks begin to be cut off, and changes only ``nodes``.
+    there is to check.  ``growth`` says when walks of plans are given up, and changes only ``nodes``
+    and which violation is shown.
     """
     nodes = tasks = 0
     for space in spaces:
         if not len(space):  # nothing leads to these goals
             continue
         word = partition.word_of(space.rows)[space.state]
-        walk = Walk(space, word, growth)
-        goal, walked = walk.run()
+        try:
+            goal, walked = Walk(space, word, growth).run()
+        except Grown:
+            goal, walked = SetWalk(space, word).run()
         nodes += walked
         tasks += len(space.starts)
         if goal is not None:
-            trail, walked = walk.violation(goal)
-            first_plan = space.nodes_on(trail.start, [step[0] for step in trail.edges])
+            mine = space.goal[space.starts] == goal
+            part = space.with_tasks(space.starts[mine], space.second[mine])
+            word = partition.word_of(part.rows)[part.state]
+            trail, walked = SetWalk(part, word).violation()
+            first_plan = part.nodes_on(trail.start, [step[0] for step in trail.edges])
             said = sentence(int(word[node]) for node in first_plan)
             words = tuple(partition.words[number] for number in said)
-            return Verdict(False, tasks, nodes + walked, describe_failure(space, trail, words))
+            return Verdict(False, tasks, nodes + walked, describe_failure(part, trail, words))
     return Verdict(True, tasks, nodes, None)
 
 

@@ -167,21 +167,6 @@ class Continuations:
         ]
         return np.array(sets, np.int64)[kind]
 
-    def can_fail(self, mine: Ints, y: Ints) -> Bools:
-        """Whether mixtures of continuations ``mine`` (robots, k) may fail from nodes ``y`` (k).
-
-        False only if none does.  Where mixtures of plans from ``y`` fail it is true, though those
-        of ``mine`` may all be optimal.
-        """
-        possible: Bools = self.fails[y]
-        for own, theirs in zip(mine, self.of[:, y], strict=True):
-            open_rows = np.flatnonzero(~possible & (own != theirs))
-            pairs = np.column_stack((own[open_rows], theirs[open_rows]))
-            different, number = unique_tuples(pairs, [len(self.sets)] * 2)
-            outside = [not self.sets.inside(a, b) for a, b in different.tolist()]
-            possible[open_rows] = np.array(outside, np.bool_)[number]
-        return possible
-
 
 def _lists(owner: Ints, entries: Ints, some: Ints) -> list[list]:  # type: ignore[type-arg]
     """The entries of some owners, as lists; ``owner`` is ascending."""

@@ -8,9 +8,9 @@ sentences differ for good are left out.  A walk that ends failed with all leads 
 (Proposition 9 of docs/concepts.md).
 
 Nodes in which the plans and their mixture are in one state and nobody leads are *diagonal*: most
-are, and of these a mask is kept.  A walk that grows, or that meets a state with very many moves,
-has the robots' continuations worked out once, and is cut off from then on where no mixture of the
-plans can fail, whatever their sentences are (`coordlang.verification.continuations`).
+are, and of these a mask is kept.  So it is quick where tasks are many and words tell most plans
+apart at once.  Where it grows, or meets a state with very many moves, it is left to the walk over
+sets (`coordlang.verification.sets`), whose nodes are far fewer, and slower one by one.
 """
 
 from __future__ import annotations
@@ -20,14 +20,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from coordlang.required.miscoordination import Trail
-from coordlang.verification.continuations import Continuations
 from coordlang.verification.views import ANY, NEVER, Leads, views_of_robot
 from planners.joint.tables import Bools, Ints, ranges, spans, unique_tuples
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
-from planners.system.errors import OutOfMemory
-from planners.system.limits import memory_left, more_memory, reaching
+from planners.system.limits import memory_left, reaching
 
 #: In place of the node that a mixture reaches: it is no optimal plan any more.
 _FAILED = -1
@@ -55,11 +52,14 @@ class _Moves:
         return _Moves(self.row[which], own, leads, self.said[which], self.prefix[which])
 
 
+class Grown(Exception):
+    """The walk has become larger than it should."""
+
+
 class Walk:
     """The walk of one plan space under one assignment of words to its nodes.
 
-    ``growth``: nodes off the diagonal, for each node of the plan space, with which it begins to be
-    cut off.
+    ``growth``: moves, for each node of the plan space, with which it is given up.
     """
 
     def __init__(self, space: PlanSpace, word: Ints, growth: float) -> None:
@@ -69,16 +69,17 @@ class Walk:
         self._views = [views_of_robot(space, robot, word) for robot in range(space.robots)]
         self._leads = Leads(int(word.max(initial=0)) + 1)
         self._index = EdgeIndex.of(space)
-        self._continuations: Continuations | None = None
-        self._of_view: list[Ints] = []
         self._diagonal = np.zeros(len(space), np.bool_)
         self._diagonal[space.starts] = True
-        self._off_diagonal = 0
+        self._moves_made = 0
 
     # ---- is there a violation?
 
     def run(self) -> tuple[int | None, int]:
-        """The goal number of some violation (None: there is none), and the nodes walked."""
+        """The goal number of some violation (None: there is none), and the nodes walked.
+
+        Raises `Grown` where it is better left to the walk over sets.
+        """
         table = np.zeros((0, 2 * self.robots), np.int64)
         walked = 0
         layers = self.space.layers
@@ -107,13 +108,8 @@ class Walk:
         return found
 
     def _diagonal_in(self, layer: slice) -> Ints:
+        """The diagonal nodes of a layer."""
         nodes = np.flatnonzero(self._diagonal[layer]) + layer.start
-        if self._continuations is not None:
-            nodes = nodes[self._continuations.fails[nodes]]
-        return self._shared(nodes)
-
-    def _shared(self, nodes: Ints) -> Ints:
-        """Walk nodes in which all plans and their mixture are in these nodes, and nobody leads."""
         table = np.zeros((len(nodes), 2 * self.robots), np.int64)
         for robot, views in enumerate(self._views):
             table[:, robot] = views.of[nodes]
@@ -123,26 +119,16 @@ class Walk:
     def _after(self, table: Ints) -> Ints:
         """The nodes one step on that are not diagonal; those that are get into the mask."""
         sizes = self._sizes(table)
-        if 100 * sizes.max(initial=0) > memory_left() and self._continuations is None:
-            self._begin_to_cut()
-            table = table[self._can_fail(table)]
-            sizes = self._sizes(table)
         if 100 * sizes.max(initial=0) > memory_left():
-            raise _too_large(f"a state with {sizes.max():,.0f} combinations of moves")
+            raise Grown
         parts = [table[:0]]
         for span in spans(sizes, _CHUNK):
             child = self._children(self._moves(table[span]))
-            child = _different(child[~self._on_diagonal(child)])
-            parts.append(child[self._can_fail(child)])
-            met = self._off_diagonal + sum(map(len, parts))
-            if self._continuations is None and met > self._growth * len(self.space):
-                self._begin_to_cut()
-                parts = [part[self._can_fail(part)] for part in parts]
-            if 4 * sum(part.nbytes for part in parts) > memory_left():
-                raise _too_large(f"a layer of {len(table):,} nodes")
-        after = _different(np.concatenate(parts))
-        self._off_diagonal += len(after)
-        return after
+            self._moves_made += len(child)
+            if self._moves_made > self._growth * len(self.space):
+                raise Grown
+            parts.append(_different(child[~self._on_diagonal(child)]))
+        return _different(np.concatenate(parts))
 
     def _sizes(self, table: Ints) -> NDArray[np.float64]:
         """How many combinations of the plans' moves each node has."""
@@ -159,27 +145,6 @@ class Walk:
             same &= views.of[y] == child[:, robot]
         self._diagonal[y[same]] = True
         return same
-
-    # ---- where it is cut off
-
-    def _begin_to_cut(self) -> None:
-        """Work out the continuations; of nodes with one view they are the same."""
-        self._continuations = Continuations(self.space)
-        for views, of_node in zip(self._views, self._continuations.of, strict=True):
-            of_view = np.zeros(len(views.word), np.int64)
-            of_view[views.of] = of_node
-            self._of_view.append(of_view)
-
-    def _can_fail(self, table: Ints) -> Bools:
-        """From which nodes a mixture may fail, so far as that is looked at."""
-        if self._continuations is None:
-            return np.ones(len(table), np.bool_)
-        y = table[:, self.robots]
-        kept: Bools = y == _FAILED
-        going = np.flatnonzero(~kept)
-        mine = np.stack([of_view[table[going, k]] for k, of_view in enumerate(self._of_view)])
-        kept[going] = self._continuations.can_fail(mine, y[going])
-        return kept
 
     # ---- moves
 
@@ -224,68 +189,6 @@ class Walk:
         mixed = np.full(len(edge), _FAILED)
         mixed[edge >= 0] = self.space.targets(edge[edge >= 0])
         return np.column_stack((*children, mixed, *moves.leads))
-
-    # ---- a violation shown
-
-    def violation(self, goal: int) -> tuple[Trail, int]:
-        """Plans of a task of a goal that has a violation, and the nodes walked to find them.
-
-        Task by task, short ones first, so that little has to be remembered.
-        """
-        walked = 0
-        starts = np.unique(self.space.starts[self.space.goal[self.space.starts] == goal])
-        for start in starts[np.argsort(self.space.layer[starts], kind="stable")].tolist():
-            trail, nodes = self._violation_from(start)
-            walked += nodes
-            if trail is not None:
-                return trail, walked
-        raise AssertionError("the violation has a start")
-
-    def _violation_from(self, start: int) -> tuple[Trail | None, int]:
-        """A violation of the task that starts in this node, and the nodes walked."""
-        table = self._shared(np.array([start]))
-        history: list[_Moves] = []
-        walked = 0
-        for _ in range(int(self.space.layer[start])):
-            walked += len(table)
-            moves = self._moves(table)
-            moves = moves.take(np.lexsort((*reversed(moves.own), moves.row)))
-            table, first = np.unique(self._children(moves), axis=0, return_index=True)
-            kept = self._can_fail(table)
-            table = table[kept]
-            history.append(moves.take(first[kept]))
-        bad = np.flatnonzero(self._violates(table))
-        if not len(bad):
-            return None, walked
-        row, steps = int(bad[0]), []
-        for moves in reversed(history):
-            steps.append([int(own[row]) for own in moves.own])
-            row = int(moves.row[row])
-        plans = [self._edges(k, start, own) for k, own in enumerate(zip(*steps[::-1], strict=True))]
-        return Trail(start, tuple(zip(*plans, strict=True))), walked
-
-    def _edges(self, robot: int, node: int, moves: tuple[int, ...]) -> list[int]:
-        """Edges of the plan space that stand behind the moves between a robot's views."""
-        space, view = self.space, self._views[robot]
-        edges = []
-        for move in moves:
-            wanted = int(view.label[move]), int(view.child[move])
-            edges.append(
-                next(
-                    edge
-                    for edge in space.out_edges(node)
-                    if (space.labels_of(edge)[robot], int(view.of[space.target_of(edge)])) == wanted
-                )
-            )
-            node = space.target_of(edges[-1])
-        return edges
-
-
-def _too_large(what: str) -> OutOfMemory:
-    return OutOfMemory(
-        f"verification needs more memory for {what}",
-        remedy=f"Check fewer tasks at a time, or use {more_memory()}.",
-    )
 
 
 def _different(table: Ints) -> Ints:

@@ -38,6 +38,8 @@ _MERGES = 5
 _PAIRS, _FIRST_PAIRS = 1_000, 30
 #: Effort that is not enough for a tenth of the first failing plans is not begun with.
 _BEGINNING = 10
+#: What may be spent on each number from below before words are merged.
+_SOON = Budget(rounds=10, conflicts=2_000)
 #: Merged words are verified once they are so many times the last ones that were.
 _FEWER = 0.9
 
@@ -137,6 +139,8 @@ class MinimalSearch:
             return
         if self._pairs // _FIRST_PAIRS > _BEGINNING * self._most:
             return
+        while self.lower < self.upper and not self._is_spent and self.decide(self.lower, _SOON):
+            pass
         self.merge()
         known = self.best
         close_bounds(lambda: (self.lower, self.upper), self.decide, lambda: self._is_spent)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What robots can still do, against plans that are listed; what is cut off, against all mixtures."""
+"""What robots can still do, against plans that are listed."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 from functools import cache
 from itertools import product
-from random import Random
 
-import numpy as np
 import pytest
 
 from coordlang.verification.continuations import Continuations, SequenceSets
@@ -71,7 +69,6 @@ def small_spaces(seeds: range, robots: int | None) -> Iterator[PlanSpace]:
 
 def compared(seeds: range, robots: int | None) -> Counter[str]:
     met: Counter[str] = Counter()
-    random = Random(7)
     for space in small_spaces(seeds, robots):
         listed, found = Listed(space), Continuations(space)
         for robot, node in product(range(space.robots), range(len(space))):
@@ -81,24 +78,13 @@ def compared(seeds: range, robots: int | None) -> Counter[str]:
             fails = listed.fails((node,) * space.robots, node)
             assert found.fails[node] == fails
             met[f"nodes: {fails}"] += 1
-        for layer in space.layers:
-            for _ in range(6):
-                nodes = [random.randrange(layer.start, layer.stop) for _ in range(space.robots + 1)]
-                *x, y = nodes
-                chosen = found.of[np.arange(space.robots), x][:, None]
-                possible = bool(found.can_fail(chosen, np.array([y]))[0])
-                fails = listed.fails(tuple(x), y)
-                assert possible or not fails
-                assert fails or not possible or found.fails[y]
-                met[f"mixtures: {fails}"] += 1
     return met
 
 
 @pytest.mark.parametrize(("robots", "seeds"), runs(120, 60, 60))
 def test_continuations_are_those_of_listed_plans(robots: int | None, seeds: range) -> None:
     met = compared(seeds, robots)
-    kinds = ("nodes: True", "nodes: False", "mixtures: True", "mixtures: False")
-    assert all(met[kind] >= 15 for kind in kinds)
+    assert min(met["nodes: True"], met["nodes: False"]) >= 15
 
 
 def test_unions_and_inclusions_of_long_sequences() -> None:

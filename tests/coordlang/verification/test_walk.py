@@ -15,15 +15,17 @@ from coordlang.language.partition import Partition
 from coordlang.required.divergences import first_differences, states_on_plans
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary import Job, greedy
+from planners.pddl.model_options import ModelOptions
 from planners.system.errors import BadInput, ProvedImpossible
 from tests.support.domains import own_task
 from tests.support.random_models import random_model
+from tests.support.texts import parsed
 from tests.support.verification_walk import violation
 
 #: Edges to the power of the robots in a plan space that the twin is given.
 MOST = 4_000
-#: Walks are cut off from the beginning, once they have grown, or never.
-GROWTHS = (-1.0, 0.1, inf)
+#: Walks of plans are given up for sets at once, once they have grown, or never.
+GROWTHS = (-1.0, 3.0, inf)
 
 
 def compared(seeds: range, robots: int) -> Counter[bool]:
@@ -68,14 +70,36 @@ def test_pieces_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     assert min(answers[True], answers[False]) >= 2
 
 
-def test_a_walk_that_is_cut_off_stays_on_the_diagonal() -> None:
-    """Under words that separate all divergences: what fails has two sentences."""
+def test_sets_are_fewer_than_plans() -> None:
+    """Under words that separate all divergences, and under one word for all states."""
     candidates = own_task("grid", "three-robots-3x3")
-    (space,) = candidates.spaces
     first = first_differences(candidates.spaces)
     words = greedy(Job(candidates, tuple(states_on_plans(candidates.spaces).tolist()), first))
-    table = Partition.of_states(candidates.rows, words.partition)
-    whole, cut = (verify(table, candidates.spaces, growth) for growth in (inf, -1.0))
-    assert whole.holds
-    assert cut.holds
-    assert cut.nodes <= len(space) < whole.nodes
+    silence = dict.fromkeys(words.partition, 0)
+    for partition, holds in (words.partition, True), (silence, False):
+        table = Partition.of_states(candidates.rows, partition)
+        plans, sets = (verify(table, candidates.spaces, growth) for growth in (inf, -1.0))
+        assert plans.holds == sets.holds == holds
+        assert sets.nodes < plans.nodes
+
+
+def test_sets_of_steps_of_long_plans() -> None:
+    """Nothing recurses: three robots go 1,200 steps, and each has two ways to begin."""
+    last = 1_200
+    robots = "".join(f"(at r{k} c0)" for k in range(3))
+    steps = "".join(f"(next c{n} c{n + 1})" for n in range(last))
+    domain, problem = parsed(
+        """(define (domain line)
+             (:predicates (at ?r ?c) (next ?a ?b))
+             (:action go :parameters (?r ?a ?b)
+               :precondition (and (at ?r ?a) (next ?a ?b))
+               :effect (and (at ?r ?b) (not (at ?r ?a)))))""",
+        f"""(define (problem long) (:domain line)
+             (:objects r0 r1 r2 {" ".join(f"c{n}" for n in range(last + 1))} aside)
+             (:init {robots} {steps} (next c0 aside) (next aside c2))
+             (:goal (and (at r0 c{last}) (at r1 c{last}) (at r2 c{last}))))""",
+    )
+    found = from_problems(domain, [problem], ModelOptions(robots=("r0", "r1", "r2")))
+    word = np.arange(len(found.rows))
+    table = Partition(tuple(f"w{n}" for n in word), found.rows, word, 0)
+    assert verify(table, found.spaces, -1.0).holds

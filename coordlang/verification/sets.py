@@ -1,0 +1,383 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The composition walk over sets: what each robot can do and say, in place of n plans in step.
+
+Of plan i a mixture has robot i's labels alone, and sentences are compared word by word.  So what
+matters of a plan are its *steps*: the label of robot i, and the word that is entered, if one is.
+`coordlang.verification.walk` carries n plans; this walk carries for each robot the set of the step
+sequences of all plans that began with its steps.  A node is ``(y, ahead_1 .. ahead_n)``: the node
+of the plan space that the mixture has reached, and for each robot the words that it has said while
+some other robot has not, with the set of its steps to come.
+
+It is cut off where the robots have no sentence in common, and where no choice of label sequences
+can fail from ``y``.  At the step by which a mixture fails labels cease to matter: it is a violation
+iff the robots' sets have a sentence in common (Proposition 14 of docs/concepts.md).  Sets are
+canonical: equal ones have one number.  No method recurses, since plans may be long.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from coordlang.required.witnesses import Trail
+from coordlang.verification.continuations import Continuations, SequenceSets
+from planners.joint.tables import Ints
+from planners.search.plan_space import PlanSpace
+from planners.system.limits import reaching
+
+#: Words, one after another.
+Words = tuple[int, ...]
+#: What each robot has said that some other has not, and the set of steps that may follow.
+_Ahead = tuple[tuple[Words, int], ...]
+#: A node of the walk.
+_Node = tuple[int, _Ahead]
+#: What robots do next, the first of them or all: labels and words entered, each as one number.
+Steps = tuple[int, ...]
+#: In place of a word: the sentence ends.
+_END = -1
+
+
+@dataclass(frozen=True, slots=True)
+class _Failure:
+    """A mixture that fails after a node, by some robots' next steps; what is ahead of all then."""
+
+    at: _Node
+    steps: Steps
+    ahead: _Ahead
+
+    @property
+    def node(self) -> int:
+        """Where the mixture was last."""
+        return self.at[0]
+
+
+class SentenceSets(SequenceSets):
+    """Sets of sentences; each sentence ends with `_END`, so that one may begin another."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.silence = self.number([(_END, 0)])
+        self._common: dict[tuple[int, int], int | None] = {}
+
+    def before(self, words: Words, number: int) -> int:
+        """The sentences that say these words and then one of a set."""
+        for word in reversed(words):
+            number = self.number([(word, number)])
+        return number
+
+    def after(self, words: Words, number: int | None) -> int | None:
+        """What follows these words in a set; None if no sentence begins so."""
+        for word in words:
+            number = None if number is None else self.moves[number].get(word)
+        return number
+
+    def has(self, number: int, sentence: Words) -> bool:
+        """Whether a sentence is one of a set."""
+        rest = self.after(sentence, number)
+        return rest is not None and _END in self.moves[rest]
+
+    def first(self, number: int) -> Words:
+        """The first sentence of a set, in the order of words."""
+        said: list[int] = []
+        while _END not in self.moves[number]:
+            word, number = next(iter(self.moves[number].items()))
+            said.append(word)
+        return tuple(said)
+
+    def common(self, one: int | None, other: int | None) -> int | None:
+        """The sentences of both; None if there are none."""
+        if one is None or other is None or one == other:
+            return one if one == other else None
+        todo = [(one, other)]
+        while todo:
+            pair = todo[-1]
+            if pair in self._common:
+                todo.pop()
+                continue
+            mine, theirs = self.moves[pair[0]], self.moves[pair[1]]
+            below = {word: (after, theirs[word]) for word, after in mine.items() if word in theirs}
+            open_pairs = [p for p in below.values() if p[0] != p[1] and p not in self._common]
+            if open_pairs:
+                todo += open_pairs
+                continue
+            shared = [
+                (word, a if a == b else self._common[a, b])
+                for word, (a, b) in sorted(below.items())
+            ]
+            kept = [(word, after) for word, after in shared if after is not None]
+            self._common[todo.pop()] = self.number(kept) if kept else None
+        return self._common[one, other]
+
+
+class SetWalk:
+    """The walk of one plan space under one assignment of words to its nodes.
+
+    Parameters
+    ----------
+    space
+        The plan space.
+    word
+        (nodes) the word of each node.
+    """
+
+    def __init__(self, space: PlanSpace, word: Ints) -> None:
+        self._space, self._word = space, word.tolist()
+        self._base = int(word.max(initial=0)) + 2
+        self._labels: list[list[int]] = space.labels.tolist()
+        self._targets: list[int] = space.targets().tolist()
+        continuations = Continuations(space)
+        #: Label sequences; of each node every robot's set, and whether some mixture fails.
+        self._sequences, self._fails = continuations.sets, continuations.fails.tolist()
+        self._optimal = list(zip(*continuations.of.tolist(), strict=True))
+        self._steps, self._sentences = SequenceSets(), SentenceSets()
+        #: Of each set of steps its sentences, and its label sequences.
+        self._said, self._done = [self._sentences.silence], [0]
+        self._saying: dict[tuple[int, int], int] = {}
+        self._prefixes: dict[int, dict[int, Any]] = {}
+        self._of = self._sets_of_nodes()
+        self._look_at_sets()
+
+    # ---- sets of steps
+
+    def _sets_of_nodes(self) -> list[tuple[int, ...]]:
+        """Of each node every robot's set of steps, from the goals up."""
+        space, of = self._space, list[tuple[int, ...]]()
+        for node in range(len(space)):
+            own: list[dict[int, set[int]]] = [{} for _ in range(space.robots)]
+            for edge in space.out_edges(node):
+                for robot, below in enumerate(of[self._targets[edge]]):
+                    own[robot].setdefault(self._step(robot, node, edge), set()).add(below)
+            of.append(tuple(_united(self._steps, moves) for moves in own))
+        return of
+
+    def _step(self, robot: int, node: int, edge: int) -> int:
+        """A robot's label on an edge out of a node and the word entered, as one number."""
+        word = self._word[self._targets[edge]]
+        entered = 0 if word == self._word[node] else word + 1
+        return self._labels[edge][robot] * self._base + entered
+
+    def _entered(self, step: int) -> Words:
+        """The word that is entered by a step, if one is."""
+        entered = step % self._base
+        return (entered - 1,) if entered else ()
+
+    def _look_at_sets(self) -> None:
+        """Find the sentences and label sequences of new sets; what follows a step is no newer."""
+        sentences, labels = self._sentences, self._sequences
+        for number in range(len(self._said), len(self._steps)):
+            said: set[int] = set()
+            done: dict[int, set[int]] = {}
+            for step, after in self._steps.moves[number].items():
+                said.add(sentences.before(self._entered(step), self._said[after]))
+                done.setdefault(step // self._base, set()).add(self._done[after])
+            self._said.append(sentences.union(tuple(sorted(said))))
+            self._done.append(_united(labels, done))
+
+    def _part_saying(self, steps: int, sentences: int) -> int:
+        """The part of a set of steps along which some of these sentences is said; there is one."""
+        todo = [] if self._known_part(steps, sentences) is not None else [(steps, sentences)]
+        while todo:
+            number, wanted = todo[-1]
+            below = {}
+            for step, after in self._steps.moves[number].items():
+                rest = self._sentences.after(self._entered(step), wanted)
+                shared = self._sentences.common(rest, self._said[after])
+                if shared is not None:
+                    below[step] = after, shared
+            parts = {step: self._known_part(*pair) for step, pair in below.items()}
+            known = [(step, part) for step, part in sorted(parts.items()) if part is not None]
+            if len(known) == len(parts):
+                self._saying[todo.pop()] = self._steps.number(known)
+            todo += [below[step] for step, part in parts.items() if part is None]
+        found = self._known_part(steps, sentences)
+        assert found is not None
+        return found
+
+    def _known_part(self, steps: int, sentences: int) -> int | None:
+        """`_part_saying` where it is known, or all of a set."""
+        return steps if self._said[steps] == sentences else self._saying.get((steps, sentences))
+
+    # ---- is there a violation?
+
+    def run(self) -> tuple[int | None, int]:
+        """The goal number of some violation (None: there is none), and the nodes walked."""
+        found, walked = self._walk(self._space.starts.tolist(), {})
+        return None if found is None else int(self._space.goal[found.node]), walked
+
+    def _walk(
+        self, starts: Sequence[int], before: dict[_Node, tuple[_Node, Steps]]
+    ) -> tuple[_Failure | None, int]:
+        """A mixture that fails while all plans have one sentence, and the nodes walked.
+
+        ``before`` gets, of each node that is reached, one that leads to it and the robots' steps.
+        """
+        space, walked = self._space, 0
+        layers: list[dict[_Node, None]] = [{} for _ in space.layers]
+        for start in starts:
+            ahead: _Ahead = tuple(((), own) for own in self._of[start])
+            layers[int(space.layer[start])][start, ahead] = None
+
+        def so_far() -> str:
+            return f"{walked:,} nodes of the verification's walk over sets"
+
+        with reaching(so_far, space.model.smaller("fewer robots", "smaller or fewer tasks")):
+            for here, below in pairwise(reversed(layers)):
+                for node in here:
+                    walked += 1
+                    able = self._able(*node)
+                    for steps, ahead, target in self._moves(node[0], able) if able else ():
+                        if target is None:
+                            return _Failure(node, steps, ahead), walked
+                        child = target, _short(ahead)
+                        below[child] = None
+                        before.setdefault(child, (node, steps))
+                here.clear()
+        return None, walked
+
+    def _able(self, node: int, ahead: _Ahead) -> _Ahead | None:
+        """What robots can do that say what all can say; None if no choice of that can fail."""
+        said, common = self._common(ahead)
+        assert common is not None, "robots without a common sentence are left out"
+        if not self._can_fail(node, ahead):
+            return None
+        able = tuple(
+            (words, self._part_saying(own, self._sentences.before(said[len(words) :], common)))
+            for words, own in ahead
+        )
+        self._look_at_sets()
+        return able if self._can_fail(node, able) else None
+
+    def _can_fail(self, node: int, ahead: _Ahead) -> bool:
+        """Whether some choice of label sequences may fail from a node."""
+        return self._fails[node] or not all(
+            self._sequences.inside(self._done[own], theirs)
+            for (_, own), theirs in zip(ahead, self._optimal[node], strict=True)
+        )
+
+    def _common(self, ahead: _Ahead) -> tuple[Words, int | None]:
+        """What the robot that is ahead of all has said, and what all can say after it."""
+        said = max((words for words, _ in ahead), key=len)
+        if any(said[: len(words)] != words for words, _ in ahead):
+            return said, None
+        rests = [self._sentences.after(said[len(words) :], self._said[own]) for words, own in ahead]
+        return said, reduce(self._sentences.common, rests)
+
+    def _moves(self, node: int, ahead: _Ahead) -> Iterator[tuple[Steps, _Ahead, int | None]]:
+        """Steps after which the robots have a sentence in common, and what is ahead of them then.
+
+        Last the node that the mixture reaches; None where it fails, whatever those robots do whose
+        step is not among them.
+        """
+        todo: list[tuple[Steps, _Ahead, Any]] = [((), ahead, self._edges_by_labels(node))]
+        while todo:
+            steps, reached, edges = todo.pop()
+            robot = len(steps)
+            words, own = reached[robot]
+            for step, after in self._steps.moves[own].items():
+                moved = words + self._entered(step), after
+                following = (*reached[:robot], moved, *reached[robot + 1 :])
+                if self._common(following)[1] is None:
+                    continue
+                found = edges.get(step // self._base)
+                if found is None or robot + 1 == len(ahead):
+                    yield (*steps, step), following, found
+                else:
+                    todo.append(((*steps, step), following, found))
+
+    def _edges_by_labels(self, node: int) -> dict[int, Any]:
+        """The targets of a node's edges, by the robots' labels one after another."""
+        found = self._prefixes.get(node)
+        if found is None:
+            found = self._prefixes[node] = {}
+            for edge in self._space.out_edges(node):
+                *first, last = self._labels[edge]
+                at = found
+                for label in first:
+                    at = at.setdefault(label, {})
+                at[last] = self._targets[edge]
+        return found
+
+    # ---- a violation shown
+
+    def violation(self) -> tuple[Trail, int]:
+        """Plans of a task that has a violation, and the nodes walked to find them.
+
+        Task by task, short ones first, so that little has to be remembered.
+        """
+        starts, walked = self._space.starts, 0
+        for start in starts[np.argsort(self._space.layer[starts], kind="stable")].tolist():
+            before: dict[_Node, tuple[_Node, Steps]] = {}
+            found, nodes = self._walk([start], before)
+            walked += nodes
+            if found is not None:
+                plans = self._plans(start, found, before)
+                return Trail(start, tuple(zip(*plans, strict=True))), walked
+        raise AssertionError("the violation has a start")
+
+    def _plans(
+        self, start: int, found: _Failure, before: dict[_Node, tuple[_Node, Steps]]
+    ) -> list[list[int]]:
+        """The edges of plans with one sentence, of which the mixture fails."""
+        history: list[Steps] = []
+        node = found.at
+        while node in before:
+            node, steps = before[node]
+            history.append(steps)
+        history.reverse()
+        said, common = self._common(found.ahead)
+        assert common is not None
+        sentence = said + self._sentences.first(common)
+        plans = []
+        for robot, (words, own) in enumerate(found.ahead):
+            taken = [steps[robot] for steps in (*history, found.steps) if robot < len(steps)]
+            taken += self._steps_saying(own, sentence[len(words) :])
+            plans.append(self._path(start, robot, taken))
+        return plans
+
+    def _steps_saying(self, own: int, sentence: Words) -> list[int]:
+        """Steps of a set along which a sentence is said."""
+        steps = []
+        while self._steps.moves[own]:
+            for step, after in self._steps.moves[own].items():
+                entered = self._entered(step)
+                rest = sentence[len(entered) :]
+                if sentence[: len(entered)] == entered and self._sentences.has(
+                    self._said[after], rest
+                ):
+                    break
+            steps.append(step)
+            own, sentence = after, rest
+        return steps
+
+    def _path(self, start: int, robot: int, steps: Sequence[int]) -> list[int]:
+        """The edges of a plan with these steps of a robot."""
+        layers: list[dict[int, int]] = [{start: -1}]  # node -> the edge that leads to it
+        for step in steps:
+            reached = {
+                self._targets[edge]: edge
+                for node in layers[-1]
+                for edge in self._space.out_edges(node)
+                if self._step(robot, node, edge) == step
+            }
+            layers.append(reached)
+        node, path = next(iter(layers[-1])), list[int]()
+        for layer in layers[:0:-1]:
+            path.append(layer[node])
+            node = int(self._space.sources[layer[node]])
+        return path[::-1]
+
+
+def _united(sets: SequenceSets, moves: Mapping[int, set[int]]) -> int:
+    """The set with these first members, each followed by what one of some sets has."""
+    return sets.number((first, sets.union(tuple(sorted(moves[first])))) for first in sorted(moves))
+
+
+def _short(ahead: _Ahead) -> _Ahead:
+    """The same without the words that all robots have said."""
+    said = min(len(words) for words, _ in ahead)
+    return tuple((words[said:], own) for words, own in ahead)
