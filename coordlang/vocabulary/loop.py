@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import isqrt
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -148,6 +149,11 @@ def find(
     raise Undecided
 
 
+def between(lower: int, upper: int) -> int:
+    """A number between bounds, nearer to the lower one: most languages need few words."""
+    return isqrt(lower * upper)
+
+
 def close_bounds(
     bounds: Callable[[], tuple[int, int]],
     decide: Callable[[int, Budget], bool],
@@ -175,7 +181,7 @@ def close_bounds(
             return
         if decide(lower, budget):
             continue
-        middle = (lower + upper) // 2
+        middle = between(lower, upper)
         if middle == lower or not decide(middle, budget):
             budget = budget.doubled()
 

@@ -11,7 +11,7 @@ symmetries.
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
 from functools import cached_property
@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from coordlang.language.warping import Clause
 from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome, word_count
-from coordlang.vocabulary.loop import Budget, Languages, close_bounds, find
+from coordlang.vocabulary.loop import Budget, Languages, between, close_bounds, find
 from coordlang.vocabulary.merging import merged
 from coordlang.vocabulary.partitions import Partitions, Refutation
 from coordlang.vocabulary.sat import Undecided
@@ -40,6 +40,8 @@ _PAIRS, _FIRST_PAIRS = 1_000, 30
 _BEGINNING = 10
 #: What may be spent on each number from below before words are merged.
 _SOON = Budget(rounds=10, conflicts=2_000)
+#: Merges in a row that fail before something else is tried.
+_VAIN = 15
 #: Merged words are verified once they are so many times the last ones that were.
 _FEWER = 0.9
 
@@ -92,6 +94,7 @@ class MinimalSearch:
         self._job = job
         self._most = sys.maxsize if effort is None else effort * _UNIT
         self._merges = 0
+        self._merging: tuple[Assignment, Iterator[Assignment]] | None = None
         self.lower = job.lower_bound
         self.best: Assignment | None = job.incumbent
         self.refuting = Refutation(1, {}, 0)
@@ -116,13 +119,11 @@ class MinimalSearch:
 
     @cached_property
     def _contained(self) -> list[ContainedInstance]:
-        from coordlang.vocabulary.contained import (
-            ContainedInstance,
-            parts,
-            tasks_of_one_orbit,
-        )
-
         candidates, group = self._job.candidates, self.languages.known.group
+        if candidates.count == 1:
+            return []
+        from coordlang.vocabulary.contained import ContainedInstance, parts, tasks_of_one_orbit
+
         found = [*tasks_of_one_orbit(candidates, group), *parts(candidates, group)]
         instances = [ContainedInstance(part, self._job.seed) for part in found]
         return sorted(instances, key=lambda instance: len(instance.states))
@@ -139,14 +140,37 @@ class MinimalSearch:
             return
         if self._pairs // _FIRST_PAIRS > _BEGINNING * self._most:
             return
-        while self.lower < self.upper and not self._is_spent and self.decide(self.lower, _SOON):
-            pass
-        self.merge()
+        self._close_in_soon()
+        self.merge(_VAIN)
         known = self.best
-        close_bounds(lambda: (self.lower, self.upper), self.decide, lambda: self._is_spent)
+        close_bounds(
+            lambda: (self.lower, self.upper), self._decide_or_merge, lambda: self._is_spent
+        )
         if self.best is known and not self._is_spent:
             # Merged words tell more states apart than a language must: fewer leave more plans open.
             self.decide(self.lower, Budget())
+
+    def _close_in_soon(self) -> None:
+        """Decide numbers while that is quick: from below, then between the bounds."""
+        while self.lower < self.upper and not self._is_spent and self.decide(self.lower, _SOON):
+            pass
+        self._try_abstractions()
+        while self.lower < self.upper and not self._is_spent:
+            if not self._find_or_refute(between(self.lower, self.upper), _SOON):
+                break
+
+    def _try_abstractions(self) -> None:
+        """Take the first abstraction whose abstract states, each with a word, are a language."""
+        from coordlang.vocabulary.abstractions import abstractions
+
+        for classes in abstractions(self._job.candidates, self._job.states):
+            partition = {state: int(classes[state]) for state in self._job.states}
+            if word_count(partition) >= self.upper or self._is_spent:
+                return
+            self._report(f"trying {word_count(partition)} words by an abstraction")
+            if self.languages.holds(partition):
+                self._offer(partition)
+                return
 
     @cached_property
     def _pairs(self) -> int:
@@ -166,22 +190,36 @@ class MinimalSearch:
     def _is_spent(self) -> bool:
         return self.work >= self._most
 
-    def merge(self) -> None:
-        """Merge words of the best language as long as it stays a language."""
+    def merge(self, vain: int = sys.maxsize) -> None:
+        """Merge words of the best language as long as it stays a language.
+
+        After ``vain`` merges in a row that failed it is left, and the next call goes on there.
+        """
         if self.best is None or self.upper <= self.lower:
             return
-        languages, coarsest = self.languages, self.best
-        for coarser in merged(self.best, self._job.states, languages.refuter):
+        if self._merging is None or self._merging[0] is not self.best:
+            self._merging = self.best, merged(self.best, self._job.states, self.languages.refuter)
+        coarsest, failed = self.best, 0
+        for coarser in self._merging[1]:
+            failed += 1
             if word_count(coarser) < word_count(coarsest):
-                coarsest = coarser
+                coarsest, failed = coarser, 0
                 if word_count(coarsest) <= _FEWER * self.upper:
                     self._offer(coarsest)  # what is not verified is lost when time is over
             self._merges += 1
             self._report(f"merging words: {word_count(coarser)} left")
-            if self._is_spent:
+            if self._is_spent or failed >= vain:
                 break
         if coarsest is not self.best:
             self._offer(coarsest)
+        self._merging = self.best, self._merging[1]
+
+    def _decide_or_merge(self, size: int, budget: Budget) -> bool:
+        if self.decide(size, budget):
+            return True
+        if size > self.lower:
+            self.merge(_VAIN)
+        return False
 
     def decide(self, size: int, budget: Budget) -> bool:
         """Find a language with ``size`` words, or prove that there is none.
@@ -190,10 +228,16 @@ class MinimalSearch:
         """
         if size > self.lower and self._finds_tied(size, budget.rounds):
             return True
+        if self._find_or_refute(size, budget):
+            return True
+        return size == self.lower == self.upper - 1 and self._finds_tied(size, budget.rounds)
+
+    def _find_or_refute(self, size: int, budget: Budget) -> bool:
+        """`decide` among all partitions."""
         try:
             refuted = self._refuted_within(size, budget) or self._refuted(size, budget)
         except Undecided:
-            return size == self.lower == self.upper - 1 and self._finds_tied(size, budget.rounds)
+            return False
         if refuted is not None:
             # In this order: a signal in between leaves clauses that refute too much.
             self.refuting = refuted
@@ -213,7 +257,7 @@ class MinimalSearch:
         if found is None:
             return Refutation.of(size, self.languages.known)
         self._offer(found)
-        self.merge()
+        self.merge(_VAIN)
         return None
 
     def _finds_tied(self, size: int, rounds: int) -> bool:
