@@ -31,16 +31,16 @@ if TYPE_CHECKING:
     from coordlang.commands.coordination import coordination as coordination
     from coordlang.commands.explain import explain as explain
     from coordlang.commands.export import export as export
-    from coordlang.commands.ground import ground as ground
     from coordlang.commands.inputs import load as load
     from coordlang.commands.inputs import load_language as load_language
     from coordlang.commands.inspect import inspect as inspect
+    from coordlang.commands.lift import ground as ground
     from coordlang.commands.lift import lift as lift
-    from coordlang.commands.plan import plan as plan
     from coordlang.commands.plans import plans as plans
-    from coordlang.commands.say import say as say
+    from coordlang.commands.sentences import plan as plan
+    from coordlang.commands.sentences import say as say
+    from coordlang.commands.sentences import understand as understand
     from coordlang.commands.simulate import simulate as simulate
-    from coordlang.commands.understand import understand as understand
     from coordlang.commands.verify import verify as verify
     from coordlang.execution.monitor import Monitor as Monitor
     from coordlang.execution.monitor import MonitorError as MonitorError
@@ -63,14 +63,16 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-#: Functions that are commands, too: each in the module of its name.
+#: Modules of `coordlang.commands` with one function each, of the same name.
 _COMMANDS = (
-    *("inspect", "plans", "check", "coordination", "build", "verify", "lift", "ground", "say"),
-    *("understand", "plan", "choices", "simulate", "explain", "export"),
+    *("inspect", "check", "coordination", "build", "verify", "choices", "simulate", "explain"),
+    *("plans", "export"),
 )
 #: Module -> the public names that it defines.
 _DEFINED_IN = {
     **{f"coordlang.commands.{name}": (name,) for name in _COMMANDS},
+    "coordlang.commands.lift": ("lift", "ground"),
+    "coordlang.commands.sentences": ("say", "understand", "plan"),
     "coordlang.commands.inputs": ("load", "load_language"),
     "coordlang.language.words": ("Language",),
     "coordlang.execution.monitor": ("Monitor", "MonitorError", "NotAllowed", "NotPossible"),
@@ -78,14 +80,8 @@ _DEFINED_IN = {
     "coordlang.execution.plan_sentence": ("NotAPlan", "NotOptimal"),
     "coordlang.required.miscoordination": ("Inseparable",),
     "planners.system.errors": (
-        "CoordlangError",
-        "Refuted",
-        "UsageError",
-        "ProvedImpossible",
-        "OutOfMemory",
-        "OutOfTime",
-        "BadInput",
-        "Unsupported",
+        *("CoordlangError", "Refuted", "UsageError", "ProvedImpossible", "OutOfMemory"),
+        *("OutOfTime", "BadInput", "Unsupported"),
     ),
     "planners.system.limits": ("time_limit",),
 }

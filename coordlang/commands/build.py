@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Mapping
 from dataclasses import asdict, replace
 from importlib.metadata import version
 from os import PathLike, fspath
@@ -16,12 +15,19 @@ from typing import Any
 import coordlang
 from coordlang.commands.building import build_few_words, build_language
 from coordlang.commands.built import Built, built_text
-from coordlang.commands.failure import UNPROVED, code_of_interrupt, why_stopped
 from coordlang.commands.inputs import Arguments, PlanningInput, public, read_language, say_size
 from coordlang.commands.options import EFFORT, LanguageSource
 from coordlang.commands.records import BuildOptions
 from coordlang.commands.repairing import repair_language
-from coordlang.commands.terminal import echo, line_width, note_single_robot, working
+from coordlang.commands.terminal import (
+    UNPROVED,
+    code_of_interrupt,
+    echo,
+    line_width,
+    note_single_robot,
+    why_stopped,
+    working,
+)
 from coordlang.language.candidates import Candidates
 from coordlang.language.file import to_bytes, write_language
 from coordlang.language.recorded import check_domain, with_recorded
@@ -79,15 +85,14 @@ def build(arguments: Arguments, options: BuildOptions) -> Built:
             reserve = _FOR_CERTIFICATE if options.certificate else options.reserve
             built = build_language(candidates, reserve=reserve, **asdict(options.way) | how)
     seconds |= built.seconds
-    producer = {
-        "program": "coordlang",
-        "version": coordlang.__version__,
-        "arguments": _arguments(options),
-        "seed": options.way.seed,
-        "solver": f"python-sat {version('python-sat')}",
-        "seconds": {name: round(value, 3) for name, value in seconds.items()},
-    }
-    language = _with_producer(built.language, producer)
+    language = _with_producer(
+        built.language,
+        version=coordlang.__version__,
+        arguments=_arguments(options),
+        seed=options.way.seed,
+        solver=f"python-sat {version('python-sat')}",
+        seconds={name: round(value, 3) for name, value in seconds.items()},
+    )
     return replace(built, language=language, seconds=seconds, fewest=fewest, deadline=deadline)
 
 
@@ -132,11 +137,13 @@ def _arguments(options: BuildOptions) -> list[str]:
     return [f"{name}={value}" for name, value in sorted(given.items())]
 
 
-def _with_producer(language: Language, producer: Mapping[str, Any]) -> Language:
+def _with_producer(language: Language, **more: Any) -> Language:
+    """The language with further entries in what its file says of its making."""
+    producer = {**language.provenance.producer, **more}
     return replace(language, provenance=replace(language.provenance, producer=producer))
 
 
-def show(built: Built, options: BuildOptions) -> int:
+def show_build(built: Built, options: BuildOptions) -> int:
     """Write the language and its certificate, and say what was found."""
     output, certificate = options.output, options.certificate
     for name in built.skipped:
@@ -161,14 +168,12 @@ def show(built: Built, options: BuildOptions) -> int:
 
 
 def _save(built: Built, output: str, certificate: str | None) -> BaseException | None:
-    """Write the language; its file records the arguments of the command line.
+    """Write the language with the arguments of the command line, in place of the one before.
 
-    The certificate of a language that stood there before goes with it.  An interrupt does not lose
-    the language: it is written, and the interrupt returned.
+    The certificate of that one goes with it.  An interrupt is returned; it loses nothing.
     """
     arguments = [visible(argument) for argument in sys.argv[1:]]
-    producer = {**built.language.provenance.producer, "arguments": arguments}
-    language = _with_producer(built.language, producer)
+    language = _with_producer(built.language, arguments=arguments)
     if output == "-":
         remove_file(certificate)
         echo(to_bytes(language).decode(), nl=False)
@@ -186,9 +191,7 @@ def _save(built: Built, output: str, certificate: str | None) -> BaseException |
 def _certificate(built: Built) -> tuple[Certificate | None, BaseException | None]:
     """The certificate, checked, or the error that ended it early, within the time limit.
 
-    Nothing is written before: a language whose certificate is refused is none.  Of a search that
-    was stopped it proves the lower bound that was reached; not after an interrupt, which asks for
-    an end.
+    It is made before anything is written: a language whose certificate is refused is none.
     """
     if isinstance(built.stopped, KeyboardInterrupt):
         return None, built.stopped
@@ -228,10 +231,7 @@ def _write_certificate(built: Built, proof: Certificate, output: str, path: str)
 def _exit_code(
     built: Built, output: str, certificate: str | None, ended: BaseException | None
 ) -> int:
-    """The exit code; writes to stderr what ended the work early.
-
-    ``ended`` is what ended it after the language was built.
-    """
+    """The exit code; says what ended the work early: ``ended`` after the language was built."""
     proved, exact = built.guarantee.proved_minimal, built.is_exact
     stopped = ended or built.stopped
     if isinstance(stopped, KeyboardInterrupt):

@@ -7,12 +7,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from time import perf_counter
+from typing import Any
 
-from coordlang.commands.built import Built, language_of
+from coordlang.commands.built import Built
 from coordlang.commands.options import BuildPreference, MethodOptions
 from coordlang.explanation.simple import simple
 from coordlang.language.candidates import Candidates, require_solvable
 from coordlang.language.partition import Partition
+from coordlang.language.provenance import Guarantee, provenance_of
+from coordlang.language.tolerance import Tolerance
+from coordlang.language.words import Language
 from coordlang.required.all_differences import differences
 from coordlang.required.divergences import FirstDifferences, states_on_plans, without_divergences
 from coordlang.required.failures import Failures
@@ -41,21 +45,9 @@ FEW_WORDS = "few-words"
 class Making:
     """Candidate tasks on their way to a language: who works, the time by phase, what is verified.
 
-    Attributes
-    ----------
-    candidates, workers, progress
-        The tasks, who does jobs, and what is called with a line of text now and then.
-    seconds
-        By phase.
-    partition_of
-        Makes a partition of what a method finds.
-    last
-        The partition that was verified last; None before there is one.
-
-    Raises
-    ------
-    ProvedImpossible
-        There is no candidate task.
+    ``progress`` is called with a line of text now and then, ``partition_of`` makes a partition of
+    what a method finds, ``verified`` are the partitions that were verified, with the verdict.
+    Raises `ProvedImpossible` if there is no candidate task.
     """
 
     def __init__(
@@ -70,8 +62,7 @@ class Making:
         self.partition_of: Callable[[Assignment], Partition] = partial(
             Partition.of_states, candidates.rows
         )
-        self.last: Assignment | None = None
-        self._known: list[tuple[Assignment, Partition, Verdict]] = []
+        self.verified: list[tuple[Assignment, Partition, Verdict]] = []
         self._since = perf_counter()
 
     def note(self, phase: str) -> None:
@@ -81,10 +72,7 @@ class Making:
         self._since = now
 
     def differences(self) -> FirstDifferences:
-        """Where coordination is required, and how plans then part.
-
-        Raises `Inseparable` if there is no language over states.
-        """
+        """Where coordination is required; `Inseparable` if there is no language over states."""
         find = hidden_differences if self.candidates.model.hides_slack else differences
         return find(self.candidates, self.workers, self.progress)
 
@@ -114,16 +102,31 @@ class Making:
             raise AssertionError(
                 f"a method returned what is no coordination language: {verdict.witness}"
             )
-        self._known.append((words, partition, verdict))
-        self.last = words
+        self.verified.append((words, partition, verdict))
 
-    def knows(self, words: Assignment) -> bool:
-        """Whether this very partition was verified."""
-        return any(known is words for known, _, _ in self._known)
+    def known(self, words: Assignment) -> tuple[Partition, Verdict] | None:
+        """The partition and the verdict, if this very assignment was verified."""
+        return next(((own, verdict) for w, own, verdict in self.verified if w is words), None)
 
-    def verified(self, words: Assignment) -> tuple[Partition, Verdict]:
-        """A partition that was verified, and the verdict."""
-        return next((partition, v) for known, partition, v in self._known if known is words)
+    def built(
+        self,
+        job: Job,
+        found: tuple[Partition, Verdict] | None,
+        method: str,
+        lower_bound: int,
+        **more: Any,
+    ) -> Built:
+        """The language of words that were found, with what is proved of it; ``more`` of `Built`."""
+        assert found is not None, "it was verified"
+        partition, verdict = found
+        guarantee = Guarantee.of(method, len(partition.words), lower_bound, verdict.holds)
+        provenance = provenance_of(self.candidates, guarantee, {"program": "coordlang"})
+        if not verdict.holds:
+            slack = provenance.tolerance.slack if provenance.tolerance else None
+            tolerance = more["failures"].tolerance or Tolerance()
+            provenance = replace(provenance, tolerance=replace(tolerance, slack=slack))
+        language = Language.of(partition, self.candidates.model, provenance)
+        return Built(language, job, verdict, seconds=self.seconds, **more)
 
 
 def build_language(
@@ -184,16 +187,15 @@ def build_language(
             start_clock((1 - reserve) * time_left())
     progress(f"building words ({method})")
     outcome = _outcome(job, options, making)
-    partition, verdict = making.verified(outcome.partition)
     making.note("verify")
-    return Built(
-        language_of(partition, job, method, outcome.lower_bound),
+    return making.built(
         job,
-        verdict,
-        outcome.figures,
-        making.seconds,
-        outcome.stopped,
-        outcome.refuting,
+        making.known(outcome.partition),
+        method,
+        outcome.lower_bound,
+        figures=outcome.figures,
+        stopped=outcome.stopped,
+        refuting=outcome.refuting,
     )
 
 
@@ -209,26 +211,9 @@ def build_few_words(
     """Find words, at most so many, under which robots that choose by themselves fail least often.
 
     Where they never do, the words are verified by definition, as every coordination language.
-
-    Parameters
-    ----------
-    candidates
-        The tasks that they are for.  Plans of them may be inseparable.
-    words
-        The most words; 1 is silence.
-    worst
-        Minimise how often robots fail in the worst task, not over all tasks.
-    seed
-        Of all random choices.
-    progress, workers
-        As for `build_language`.
-
-    Raises
-    ------
-    ProvedImpossible
-        There is no candidate task.
-    TooManyToCount
-        Not even how often robots fail in silence can be counted.
+    Plans of the tasks may be inseparable; one word is silence.  With ``worst`` it counts how often
+    robots fail in the worst task, not over all tasks.  Arguments and errors are as in
+    `build_language`, and `TooManyToCount` where not even failures in silence can be counted.
     """
     making = Making(candidates, workers, progress)
     require_room(candidates.source)
@@ -236,17 +221,14 @@ def build_few_words(
     making.note("coordination")
     found = few_words(job, words, worst=worst)
     making.note("vocabulary")
-    partition = making.partition_of(found.partition)
-    verdict = Verdict(False, candidates.count, 0, None)
     stopped = found.stopped
+    unverified = making.partition_of(found.partition), Verdict(False, candidates.count, 0, None)
     if not found.failures.worst:
         with little_time_after(stopped):
             making.check(found.partition)
-        partition, verdict = making.verified(found.partition)
         if not isinstance(stopped, KeyboardInterrupt):
             stopped = None  # no search was left where nothing fails
     making.note("verify")
-    failures = Failures(found.failures.mean, found.failures.worst)
     figures = {
         "silence_mean": float(found.silence.mean),
         "silence_worst": float(found.silence.worst),
@@ -254,16 +236,14 @@ def build_few_words(
         "partitions_recounted": found.recounted,
         "least_of_all_partitions": found.is_best,
     }
-    return Built(
-        language_of(
-            partition, job, FEW_WORDS, job.lower_bound, holds=verdict.holds, failures=failures
-        ),
+    return making.built(
         job,
-        verdict,
-        figures,
-        making.seconds,
-        stopped,
-        failures=failures,
+        making.known(found.partition) or unverified,
+        FEW_WORDS,
+        job.lower_bound,
+        figures=figures,
+        stopped=stopped,
+        failures=Failures(found.failures.mean, found.failures.worst),
         few_words=found,
     )
 
@@ -305,7 +285,7 @@ def _outcome(job: Job, options: MethodOptions, making: Making) -> Outcome:
         if options.prefer and outcome.stopped is None:
             outcome = PREFERENCES[options.prefer](job, outcome)
             making.note(options.prefer)
-        if not making.knows(outcome.partition):
+        if making.known(outcome.partition) is None:
             job.progress("verifying by definition")
             with little_time_after(outcome.stopped):
                 job.check(outcome.partition)
@@ -314,6 +294,6 @@ def _outcome(job: Job, options: MethodOptions, making: Making) -> Outcome:
     stopped = run_until_stopped(run)
     if stopped is None:
         return found[0]
-    if making.last is None:
+    if not making.verified:
         raise stopped
-    return Outcome(making.last, job.lower_bound, stopped=stopped)
+    return Outcome(making.verified[-1][0], job.lower_bound, stopped=stopped)

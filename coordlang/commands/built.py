@@ -4,14 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import inf
 from typing import TYPE_CHECKING, Any
 
 from coordlang.language.candidates import Candidates
-from coordlang.language.partition import Partition
-from coordlang.language.provenance import Guarantee, provenance_of
-from coordlang.language.tolerance import Tolerance
+from coordlang.language.provenance import Guarantee
 from coordlang.language.warping import Clause
 from coordlang.language.words import Language
 from coordlang.required.divergences import FirstDifferences
@@ -168,25 +166,6 @@ class Built(Presented):
             **more,
             "seconds": {name: round(value, 3) for name, value in self.seconds.items()},
         }
-
-
-def language_of(
-    partition: Partition,
-    job: Job,
-    method: str,
-    lower_bound: int,
-    *,
-    holds: bool = True,
-    failures: Failures = NONE,
-) -> Language:
-    """The language of words that were found, with what is proved of it."""
-    guarantee = Guarantee.of(method, len(partition.words), lower_bound, holds)
-    provenance = provenance_of(job.candidates, guarantee, {"program": "coordlang"})
-    if not holds:
-        slack = provenance.tolerance.slack if provenance.tolerance else None
-        tolerance = failures.tolerance or Tolerance()
-        provenance = replace(provenance, tolerance=replace(tolerance, slack=slack))
-    return Language.of(partition, job.candidates.model, provenance)
 
 
 def built_text(built: Built, width: int) -> str:

@@ -7,10 +7,9 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
-from coordlang.commands.failure import IMPOSSIBLE, REFUTED
 from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.records import CheckOptions
-from coordlang.commands.terminal import echo
+from coordlang.commands.terminal import IMPOSSIBLE, REFUTED, echo
 from planners.classical.fast_downward import optimal_cost
 from planners.search.optimal_plans import search
 from planners.system.errors import ProvedImpossible
@@ -64,7 +63,7 @@ def check(files: Arguments, options: CheckOptions) -> CrossCheck:
     return CrossCheck(ours, answer.cost, answer.form, answer.actions)
 
 
-def show(found: CrossCheck, options: CheckOptions) -> int:
+def show_check(found: CrossCheck, options: CheckOptions) -> int:
     """Print the two costs; 1 if they differ."""
     if options.as_json:
         echo(json.dumps(found.data()))

@@ -4,28 +4,35 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import zip_longest
 from math import prod
 from os import fspath
 from typing import Any
 
 import click
 
-from coordlang.commands.choices_text import choices_text
-from coordlang.commands.failure import REFUTED
-from coordlang.commands.files import write
 from coordlang.commands.inputs import Arguments, InTask, public
+from coordlang.commands.layout import alike, named, packed, wrapped
 from coordlang.commands.options import File
 from coordlang.commands.records import ChoicesOptions
-from coordlang.commands.terminal import covered_code, echo, line_width, note
+from coordlang.commands.terminal import REFUTED, covered_code, echo, line_width, note, write
 from coordlang.commands.witness import witness_text
-from coordlang.execution.choices import MOST, SentenceChoices, monitor, to_bytes, to_data
+from coordlang.execution.choices import (
+    MOST,
+    RobotChoices,
+    SentenceChoices,
+    monitor,
+    to_bytes,
+    to_data,
+)
 from coordlang.execution.choices import choices as choices_under
-from coordlang.execution.drawing import choices_dot
+from coordlang.execution.drawing import choices_dot, distinguishing
 from coordlang.execution.monitor import Answer, Monitor, MonitorError, NotAllowed
 from coordlang.execution.task_language import TaskLanguage
+from coordlang.language.candidates import describe
 from coordlang.language.tolerance import percent
 from coordlang.required.failure import TooManyToCount, failure_of_sentence
 from coordlang.required.miscoordination import Miscoordination
@@ -38,6 +45,11 @@ from planners.system.writing import write_atomically
 
 #: Additions that are made to count how often choices fail, some seconds of work.
 _ADDITIONS = 1_000_000
+#: States of an automaton beyond which a table is cut.
+STATES_SHOWN = 40
+_MAY_DO = "may do"
+#: Characters that what is known has at least beside what may be done.
+_LEAST_ROOM = 30
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -158,7 +170,7 @@ def choices(files: Arguments, options: ChoicesOptions) -> RobotsChoices:
     OutOfMemory
         If the automata, or with ``check`` the combinations, do not fit into the memory.
     """
-    said = files.sentence
+    said = files.needed("SENTENCE")
     used = files.task().used
     chosen = _numbers(used.model.robots, options.robot) or tuple(range(len(used.model.robots)))
     found = choices_under(used, used.words_of(said), most=None if options.check else MOST)
@@ -175,7 +187,7 @@ def _numbers(known: tuple[str, ...], whose: str | Sequence[str]) -> tuple[int, .
     return tuple(dict.fromkeys(known.index(name) for name in names))
 
 
-def show(found: RobotsChoices, options: ChoicesOptions) -> int:
+def show_choices(found: RobotsChoices, options: ChoicesOptions) -> int:
     """Print or write the choices, or what one robot may do next."""
     form, code = options.form, 0
     if options.history or any(_detours(options).values()):
@@ -188,7 +200,7 @@ def show(found: RobotsChoices, options: ChoicesOptions) -> int:
         text = _monitor_text(at, answer) if form == "text" else _monitor_json(at, answer)
         code = REFUTED if answer is not None and not answer else 0
     elif form == "text":
-        text = choices_text(found, line_width(), is_checked=options.check)
+        text = _text(found, line_width(), is_checked=options.check)
     else:
         text = found.dot() if form == "dot" else found.text()
     write(text, options.output)
@@ -269,3 +281,93 @@ def _monitor_json(at: Monitor, answer: Answer | None) -> str:
         data["subplans"] = json_count(answer.subplans)
         data["subplan"] = list(answer.subplan) if answer.subplan is not None else None
     return json.dumps(data) + "\n"
+
+
+def _text(found: RobotsChoices, width: int, *, is_checked: bool) -> str:
+    """Each robot's automaton as a table; robots whose automata are equal are shown together."""
+    used, mixtures = found.found.task_language, found.found.mixtures
+    lines = [
+        *wrapped(f"The task {describe(used.space, used.task)}", width, "", "  "),
+        f'"{found.sentence}" leaves {counted(found.plans, "plan")} open.',
+    ]
+    if is_checked and mixtures is not None and mixtures.holds:
+        number = counted(found.combinations, "combination")
+        nodes = counted(mixtures.nodes, "node")
+        lines.append(
+            f"checked: {number} of own subplans, all {used.model.kept_plans} ({nodes} walked)"
+        )
+    tables = [_table(found, found.found.robots[robot], width) for robot in found.chosen]
+    for group in alike(tables):
+        robots = named([used.model.robots[found.chosen[number]] for number in group])
+        may, table = "may" if len(group) == 1 else "may each", tables[group[0]]
+        lines += ["", *wrapped(f"{robots} {may} {table[0]}", width, "", "  "), *table[1:]]
+    return "\n".join(lines) + "\n"
+
+
+def _table(found: RobotsChoices, own: RobotChoices, width: int) -> list[str]:
+    """The automaton state by state: what may be done there, where it leads, what is known there."""
+    automaton = own.automaton
+    subplans = counted(automaton.count, "subplan")
+    states = counted(len(automaton), "state")
+    rows = _rows(found, own)[:STATES_SHOWN]
+    lines = [f"follow {subplans} ({states}):", *(_row_lines(rows, width) if rows else ())]
+    rest = automaton.layers[-1].start - len(rows)
+    if rest > 0:
+        lines.append(f"  .. and {counted(rest, 'state')} more; --format json has all of them")
+    return lines
+
+
+def _row_lines(rows: Sequence[_Row], width: int) -> Iterator[str]:
+    """Columns as wide as they need be; broken into lines where they do not fit.
+
+    Then each alternative has a line of its own, and so many atoms as fit stand beside it.
+    """
+    head = ("step", "state", "left")
+    numbers = [
+        max(map(len, column)) for column in zip(head, *(row.numbers for row in rows), strict=True)
+    ]
+    indent = sum(numbers) + 2 * len(numbers) + 2
+    whole = [(" | ".join(row.moves), " ".join(row.knows)) for row in rows]
+    broken = indent + max(len(m) for m, _ in whole) + 2 + max(len(k) for _, k in whole) > width
+    shown = [
+        (row.moves[:1] + tuple(f"| {move}" for move in row.moves[1:]) if broken else (moves,), row)
+        for row, (moves, _) in zip(rows, whole, strict=True)
+    ]
+    may_do = max(len(_MAY_DO), *(len(line) for lines, _ in shown for line in lines))
+    room = max(_LEAST_ROOM, width - indent - may_do - 2) if broken else width
+
+    def line(left: Sequence[str], move: str, atoms: str) -> str:
+        cells = [cell.rjust(size) for cell, size in zip(left, numbers, strict=True)]
+        return "  ".join(["", *cells, move.ljust(may_do), atoms]).rstrip()
+
+    yield line(head, _MAY_DO, "knows")
+    for moves, row in shown:
+        atoms = packed(row.knows, room, "", "") if broken else [" ".join(row.knows)]
+        for number, (move, known) in enumerate(zip_longest(moves, atoms, fillvalue="")):
+            yield line(row.numbers if number == 0 else ("",) * len(head), move, known)
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """One state of an automaton: its step, number and subplans left, moves, and what is known."""
+
+    numbers: tuple[str, str, str]
+    moves: tuple[str, ...]
+    knows: tuple[str, ...]
+
+
+def _rows(found: RobotsChoices, own: RobotChoices) -> list[_Row]:
+    """A row for each state in which something may be done, of the first steps."""
+    model, automaton = found.found.task_language.model, own.automaton
+    rows = []
+    for step, states in enumerate(automaton.layers[:-1], 1):
+        if states.start >= STATES_SHOWN:
+            break
+        for state, atoms in zip(states, distinguishing(found.found, own, states), strict=True):
+            moves = tuple(
+                f"{model.label_text(own.robot, label) or 'idle'} -> {to}"
+                for label, to in automaton.moves(state)
+            )
+            numbers = str(step), str(state), f"{automaton.left[state]:,}"
+            rows.append(_Row(numbers, moves, tuple(atoms)))
+    return rows

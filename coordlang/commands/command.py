@@ -7,18 +7,18 @@ A command calls the Python function of its name and shows the result; nothing el
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from importlib import import_module
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
 import click
+from click.shell_completion import CompletionItem
 
-from coordlang.commands.files import FILE, FOLDER, OutputFile, beside, check_outputs, never_stdout
-from coordlang.commands.options import CommandOptions, Kept, Limits
+from coordlang.commands.options import CommandOptions, Kept, Limits, OutputFile
 from coordlang.commands.terminal import echo, line_width, note, working
-from planners.system.errors import CoordlangError, OutOfTime
+from planners.system.errors import CoordlangError, OutOfTime, UsageError
 from planners.system.limits import default_memory_limit, limited_memory, require_memory, time_limit
 from planners.system.options import Given, options_of, record_from
 
@@ -28,58 +28,77 @@ _PDDL = ("DOMAIN", "PROBLEM", "PROBLEMS...")
 _FILES = ("FILE", "LANGUAGE", "PROBLEM", "RECORD", "RUN.json")
 
 
+class _Named(click.ParamType):  # type: ignore[type-arg]  # generic in newer versions only
+    """Text that names a ``file`` or a ``dir``: shells complete it, and nothing is checked yet."""
+
+    def __init__(self, kind: str) -> None:
+        self.name = kind
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        return [CompletionItem(incomplete, type=self.name)]
+
+
+FILE, FOLDER = _Named("file"), _Named("dir")
+
+
 def command_of(
     name: str, record: type[CommandOptions], loaded: Callable[[str], Any] = import_module
 ) -> click.Command:
     """Make a command whose help is the docstring of its record.
 
     Its module is loaded when it is called: there are the function of its name, made by
-    `coordlang.commands.inputs.public`, and ``show``, which gets the result and the options, writes,
-    and returns the exit code, None for 0.
+    `coordlang.commands.inputs.public`, and ``show_NAME``, which gets the result and the options,
+    writes, and returns the exit code, None for 0.
     """
-    takes, alone = record.takes, record.alone
     records = [record, Kept, Limits] if record.keeps_plans else [record, Limits]
     named = {each.name: each for kind in records for each in options_of(kind)}
     on_cli = [each for each in named.values() if each.option.only != "python"]
 
-    def called(arguments: tuple[str, ...], **values: object) -> int | None:
+    def called(arguments: tuple[str, ...] = (), **values: object) -> int | None:
         given = {key: value for key, value in values.items() if _was_given(key)}
-        factored = given.get("factored")
-        read: dict[str, object] = {}
-        if alone is None or alone not in given:
-            read = positional(takes, arguments, is_factored=factored is not None)
-        elif arguments or factored is not None:
-            instead = f"{named[alone].spelling} {named[alone].option.metavar} alone"
-            raise click.UsageError(f"expected {instead}, without {takes}")
-        files = _read_files(arguments, factored)
+        read = _positional(record, named, arguments, given)
+        files = _read_files(arguments, given.get("factored"))
         _check_outputs(on_cli, given, files)
         own, kept, limits = (
             {each.name: given[each.name] for each in options_of(kind) if each.name in given}
             for kind in (record, Kept, Limits)
         )
-        module = loaded(f"coordlang.commands.{name}")
+        module = loaded(f"coordlang.commands.{record.module or name}")
         is_kept = record.keeps_plans and not record_from(Kept, kept, name).no_cache
         cache = _keeping() if is_kept else nullcontext()
         with limited(record_from(Limits, limits, name)), cache, _said(own.get("resume")):
             with working(record.doing) as progress:
-                own |= {
-                    key: value
-                    for key, value in (("progress", progress), ("note", note))
-                    if key in named and named[key].kind == Callable[[str], None]
-                }
+                for key, value in (("progress", progress), ("note", note)):
+                    if key in named and named[key].kind == Callable[[str], None]:
+                        own[key] = value
                 options = record_from(record, own, name, on_cli=True)
                 check_outputs(options.outputs(), files)
                 result = getattr(module, name).with_record(options, **read)
-            shown: int | None = module.show(result, options)
+            shown: int | None = getattr(module, f"show_{name}")(result, options)
             return shown
 
-    argument = click.Argument(["arguments"], nargs=-1, type=FILE, metavar=takes)
-    return click.Command(
-        name,
-        params=[*([argument] if takes else []), *map(_click_option, on_cli)],
-        callback=called if takes else lambda **values: called((), **values),
-        help=record.__doc__,
-    )
+    argument = click.Argument(["arguments"], nargs=-1, type=FILE, metavar=record.takes)
+    params = [*([argument] if record.takes else []), *map(_click_option, on_cli)]
+    return click.Command(name, params=params, callback=called, help=record.__doc__)
+
+
+def _positional(
+    record: type[CommandOptions],
+    named: Mapping[str, Given],
+    arguments: tuple[str, ...],
+    given: Mapping[str, object],
+) -> dict[str, object]:
+    """The arguments by name; none where the option is given in whose presence there are none."""
+    is_factored = given.get("factored") is not None
+    if record.alone is None or record.alone not in given:
+        return positional(record.takes, arguments, is_factored=is_factored)
+    if arguments or is_factored:
+        alone = named[record.alone]
+        instead = f"{alone.spelling} {alone.option.metavar} alone"
+        raise click.UsageError(f"expected {instead}, without {record.takes}")
+    return {}
 
 
 def positional(takes: str, given: tuple[str, ...], *, is_factored: bool) -> dict[str, object]:
@@ -135,30 +154,66 @@ def _was_given(name: str) -> bool:
 def _read_files(arguments: tuple[str, ...], factored: object) -> list[str]:
     """Files that no output may overwrite: the arguments, and what is read beside them."""
     folder = [] if factored is None else map(str, Path(str(factored)).glob("*.pddl"))
-    return [*arguments, *map(beside, arguments), *folder]
+    beside = [str(Path(problem).parent / "coordinates.json") for problem in arguments]
+    return [*arguments, *beside, *folder]
 
 
 def _check_outputs(named: Iterable[Given], given: dict[str, object], inputs: list[str]) -> None:
     """Refuse files that cannot be written, or that would overwrite one that is read."""
-    options = [(each, given[each.name]) for each in named if given.get(each.name) is not None]
-    for each, value in options:
-        if _names_file(each) and not each.option.is_output:
-            inputs += value if isinstance(value, tuple) else [str(value)]
     outputs: list[OutputFile] = []
-    for each, value in options:
-        if not each.option.is_output:
+    for each in named:
+        value = given.get(each.name)
+        if value is None:
             continue
-        paths = value if isinstance(value, tuple) else (str(value),)
-        for number, path in enumerate(paths, 1):
-            spelling = each.spelling if len(paths) == 1 else f"{each.spelling} {number}"
-            if each.option.metavar == "DIR":
-                inside = (os.path.join(path, file) if path else "" for file in each.option.files)
-                outputs += [OutputFile(spelling, file, makes_folder=True) for file in inside]
-            else:
-                if each.name != "output":
-                    never_stdout(spelling, path)
-                outputs.append(OutputFile(spelling, path))
+        paths = [*map(str, value)] if isinstance(value, tuple) else [str(value)]
+        if each.option.is_output:
+            outputs += _outputs_of(each, paths)
+        elif _names_file(each):
+            inputs += paths
     check_outputs(outputs, inputs)
+
+
+def _outputs_of(given: Given, paths: list[str]) -> Iterator[OutputFile]:
+    """The files that an option names, or that are written into its folder."""
+    for number, path in enumerate(paths, 1):
+        spelling = given.spelling if len(paths) == 1 else f"{given.spelling} {number}"
+        if given.option.metavar == "DIR":
+            for file in given.option.files:
+                yield OutputFile(spelling, os.path.join(path, file) if path else "", True)
+            continue
+        if given.name != "output" and path == "-":
+            raise UsageError(f"{spelling} -: this cannot go to stdout", remedy="Name a file.")
+        yield OutputFile(spelling, path)
+
+
+def check_outputs(outputs: Iterable[OutputFile], inputs: Iterable[str]) -> None:
+    """Refuse outputs that cannot be written, or overwrite an input file or one another.
+
+    Before the work, not after it.  Raises `UsageError`.
+    """
+    from planners.system.writing import is_device, why_unwritable
+
+    read = [path for path in inputs if path != "-" and os.path.isfile(path)]
+    written: dict[str, str] = {}
+    for option, path, makes_folder in outputs:
+        if path is None or path == "-":
+            continue
+        if reason := why_unwritable(path, makes_folder=makes_folder):
+            what = f"{option} {path} cannot be written: {reason}"
+            raise UsageError(what, remedy="Name a file in a folder that you may write to.")
+        if is_device(path):
+            continue  # a device or a pipe is written to, and never replaced
+        if os.path.exists(path) and any(os.path.samefile(path, other) for other in read):
+            raise UsageError(
+                f"{option} {path} would overwrite an input file",
+                remedy="Give the output another name.",
+            )
+        other = written.setdefault(os.path.realpath(path), option)
+        if other != option:
+            raise UsageError(
+                f"{other} and {option} name the same file: {path}",
+                remedy="Give each a file of its own.",
+            )
 
 
 @contextmanager

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
@@ -12,7 +11,7 @@ from typing import Any
 from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.layout import WIDTH
 from coordlang.commands.records import CoordinationOptions
-from coordlang.commands.terminal import echo, line_width, note_single_robot
+from coordlang.commands.terminal import note_single_robot, show_answer
 from coordlang.commands.witness import witness_data, witness_text
 from coordlang.language.tolerance import percent
 from coordlang.required.failure import mean
@@ -60,7 +59,7 @@ class TaskCoordination(Presented):
             "plans": json_count(self.plans),
             "requires_coordination": self.required,
             "miscoordination": witness_data(self.witness),
-            "failure": _number(self.failure),
+            "failure": None if self.failure is None else float(self.failure),
             **({"failure_estimate": self.estimate.data()} if self.estimate else {}),
             **({"slack": self.slack} if self.slack else {}),
             **({"fewest_actions": self.fewest.data()} if self.fewest else {}),
@@ -147,11 +146,8 @@ class Coordination(Presented):
 
     def data(self) -> dict[str, Any]:
         """The answers as JSON data."""
-        return {
-            "tasks": [task.data() for task in self.tasks],
-            "failure_mean": _number(self.failure_mean),
-            "failure_worst": _number(self.failure_worst),
-        }
+        overall = Failures(self.failure_mean, self.failure_worst)
+        return {"tasks": [task.data() for task in self.tasks], **overall.data()}
 
     def __str__(self) -> str:
         return self.text()
@@ -204,11 +200,7 @@ def coordination(files: Arguments, options: CoordinationOptions) -> Coordination
     return Coordination(loaded.model.robots, tasks)
 
 
-def _number(share: Fraction | None) -> float | None:
-    return None if share is None else float(share)
-
-
-def show(found: Coordination, options: CoordinationOptions) -> None:
+def show_coordination(found: Coordination, options: CoordinationOptions) -> None:
     """Print the answers."""
     note_single_robot(found.robots)
-    echo(json.dumps(found.data()) if options.as_json else found.text(line_width()))
+    show_answer(found, as_json=options.as_json)

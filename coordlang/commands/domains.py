@@ -1,16 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``coordlang domains``: the domains that come with coordlang, and maps as problems of theirs."""
+"""``coordlang domains`` and ``tasks``: shipped domains, maps as problems of theirs, task files."""
 
 from __future__ import annotations
 
 import json
 import os
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from coordlang.commands.files import OutputFile, check_outputs
+from coordlang.commands.command import check_outputs
 from coordlang.commands.inputs import Arguments, public
-from coordlang.commands.records import DomainsOptions
-from coordlang.commands.terminal import echo
+from coordlang.commands.options import OutputFile
+from coordlang.commands.records import DomainsOptions, TasksOptions
+from coordlang.commands.terminal import echo, write
+from coordlang.language.listed import ListedTask
+from coordlang.language.patterns import varied_tasks
+from coordlang.language.task_file import tasks_text
 from coordlang.sites.movingai import planning_files
 from coordlang.sites.shipped import about, domain_names, shipped_domains
 from planners.system.errors import UsageError
@@ -25,13 +31,9 @@ ALL = "all"
 def domains(_: Arguments, options: DomainsOptions) -> list[str]:
     """The names of the domains that are listed or were copied, or of the files of a map."""
     copy, shipped = options.copy, shipped_domains()
-    parts = map_file, scen, agents, output = (
-        options.map,
-        options.scen,
-        options.agents,
-        options.output,
-    )
-    if any(part is not None for part in parts):
+    map_file, scen, agents, output = options.map, options.scen, options.agents, options.output
+    parts = map_file, scen, agents, output
+    if parts != (None,) * 4:
         if copy or map_file is None or scen is None or agents is None or output is None:
             raise UsageError(
                 "a map needs --map FILE.map, --scen FILE.scen, --agents K and -o DIR, "
@@ -46,7 +48,7 @@ def domains(_: Arguments, options: DomainsOptions) -> list[str]:
     return names
 
 
-def show(names: list[str], options: DomainsOptions) -> None:
+def show_domains(names: list[str], options: DomainsOptions) -> None:
     """Print the names, or what was written."""
     shipped = shipped_domains()
     if options.output is not None and options.agents is not None:
@@ -70,7 +72,7 @@ def _write_map(map_file: str, scen: str, agents: int, output: str) -> list[str]:
     """Write a map's files, over none that says something else; their names are returned."""
     texts = planning_files(Path(map_file), Path(scen), agents)
     paths = {name: os.path.join(output, name) for name in texts}
-    check_outputs([OutputFile("-o", path, True) for path in paths.values()], [map_file, scen])
+    check_outputs([OutputFile("-o", path, True) for path in paths.values()], (map_file, scen))
     for name, path in paths.items():
         if os.path.lexists(path) and _bytes(path) != texts[name].encode():
             raise UsageError(
@@ -111,3 +113,24 @@ def _copy(shipped: Path, names: list[str], target: str) -> None:
             )
         check_outputs([OutputFile("--copy", path if target else "", makes_folder=True)], [])
     copy_folders([shipped / name for name in names], target)
+
+
+@public(TasksOptions)
+def tasks(files: Arguments, options: TasksOptions) -> Sequence[ListedTask]:
+    """The task of a problem with other starts and other goals."""
+    # Tasks start with no action to remember.
+    model = replace(options.source.model, remember_actions=False)
+    files = replace(files, source=replace(options.source, model=model))
+    return varied_tasks(files.instance(), options.start, options.goal)
+
+
+def show_tasks(found: Sequence[ListedTask], options: TasksOptions) -> None:
+    """Write the file, and say how many tasks there are."""
+    write(tasks_text(found), options.output)
+    starts, goals = ({getattr(task, part) for task in found} for part in ("init", "goal"))
+    if options.as_json and options.output != "-":
+        figures = {"tasks": len(found), "starts": len(starts), "goals": len(goals)}
+        echo(json.dumps(figures))
+        return
+    line = f"{counted(len(starts), 'start')}, {counted(len(goals), 'goal')}"
+    echo(f"{counted(len(found), 'task')}: {line}", err=options.output == "-")

@@ -24,9 +24,7 @@ from coordlang.explanation.text import (
     descriptions_text,
     pddl_condition,
 )
-from coordlang.explanation.text import (
-    shown as formula_text,
-)
+from coordlang.explanation.text import shown as formula_text
 from coordlang.explanation.words import (
     MappedStates,
     WordDescriptions,
@@ -191,7 +189,14 @@ class Explanation(InTask):
     def data(self) -> dict[str, Any]:
         """Words and sentences, as ``--json`` has them."""
         used = self.used
-        listed = [_sentence_data(sentence) for sentence in self.sentences]
+        listed: list[dict[str, Any]] = [
+            {
+                "sentence": " ".join(sentence.words),
+                "plans": json_count(sentence.plans),
+                "choices": [[list(own) for own in step] for step in sentence.choices],
+            }
+            for sentence in self.sentences
+        ]
         for entry, asks in zip(listed, self.demands() if self.with_demands else (), strict=False):
             entry |= demands_data(asks)
         return {
@@ -268,31 +273,23 @@ def explain(files: Arguments, options: ExplainOptions) -> Explanation:
     return Explanation(used, words, only, options.task)
 
 
-def _sentence_data(sentence: TaskSentence) -> dict[str, Any]:
-    return {
-        "sentence": " ".join(sentence.words),
-        "plans": json_count(sentence.plans),
-        "choices": [[list(own) for own in step] for step in sentence.choices],
-    }
-
-
-def show(found: Explanation, options: ExplainOptions) -> int:
+def show_explain(found: Explanation, options: ExplainOptions) -> int:
     """Print the sentences of the task, and the words."""
     if options.as_json:
         with working("listing the sentences of the task"):
             data = found.data()
         echo(json.dumps(data))
     else:
-        echo(found.words.head + "\n")
-        echo(_task_and_words(found))
+        _show_text(found)
     if options.task:
         return covered_code(found.covered, found.tolerance)
     warn_of_failures(found.tolerance)
     return 0
 
 
-def _task_and_words(found: Explanation) -> str:
+def _show_text(found: Explanation) -> None:
     """What is easier to read comes first; where a task has too many sentences, the words alone."""
+    echo(found.words.head + "\n")
     width = line_width()
     words = fitted(found.words.formulas_text(), width)
     try:
@@ -301,4 +298,4 @@ def _task_and_words(found: Explanation) -> str:
     except OutOfMemory:
         echo(words)
         raise
-    return f"{fitted(task, width)}\n\n{words}"
+    echo(f"{fitted(task, width)}\n\n{words}")

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from os import fspath
 from typing import Any
 
-from coordlang.commands.files import write
 from coordlang.commands.inputs import Arguments, InTask, public
 from coordlang.commands.plans import PlanSteps
 from coordlang.commands.records import WRITTEN, ExportOptions
-from coordlang.commands.terminal import covered_code, echo
-from coordlang.commands.understand import SentencePlans
+from coordlang.commands.sentences import SentencePlans
+from coordlang.commands.terminal import covered_code, echo, write
 from coordlang.execution.choices import choices as choices_under
 from coordlang.execution.open_plans import OpenPlans
 from coordlang.execution.task_language import TaskLanguage
@@ -208,7 +207,7 @@ def export(files: Arguments, options: ExportOptions) -> Any:
     NoPlanFits
         If no optimal plan has the sentence.
     """
-    said = files.sentence
+    said = files.needed("SENTENCE")
     used = files.task().used
     words = used.words_of(said)
     if options.to == "pddl":
@@ -227,7 +226,9 @@ def _label_text(model: JointModel, robot: int, label: int) -> str | None:
     return model.labels[robot][label] if label else None
 
 
-def show(found: ExportedTask | ExportedFormula | ExportedTrees, options: ExportOptions) -> int:
+def show_export(
+    found: ExportedTask | ExportedFormula | ExportedTrees, options: ExportOptions
+) -> int:
     """Write the export, or the translated plan."""
     output, as_json = options.output, options.as_json
     if isinstance(found, ExportedTask) and options.translate_plan is not None:

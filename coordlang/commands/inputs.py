@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from os import PathLike, fspath
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from coordlang.commands import options as given
 from coordlang.commands.options import Source, TasksSource
@@ -46,6 +46,14 @@ _PARAMETERS = {
     "PROBLEMS...": ("problems", "ProblemSource"),
     "SENTENCE": ("sentence", "SentenceSource | None"),
     "PLAN": ("plan", "PlanSource | None"),
+}
+
+#: Argument of a command -> what is missing without it, and what to do.
+_NEEDED = {
+    "LANGUAGE": ("a language", "Give a language file, or a language."),
+    "LIFTED": ("a language", "Give a language file, or a language."),
+    "SENTENCE": ("a sentence", 'Give its words, as in "w1 w0".'),
+    "PLAN": ("a plan", "Give a plan file or the steps of one plan."),
 }
 
 
@@ -120,21 +128,13 @@ class Arguments:
         found = [*self.values.get("PROBLEMS...", ()), self.values.get("PROBLEM")]
         return [problem for problem in found if problem is not None]
 
-    @property
-    def language(self) -> given.LanguageSource:
-        """The language; `UsageError` if none is given."""
-        found = self.values.get("LIFTED", self.values.get("LANGUAGE"))
+    def needed(self, word: str) -> Any:
+        """An argument that must be given; `UsageError` if it is not."""
+        found = self.values.get(word)
         if found is None:
-            raise UsageError("expected a language", remedy="Give a language file, or a language.")
-        return cast("given.LanguageSource", found)
-
-    @property
-    def sentence(self) -> given.SentenceSource:
-        """The sentence; `UsageError` if none is given."""
-        found = self.values.get("SENTENCE")
-        if found is None:
-            raise UsageError("expected a sentence", remedy='Give its words, as in "w1 w0".')
-        return cast("given.SentenceSource", found)
+            what, remedy = _NEEDED[word]
+            raise UsageError(f"expected {what}", remedy=remedy)
+        return found
 
     def read(self) -> PlanningInput:
         """Read domain and problems, or the files of ``source.factored`` in their place.
@@ -175,7 +175,7 @@ class Arguments:
         """Read a language and put it into the task of a problem."""
         from coordlang.execution.task_language import language_in_task
 
-        language, files = self.language, self.read()
+        language, files = self.needed("LANGUAGE"), self.read()
         read, position = language_for(language, files, coordinates=coordinates)
         options = files.options_of(read)
         used = language_in_task(read, files.domain, files.problems[0], options, position)
@@ -329,18 +329,18 @@ def language_for(
 ) -> tuple[Language, Position]:
     """Read a language; a lifted one is put into the problems, and verified there for tasks.
 
-    Without ``tasks`` for the problems' own ones.  One that is to be used, and verified for that,
-    keeps the words that no state here has, so that words look the same in all problems.
+    Without ``tasks`` for the problems' own ones.  What is verified here keeps the words that no
+    state here has, so that words look the same in all problems.
     """
     from coordlang.language.words import Language
 
     read, position = read_language(language)
     if isinstance(read, Language):
         return read, position
-    from coordlang.commands.ground import ground_in
+    from coordlang.commands.lift import ground_in
     from planners.parallel.workers import Workers
 
-    found = ground_in(
+    found, _ = ground_in(
         read,
         files,
         position,
@@ -350,7 +350,7 @@ def language_for(
         workers=Workers(),
         every_word=is_verified,
     )
-    return found.language, position
+    return found, position
 
 
 def read_coordinates_of(

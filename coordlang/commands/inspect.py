@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from os import fspath
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.layout import WIDTH, wrapped
 from coordlang.commands.records import WRITTEN, InspectOptions
-from coordlang.commands.terminal import echo, line_width, note, note_single_robot
+from coordlang.commands.terminal import note, note_single_robot, show_answer
 from planners.search.search_estimate import SearchEstimate
 from planners.system.notebook import Presented, counted, html_table
 
@@ -156,12 +155,12 @@ def inspect(files: Arguments, options: InspectOptions) -> Inspected:
     return found
 
 
-def show(found: Inspected, options: InspectOptions) -> None:
+def show_inspect(found: Inspected, options: InspectOptions) -> None:
     """Print what was understood."""
     if options.write is not None:
         note(f"written to {fspath(options.write)}: {', '.join(WRITTEN)}")
     note_single_robot(found.robots)
-    echo(json.dumps(found.data()) if options.as_json else found.text(line_width()))
+    show_answer(found, as_json=options.as_json)
 
 
 def _counts(counts: dict[str, int]) -> str:

@@ -12,11 +12,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Union
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Union
 
 import click
 
-from coordlang.commands.files import OutputFile
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import UsageError
 from planners.system.options import group, option
@@ -54,6 +53,19 @@ NO_SLACK = ("slack", "words_see_slack")
 DEFAULT_MAX = 10
 
 
+class OutputFile(NamedTuple):
+    """A file that is written: the option that names it, and its path.
+
+    None is no file, ``-`` is stdout and not looked at.  ``makes_folder``: its folder is made where
+    it is missing.
+    """
+
+    option: str
+    path: str | None
+    makes_folder: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class CommandOptions:
     """What a command can be asked for; the docstring of each record is the command's ``--help``.
 
@@ -63,24 +75,30 @@ class CommandOptions:
         The arguments, as the usage line shows them: ``LANGUAGE DOMAIN PROBLEM [SENTENCE]``.
     doing
         What a terminal shows while the function works.
+    module
+        The module of the function; None: the one of its name.
     keeps_plans
         Whether it searches no task again that was searched before, unless ``--no-cache`` is given.
     alone
         The option in whose presence there are no arguments.
+    given
+        The names of the options that were given.
     """
 
-    __slots__ = ()
     takes: ClassVar[str] = ""
     doing: ClassVar[str] = "reading and grounding"
+    module: ClassVar[str | None] = None
     keeps_plans: ClassVar[bool] = True
     alone: ClassVar[str | None] = None
+
+    given: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         """Let ``--json`` stand for ``--format json``, where there is a format."""
         form = getattr(self, "form", None)
         if form is None or not getattr(self, "as_json", False):
             return
-        if form != "json" and "form" in getattr(self, "given", ()):
+        if form != "json" and "form" in self.given:
             raise click.UsageError(f"--json is short for --format json: leave out --format {form}")
         object.__setattr__(self, "form", "json")
 

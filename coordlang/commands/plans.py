@@ -8,11 +8,10 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from typing import Any, ClassVar
 
-from coordlang.commands.files import write
 from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.options import DEFAULT_MAX
 from coordlang.commands.records import PlansOptions, UnderstandOptions
-from coordlang.commands.terminal import echo, note_single_robot
+from coordlang.commands.terminal import echo, note_single_robot, write
 from planners.search.kept_plans import search
 from planners.search.optimal_plans import search as bounded_search
 from planners.search.plan_file import Texts, texts, to_ipc, to_json, to_plansys2
@@ -155,7 +154,7 @@ def plans(files: Arguments, options: PlansOptions) -> OptimalPlans:
     return OptimalPlans(Plans.of(space))
 
 
-def show(found: OptimalPlans, options: PlansOptions) -> None:
+def show_plans(found: OptimalPlans, options: PlansOptions) -> None:
     """Print the plans, or their number."""
     note_single_robot(found.robots)
     show_listed(found, options, found.data, "plans" if found.slack else "optimal plans")
@@ -180,18 +179,12 @@ def show_listed(
         if listing.sample:
             data["complete"] = False
         write(json.dumps(data) + "\n", output)
-    elif listing.only_count:
+        return
+    if listing.only_count:
         write(f"{found.count}\n", output)
-    else:
-        write(_text(found, listed, is_sample=bool(listing.sample)), output)
-        if not listing.sample and len(listed) < found.count:
-            echo(f"{len(listed)} of {found.count} {what} listed; --max N lists more", err=True)
-
-
-def _text(found: OptimalPlans, listed: Sequence[PlanSteps], *, is_sample: bool) -> str:
-    """The plans as IPC text, each with its number."""
-    parts = []
-    for number, plan in enumerate(listed, 1):
-        title = f"sampled plan {number}" if is_sample else f"plan {number} of {found.count}"
-        parts.append(f"; {title}\n{found.ipc(plan)}\n")
-    return "".join(parts)
+        return
+    title = "sampled plan {}" if listing.sample else f"plan {{}} of {found.count}"
+    texts = [f"; {title.format(n)}\n{found.ipc(plan)}\n" for n, plan in enumerate(listed, 1)]
+    write("".join(texts), output)
+    if not listing.sample and len(listed) < found.count:
+        echo(f"{len(listed)} of {found.count} {what} listed; --max N lists more", err=True)

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from coordlang.commands.files import OutputFile
 from coordlang.commands.options import (
     NO_SLACK,
     CertificateSource,
@@ -24,6 +23,7 @@ from coordlang.commands.options import (
     LiftedWork,
     Listing,
     MethodOptions,
+    OutputFile,
     ProblemSource,
     Progress,
     SentenceSource,
@@ -95,7 +95,6 @@ class PlansOptions(CommandOptions):
     as_json: bool = json_option("Short for --format json.")
     listing: Listing = group(Listing)
     source: Source = group(Source, without=("words_see_slack",))
-    given: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +136,7 @@ class TasksOptions(CommandOptions):
     """
 
     takes = "DOMAIN PROBLEM"
+    module = "domains"
     keeps_plans = False
 
     start: tuple[str, ...] = option(
@@ -211,7 +211,6 @@ class BuildOptions(CommandOptions):
     progress: Progress | None = progress_option()
     work: Jobs = group(Jobs)
     source: Source = group(Source)
-    given: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         if self.words is None and self.worst:
@@ -326,6 +325,7 @@ class GroundOptions(CommandOptions):
     """
 
     takes = "LIFTED DOMAIN PROBLEM"
+    module = "lift"
     doing = "finding all optimal plans"
 
     tasks: TasksSource | None = option(
@@ -352,6 +352,7 @@ class SayOptions(CommandOptions):
     """
 
     takes = "LANGUAGE DOMAIN PROBLEM PLAN"
+    module = "sentences"
     doing = "finding all optimal plans"
 
     as_json: bool = json_option()
@@ -369,6 +370,7 @@ class UnderstandOptions(CommandOptions):
     """
 
     takes = "LANGUAGE DOMAIN PROBLEM SENTENCE"
+    module = "sentences"
     doing = "finding the plans with the sentence"
 
     listing: Listing = group(Listing)
@@ -385,7 +387,6 @@ class UnderstandOptions(CommandOptions):
     )
     output: str | None = output_option()
     source: Source = group(Source, without=NO_SLACK)
-    given: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         CommandOptions.__post_init__(self)
@@ -410,6 +411,7 @@ class PlanOptions(CommandOptions):
     """
 
     takes = "LANGUAGE DOMAIN PROBLEM [SENTENCE]"
+    module = "sentences"
     doing = "searching for a plan"
 
     prefer: str | Sequence[str] = option(
@@ -422,7 +424,6 @@ class PlanOptions(CommandOptions):
     form: Literal["ipc", "json", "plansys2"] = form_option("ipc", "How the plan is written.")
     as_json: bool = json_option("Short for --format json.")
     source: Source = group(Source, without=NO_SLACK)
-    given: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         CommandOptions.__post_init__(self)
@@ -464,7 +465,6 @@ class ChoicesOptions(CommandOptions):
     as_json: bool = json_option("Short for --format json.")
     output: str | None = output_option()
     source: Source = group(Source, without=NO_SLACK)
-    given: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)
@@ -595,7 +595,6 @@ class ExportOptions(CommandOptions):
     )
     as_json: bool = json_option()
     source: Source = group(Source, without=NO_SLACK)
-    given: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         pddl_only = {"max_actions": "--max-actions", "for_planner": "--for"}

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import count
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from coordlang.commands.building import Making
-from coordlang.commands.built import Built, language_of
+from coordlang.commands.built import Built
 from coordlang.commands.layout import WIDTH, wrapped
 from coordlang.commands.options import MethodOptions
 from coordlang.commands.witness import witness_data, witness_text
@@ -143,23 +143,8 @@ def repair_language(
     """Change the words of as few states as makes a language serve candidate tasks.
 
     The result is verified by definition.  States that are on no plan of the candidate tasks keep
-    their words.
-
-    Parameters
-    ----------
-    candidates
-        The tasks that it must serve.
-    start
-        The language; states that the tasks' problem cannot have are left out.
-    seed
-        Recorded.
-    progress, workers
-        As for `coordlang.commands.building.build_language`.
-
-    Raises
-    ------
-    Inseparable, ProvedImpossible, OutOfMemory
-        As `coordlang.commands.building.build_language` does.
+    their words; of ``start`` those that the tasks' problem cannot have are left out.  ``seed`` is
+    recorded; arguments and errors are else as in `coordlang.commands.building.build_language`.
     """
     making = Making(candidates, workers, progress)
     found = making.differences()
@@ -172,14 +157,15 @@ def repair_language(
     verdict = making.verdict(partition)
     making.note("verify")
     repaired = Repaired(None, new_states=len(job.states) - len(words), gone=old.gone)
-    figures: Mapping[str, float] = {}
-    stopped = None
+    more: dict[str, Any] = {"figures": {}}
     if not verdict.holds:
         making.partition_of = old.repaired
         result = repair(job, words, len(partition.words), partition.default)
         making.note("repair")
         witness = verdict.witness
-        partition, verdict = making.verified(result.partition)
+        verified = making.known(result.partition)
+        assert verified is not None, "what repairs checks what it returns"
+        partition, verdict = verified
         repaired = replace(
             repaired,
             witness=witness,
@@ -188,18 +174,19 @@ def repair_language(
             new_words=tuple(w for w in partition.words if w not in old.partition.words),
             new_words_bound=result.new_words_bound,
         )
-        figures, stopped = result.figures, result.stopped
+        more = {"figures": result.figures, "stopped": result.stopped}
     # What the old file claims of fewer words is not believed.
-    language = language_of(partition, job, METHOD, job.lower_bound)
-    return Built(language, job, verdict, figures, making.seconds, stopped, repaired=repaired)
+    return making.built(
+        job, (partition, verdict), METHOD, job.lower_bound, repaired=repaired, **more
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class _Old:
     """The old words in the model of the candidate tasks.
 
-    ``listed`` (states) is the place in ``partition`` of each candidate state that the language
-    lists, -1 where it does not.  ``gone`` of its states are none of this model.
+    ``listed`` (states) is the place of each candidate state in ``partition``, -1 where it has none.
+    ``gone`` of the language's states are none of this model.
     """
 
     candidates: Candidates
@@ -211,7 +198,9 @@ class _Old:
     def of(cls, language: Language, candidates: Candidates) -> _Old:
         _, wrong = read_keys(candidates.model.codec, language.states)
         if len(wrong):
-            language = _without(language, set(wrong.tolist()))
+            gone = set(wrong.tolist())
+            kept = [item for n, item in enumerate(language.states.items()) if n not in gone]
+            language = replace(language, states=dict(kept))
         partition = language.partition(candidates.model)
         listed = find_rows(partition.rows, candidates.rows)
         return cls(candidates, partition, listed, len(wrong))
@@ -231,13 +220,14 @@ class _Old:
         word = np.concatenate((self.partition.word, given[fresh]))
         word[self.listed[states][~fresh]] = given[~fresh]
         used, number = np.unique(word, return_inverse=True)
-        names = _names(self.partition.words, used.tolist())
+        old = self.partition.words
+        fresh_names = (name for name in (f"w{n}" for n in count()) if name not in old)
+        names = tuple(old[w] if w < len(old) else next(fresh_names) for w in used.tolist())
         most = int(np.bincount(number).argmax())
-        default = used.tolist().index(self.partition.default) if self._default_in(used) else most
+        former = used.tolist()
+        is_used = self.partition.default in former
+        default = former.index(self.partition.default) if is_used else most
         return Partition.of_table(names, rows, number.reshape(-1), default)
-
-    def _default_in(self, used: Ints) -> bool:
-        return self.partition.default in used
 
     def changes(self, result: Repair, partition: Partition) -> tuple[ChangedState, ...]:
         """The changed states, sorted by their keys."""
@@ -250,15 +240,3 @@ class _Old:
         )
         old, new = self.partition.words, partition.words
         return tuple(ChangedState(key, old[was], new[now]) for key, was, now in sorted(names))
-
-
-def _without(language: Language, places: set[int]) -> Language:
-    """A language without the states at some places of its list."""
-    kept = [item for n, item in enumerate(language.states.items()) if n not in places]
-    return replace(language, states=dict(kept))
-
-
-def _names(old: Sequence[str], used: Sequence[int]) -> tuple[str, ...]:
-    """The names of the words that are used; new ones are called as no old one is."""
-    fresh = (name for name in (f"w{n}" for n in count()) if name not in old)
-    return tuple(old[word] if word < len(old) else next(fresh) for word in used)

@@ -40,7 +40,7 @@ def report(arguments: Arguments, options: ReportOptions) -> Page:
     """Make the page of a language: its words, and sentences and plans of tasks."""
     files = arguments.read()
     points = read_coordinates_of(options.coordinates, files.problems[0])
-    read, position = language_for(arguments.language, files, coordinates=points)
+    read, position = language_for(arguments.needed("LANGUAGE"), files, coordinates=points)
     check_source(read, files.domain, files.problems, position)
     page = make_report(
         read,
@@ -68,7 +68,7 @@ def _simulated(path: str | None, domain: Domain) -> SimulationRecord | None:
     return record
 
 
-def show(found: Page, options: ReportOptions) -> None:
+def show_report(found: Page, options: ReportOptions) -> None:
     """Write the page."""
     page = found.report
     to_stdout = options.output == "-"

@@ -147,7 +147,7 @@ def simulate(files: Arguments, options: SimulateOptions) -> Simulated:
     """
     if options.replay is not None:
         return Simulated(read_simulation(options.replay))
-    _ = files.language
+    files.needed("LANGUAGE")
     settings, runs = _settings(options), options.runs
     require_simulator()
     task = files.task(options.coordinates)
@@ -194,18 +194,12 @@ def _prepared(used: TaskLanguage, options: SimulateOptions) -> Mission:
 
 def _settings(options: SimulateOptions) -> Settings:
     """How robots are built and keep step; `UsageError` for what they cannot be built with."""
+    given = {name: getattr(options, name) for name in ("step", "cell", "noise", "lidar", "human")}
     radius = options.cell / 5 if options.radius is None else options.radius
-    return Settings(
-        options.step,
-        options.cell,
-        radius,
-        noise=options.noise,
-        lidar=options.lidar,
-        human=options.human,
-    )
+    return Settings(radius=radius, **given)
 
 
-def show(found: Simulated, options: SimulateOptions) -> int:
+def show_simulate(found: Simulated, options: SimulateOptions) -> int:
     """Write the recordings, and print what came of the runs."""
     with working("drawing") as say:
         for path in options.output:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import shutil
 import sys
@@ -12,17 +13,32 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from time import monotonic
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
-from coordlang.commands.failure import REFUTED, UNPROVED, code_of_interrupt, why_stopped
 from coordlang.commands.layout import WIDTH
 from planners.system.limits import Underway, underway
 from planners.system.messages import visible
+from planners.system.signals import Interrupted
 
 if TYPE_CHECKING:
     from coordlang.language.tolerance import Tolerance
+
+# Exit codes that are of no error of the one error tree (docs/cli.md, exit codes).
+
+#: The answer is no: refuted, or nothing is guaranteed.
+REFUTED = 1
+#: An answer without the proof that was asked for.
+UNPROVED = 3
+#: It is proved that there is no plan.
+IMPOSSIBLE = 11
+#: From here on exit codes are of signals.
+SIGNALS = 128
+#: Interrupted from the keyboard.
+INTERRUPTED = 130
+#: As a shell reports a process whose reader has gone: the answer did not arrive.
+BROKEN_PIPE = 141
 
 #: Seconds of work before progress is shown: short commands neither flicker nor load rich.
 _DELAY = 0.4
@@ -50,6 +66,21 @@ def echo(text: object, *, err: bool = False, nl: bool = True) -> None:
     if not err and context is not None and isinstance(context.obj, Output):
         context.obj.written = True
     click.echo(visible(str(text), keep="\n\t"), err=err, nl=nl)
+
+
+def write(text: str, output: str | None) -> None:
+    """Write to a file, or to stdout without one (or for ``-``)."""
+    from planners.system.writing import write_atomically
+
+    if output is None or output == "-":
+        echo(text, nl=False)
+    else:
+        write_atomically(output, text.encode())
+
+
+def show_answer(found: Any, *, as_json: bool) -> None:
+    """Write the ``data`` of a result as one JSON object, or its ``text`` as wide as the page."""
+    echo(json.dumps(found.data()) if as_json else found.text(line_width()))
 
 
 def note(text: str) -> None:
@@ -80,6 +111,18 @@ def covered_code(is_covered: bool, tolerance: Tolerance | None) -> int:
     what = "the language does not cover this task: it guarantees nothing here"
     echo(f"coordlang: warning: {what}", err=True)
     return REFUTED
+
+
+def why_stopped(stopped: BaseException) -> str:
+    """What ended work whose best result is kept, in one line."""
+    if isinstance(stopped, KeyboardInterrupt):
+        return "interrupted"
+    return str(stopped).splitlines()[0] if str(stopped) else "out of memory"
+
+
+def code_of_interrupt(stopped: KeyboardInterrupt) -> int:
+    """The exit code after an interrupt, by the keyboard or by a signal, as a shell reports it."""
+    return SIGNALS + stopped.number if isinstance(stopped, Interrupted) else INTERRUPTED
 
 
 def ended_early(stopped: BaseException | None, what: str) -> int:

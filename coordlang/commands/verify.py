@@ -3,16 +3,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import Any
 
-from coordlang.commands.failure import REFUTED
 from coordlang.commands.inputs import Arguments, language_for, public, say_size
 from coordlang.commands.records import VerifyOptions
-from coordlang.commands.terminal import echo, line_width
+from coordlang.commands.terminal import REFUTED, echo, show_answer
 from coordlang.commands.witness import witness_data, witness_text
 from coordlang.language.candidates import require_solvable
 from coordlang.language.recorded import check_source, recorded_candidates
@@ -165,7 +163,7 @@ def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
     if isinstance(proof, str | PathLike):
         proof = read_certificate(fspath(proof))
     files = arguments.read()
-    read, position = language_for(arguments.language, files, tasks, is_verified=False)
+    read, position = language_for(arguments.needed("LANGUAGE"), files, tasks, is_verified=False)
     check_source(read, files.domain, files.problems, position)
     model = files.options_of(read)
     if tasks is None:
@@ -210,9 +208,9 @@ def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
     )
 
 
-def show(found: Verification, options: VerifyOptions) -> int:
+def show_verify(found: Verification, options: VerifyOptions) -> int:
     """Print the verdict, and what the certificate proves."""
-    echo(json.dumps(found.data()) if options.as_json else found.text(line_width()))
+    show_answer(found, as_json=options.as_json)
     if found.unchecked and not options.as_json:
         echo(found.unchecked)
     if not found.holds:

@@ -30,16 +30,8 @@ _SUBSETS = 200_000
 class Graph:
     """A part of a plan space whose nodes and edges all lie on plans of the part.
 
-    Attributes
-    ----------
-    nodes
-        Plan-space nodes, by step and in the order in which they are drawn.
-    order
-        (nodes) The place in the step's column.
-    edges
-        Plan-space edges, sorted by source in ``nodes`` and labels.
-    complete
-        It is the whole plan space.
+    ``nodes`` are sorted by step and by ``order`` (nodes), the place in the step's column; ``edges``
+    by source in ``nodes`` and labels; ``complete``: it is the whole plan space.
     """
 
     nodes: Ints
@@ -125,10 +117,12 @@ def shown_sentences(
     every = _all_sentences(language) if len(language.space.target) <= most else None
     plans = _drawn_sentences(language, graph, seed, most) if every is None else every
     ranked = sorted(plans.items(), key=lambda entry: (-entry[1], entry[0]))[:SENTENCES]
-    listed = tuple(
-        ShownSentence(words, number, _own_counts(language, words)) for words, number in ranked
-    )
-    return ShownSentences(listed, None if every is None else len(every))
+    listed = []
+    for words, number in ranked:
+        open_plans = language.plans_with(words)
+        own = tuple(_own_count(open_plans, robot) for robot in range(len(language.model.robots)))
+        listed.append(ShownSentence(words, number, own))
+    return ShownSentences(tuple(listed), None if every is None else len(every))
 
 
 def _all_sentences(language: TaskLanguage) -> Mapping[Sentence, int] | None:
@@ -159,13 +153,8 @@ def _drawn_sentences(
     return found
 
 
-def _own_counts(language: TaskLanguage, words: Sentence) -> tuple[int | None, ...]:
-    """Count each robot's own subplans in the plans with a sentence."""
-    open_plans = language.plans_with(words)
-    return tuple(_own_count(open_plans, robot) for robot in range(len(language.model.robots)))
-
-
 def _own_count(open_plans: PlanSpace, robot: int) -> int | None:
+    """Count a robot's own subplans in these plans; None if that is too much work."""
     try:
         return determinise(open_plans, robot, most=_SUBSETS).count
     except OutOfMemory:

@@ -67,19 +67,9 @@ def graph_layout(number: int, links: Sequence[tuple[int, int]]) -> Floats:
     """Place the nodes of an undirected graph so that distances are close to path lengths.
 
     Least stress, ``sum (distance - length)^2 / length^2`` over pairs of nodes, by the method of
-    Kamada and Kawai (1989), which starts from classical scaling.  O(number^2) a step.
-
-    Parameters
-    ----------
-    number
-        The nodes are 0 .. number - 1.
-    links
-        The edges; parts that are not connected are placed a little apart.
-
-    Returns
-    -------
-    array (number, 2)
-        Linked nodes are about 1 apart, the longer axis lies along x, the least coordinates are 0.
+    Kamada and Kawai (1989), which starts from classical scaling.  O(number^2) a step.  Returns an
+    array (number, 2): linked nodes are about 1 apart, parts that are not connected a little more,
+    the longer axis lies along x, the least coordinates are 0.
     """
     if number <= 1:
         return np.zeros((number, 2))
@@ -192,20 +182,9 @@ def spread(points: Floats, least: float) -> Floats:
 def layer_orders(sizes: Sequence[int], edges: Sequence[tuple[int, int]]) -> list[int]:
     """Order the nodes of each layer so that few edges cross: the barycentre heuristic.
 
-    Sugiyama, Tagawa, Toda (1981).  networkx places the nodes of layers in the order in which they
-    are given (`multipartite_layout`) and has nothing that reduces crossings.
-
-    Parameters
-    ----------
-    sizes
-        The numbers of nodes of the layers; nodes are numbered layer by layer.
-    edges
-        Pairs of nodes, each from a layer to the next one.
-
-    Returns
-    -------
-    list of int
-        The place of each node within its layer.
+    Sugiyama, Tagawa, Toda (1981); networkx has nothing that reduces crossings.  ``sizes`` are the
+    numbers of nodes of the layers, which are numbered layer by layer; ``edges`` lead from a layer
+    to the next one.  Returns the place of each node within its layer.
     """
     bounds = np.cumsum([0, *sizes])
     ends = np.array(sorted(set(edges)), np.int64).reshape(-1, 2)

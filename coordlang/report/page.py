@@ -191,7 +191,7 @@ def _json(data: Mapping[str, Any]) -> str:
 def _figures(language: Language, plans: str) -> list[tuple[str, str, str]]:
     g, tolerance = language.guarantee, language.tolerance
     kind = {"all": "all pairs of states", "problems": "of the problems", "file": "of a task file"}
-    return [
+    figures = [
         ("Words", _number(g.size), g.claim),
         (
             "Tasks",
@@ -199,18 +199,11 @@ def _figures(language: Language, plans: str) -> list[tuple[str, str, str]]:
             kind.get(str(language.provenance.tasks.get("kind")), ""),
         ),
         ("States", _number(len(language.states)), f"on {plans} of these tasks"),
-        *(
-            [
-                (
-                    "Failures",
-                    percent(tolerance.failure_mean),
-                    "on average over the tasks, its file says",
-                )
-            ]
-            if tolerance is not None and tolerance.failure_mean is not None
-            else []
-        ),
     ]
+    if tolerance is not None and tolerance.failure_mean is not None:
+        share = percent(tolerance.failure_mean)
+        figures.append(("Failures", share, "on average over the tasks, its file says"))
+    return figures
 
 
 def _about(

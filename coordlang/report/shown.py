@@ -31,18 +31,10 @@ _PAIRS = 100_000
 
 @dataclass(frozen=True, slots=True)
 class ShownTask:
-    """A task that is shown.
+    """A task that is shown, with the language in it.
 
-    Attributes
-    ----------
-    name
-        That of its problem, None for a candidate task of the language.
-    language
-        The language in this task.
-    witness
-        Plans that miscoordinate, None if there are none.
-    decided
-        False where the memory did not suffice to find out.
+    ``name`` is that of its problem, None for a candidate task; ``witness`` has plans that
+    miscoordinate (None: there are none); ``decided``: the memory sufficed to find out.
     """
 
     name: str | None
@@ -53,16 +45,10 @@ class ShownTask:
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """The tasks shown.
+    """The tasks shown: those of the problems, then those that were drawn.
 
-    Attributes
-    ----------
-    tasks
-        Those of the problems, then those that were drawn.
-    looked, requiring
-        How many candidate tasks were examined, and how many of them require coordination.
-    complete
-        Whether all candidate tasks are shown.
+    Of the candidate tasks so many were ``looked`` at, and so many are ``requiring`` coordination;
+    ``complete``: all of them are shown.
     """
 
     tasks: tuple[ShownTask, ...]
@@ -113,10 +99,7 @@ def select_tasks(
 def _drawn(
     candidates: Iterable[TaskLanguage], known: set[tuple[str, str]], room: int
 ) -> tuple[list[ShownTask], list[ShownTask], bool]:
-    """Examine candidate tasks until there are enough for ``room`` tasks.
-
-    Returns those that require coordination, the others, and whether all were examined.
-    """
+    """Enough candidate tasks that require coordination, others, and whether these are all."""
     requiring: list[ShownTask] = []
     others: list[ShownTask] = []
     for language in candidates:
@@ -154,7 +137,9 @@ def _candidates(
     if first.language.provenance.tasks.get("kind") == "all":
         tasks = _pairs(first, random)
     else:
-        tasks = _recorded(first, domain, problem, random, position)
+        listed = recorded_list(first.language)
+        random.shuffle(listed)
+        tasks = (planning_task(first.model, domain, problem, one, position) for one in listed)
     for task in tasks:
         try:
             space = search(first.model, task)
@@ -162,16 +147,6 @@ def _candidates(
             continue  # of two states one need not be reachable from the other
         word = first.partition.word_of(space.rows)[space.state]
         yield replace(first, space=space, task=0, word=word, covered=True, holds=True, verdict=None)
-
-
-def _recorded(
-    first: TaskLanguage, domain: Domain, problem: Problem, random: Random, position: Position | None
-) -> Iterator[PlanningTask]:
-    """Yield the tasks that the language file lists, in random order."""
-    listed = recorded_list(first.language)
-    random.shuffle(listed)
-    for one in listed:
-        yield planning_task(first.model, domain, problem, one, position)
 
 
 def _pairs(first: TaskLanguage, random: Random) -> Iterator[PlanningTask]:

@@ -34,14 +34,8 @@ _VERIFIED = 20_000
 class Played:
     """The execution of a mixture of plans.
 
-    Attributes
-    ----------
-    states
-        The keys of the states passed, the start first, as far as the steps are applicable.
-    stops, why
-        The number of the first step that is not applicable (None: all are), and the reason.
-    reaches
-        Whether the last state satisfies the goal.
+    ``states`` are the keys of those passed, the start first; ``stops`` is the number of the first
+    step that is not applicable (None: all are), and ``why``; ``reaches``: the goal holds at last.
     """
 
     states: tuple[str, ...]
@@ -52,18 +46,11 @@ class Played:
 
 @dataclass(frozen=True, slots=True)
 class TaskPage:
-    """Everything about one shown task.
+    """Everything about one shown task: its plans and its sentences, and what goes wrong.
 
-    Attributes
-    ----------
-    shown, graph, sentences
-        The task, its plans and its sentences.
-    played
-        What happens without a language, if plans of the task miscoordinate.
-    verified
-        Whether the language coordinates the task; None where that was not checked.
-    violation, violation_played
-        Plans of one sentence that miscoordinate: the language is none.
+    ``played`` is what happens without a language, if plans of the task miscoordinate; ``verified``:
+    the language coordinates the task (None: not checked); ``violation``: plans of one sentence that
+    miscoordinate, so that it is none.
     """
 
     shown: ShownTask
@@ -165,7 +152,15 @@ def task_data(part: TaskPage, tables: Tables) -> dict[str, Any]:
         "all_nodes": len(space),
         "all_edges": len(space.target),
         **_graph_data(language, part.graph, tables),
-        **_sentences_data(part.sentences),
+        "sentences": [
+            {
+                "words": list(one.words),
+                "plans": str(one.plans),
+                "own": [None if number is None else str(number) for number in one.own],
+            }
+            for one in part.sentences.listed
+        ],
+        "all_sentences": part.sentences.total,
         "witness": _witness_data(part.shown.witness, part.played, tables),
         "violation": _witness_data(part.violation, part.violation_played, tables),
     }
@@ -210,20 +205,6 @@ def _graph_data(language: TaskLanguage, graph: Graph, tables: Tables) -> dict[st
             ]
             for robot in range(len(model.robots))
         ],
-    }
-
-
-def _sentences_data(sentences: ShownSentences) -> dict[str, Any]:
-    return {
-        "sentences": [
-            {
-                "words": list(one.words),
-                "plans": str(one.plans),
-                "own": [None if number is None else str(number) for number in one.own],
-            }
-            for one in sentences.listed
-        ],
-        "all_sentences": sentences.total,
     }
 
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import click
 import pytest
 
-from coordlang.commands.failure import BROKEN_PIPE, INTERRUPTED
 from coordlang.commands.main import COMMANDS, cli
+from coordlang.commands.terminal import BROKEN_PIPE, INTERRUPTED
 from planners.system.errors import CoordlangError
 from tests.support.domains import ROOT
 from tests.support.pages import DOCS, PAGES, anchor, blocks, code, links, prose, rows, sections

@@ -14,7 +14,7 @@ import jsonschema
 import pytest
 
 import coordlang as door
-from coordlang.commands.failure import wants_json
+from coordlang.commands.main import wants_json
 from coordlang.commands.schema import json_schema
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import OutOfTime

@@ -24,7 +24,7 @@ from tests.support.domains import all_tasks
 FREE = resource.RLIM_INFINITY
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Nothing(CommandOptions):
     """No options."""
 
@@ -40,7 +40,7 @@ class Probe:
         return resource.getrlimit(resource.RLIMIT_AS)[0]
 
     @staticmethod
-    def show(found: int, _: Nothing) -> None:
+    def show_probe(found: int, _: Nothing) -> None:
         print(found)
 
 

@@ -46,7 +46,7 @@ def greet(files: Arguments, options: Greeting) -> tuple[Any, Any, Greeting]:
     return files.domain, files.values.get("PROBLEM"), options
 
 
-def show(result: tuple[str, str, Greeting], options: Greeting) -> int:
+def show_greet(result: tuple[str, str, Greeting], options: Greeting) -> int:
     domain, problem, greeting = result
     assert greeting is options
     model = greeting.source.model

@@ -159,7 +159,7 @@ def test_a_task_that_is_not_covered_and_refuted(
 def test_large_tables_are_cut(
     coordlang: Command, cells: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("coordlang.commands.choices_text.STATES_SHOWN", 2)
+    monkeypatch.setattr("coordlang.commands.choices.STATES_SHOWN", 2)
     outcome = coordlang("choices", cells, *CELLS, "w1 w0", "--robot", "r2")
     assert "idle -> 1" in outcome.out
     assert outcome.out.endswith("  .. and 1 state more; --format json has all of them\n")

@@ -59,7 +59,7 @@ def test_where_the_memory_does_not_suffice(
     def too_large(*_: object) -> None:
         raise api.OutOfMemory("the walk would need 47 GiB")
 
-    monkeypatch.setattr("coordlang.commands.ground.verify_candidates", too_large)
+    monkeypatch.setattr("coordlang.commands.lift.verify_candidates", too_large)
     language = tmp_path / "language.json"
     outcome = coordlang("ground", lifted, GRID, LARGER, "-o", language, "--jobs", "1")
     assert outcome.code == 3

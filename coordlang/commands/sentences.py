@@ -1,27 +1,168 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``coordlang plan``: one optimal plan under a sentence, or under the best sentence."""
+"""``coordlang say``, ``understand`` and ``plan``: plans and their sentences."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from os import PathLike, fspath
 from typing import Any
 
 from coordlang.commands.inputs import Arguments, InTask, public
-from coordlang.commands.plans import PlanSteps
-from coordlang.commands.records import PlanOptions
-from coordlang.commands.terminal import covered_code, echo
-from coordlang.commands.understand import SentencePlans
+from coordlang.commands.options import PlanSource
+from coordlang.commands.plans import OptimalPlans, PlanSteps, show_listed
+from coordlang.commands.records import NODES_DRAWN, PlanOptions, SayOptions, UnderstandOptions
+from coordlang.commands.terminal import covered_code, echo, note, write
 from coordlang.execution.best_sentence import BestSentence, best_sentence
+from coordlang.execution.drawing import cut_note, plans_dot
 from coordlang.execution.guided_search import ExpandedStates, GuidedPlan, plan_under_sentence
-from coordlang.execution.open_plans import OpenPlans
+from coordlang.execution.open_plans import OpenPlans, PlanDag, open_plans_data, plan_dag
+from coordlang.execution.plan_sentence import read_plan_file, sentence_of_plan
 from coordlang.execution.preferences import Preference, read_preference
 from coordlang.execution.task_language import TaskLanguage
+from coordlang.language.tolerance import tolerance_data
 from planners.search.heuristics import HeuristicName
 from planners.search.plan_file import Texts, json_count
-from planners.system.errors import UsageError
+from planners.system.errors import CoordlangError, UsageError
 from planners.system.notebook import counted
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Said(InTask):
+    """The sentence of each plan."""
+
+    used: TaskLanguage
+    sentences: tuple[str, ...]
+    shown = ("sentences", "covered")
+
+    @property
+    def sentence(self) -> str:
+        """The sentence of the only plan; raises `ValueError` where there are several plans."""
+        if len(self.sentences) != 1:
+            raise ValueError(f"there are {len(self.sentences)} plans: use .sentences")
+        return self.sentences[0]
+
+    def __str__(self) -> str:
+        return "\n".join(self.sentences)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.sentences)
+
+    def data(self) -> dict[str, Any]:
+        """The sentences, and what is guaranteed, as ``--json`` has them."""
+        return {
+            "sentences": list(self.sentences),
+            "covered": self.covered,
+            **tolerance_data(self.tolerance),
+        }
+
+
+@public(SayOptions)
+def say(files: Arguments, options: SayOptions) -> Said:
+    """Say optimal plans: the sentence of a plan is the sequence of words that it passes through.
+
+    ``plan`` is a plan file (which may hold several plans), or the steps of one plan.
+
+    Raises
+    ------
+    NotAPlan, NotOptimal
+        With the first step that breaks: only optimal plans have a sentence.
+    """
+    plan = files.needed("PLAN")
+    used = files.task().used
+    plans = _plans(plan, used)
+    sentences = []
+    for number, steps in enumerate(plans, 1):
+        try:
+            sentences.append(used.text(sentence_of_plan(used, steps)))
+        except CoordlangError as error:
+            if len(plans) > 1:
+                error.what = f"plan {number} of {len(plans)}: {error.what}"
+            raise
+    return Said(used, tuple(sentences))
+
+
+def _plans(plan: PlanSource, used: TaskLanguage) -> Sequence[Sequence[Texts]]:
+    if isinstance(plan, str | PathLike):
+        return read_plan_file(fspath(plan), used.model)
+    if isinstance(plan, Mapping):
+        raise UsageError(
+            "expected a plan file or the steps of one plan",
+            remedy="A step has one text for each robot, None where it idles.",
+        )
+    return [plan]
+
+
+def show_say(found: Said, options: SayOptions) -> int:
+    """Print the sentences."""
+    echo(json.dumps(found.data()) if options.as_json else found)
+    return covered_code(found.covered, found.tolerance)
+
+
+class SentencePlans(OptimalPlans, InTask):
+    """The optimal plans that a sentence leaves open, as `OptimalPlans` with a drawn DAG."""
+
+    __slots__ = ("_open", "used")
+    shown = ("sentence", *OptimalPlans.shown, "covered")
+
+    def __init__(self, open_plans: OpenPlans) -> None:
+        super().__init__(open_plans.plans)
+        self._open = open_plans
+        self.used = open_plans.task_language
+
+    @property
+    def sentence(self) -> str:
+        """The sentence."""
+        return self.used.text(self._open.words)
+
+    def dag(self, nodes: int | None = None) -> PlanDag:
+        """Return the plans as the paths of a DAG, cut to about so many nodes (None: all)."""
+        return plan_dag(self._open, nodes)
+
+    def dot(self, nodes: int = NODES_DRAWN) -> str:
+        """Return the DAG in the language of Graphviz."""
+        return plans_dot(self.dag(nodes))
+
+    def cut_note(self, nodes: int = NODES_DRAWN) -> str | None:
+        """Return what a picture with so many nodes leaves out, or None."""
+        return cut_note(self.dag(nodes)) or None
+
+    def data_with(self, listed: Sequence[Sequence[Texts]], graph: PlanDag | None) -> dict[str, Any]:
+        """Return a JSON plan file with sentence and guarantee, and with the DAG if one is given."""
+        return open_plans_data(self._open, [self._known(plan) for plan in listed], graph)
+
+
+@public(UnderstandOptions)
+def understand(files: Arguments, options: UnderstandOptions) -> SentencePlans:
+    """Understand a sentence: the optimal plans of the task that have it.
+
+    Raises
+    ------
+    NoPlanFits
+        If no optimal plan has the sentence; it says where it first breaks.
+    BadInput
+        For a word that the language does not have, or one said twice in a row.
+    """
+    said = files.needed("SENTENCE")
+    used = files.task().used
+    return SentencePlans(OpenPlans.of(used, used.words_of(said)))
+
+
+def show_understand(found: SentencePlans, options: UnderstandOptions) -> int:
+    """Print, write or draw the plans."""
+    if options.form == "dot":
+        nodes = options.nodes or NODES_DRAWN
+        write(found.dot(nodes), options.output)
+        if cut := found.cut_note(nodes):
+            note(f"{cut}; --nodes N draws more")
+    else:
+        is_drawn = options.form == "json" and not options.listing.only_count
+        dag = found.dag(options.nodes) if is_drawn else None
+        data = partial(found.data_with, graph=dag)
+        show_listed(found, options, data, "plans", options.output)
+    return covered_code(found.covered, found.tolerance)
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +317,7 @@ def _work(search: GuidedPlan) -> dict[str, int]:
     return {"expanded": search.expanded, "generated": search.generated, "states": search.states}
 
 
-def show(found: PlanUnderSentence, options: PlanOptions) -> int:
+def show_plan(found: PlanUnderSentence, options: PlanOptions) -> int:
     """Print the plan, and the work of the search."""
     if options.form == "json":
         echo(json.dumps(found.data()))
