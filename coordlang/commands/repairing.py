@@ -220,13 +220,11 @@ class _Old:
         word = np.concatenate((self.partition.word, given[fresh]))
         word[self.listed[states][~fresh]] = given[~fresh]
         used, number = np.unique(word, return_inverse=True)
-        old = self.partition.words
-        fresh_names = (name for name in (f"w{n}" for n in count()) if name not in old)
-        names = tuple(old[w] if w < len(old) else next(fresh_names) for w in used.tolist())
+        kept, old, default = used.tolist(), self.partition.words, self.partition.default
+        new = (name for name in (f"w{n}" for n in count()) if name not in old)
+        names = tuple(old[word] if word < len(old) else next(new) for word in kept)
         most = int(np.bincount(number).argmax())
-        former = used.tolist()
-        is_used = self.partition.default in former
-        default = former.index(self.partition.default) if is_used else most
+        default = kept.index(default) if default in kept else most
         return Partition.of_table(names, rows, number.reshape(-1), default)
 
     def changes(self, result: Repair, partition: Partition) -> tuple[ChangedState, ...]:
