@@ -72,7 +72,7 @@ class ComposingStepper(Stepper):
         self._apart = {pair for pair, table in self.tables.items() if not table.all()}
         self._robot = [
             _Subactions(own, codec, evaluator, number, cost, idling_costs[number])
-            for number, own in enumerate(subactions)
+            for number, own in enumerate(self.labelled)
         ]
 
     @property
@@ -99,9 +99,10 @@ class ComposingStepper(Stepper):
 
         None where the effects of some label depend on the state or the step.
         """
-        if any(robot.conditional for robot in self._robot):
+        every = [robot.operators for robot in self._robot]
+        if any(own.conditional for own in every):
             return None
-        return [(robot.adds, robot.deletes) for robot in self._robot]
+        return [(own.adds, own.deletes) for own in every]
 
     def _pieces(self, rows: Rows, options: Options | None) -> Iterator[tuple[Ints, Labels]]:
         """At least one piece."""
@@ -115,7 +116,9 @@ class ComposingStepper(Stepper):
 
     def choices(self, rows: Rows) -> Options:
         """For each robot the labels whose conditions on the state hold, by state (CSR)."""
-        return [self._options(robot, rows) for robot in self._robot]
+        found = [robot.operators.applicable(rows) for robot in self._robot]
+        every = np.arange(len(rows) + 1)
+        return [(np.searchsorted(row, every), label) for row, label in found]
 
     def most_steps(self, rows: Rows) -> int:
         """Products of the own choices."""
@@ -202,15 +205,6 @@ class ComposingStepper(Stepper):
             for a, b in np.argwhere(~self.tables[i, j][np.ix_(mine, theirs)]).tolist():
                 yield i, j, int(mine[a]), int(theirs[b])
 
-    def _options(self, robot: _Subactions, rows: Rows) -> tuple[Ints, Ints]:
-        """CSR of each state's labels for one robot, idling first: (first index, labels)."""
-        row, operator = robot.applicable(rows)
-        row = np.concatenate((np.arange(len(rows)), row))
-        label = np.concatenate((np.zeros(len(rows), np.int64), operator + 1))
-        order = np.lexsort((label, row))
-        row, label = row[order], label[order]
-        return np.searchsorted(row, np.arange(len(rows) + 1)), label
-
     def _possible(self, robot: int, rows: Rows, first: Ints, label: Ints) -> _Options:
         """One robot's options; those that no choice of the others makes possible are left out."""
         row = np.repeat(np.arange(len(rows)), np.diff(first))
@@ -274,20 +268,11 @@ class ComposingStepper(Stepper):
         adds, deletes = np.zeros(shape, np.uint64), np.zeros(shape, np.uint64)
         cost = np.zeros(len(source), np.int64)
         for i, robot in enumerate(self._robot):
-            own = labels[:, i]
-            adds |= robot.adds[own]
-            deletes |= robot.deletes[own]
-            cost += robot.cost[own]
-            for label, effects in robot.conditional.items():
-                there = np.flatnonzero(own == label)
-                for effect in effects if len(there) else ():
-                    fires = there[
-                        self._evaluator.holds(effect.condition, rows, source[there], labels[there])
-                    ]
-                    number = self._codec.facts.index.get(effect.atom)
-                    if number is not None:
-                        into = adds if effect.adds else deletes
-                        self._codec.set(into, fires, [number])
+            mine = labels[:, i]
+            added, deleted = robot.operators.changes(rows, source, mine, labels)
+            adds |= added
+            deletes |= deleted
+            cost += robot.cost[mine]
         return (rows[source] & ~deletes) | adds, cost
 
 
@@ -305,14 +290,11 @@ class _Options:
 
 
 class _Subactions:
-    """One robot's subactions as tables; index 0 of ``adds``, ``deletes`` and ``cost`` is idling.
-
-    ``conditional`` has the conditional effects of each label number.
-    """
+    """One robot's labels as tables: what they do, their ``cost``, and clauses about the step."""
 
     def __init__(
         self,
-        actions: Sequence[GroundAction],
+        actions: Sequence[GroundAction | None],
         codec: StateCodec,
         evaluator: Evaluator,
         robot: int,
@@ -320,31 +302,23 @@ class _Subactions:
         idling_cost: int,
     ) -> None:
         self._evaluator = evaluator
-        self._operators = Operators(actions, codec, evaluator)
-        idle = np.zeros((1, codec.fact_blocks), np.uint64)
-        self.adds = np.vstack((idle, self._operators.adds))
-        self.deletes = np.vstack((idle, self._operators.deletes))
-        self.conditional = {n + 1: e for n, e in self._operators.conditional.items()}
+        self.operators = Operators(actions, codec, evaluator)
         # A shared subaction is paid once, by the first of its owners.
-        own = [cost_of(a, cost) if a.owners[0] == robot else 0 for a in actions]
+        own = [cost_of(a, cost) if a.owners[0] == robot else 0 for a in actions if a]
         self.cost = np.array([idling_cost, *own], np.int64)
         of_label: dict[int, list[Clause]] = {}
         #: Formulas about the step that have too many clauses, by label.
         self._formulas: dict[int, list[Formula]] = {}
-        for number, formulas in self._operators.step_formulas.items():
+        for label, formulas in self.operators.step_formulas.items():
             for formula in formulas:
-                found = clauses(formula, evaluator, robot, number + 1)
+                found = clauses(formula, evaluator, robot, label)
                 if found is None:
-                    self._formulas.setdefault(number + 1, []).append(formula)
+                    self._formulas.setdefault(label, []).append(formula)
                 else:
-                    of_label.setdefault(number + 1, []).extend(found)
-        self.clauses = StepClauses(robot, of_label, len(actions) + 1)
-        self._has_formula = np.zeros(len(actions) + 1, np.bool_)
+                    of_label.setdefault(label, []).extend(found)
+        self.clauses = StepClauses(robot, of_label, len(actions))
+        self._has_formula = np.zeros(len(actions), np.bool_)
         self._has_formula[list(self._formulas)] = True
-
-    def applicable(self, rows: Rows) -> tuple[Ints, Ints]:
-        """Pairs (row, subaction) whose conditions on the state hold, sorted."""
-        return self._operators.applicable(rows)
 
     def drop_unmet(self, fits: Bools, robot: int, rows: Rows, source: Ints, labels: Labels) -> None:
         """Clear ``fits`` where a formula of this robot's subaction about the step is not met."""

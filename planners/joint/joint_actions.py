@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from planners.grounding import GroundAction, GroundEffect
+from planners.grounding import GroundAction
 from planners.joint.composition import cost_of
 from planners.joint.conditions import Evaluator
 from planners.joint.model import Options, Stepper, Steps
 from planners.joint.operators import Operators
 from planners.joint.states import StateCodec
-from planners.joint.tables import Ints, Rows
+from planners.joint.tables import Rows
 from planners.pddl.model_options import Cost
 from planners.system.errors import BadInput, Position
 
@@ -37,7 +37,7 @@ class JointActionStepper(Stepper):
         positions: Mapping[str, Position],
     ) -> None:
         self._positions = positions
-        self._codec, self._evaluator, self._robots = codec, evaluator, tuple(robots)
+        self._robots = tuple(robots)
         self._names, self._actions = [tuple(own) for own in labels], tuple(actions)
         self._operators = Operators(actions, codec, evaluator)
         numbers = [{text: n for n, text in enumerate(own)} for own in labels]
@@ -49,9 +49,8 @@ class JointActionStepper(Stepper):
     def steps(self, rows: Rows, options: Options | None = None) -> Steps:
         """See `Stepper`; ``options`` are not looked at: no robot chooses by itself."""
         row, operator = self._operators.applicable(rows)
-        result = (rows[row] & ~self._operators.deletes[operator]) | self._operators.adds[operator]
-        for number, effects in self._operators.conditional.items():
-            result = self._fire(rows, row, operator, number, effects, result)
+        adds, deletes = self._operators.changes(rows, row, operator)
+        result = (rows[row] & ~deletes) | adds
         labels = self._labels[operator]
         # Of joint actions with the same parts the cheapest comes first, and is kept.
         order = np.lexsort((self._cost[operator], *labels.T[::-1], row))
@@ -104,29 +103,6 @@ class JointActionStepper(Stepper):
         _, operators = self._operators.applicable(row[None, :])
         here = set(found.tolist()) & set(operators.tolist())
         return self._actions[min(here, key=lambda n: (int(self._cost[n]), n))].label
-
-    def _fire(
-        self,
-        rows: Rows,
-        row: Ints,
-        operator: Ints,
-        number: int,
-        effects: list[GroundEffect],
-        result: Rows,
-    ) -> Rows:
-        """The results with an action's conditional effects applied (adds win over deletes)."""
-        there = np.flatnonzero(operator == number)
-        for adding in (False, True):
-            for effect in effects:
-                fact = self._codec.facts.index.get(effect.atom)
-                if effect.adds != adding or fact is None:
-                    continue
-                fires = there[self._evaluator.holds(effect.condition, rows, row[there])]
-                if adding:
-                    self._codec.set(result, fires, [fact])
-                elif not self._codec.column(self._operators.adds[[number]], fact)[0]:
-                    self._codec.clear(result, fires, [fact])
-        return result
 
 
 def _cost_of(action: GroundAction, cost: Cost) -> int:

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from planners.grounding import GroundAction, GroundEffect
-from planners.joint.conditions import Evaluator, speaks_of_step, split_condition
+from planners.joint.conditions import Evaluator, Labels, speaks_of_step, split_condition
 from planners.joint.states import StateCodec, TrueFacts, test_bits
-from planners.joint.tables import Bools, Ints, Rows, ranges
+from planners.joint.tables import Bools, Ints, Numbers, Rows, ranges
 from planners.pddl.lifted import TRUE, Formula
 
 #: Looking up one true fact takes about as long as testing so many.
@@ -119,7 +119,7 @@ class Matcher:
 
 
 class Operators:
-    """Ground actions, numbered as given, for whole tables of states at a time.
+    """Ground actions, numbered as given, for whole tables of states at a time; None is idling.
 
     ``adds`` and ``deletes`` (actions, fact blocks) are what they do in every state, ``conditional``
     the effects of those that also depend on it; ``step_formulas`` are the parts of preconditions
@@ -127,32 +127,34 @@ class Operators:
     """
 
     def __init__(
-        self, actions: Sequence[GroundAction], codec: StateCodec, evaluator: Evaluator
+        self, actions: Sequence[GroundAction | None], codec: StateCodec, evaluator: Evaluator
     ) -> None:
-        self._evaluator = evaluator
+        self._codec, self._evaluator = codec, evaluator
         self._state_formulas: dict[int, list[Formula]] = {}
         self.step_formulas: dict[int, list[Formula]] = {}
         self.conditional: dict[int, list[GroundEffect]] = {}
         self.adds = np.zeros((len(actions), codec.fact_blocks), np.uint64)
         self.deletes = np.zeros_like(self.adds)
-        required, forbidden = [], np.zeros_like(self.adds)
+        required, forbidden = [frozenset[int]()] * len(actions), np.zeros_like(self.adds)
         for number, action in enumerate(actions):
+            if action is None:
+                continue
             literals, rest = split_condition(action.precondition, evaluator)
-            required.append(frozenset(fact for fact, positive in literals if positive))
+            required[number] = frozenset(fact for fact, positive in literals if positive)
             forbidden[number] = codec.mask(fact for fact, positive in literals if not positive)
             for formula in rest:
                 kind = self.step_formulas if speaks_of_step(formula) else self._state_formulas
                 kind.setdefault(number, []).append(formula)
-            self._enter_effects(number, action, codec)
+            self._enter_effects(number, action)
         self._matcher = Matcher(required, forbidden)
 
-    def _enter_effects(self, number: int, action: GroundAction, codec: StateCodec) -> None:
-        index = codec.facts.index
-        certain = [e for e in action.effects if e.condition == TRUE and e.atom in index]
-        self.adds[number] = codec.mask(index[e.atom] for e in certain if e.adds)
-        self.deletes[number] = codec.mask(index[e.atom] for e in certain if not e.adds)
-        conditional = [e for e in action.effects if e.condition != TRUE]
-        if conditional:
+    def _enter_effects(self, number: int, action: GroundAction) -> None:
+        index = self._codec.facts.index
+        known = [effect for effect in action.effects if effect.atom in index]
+        certain = [effect for effect in known if effect.condition == TRUE]
+        self.adds[number] = self._codec.mask(index[e.atom] for e in certain if e.adds)
+        self.deletes[number] = self._codec.mask(index[e.atom] for e in certain if not e.adds)
+        if conditional := [effect for effect in known if effect.condition != TRUE]:
             self.conditional[number] = conditional
 
     def applicable(self, rows: Rows) -> tuple[Ints, Ints]:
@@ -164,3 +166,20 @@ class Operators:
             for formula in formulas:
                 keep[there] &= self._evaluator.holds(formula, rows, row[there])
         return row[keep], operator[keep]
+
+    def changes(
+        self, rows: Rows, source: Ints, chosen: Numbers, labels: Labels | None = None
+    ) -> tuple[Rows, Rows]:
+        """What the actions ``chosen[k]`` add to ``rows[source[k]]``, and what they delete.
+
+        ``labels[k]`` are what all robots do beside, where conditions may speak of that.
+        """
+        adds, deletes = self.adds[chosen], self.deletes[chosen]
+        for number, effects in self.conditional.items():
+            there = np.flatnonzero(chosen == number)
+            beside = None if labels is None else labels[there]
+            for effect in effects if len(there) else ():
+                fires = self._evaluator.holds(effect.condition, rows, source[there], beside)
+                into = adds if effect.adds else deletes
+                self._codec.set(into, there[fires], [self._codec.facts.index[effect.atom]])
+        return adds, deletes
