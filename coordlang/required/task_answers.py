@@ -19,8 +19,7 @@ from planners.joint.composition import cost_of
 from planners.joint.model import JointModel, PlanningTask
 from planners.joint.tables import Ints
 from planners.loading import PlanningInstance
-from planners.parallel.batch import Batch, Table, digest
-from planners.parallel.store import Store
+from planners.parallel.batch import Batch, Store, Table, digest
 from planners.parallel.workers import Workers
 from planners.pddl.model_options import Cost
 from planners.search.kept_plans import keeping_plans, search, store_in_use

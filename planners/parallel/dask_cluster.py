@@ -26,8 +26,7 @@ import distributed
 import msgspec
 from distributed.scheduler import KilledWorker
 
-from planners.parallel.batch import Batch, Outcome, code_hash
-from planners.parallel.worker import attempt
+from planners.parallel.batch import Batch, Outcome, attempt, code_hash
 from planners.system.errors import CoordlangError, OutOfMemory, UsageError
 from planners.system.limits import time_left
 from planners.system.messages import echoed
@@ -248,7 +247,7 @@ class _Shared(distributed.WorkerPlugin):  # type: ignore[misc]
 
 
 def _do(name: str, expected: dict[str, tuple[str, ...]], job: Any) -> Any:
-    """One job, as a task; see `planners.parallel.worker.attempt`."""
+    """One job, as a task; see `planners.parallel.batch.attempt`."""
     worker = distributed.get_worker()
     for package, wanted in expected.items():
         for theirs, ours in zip(versions(package), wanted, strict=True):

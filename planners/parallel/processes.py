@@ -1,30 +1,39 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Worker processes of this machine: an executor that can be ended at any moment."""
+"""Worker processes of this machine: an executor that can be ended at any moment.
+
+A worker ends when its parent does and when it is asked to (SIGINT, SIGTERM, SIGHUP); what is half
+written is removed then.
+"""
 
 from __future__ import annotations
 
+import os
 import pickle
 import signal
 import sys
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import resource_tracker
+from multiprocessing import parent_process, resource_tracker
 from multiprocessing.connection import wait
 from multiprocessing.context import SpawnContext, SpawnProcess
-from types import ModuleType
+from types import FrameType, ModuleType
 from typing import Any
 
-from planners.parallel.batch import Batch, Outcome
-from planners.parallel.worker import begin, do
+from planners.parallel.batch import Batch, Outcome, attempt
 from planners.system.errors import OutOfMemory, UsageError
-from planners.system.limits import lacks_memory
+from planners.system.limits import address_space, lacks_memory, limit_memory, load_libraries
 from planners.system.signals import ENDING, postponed_signals
 
 #: Seconds in which a worker that is asked to end cleans up.
 _STOPPING = 1.0
+#: The exit code of a worker that was asked to end.
+_ASKED_TO_END = 75
+#: With as many workers as cores each has one thread, where BLAS would take all cores.
+_THREADS = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 @contextmanager
@@ -44,10 +53,10 @@ def in_processes(
     """
     context = _Context()
     packed = pickle.dumps((batch.function, batch.shared), pickle.HIGHEST_PROTOCOL)
-    executor = ProcessPoolExecutor(count, context, begin, (packed, memory))
+    executor = ProcessPoolExecutor(count, context, _begin, (packed, memory))
     try:
         with _spawning():
-            futures = [executor.submit(do, job) for job in jobs]
+            futures = [executor.submit(_do, job) for job in jobs]
             # An executor watches the processes that were there when it was last asked something.
             executor.submit(int)
         yield futures
@@ -95,15 +104,69 @@ def _spawning() -> Iterator[None]:
     """Start processes in the block that nothing of this one disturbs.
 
     They are not told of the script that runs here, which may have no main guard, and hear signals
-    when they are ready (`planners.parallel.worker.begin`).
+    when they are ready.
     """
     with postponed_signals():
         resource_tracker.ensure_running()  # it would unblock the signals
-        main = sys.modules["__main__"]
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+        main, environment = sys.modules["__main__"], dict(os.environ)
         try:
             sys.modules["__main__"] = ModuleType("__main__")
+            os.environ.update(_THREADS)
             yield
         finally:
             sys.modules["__main__"] = main
+            for name in _THREADS.keys() - environment.keys():
+                del os.environ[name]
+            os.environ.update(environment)
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+# ---- in a worker
+
+
+class _Ended(SystemExit):
+    """A signal ends the worker, wherever it is."""
+
+
+class _Worker:
+    """The batch that this process works on: packed, and unpacked with the first job."""
+
+    packed = b""
+    work: tuple[Any, Any] | None = None
+
+
+def _begin(packed: bytes, memory: int | None) -> None:
+    """Prepare this process: output, signals, and so many bytes more than its libraries take."""
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for standard in range(3):
+        os.dup2(nowhere, standard)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    for number in ENDING:
+        signal.signal(number, _asked_to_end)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
+    if memory is not None:
+        load_libraries()
+        limit_memory(address_space() + memory)
+    _Worker.packed = packed
+
+
+def _do(job: Any) -> Outcome:
+    try:
+        if _Worker.work is None:
+            _Worker.work = pickle.loads(_Worker.packed)
+        return attempt(_Worker.work, job)
+    except _Ended:  # all has been cleaned up; the executor would send it as a result
+        os._exit(_ASKED_TO_END)
+
+
+def _asked_to_end(_signal: int, _frame: FrameType | None) -> None:
+    raise _Ended(_ASKED_TO_END)
+
+
+def _end_with_parent() -> None:
+    """End this process soon after its parent was killed."""
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)

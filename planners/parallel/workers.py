@@ -12,8 +12,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from planners.parallel.batch import Batch, Outcome, Table
-from planners.parallel.store import Store
+from planners.parallel.batch import Batch, Outcome, Store, Table
 from planners.system.errors import OutOfMemory, UsageError
 from planners.system.limits import has_memory_limit, memory_left
 
@@ -68,30 +67,22 @@ class Workers:
         UsageError
             If no worker can be started.
         """
-        ready: dict[int, Outcome] = {}
-        with closing(self._ended(batch)) as ended:
+        kept = self.kept
+        keys = [] if kept is None else batch.keys()
+        tables = ((number, kept.read(key)) for number, key in enumerate(keys) if kept)
+        ready: dict[int, Outcome] = {n: table for n, table in tables if table is not None}
+        left = [number for number in range(len(batch.jobs)) if number not in ready]
+        with closing(self._done(batch, left)) as done:
             for number in range(len(batch.jobs)):
                 while number not in ready:
-                    ready.update([next(ended)])
+                    ended, outcome = next(done)
+                    ready[ended] = outcome
+                    if kept is not None and isinstance(outcome, dict):
+                        kept.write(keys[ended], outcome)
                 outcome = ready.pop(number)
                 if isinstance(outcome, BaseException):
                     raise outcome
                 yield outcome
-
-    def _ended(self, batch: Batch) -> Generator[tuple[int, Outcome]]:
-        """Yield jobs with their outcomes as they end; first those whose results are kept."""
-        left = list(range(len(batch.jobs)))
-        keys = [] if self.kept is None else batch.keys()
-        for number, key in enumerate(keys):
-            table = self.kept.read(key) if self.kept else None
-            if table is not None:
-                left.remove(number)
-                yield number, table
-        with closing(self._done(batch, left)) as done:
-            for number, outcome in done:
-                if self.kept is not None and isinstance(outcome, dict):
-                    self.kept.write(keys[number], outcome)
-                yield number, outcome
 
     def _done(self, batch: Batch, left: list[int]) -> Generator[tuple[int, Outcome]]:
         """Do the jobs that are left, and those again whose worker was lost.

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -15,8 +15,7 @@ import numpy as np
 
 from planners.grounding import GroundAction
 from planners.joint.model import FullState, JointModel, PlanningTask
-from planners.parallel.batch import Table, code_hash, digest
-from planners.parallel.store import Store
+from planners.parallel.batch import Store, Table, code_hash, digest
 from planners.pddl.formula_tree import formula_text, label
 from planners.pddl.lifted import And, Formula, Or
 from planners.search import optimal_plans
@@ -125,11 +124,9 @@ def _plan_space(table: Table, model: JointModel, task: PlanningTask) -> PlanSpac
 
 def model_digest(model: JointModel) -> str:
     """A hash of all that a search reads of a joint model, whatever files it was made from."""
-    texts = _Texts()
     found = sha256()
-    for action in model.actions:
-        found.update(texts.of_action(action).encode())
-        found.update(b"\n")
+    for text in _texts(model.actions):
+        found.update(f"{text}\n".encode())
     return digest(
         found.hexdigest(),
         model.robots,
@@ -152,27 +149,22 @@ def key_of(model: str, task: PlanningTask) -> str:
     return digest(code_hash("planners"), np.version.version, model, task.init, wanted)
 
 
-class _Texts:
-    """Ground actions as text; formulas that many of them share are written once."""
+def _texts(actions: Iterable[GroundAction]) -> Iterator[str]:
+    """All that a search reads of ground actions; formulas that many share are written once."""
+    known: dict[int, str] = {}  # by identity; the actions keep their formulas alive
 
-    def __init__(self) -> None:
-        # By identity; the actions keep their formulas alive.
-        self._known: dict[int, str] = {}
+    def part(formula: Formula) -> str:
+        if id(formula) not in known:
+            known[id(formula)] = formula_text(formula)
+        return known[id(formula)]
 
-    def of_action(self, action: GroundAction) -> str:
-        """All that a search reads of an action."""
-        effects = [(e.adds, self._part(e.atom), self._of(e.condition)) for e in action.effects]
+    def whole(formula: Formula) -> str:
+        if isinstance(formula, And | Or):
+            return f"({type(formula).__name__} {' '.join(map(part, formula.parts))})"
+        return part(formula)
+
+    for action in actions:
+        effects = [(e.adds, part(e.atom), whole(e.condition)) for e in action.effects]
         links = sorted(label(link.action, link.args) for link in action.links)
         rest = (action.owners, action.parts, action.cost, links, effects)
-        return f"{action.label} {self._of(action.precondition)} {rest}"
-
-    def _of(self, formula: Formula) -> str:
-        if isinstance(formula, And | Or):
-            return f"({type(formula).__name__} {' '.join(map(self._part, formula.parts))})"
-        return self._part(formula)
-
-    def _part(self, formula: Formula) -> str:
-        found = self._known.get(id(formula))
-        if found is None:
-            found = self._known[id(formula)] = formula_text(formula)
-        return found
+        yield f"{action.label} {whole(action.precondition)} {rest}"

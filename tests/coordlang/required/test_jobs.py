@@ -21,7 +21,7 @@ from coordlang.required.miscoordination import Inseparable
 from coordlang.required.task_answers import answers
 from coordlang.verification.by_definition import verify, verify_candidates
 from planners.loading import load
-from planners.parallel.store import Store
+from planners.parallel.batch import Store
 from planners.parallel.workers import Workers
 from planners.search.portions import Explored, Searched, cut
 from planners.system.errors import BadInput, ProvedImpossible

@@ -16,7 +16,7 @@ from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.failing_tuples import FailingTuples
 from coordlang.vocabulary.refuter import Refuter
 from planners.joint.tables import Ints
-from planners.parallel.store import Store
+from planners.parallel.batch import Store
 from planners.parallel.workers import Workers
 from tests.support.domains import all_tasks, own_task
 

@@ -14,8 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planners.parallel import batch as batches
-from planners.parallel.batch import Batch, digest
-from planners.parallel.store import Store
+from planners.parallel.batch import Batch, Store, digest
 from planners.parallel.workers import Workers, workers
 from planners.system.errors import UsageError
 from tests.support import jobs as support

@@ -17,7 +17,7 @@ import pytest
 
 from planners.joint.model import PlanningTask
 from planners.loading import PlanningInstance, build
-from planners.parallel.store import Store
+from planners.parallel.batch import Store
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.model_options import Cost, ModelOptions
 from planners.pddl.sexpr import Source
