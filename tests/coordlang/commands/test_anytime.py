@@ -10,6 +10,7 @@ import signal
 import subprocess
 import time
 from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -92,7 +93,7 @@ def test_a_better_partition_found_on_the_way_is_kept(monkeypatch: pytest.MonkeyP
     def late(*_: object) -> bool:
         raise OutOfTime("late")
 
-    monkeypatch.setattr("coordlang.vocabulary.minimal.close_bounds", late)
+    monkeypatch.setattr(import_module("coordlang.vocabulary.minimal"), "close_bounds", late)
     built = build_language(all_tasks("grid", "gw2-2x3"), "minimal")
     assert isinstance(built.stopped, OutOfTime)
     assert (

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from importlib import import_module
 from itertools import product
 from random import Random
 
@@ -72,7 +73,7 @@ def test_what_is_not_found_raises_no_bound(monkeypatch: pytest.MonkeyPatch, find
 
     monkeypatch.setattr(TiedWords, "find", told)
     monkeypatch.setattr(Budget.__init__, "__defaults__", (1, 30_000))
-    monkeypatch.setattr("coordlang.vocabulary.minimal._SOON", Budget(1, 30_000))
+    monkeypatch.setattr(import_module("coordlang.vocabulary.minimal"), "_SOON", Budget(1, 30_000))
     built = build_language(all_tasks("grid", "gw2-2x3"), "minimal")
     guarantee = built.language.guarantee
     assert (guarantee.size, guarantee.lower_bound) == (5, 5)
