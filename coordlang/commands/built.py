@@ -187,7 +187,7 @@ def built_text(built: Built, width: int) -> str:
         f"{figures['divergences']:,} divergences, "
         f"{figures['walk_nodes']:,} nodes of plans, {total:.2f} s\n"
         f"{_more_effort(built)}{_fewest(figures)}"
-        f"{_failures(built)}{_preferred(figures)}"
+        f"{_failures(built)}{_flexibility(figures)}{_readability(figures)}"
         f"{repaired}"
     )
 
@@ -229,22 +229,27 @@ def _failures(built: Built) -> str:
     return f"{line}\nin silence they {silence.text()}\n"
 
 
-def _preferred(figures: dict[str, Any]) -> str:
-    """How short formulas are, or how many plans sentences leave open, where that was optimised."""
-    if "terms" in figures:
-        terms, limits = figures["terms"], figures["limits"]
-        proved = (terms, limits) == (figures["terms_lower_bound"], figures["limits_lower_bound"])
-        proof = "proved the shortest" if proved else f"at least {figures['terms_lower_bound']}"
-        before = f"{counted(figures['terms_before'], 'term')}, {figures['limits_before']} limits"
-        return (
-            f"formulas of {counted(terms, 'term')} with {counted(limits, 'limit')} on variables "
-            f"({before} before; {proof})\n"
-        )
-    if "flexibility" in figures:
-        return (
-            f"a sentence leaves {figures['flexibility']:,.2f} plans open on average ("
-            f"{figures['flexibility_before']:,.2f} before, "
-            f"{figures['flexibility_bound']:,.2f} at most), "
-            f"communication saving {100 * figures['communication_saving']:.1f} %\n"
-        )
-    return ""
+def _flexibility(figures: dict[str, Any]) -> str:
+    """How many plans the sentences leave open, where that was optimised; whole lines."""
+    if "flexibility" not in figures:
+        return ""
+    return (
+        f"a sentence leaves {figures['flexibility']:,.2f} plans open on average ("
+        f"{figures['flexibility_before']:,.2f} before, "
+        f"{figures['flexibility_bound']:,.2f} at most), "
+        f"communication saving {100 * figures['communication_saving']:.1f} %\n"
+    )
+
+
+def _readability(figures: dict[str, Any]) -> str:
+    """How short formulas are, where that was optimised; whole lines."""
+    if "terms" not in figures:
+        return ""
+    terms, limits = figures["terms"], figures["limits"]
+    proved = (terms, limits) == (figures["terms_lower_bound"], figures["limits_lower_bound"])
+    proof = "proved the shortest" if proved else f"at least {figures['terms_lower_bound']}"
+    before = f"{counted(figures['terms_before'], 'term')}, {figures['limits_before']} limits"
+    return (
+        f"formulas of {counted(terms, 'term')} with {counted(limits, 'limit')} on variables "
+        f"({before} before; {proof})\n"
+    )

@@ -291,6 +291,10 @@ def test_prefer_simple(shell: Shell) -> None:
     shown = json.loads(shell("explain l.json SQUARE --json").out)["formulas"]
     assert sum(sorted(len(formula["terms"]) for formula in shown.values())[:-1]) == 2
     shell("verify l.json SQUARE")
+    # The method `best` prefers flexible languages, too, and both are told.
+    shell(
+        "build SQUARE --prefer simple -o b.json", 0, "a sentence leaves 1.00 plans", "formulas of 1"
+    )
 
 
 DOMAIN = """(define (domain e) (:types robot place) (:predicates (q ?r - robot) (ok ?r - robot))
