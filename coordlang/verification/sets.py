@@ -10,7 +10,7 @@ some other robot has not, with the set of its steps to come.
 
 It is cut off where the robots have no sentence in common, and where no choice of label sequences
 can fail from ``y``.  At the step by which a mixture fails labels cease to matter: it is a violation
-iff the robots' sets have a sentence in common (Proposition 14 of docs/concepts.md).  Sets are
+iff the robots' sets have a sentence in common (Proposition 14a of docs/concepts.md).  Sets are
 canonical: equal ones have one number.  No method recurses, since plans may be long.
 """
 
@@ -27,6 +27,7 @@ import numpy as np
 from coordlang.required.witnesses import Trail
 from coordlang.verification.continuations import Continuations, SequenceSets
 from planners.joint.tables import Ints
+from planners.search.edge_index import EdgeTrees
 from planners.search.plan_space import PlanSpace
 from planners.system.limits import reaching
 
@@ -49,11 +50,6 @@ class _Failure:
     at: _Node
     steps: Steps
     ahead: _Ahead
-
-    @property
-    def node(self) -> int:
-        """Where the mixture was last."""
-        return self.at[0]
 
 
 class SentenceSets(SequenceSets):
@@ -138,7 +134,7 @@ class SetWalk:
         #: Of each set of steps its sentences, and its label sequences.
         self._said, self._done = [self._sentences.silence], [0]
         self._saying: dict[tuple[int, int], int] = {}
-        self._prefixes: dict[int, dict[int, Any]] = {}
+        self._edges = EdgeTrees(space)
         self._of = self._sets_of_nodes()
         self._look_at_sets()
 
@@ -206,15 +202,16 @@ class SetWalk:
 
     def run(self) -> tuple[int | None, int]:
         """The goal number of some violation (None: there is none), and the nodes walked."""
-        found, walked = self._walk(self._space.starts.tolist(), {})
-        return None if found is None else int(self._space.goal[found.node]), walked
+        found, walked = self._walk(self._space.starts.tolist())
+        return None if found is None else int(self._space.goal[found.at[0]]), walked
 
     def _walk(
-        self, starts: Sequence[int], before: dict[_Node, tuple[_Node, Steps]]
+        self, starts: Sequence[int], before: dict[_Node, tuple[_Node, Steps]] | None = None
     ) -> tuple[_Failure | None, int]:
         """A mixture that fails while all plans have one sentence, and the nodes walked.
 
-        ``before`` gets, of each node that is reached, one that leads to it and the robots' steps.
+        ``before`` gets, of each node that is reached, one that leads to it and the robots' steps;
+        None: nothing is remembered.
         """
         space, walked = self._space, 0
         layers: list[dict[_Node, None]] = [{} for _ in space.layers]
@@ -235,7 +232,8 @@ class SetWalk:
                             return _Failure(node, steps, ahead), walked
                         child = target, _short(ahead)
                         below[child] = None
-                        before.setdefault(child, (node, steps))
+                        if before is not None:
+                            before.setdefault(child, (node, steps))
                 here.clear()
         return None, walked
 
@@ -273,7 +271,7 @@ class SetWalk:
         Last the node that the mixture reaches; None where it fails, whatever those robots do whose
         step is not among them.
         """
-        todo: list[tuple[Steps, _Ahead, Any]] = [((), ahead, self._edges_by_labels(node))]
+        todo: list[tuple[Steps, _Ahead, Any]] = [((), ahead, self._edges.of(node))]
         while todo:
             steps, reached, edges = todo.pop()
             robot = len(steps)
@@ -288,19 +286,6 @@ class SetWalk:
                     yield (*steps, step), following, found
                 else:
                     todo.append(((*steps, step), following, found))
-
-    def _edges_by_labels(self, node: int) -> dict[int, Any]:
-        """The targets of a node's edges, by the robots' labels one after another."""
-        found = self._prefixes.get(node)
-        if found is None:
-            found = self._prefixes[node] = {}
-            for edge in self._space.out_edges(node):
-                *first, last = self._labels[edge]
-                at = found
-                for label in first:
-                    at = at.setdefault(label, {})
-                at[last] = self._targets[edge]
-        return found
 
     # ---- a violation shown
 

@@ -15,7 +15,6 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from random import Random
-from typing import Any
 
 import numpy as np
 
@@ -24,6 +23,7 @@ from coordlang.vocabulary.sat import Undecided
 from coordlang.vocabulary.sentence_sets import NOTHING, Words
 from coordlang.vocabulary.spoken_choices import SpokenChoices, Step
 from planners.joint.tables import Ints
+from planners.search.edge_index import EdgeTrees
 
 #: Ways to a failing step that are taken from one node at most, beside the first.
 _RANDOM_WAYS = 40
@@ -169,7 +169,7 @@ class Mixtures:
 
     def __init__(self, choices: Choices) -> None:
         self._choices, self._space = choices, choices.space
-        self._prefixes: dict[int, dict[int, Any]] = {}
+        self._edges = EdgeTrees(choices.space)
         self._suspects: dict[int, int] = {}
         self._turn = 0
         self._forget()
@@ -270,7 +270,7 @@ class Mixtures:
             return iter(steps if random is None else random.sample(steps, len(steps)))
 
         none: list[Words] = [()] * robots
-        open_steps = [(drawn(ahead[0][1]), none, ahead, self._prefixes_of(node))]
+        open_steps = [(drawn(ahead[0][1]), none, ahead, self._edges.of(node))]
         while open_steps:
             steps, codes, reached, prefixes = open_steps[-1]
             step = next(steps, None)
@@ -311,19 +311,6 @@ class Mixtures:
     def _one_sentence(self, ahead: _Ahead, random: Random | None) -> Words:
         said, common = self._common(ahead)
         return said + self._spoken.words.drawn(common, random or Random(0))
-
-    def _prefixes_of(self, node: int) -> dict[int, Any]:
-        """The edges of a node by the robots' labels, one after another, with their targets."""
-        found = self._prefixes.get(node)
-        if found is None:
-            found = self._prefixes[node] = {}
-            for edge in self._space.out_edges(node):
-                *first, last = self._spoken.labels[edge]
-                at = found
-                for label in first:
-                    at = at.setdefault(label, {})
-                at[last] = self._spoken.targets[edge]
-        return found
 
     # ---- plans of a mixture
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables of node tuples: duplicates out, members found; the inner loop of composition walks."""
+"""Finding edges by the robots' labels, one robot after another: for tables, and node by node."""
 
 from __future__ import annotations
 
@@ -50,3 +50,32 @@ class EdgeIndex:
         wanted = np.where((prefix >= 0) & (label < size), prefix * size + label, -1)
         found = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
         return np.where(keys[found] == wanted, found, -1)
+
+
+class EdgeTrees:
+    """The targets of each node's edges, by the robots' labels one after another.
+
+    A tree for each node, made when it is asked for: robot 1's label -> robot 2's -> .. -> target.
+
+    Parameters
+    ----------
+    space
+        The plan space.
+    """
+
+    def __init__(self, space: PlanSpace) -> None:
+        self._space = space
+        self._trees: dict[int, dict[int, Any]] = {}
+
+    def of(self, node: int) -> dict[int, Any]:
+        """The tree of a node; a label that no edge has, after those before it, is not in it."""
+        tree = self._trees.get(node)
+        if tree is None:
+            tree = self._trees[node] = {}
+            for edge in self._space.out_edges(node):
+                *first, last = self._space.labels_of(edge)
+                at = tree
+                for label in first:
+                    at = at.setdefault(label, {})
+                at[last] = self._space.target_of(edge)
+        return tree
