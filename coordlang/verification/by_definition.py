@@ -3,10 +3,9 @@
 
 It shares the joint model and the plan spaces with the builders, nothing else.  A violation are n
 plans with one sentence whose mixture is no optimal plan.  They are looked for by walking n plans in
-step (`coordlang.verification.walk`), and where that walk grows over the sets of what robots can do
-and say (`coordlang.verification.sets`).
-Every walk is that of one goal, so of many tasks the goals are cut into portions, each a job, and
-the verdict is that of all portions together.
+step (`coordlang.verification.walk`), and where that walk grows, over the sets of what robots can do
+and say (`coordlang.verification.sets`).  Every walk is that of one goal, so of many tasks the goals
+are cut into portions, each a job, and the verdict is that of all portions together.
 """
 
 from __future__ import annotations

@@ -128,6 +128,8 @@ class Walk:
             if self._moves_made > self._growth * len(self.space):
                 raise Grown
             parts.append(_different(child[~self._on_diagonal(child)]))
+            if 4 * sum(part.nbytes for part in parts) > memory_left():
+                raise Grown
         return _different(np.concatenate(parts))
 
     def _sizes(self, table: Ints) -> NDArray[np.float64]:
