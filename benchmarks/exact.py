@@ -12,7 +12,7 @@ the end, with the proved bound where that is smaller (7..8); refuted partitions 
 tuples up to symmetry; walks of a part of the tasks; clauses; wall and CPU seconds of the whole
 build; and the load of the machine over the last minute.  Every number of words is that of a
 language verified by definition.  The time limit is for each row and seed; a row that has no
-greedy words within it is left out.
+language, or no greedy words within the limits, is left out.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from planners.parallel.workers import Workers
 from planners.pddl.model_options import ModelOptions
-from planners.system.errors import CoordlangError
+from planners.system.errors import OutOfMemory, OutOfTime, ProvedImpossible
 from planners.system.limits import time_limit
 
 FURTHER = ("open-2x6", "open-3x4", "open-3x5", "open-4x4", "ring-4x5")
@@ -131,7 +131,7 @@ def measured(key: str, name: str, seed: int, given: Namespace) -> Figures:
             built = build_language(
                 candidates, "minimal", seed=seed, workers=workers, progress=bounds
             )
-    except CoordlangError:
+    except (OutOfTime, OutOfMemory, ProvedImpossible):
         return {"row": key, "version": frame.project(), "cells": []}
     guarantee = built.language.guarantee
     words = text_of(guarantee.lower_bound, guarantee.size)

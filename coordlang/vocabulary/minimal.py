@@ -38,7 +38,7 @@ _MERGES = 5
 _PAIRS, _FIRST_PAIRS = 1_000, 30
 #: Effort that is not enough for a tenth of the first failing plans is not begun with.
 _BEGINNING = 10
-#: What may be spent on each number from below before words are merged.
+#: What may be spent on each number, from below and between the bounds, before words are merged.
 _SOON = Budget(rounds=10, conflicts=2_000)
 #: Merges in a row that fail before something else is tried.
 _VAIN = 15
@@ -120,7 +120,7 @@ class MinimalSearch:
     @cached_property
     def _contained(self) -> list[ContainedInstance]:
         candidates, group = self._job.candidates, self.languages.known.group
-        if candidates.count == 1:
+        if candidates.count == 1:  # it contains itself alone
             return []
         from coordlang.vocabulary.contained import ContainedInstance, parts, tasks_of_one_orbit
 
@@ -215,6 +215,7 @@ class MinimalSearch:
         self._merging = self.best, self._merging[1]
 
     def _decide_or_merge(self, size: int, budget: Budget) -> bool:
+        """`decide`; where a number between the bounds takes long, merging goes on."""
         if self.decide(size, budget):
             return True
         if size > self.lower:
