@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import cache
-from itertools import product
+from itertools import count, product
 from random import Random
 
 from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
@@ -19,7 +20,7 @@ from planners.system.errors import ProvedImpossible
 from tests.support import naive
 from tests.support.composition_walk import walk
 from tests.support.domains import all_tasks
-from tests.support.random_models import graph_text
+from tests.support.random_models import graph_text, random_model
 from tests.support.texts import parsed
 
 #: More plans of one task are not listed.
@@ -61,13 +62,34 @@ def states_of(spaces: Sequence[PlanSpace]) -> int:
     return len({int(s) for space in spaces for s in space.state})
 
 
+def small_candidates(
+    robots: int, *, states: int, plans: int = 0, tasks: int = 100, separable: bool = True
+) -> Iterator[tuple[int, Candidates]]:
+    """Random models by their seeds, as all pairs of states or with their own task, that are no
+    larger.
+
+    ``plans`` of one task are listed at most, 0: any number; ``separable``: no plans are inseparable.
+    """
+    for seed in count():
+        domain, problem, options = random_model(seed, robots)
+        with suppress(ProvedImpossible, naive.TooLarge):
+            found = (all_pairs if seed % 3 else from_problems)(domain, [problem], options)
+            if not 0 < found.count <= tasks or states_of(found.spaces) > states:
+                continue
+            if separable and any(inseparable(space) is not None for space in found.spaces):
+                continue
+            if plans:
+                list(listed(found, plans))
+            yield seed, found
+
+
 def listed(
-    candidates: Candidates,
+    candidates: Candidates, most: int = MOST
 ) -> Iterator[tuple[PlanSpace, int, list[Plan], list[tuple[int, ...]]]]:
     """Each task with its plans in their order and the states that they pass through."""
     for space in candidates.spaces:
         for task in range(len(space.starts)):
-            plans = naive.listed(space, task, MOST)
+            plans = naive.listed(space, task, most)
             yield space, task, plans, [naive.states(space, task, plan) for plan in plans]
 
 

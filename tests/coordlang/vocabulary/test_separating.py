@@ -6,41 +6,36 @@ tried.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
-from itertools import combinations, count
+from collections.abc import Iterator
+from itertools import combinations, islice
 
 import pytest
 
 from coordlang.commands.building import build_language
-from coordlang.language.candidates import Candidates, all_pairs, from_problems
+from coordlang.language.candidates import Candidates
 from coordlang.required.last_differences import DifferenceWalk
-from coordlang.required.miscoordination import inseparable
 from coordlang.vocabulary.exhaustive import _partitions
 from coordlang.vocabulary.separations import alternatives, constraints
-from planners.system.errors import ProvedImpossible
 from tests.support import naive
-from tests.support.candidates import states_of
-from tests.support.composition_walk import walk
+from tests.support.candidates import listed, requiring, small_candidates
 from tests.support.domains import all_tasks
-from tests.support.random_models import random_model
 
-#: Groups of pairs of states; all pairs of one group must be separated.
-Demand = tuple[frozenset[frozenset[int]], ...]
+#: Pairs of states, all of which must be separated; and of several such groups one.
+Group = frozenset[frozenset[int]]
+Demand = frozenset[Group]
 
 
 def demands(candidates: Candidates, most: int, *, beta: bool) -> set[Demand]:
     """What Theorem 3 asks, one demand for each failing tuple of plans."""
     found = set()
-    for space in candidates.spaces:
-        for task in range(len(space.starts)):
-            plans = naive.listed(space, task, most)
-            for chosen in naive.failing(plans, len(space.model.robots)):
-                sequences = [naive.states(space, task, plan) for plan in chosen]
-                found.add(tuple(sorted({*_demand(sequences, beta)}, key=sorted_pairs)))
+    for space, task, plans, _ in listed(candidates, most):
+        for chosen in naive.failing(plans, space.robots):
+            sequences = [naive.states(space, task, plan) for plan in chosen]
+            found.add(frozenset(_demand(sequences, beta)))
     return found
 
 
-def _demand(sequences: list[tuple[int, ...]], beta: bool) -> Iterator[frozenset[frozenset[int]]]:
+def _demand(sequences: list[tuple[int, ...]], beta: bool) -> Iterator[Group]:
     differ = [n for n, here in enumerate(zip(*sequences, strict=True)) if len(set(here)) > 1]
     yield from _triples(sequences[0][differ[0] - 1], {s[differ[0]] for s in sequences})
     if beta and differ[-1] == len(sequences[0]) - 1:
@@ -49,13 +44,9 @@ def _demand(sequences: list[tuple[int, ...]], beta: bool) -> Iterator[frozenset[
         yield from _triples(sequences[0][differ[-1] + 1], {s[differ[-1]] for s in sequences})
 
 
-def _triples(shared: int, others: set[int]) -> Iterator[frozenset[frozenset[int]]]:
+def _triples(shared: int, others: set[int]) -> Iterator[Group]:
     for a, b in combinations(others, 2):
         yield frozenset({frozenset({shared, a}), frozenset({shared, b}), frozenset({a, b})})
-
-
-def sorted_pairs(group: frozenset[frozenset[int]]) -> list[list[int]]:
-    return sorted(sorted(p) for p in group)
 
 
 def satisfies(word: dict[int, int], demand: Demand) -> bool:
@@ -63,7 +54,7 @@ def satisfies(word: dict[int, int], demand: Demand) -> bool:
     return any(all(len({word[s] for s in p}) == len(p) == 2 for p in group) for group in demand)
 
 
-def least(candidates: Candidates, states: list[int], wanted: set[Demand]) -> int:
+def least(states: list[int], wanted: set[Demand]) -> int:
     for size in range(1, len(states) + 1):
         for words in _partitions(len(states), size):
             word = dict(zip(states, words, strict=True))
@@ -74,27 +65,8 @@ def least(candidates: Candidates, states: list[int], wanted: set[Demand]) -> int
 
 def small_models(robots: int, most: int, number: int) -> Iterator[tuple[int, Candidates]]:
     """Random models that require coordination, small enough to list plans and partitions."""
-    for seed in count():
-        domain, problem, options = random_model(seed, robots)
-        make: Callable[..., Candidates] = all_pairs if seed % 3 else from_problems
-        try:
-            candidates = make(domain, [problem], options)
-        except ProvedImpossible:
-            continue
-        if not 0 < candidates.count <= 100 or states_of(candidates.spaces) > 7:
-            continue
-        if any(inseparable(space) is not None for space in candidates.spaces):
-            continue
-        if not any(walk(space).requires[space.starts].any() for space in candidates.spaces):
-            continue
-        try:
-            demands(candidates, most, beta=True)
-        except naive.TooLarge:
-            continue
-        yield seed, candidates
-        number -= 1
-        if not number:
-            return
+    models = small_candidates(robots, states=7, plans=most)
+    return islice(((seed, found) for seed, found in models if requiring(found)), number)
 
 
 @pytest.mark.parametrize("written", [pytest.param(True, marks=pytest.mark.thorough), False])
@@ -110,8 +82,7 @@ def small_models(robots: int, most: int, number: int) -> Iterator[tuple[int, Can
 def test_against_the_theorem(
     robots: int, most: int, number: int, written: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Least sizes with and without beta, and the order of the four methods; `minimal` equals
-    `exhaustive`.
+    """Least sizes with and without beta, and the order of the four methods.
 
     With all constraints written down, and with constraints asked of the walk.
     """
@@ -123,29 +94,18 @@ def test_against_the_theorem(
         states = sorted({int(s) for space in candidates.spaces for s in space.state})
         full = build_language(candidates, "separating", seed=seed)
         first = build_language(candidates, "separating", alpha_only=True)
-        codec = candidates.model.codec
         for built, wanted in ((full, both), (first, alpha)):
             assert built.stopped is None
             size = built.language.guarantee.size
-            assert (
-                size == least(candidates, states, wanted) == built.figures["separating_lower_bound"]
-            )
-            word = {
-                s: built.language.words.index(built.language.states[codec.key(candidates.rows[s])])
-                for s in states
-            }
+            assert size == least(states, wanted) == built.figures["separating_lower_bound"]
+            table = built.language.partition(candidates.model).word_of(candidates.rows)
+            word = {state: int(table[state]) for state in states}
             assert all(satisfies(word, demand) for demand in wanted)
-        exhaustive, minimal, greedy = (
-            build_language(candidates, method).language.guarantee
-            for method in ("exhaustive", "minimal", "greedy")
+        exhaustive, greedy = (
+            build_language(candidates, method) for method in ("exhaustive", "greedy")
         )
-        assert exhaustive.size == minimal.size == minimal.lower_bound
-        sizes = (
-            exhaustive.size,
-            full.language.guarantee.size,
-            first.language.guarantee.size,
-            greedy.size,
-        )
+        every = (exhaustive, full, first, greedy)
+        sizes = tuple(built.language.guarantee.size for built in every)
         assert list(sizes) == sorted(sizes)
         seen[sizes] += 1
     assert any(a < b for a, b, _, _ in seen), "no model where the minimum is below Theorem 3's"
@@ -205,11 +165,7 @@ def test_every_constraint_and_no_other(robots: int, most: int, number: int) -> N
     for _, candidates in small_models(robots, most, number):
         found = [DifferenceWalk(space).every(10**6) for space in candidates.spaces]
         every = {
-            tuple(
-                sorted(
-                    (frozenset(frozenset(p) for p in s.pairs) for s in constraint), key=sorted_pairs
-                )
-            )
+            frozenset(frozenset(frozenset(p) for p in s.pairs) for s in constraint)
             for differences in found
             if differences is not None
             for constraint in constraints(differences)
@@ -227,16 +183,3 @@ def test_too_many_constraints_are_not_written_down() -> None:
     assert len(set(constraints(every))) == 12, "each is met in two ways: the domain is symmetric"
     assert walk_of.every(24) == every
     assert walk_of.every(23) is None
-
-
-def test_walk_keeps_only_what_fails() -> None:
-    """Where nothing requires coordination nothing is kept, and every partition is separating."""
-    import numpy as np
-
-    candidates = all_tasks("t-map")
-    kept = [DifferenceWalk(space) for space in candidates.spaces]
-    assert sum(w.nodes for w in kept) > 0
-    apart = np.arange(len(candidates.rows))
-    random = np.random.default_rng(0)
-    assert not [c for w in kept for c in w.unseparated(apart, random)]
-    assert [c for w in kept for c in w.unseparated(apart * 0, random)]

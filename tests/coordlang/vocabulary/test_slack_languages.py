@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from random import Random
@@ -17,21 +18,16 @@ from coordlang.required.divergences import first_differences, states_on_plans
 from coordlang.required.miscoordination import Inseparable
 from coordlang.verification.by_definition import verify
 from coordlang.verification.check_certificate import check
-from planners.pddl import read_domain, read_problem
 from planners.pddl.model_options import ModelOptions
 from planners.search.plans import counts
 from planners.system.errors import BadInput, ProvedImpossible, Refuted, UsageError
-from tests.support.domains import DOMAINS
-from tests.support.naive import is_language
+from tests.support.domains import read
+from tests.support.naive import is_language, sentence
 from tests.support.random_models import random_model
-
-#: Plans of a task that the twin lists at most, and of all tasks together.
-MOST, MOST_TOGETHER = 60, 250
 
 
 def shipped(folder: str, stem: str, *, every: bool = False, **options: object) -> Candidates:
-    domain = read_domain(DOMAINS / folder / "domain.pddl")
-    problem = read_problem(DOMAINS / folder / f"{stem}.pddl", domain)
+    domain, problem = read(folder, stem)
     make = all_pairs if every else from_problems
     return make(domain, [problem], ModelOptions(**options))  # type: ignore[arg-type]
 
@@ -46,65 +42,44 @@ def small_tasks(seeds: range, robots: int) -> Iterator[Candidates]:
         except (ProvedImpossible, BadInput, UsageError):
             continue
         (space,) = found.spaces
-        if 1 < counts(space)[int(space.starts[0])] <= (MOST if robots == 2 else 12):
+        if 1 < counts(space)[int(space.starts[0])] <= (60 if robots == 2 else 12):
             yield found
 
 
-def agree(seeds: range, robots: int) -> tuple[int, int]:
-    """Verdicts compared with the definition; how many are no languages, and how many are."""
-    refuted = held = 0
+@pytest.mark.parametrize(
+    ("robots", "seeds"),
+    [
+        (2, range(14)),
+        pytest.param(2, range(14, 250), marks=pytest.mark.thorough),
+        pytest.param(3, range(60), marks=pytest.mark.thorough),
+    ],
+)
+def test_verdicts_and_least_numbers_are_those_of_the_definition(robots: int, seeds: range) -> None:
+    seen: Counter[str] = Counter()
     for found in small_tasks(seeds, robots):
         (space,) = found.spaces
         states = states_on_plans([space]).tolist()
         random = Random(len(space))
-        for words in (1, 2, 3, len(states)):
-            word = {state: random.randrange(words) for state in states}
-            if words == len(states):
-                word = {state: number for number, state in enumerate(states)}
+        apart = {state: number for number, state in enumerate(states)}
+        drawn = [{state: random.randrange(words) for state in states} for words in (1, 2, 3)]
+        for word in (*drawn, apart):
             holds = verify(Partition.of_states(found.rows, word), [space]).holds
             assert holds == is_language(space, word, 10_000)
-            refuted, held = refuted + (not holds), held + holds
-    return refuted, held
-
-
-def test_verdicts_are_those_of_the_definition() -> None:
-    refuted, held = agree(range(12), 2)
-    assert min(refuted, held) > 0
-
-
-def minimal_is_exhaustive(seeds: range) -> tuple[int, int]:
-    """Least numbers of words compared with brute force; how many tasks, and how many inseparable."""
-    number = inseparable = 0
-    for found in small_tasks(seeds, 2):
-        (space,) = found.spaces
-        states = states_on_plans([space]).tolist()
-        if len(states) > 9:
+            seen["holds" if holds else "refuted"] += 1
+        if len(states) > 9 or robots > 2:
             continue
-        apart = {state: word for word, state in enumerate(states)}
         if not is_language(space, apart, 10_000):
             with pytest.raises(Inseparable) as error:
                 build_language(found, "minimal")
             assert error.value.exit_code == 11
-            inseparable += 1
+            seen["inseparable"] += 1
             continue
         least = build_language(found, "minimal").language.guarantee
-        brute = build_language(found, "exhaustive").language.guarantee
         assert least.proved_minimal
-        assert least.size == brute.size
-        number += least.size > 1
-    return number, inseparable
-
-
-def test_the_least_number_of_words_is_that_of_brute_force() -> None:
-    number, inseparable = minimal_is_exhaustive(range(14))
-    assert number + inseparable > 0
-
-
-@pytest.mark.thorough
-def test_more_tasks() -> None:
-    assert min(agree(range(12, 250), 2)) > 10
-    assert min(agree(range(60), 3)) > 0
-    assert min(minimal_is_exhaustive(range(14, 200))) > 2
+        assert least.size == build_language(found, "exhaustive").language.guarantee.size
+        seen["several words"] += least.size > 1
+    assert min(seen["holds"], seen["refuted"]) > len(seeds) // 20, seen
+    assert robots > 2 or seen["several words"] + seen["inseparable"] > len(seeds) // 40, seen
 
 
 @pytest.mark.parametrize("method", ["greedy", "minimal"])
@@ -124,11 +99,7 @@ def test_waiting_here_or_there_is_one_sentence_and_both_plans_are_named() -> Non
     witness = error.value.witness
     first, second = witness.states
     assert first != second
-
-    def once(states: tuple[str, ...]) -> list[str]:
-        return [s for n, s in enumerate(states) if n == 0 or s != states[n - 1]]
-
-    assert once(first) == once(second)
+    assert sentence([*first]) == sentence([*second])
     assert "--words-see-slack" in str(error.value)
 
 

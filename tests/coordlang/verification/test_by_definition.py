@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Verification, and what requires coordination, against listed plans and every mixture of them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from functools import cache
+from itertools import islice
+from math import inf
+from random import Random
+
+import numpy as np
+import pytest
+
+from coordlang.language.candidates import Candidates, from_problems
+from coordlang.language.partition import Partition
+from coordlang.required.divergences import first_differences, states_on_plans
+from coordlang.required.miscoordination import Miscoordination, inseparable, miscoordination
+from coordlang.verification.by_definition import verify
+from coordlang.vocabulary import Job, greedy
+from planners.pddl.model_options import ModelOptions
+from tests.support import naive
+from tests.support.candidates import listed, small_candidates
+from tests.support.domains import own_task
+from tests.support.texts import parsed
+
+#: (robots, plans of one task that the twin lists at most, models)
+SIZES = [
+    (2, 60, 80),
+    (3, 14, 80),
+    (4, 7, 12),
+    pytest.param(2, 60, 600, marks=pytest.mark.slow),
+    pytest.param(3, 14, 600, marks=pytest.mark.slow),
+    pytest.param(4, 7, 200, marks=pytest.mark.slow),
+]
+#: Walks of plans are given up for sets at once, once they have grown, or never.
+GROWTHS = (-1.0, 3.0, inf)
+
+
+@cache
+def models(robots: int, most: int, number: int) -> list[Candidates]:
+    """Random candidate tasks whose plans can be listed, inseparable ones among them."""
+    found = small_candidates(robots, states=10**6, plans=most, tasks=300, separable=False)
+    return [candidates for _, candidates in islice(found, number)]
+
+
+@pytest.mark.parametrize(("robots", "most", "number"), SIZES)
+def test_where_plans_that_require_coordination_part(robots: int, most: int, number: int) -> None:
+    """The last shared states and the next ones of all failing mixtures, and which tasks have any."""
+    seen: Counter[str] = Counter()
+    for candidates in models(robots, most, number):
+        alphas, requires, same_states = set(), [], False
+        for space, task, plans, _ in listed(candidates, most):
+            failing = list(naive.failing(plans, robots))
+            requires.append(bool(failing))
+            for chosen in failing:
+                alpha = naive.divergence([naive.states(space, task, plan) for plan in chosen])
+                same_states |= alpha is None
+                alphas |= {alpha} if alpha else set()
+        witnesses = [
+            miscoordination(space, task)
+            for space in candidates.spaces
+            for task in range(len(space.starts))
+        ]
+        assert [w is not None for w in witnesses] == requires
+        assert any(inseparable(space) is not None for space in candidates.spaces) == same_states
+        seen["required" if any(requires) else "not required"] += 1
+        seen["inseparable"] += same_states
+        if not same_states:
+            found = first_differences(candidates.spaces)
+            assert found.requiring == sum(requires)
+            last, after = (found.divergences.last.tolist(), found.divergences.following.tolist())
+            table = {
+                (p, frozenset(s for s in q if s >= 0)) for p, q in zip(last, after, strict=True)
+            }
+            assert table == naive.minimal(alphas)
+    assert min(seen["required"], seen["not required"]) >= number // 10, seen
+    assert seen["inseparable"] >= number // 40
+
+
+@pytest.mark.parametrize(("robots", "most", "number"), SIZES)
+def test_verdicts_are_those_of_the_definition(
+    robots: int, most: int, number: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: Counter[bool] = Counter()
+    for seed, candidates in enumerate(models(robots, most, number)):
+        if seed % 10 == 0:  # moves are looked at in chunks
+            monkeypatch.setattr("coordlang.verification.walk._CHUNK", 7 if seed % 20 else 10**6)
+        random = Random(seed)
+        size = random.randint(1, 4)
+        word = np.array([random.randrange(size) for _ in candidates.rows])
+        table = Partition(tuple(f"w{n}" for n in range(size)), candidates.rows, word, 0)
+        expected = all(
+            naive.is_language(space, dict(enumerate(word.tolist())), most)
+            for space in candidates.spaces
+        )
+        for growth in GROWTHS:
+            verdict = verify(table, candidates.spaces, growth)
+            assert verdict.holds == expected
+            if verdict.witness is not None:
+                check_witness(candidates, table, verdict.witness)
+        seen[expected] += 1
+    assert min(seen[True], seen[False]) >= number // 10
+
+
+def check_witness(candidates: Candidates, table: Partition, witness: Miscoordination) -> None:
+    """The shown plans are optimal, have one sentence, and their mixture is no plan."""
+    numbers = candidates.model.numbers
+    shown = tuple(tuple(naive.known(numbers(step)) for step in plan) for plan in witness.plans)
+    for space, task, plans, _ in listed(candidates, 10**6):
+        if set(shown) <= set(plans) and naive.mixture(shown) not in plans:
+            word = table.word_of(space.rows).tolist()
+            passed = [naive.states(space, task, plan) for plan in shown]
+            if len({naive.sentence([word[s] for s in states]) for states in passed}) == 1:
+                return
+    raise AssertionError("no task has these plans with one sentence and a failing mixture")
+
+
+def test_sets_are_fewer_than_plans() -> None:
+    """Under words that separate all divergences, and under one word for all states."""
+    candidates = own_task("grid", "three-robots-3x3")
+    first = first_differences(candidates.spaces)
+    words = greedy(Job(candidates, tuple(states_on_plans(candidates.spaces).tolist()), first))
+    silence = dict.fromkeys(words.partition, 0)
+    for partition, holds in (words.partition, True), (silence, False):
+        table = Partition.of_states(candidates.rows, partition)
+        plans, sets = (verify(table, candidates.spaces, growth) for growth in (inf, -1.0))
+        assert plans.holds == sets.holds == holds
+        assert sets.nodes < plans.nodes
+
+
+def test_sets_of_steps_of_long_plans() -> None:
+    """Nothing recurses: three robots go 1,200 steps, and each has two ways to begin."""
+    last = 1_200
+    robots = "".join(f"(at r{k} c0)" for k in range(3))
+    steps = "".join(f"(next c{n} c{n + 1})" for n in range(last))
+    domain, problem = parsed(
+        """(define (domain line)
+             (:predicates (at ?r ?c) (next ?a ?b))
+             (:action go :parameters (?r ?a ?b)
+               :precondition (and (at ?r ?a) (next ?a ?b))
+               :effect (and (at ?r ?b) (not (at ?r ?a)))))""",
+        f"""(define (problem long) (:domain line)
+             (:objects r0 r1 r2 {" ".join(f"c{n}" for n in range(last + 1))} aside)
+             (:init {robots} {steps} (next c0 aside) (next aside c2))
+             (:goal (and (at r0 c{last}) (at r1 c{last}) (at r2 c{last}))))""",
+    )
+    found = from_problems(domain, [problem], ModelOptions(robots=("r0", "r1", "r2")))
+    word = np.arange(len(found.rows))
+    table = Partition(tuple(f"w{n}" for n in word), found.rows, word, 0)
+    assert verify(table, found.spaces, -1.0).holds
