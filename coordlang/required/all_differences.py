@@ -43,20 +43,17 @@ def differences(
 
     Raises `Inseparable` with the plans of the first portion that has some.
     """
-    source = candidates.source
+    source, spoken_for = candidates.source, None
     goals = symmetric_goals(candidates)
     if goals is not None and isinstance(source, Explored):
         progress(f"looking at {len(goals.chosen):,} of {len(source.goals):,} goals, by symmetry")
-        some = source.only(goals.chosen), goals.spoken_for[goals.chosen]
-        found = _tables(some, workers, progress, portion)
-        if not found[-1]["inseparable"]:
-            return _together(found, goals)
-    found = _tables((source, None), workers, progress, portion)
+        source, spoken_for = source.only(goals.chosen), goals.spoken_for[goals.chosen]
+    found = _tables((source, spoken_for), workers, progress, portion)
     if found[-1]["inseparable"]:
         witness = inseparable(source.portion(cut(source.efforts, portion)[len(found) - 1]))
         assert witness is not None
         raise Inseparable(witness)
-    return _together(found)
+    return _together(found, goals)
 
 
 #: Goals that are looked at, and for how many goals each counts (None: for itself).

@@ -9,7 +9,7 @@ labels.  Plans that stay in the same states share all of them: their walk is ove
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -166,12 +166,8 @@ def _leaks(space: PlanSpace) -> Bools:
 def _steps_in_same_states(
     space: PlanSpace, ways: Mapping[_Pair, _Way]
 ) -> tuple[dict[_Pair, _Way], _Way | None]:
-    """The nodes one step on that are off the diagonal; and the first mixture that breaks, if any.
-
-    First is the one with the fewest robots after which no edge fits.
-    """
+    """The nodes off the diagonal one step on, and the first mixture that breaks, if any does."""
     below: dict[_Pair, _Way] = {}
-    broken: list[tuple[int, _Way]] = []
     for (x, y), way in ways.items():
         bundles: dict[int, _Bundle] = {}
         for edge in space.out_edges(x):
@@ -182,19 +178,10 @@ def _steps_in_same_states(
             for mixed in product(*(sorted(set(own)) for own in labels)):
                 longer = (way, bundles[target], mixed)
                 if mixed not in targets:
-                    broken.append((_fitting(mixed, targets), longer))
-                elif targets[mixed] != target:
+                    return {}, longer
+                if targets[mixed] != target:
                     below.setdefault((target, targets[mixed]), longer)
-    _, first = min(broken, key=lambda one: one[0], default=(0, None))
-    return below, first
-
-
-def _fitting(mixed: Labels, targets: Iterable[Labels]) -> int:
-    """For how many robots, from the first on, some joint action has these labels."""
-    return max(
-        next(k for k, (own, other) in enumerate(zip(mixed, labels, strict=True)) if own != other)
-        for labels in targets
-    )
+    return below, None
 
 
 def _trail_in_same_states(space: PlanSpace, way: _Way) -> Trail:

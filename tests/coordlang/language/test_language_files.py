@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -181,18 +180,6 @@ def test_comments_that_are_read_belong_to_the_domain(coordlang: Command, tmp_pat
     other = text.replace("subaction r1 (move", "subaction r1 (drive")
     assert other != text
     copy.write_text(other)
-    assert coordlang("verify", path, copy, problem).code == 31
-
-
-def test_a_file_with_the_hash_of_the_text_is_read(coordlang: Command, tmp_path: Path) -> None:
-    """As language files had it before."""
-    domain, problem = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
-    path, copy = tmp_path / "l.json", tmp_path / "copy.pddl"
-    assert coordlang("build", domain, problem, "--method", "greedy", "-o", path).code == 0
-    old = {"name": "t-map", "sha256": sha256(domain.read_bytes()).hexdigest()}
-    edit(path, domain=old)
-    assert coordlang("verify", path, domain, problem).code == 0
-    copy.write_text(domain.read_text() + "; one comment more\n")
     assert coordlang("verify", path, copy, problem).code == 31
 
 
