@@ -7,10 +7,10 @@ This file needs Python's standard library and nothing else, so that a robot can 
 beside a choices file (docs/formats.md), which ``coordlang choices --format json`` writes.  Neither
 PDDL nor a planner is needed then.
 
-All checks and all larger pieces of work are done when the file is read, and in `Monitor.can` and
-`Monitor.commit`.  What a robot calls in every step (`Monitor.allowed`, `Monitor.did`,
-`Monitor.known`, `Monitor.remaining`, `Monitor.step`, `Monitor.finished`, `Monitor.copy`) takes the
-same time however many steps were done before.  It opens no file and imports nothing.
+A `Subplans` holds what is open under the sentence; `Monitor` is where the robot is in it.  All
+checks and all larger pieces of work are done when the file is read, and in `Monitor.can` and
+`Monitor.commit`.  What a robot calls in every step takes the same time and memory however many
+steps were done before, opens no file and imports nothing.
 """
 
 from __future__ import annotations
@@ -19,8 +19,6 @@ import gzip
 import json
 import re
 import zlib
-from array import array
-from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from decimal import Decimal
@@ -44,7 +42,6 @@ _SHOWN_TEXT = 200  # characters of a text that a message shows
 _AROUND_PARENTHESES = re.compile(r"\s*([()])\s*")
 _PDDL_TEXT = re.compile(r"\([^()]+\)")
 _KINDS = {str: "a text", int: "a whole number", list: "a list", dict: "an object"}
-_KNOWN = ("true", "unknown")  # the keys of what is known in a state
 _Kind = TypeVar("_Kind")
 
 #: One text or several; None is idling.
@@ -120,107 +117,155 @@ class Answer:
         return self.subplan is not None
 
 
-@dataclass(frozen=True, slots=True)
-class _Walk:
-    """The subplans that are left, as an automaton: its nodes are numbered step by step, 0 first.
+class Knowledge:
+    """What is known in each state of a choices file: facts that are true, others unknown or false.
 
-    The edges out of node n are ``first[n]`` to ``first[n + 1]``, sorted by their label; each has a
-    label and a target.  ``state[n]`` is the state of the choices file in which n is, ``left[n]``
-    the number of subplans from n on, at least 1.  Flat arrays, because the garbage collector does
-    not look into them.
+    Two sets of numbers ``state * facts + fact``: one object each for the garbage collector.
     """
 
-    first: array[int]
-    label: array[int]
-    target: array[int]
+    def __init__(self, entry: Mapping[str, Any], where: str) -> None:
+        facts, others = _atoms(entry, "facts", where), _atoms(entry, "others", where)
+        if len({*facts, *others}) < len(facts) + len(others):
+            raise _broken(f"{where}: an atom occurs twice in 'facts' and 'others'")
+        self._size = len(facts)
+        #: The number of each atom; None for one of which nothing is ever known.
+        self.atoms: dict[str, int | None] = {text: n for n, text in enumerate(facts)}
+        self.atoms |= dict.fromkeys(sorted(others))
+        self._true: set[int] = set()
+        self._unknown: set[int] = set()
+
+    def read(self, states: Sequence[Any]) -> None:
+        """Take in what the states of a file say."""
+        for state, record in enumerate(states):
+            for key, found in (("true", self._true), ("unknown", self._unknown)):
+                for fact in _get(record, key, list, f"state {state}"):
+                    if not _is_number(fact) or not 0 <= fact < self._size:
+                        raise _broken(
+                            f"state {state}: '{key}' has {_shown(fact)}; "
+                            f"facts are numbers below {self._size}"
+                        )
+                    found.add(state * self._size + fact)
+        if both := self._true & self._unknown:
+            state, fact = divmod(min(both), self._size)
+            raise MonitorError(f"state {state} says that fact {fact} is true and unknown")
+
+    def value(self, state: int, atom: str) -> bool | None:
+        """Whether an atom is true in a state; None where it is unknown.
+
+        Raises `MonitorError` for what is no atom of the file.
+        """
+        if atom not in self.atoms:
+            raise self._no_atom(atom)
+        fact = self.atoms[atom]
+        if fact is None or state * self._size + fact in self._unknown:
+            return None
+        return state * self._size + fact in self._true
+
+    def _no_atom(self, atom: str) -> MonitorError:
+        head = _head(atom)
+        alike = [text for text in self.atoms if _head(text) == head]
+        if alike:
+            more = " .." if len(alike) > _SHOWN else ""
+            similar = f"there are {', '.join(alike[:_SHOWN])}{more}"
+        else:
+            similar = f"none is ({_shown(head)} ..)"
+        return MonitorError(f"{_shown(atom)} is no atom that can change: {similar}")
+
+
+def _head(atom: str) -> str:
+    return atom.strip("()").split(" ")[0]
+
+
+@dataclass(frozen=True, slots=True)
+class Subplans:
+    """What is open to a robot: the own subplans that are left, as an automaton without cycles.
+
+    Node 0 is where they begin.  ``moves[n]`` leads from node n by what is done there (None: idle,
+    sorted, idling first) to a node with a larger number; ``left[n]`` is the number of subplans from
+    n on, at least 1; ``state[n]`` the state of the choices file in which n is.
+    """
+
+    moves: Sequence[Mapping[str | None, int]]
     state: Sequence[int]
     left: Sequence[int]
 
-    def edges(self, node: int) -> range:
-        """The edges out of a node."""
-        return range(self.first[node], self.first[node + 1])
+    @classmethod
+    def of(
+        cls, moves: Sequence[Mapping[str | None, int]], state: Sequence[int], left: Sequence[int]
+    ) -> Subplans:
+        """Keep the nodes from which a subplan is left; node 0 is one of them."""
+        kept = [node for node, count in enumerate(left) if count]
+        number = dict(zip(kept, range(len(kept)), strict=True))
+        return cls(
+            [{text: number[to] for text, to in moves[node].items() if left[to]} for node in kept],
+            [state[node] for node in kept],
+            [left[node] for node in kept],
+        )
 
+    def first(self) -> tuple[str | None, ...]:
+        """The first subplan in order."""
+        node, done = 0, []
+        while self.moves[node]:
+            text, node = next(iter(self.moves[node].items()))
+            done.append(text)
+        return tuple(done)
 
-class _Known:
-    """What is known in each state, as sorted numbers in one flat array.
+    def making(self, node: int, detour: Detour, knowledge: Knowledge, most: int) -> Subplans | None:
+        """Those from a node on that make a detour; None if there are none.
 
-    The number of a fact in a state is ``2 * (state * facts + fact)``, and 1 more if the fact is
-    unknown there; a fact that does not occur is false.
-    """
-
-    def __init__(self, states: Sequence[Any], facts: int) -> None:
-        self._facts, self._numbers = facts, array("q")
-        for state, record in enumerate(states):
-            true, unknown = (_fact_numbers(record, key, facts, state) for key in _KNOWN)
-            if both := true & unknown:
-                raise MonitorError(f"state {state} says that fact {min(both)} is true and unknown")
-            found = [2 * fact for fact in true] + [2 * fact + 1 for fact in unknown]
-            self._numbers.extend(2 * state * facts + number for number in sorted(found))
-
-    def value(self, state: int, fact: int | None) -> bool | None:
-        """Whether a fact is true in a state; None where it is unknown.  None always is."""
-        if fact is None:
-            return None
-        number = 2 * (state * self._facts + fact)
-        at = bisect_left(self._numbers, number)
-        found = self._numbers[at] - number if at < len(self._numbers) else 2
-        return None if found == 1 else found == 0
-
-
-def _fact_numbers(record: Any, key: str, facts: int, state: int) -> set[int]:
-    numbers = _get(record, key, list, f"state {state}")
-    for fact in numbers:
-        if not _is_number(fact) or not 0 <= fact < facts:
-            raise _broken(
-                f"state {state}: '{key}' has {_shown(fact)}; facts are numbers below {facts}"
+        Nodes are pairs: one of these, and the parts of the detour that are made by then (bits: the
+        visits, then the dos).  Raises `MonitorError` for more than ``most`` of them.
+        """
+        made_in = cache(partial(_made_in, detour, knowledge))
+        made_by = cache(partial(_made_by, detour))
+        made = made_in(self.state[node])
+        nodes = [(node, made)] if made is not None else []
+        numbers = {pair: number for number, pair in enumerate(nodes)}
+        moves: list[dict[str | None, int]] = []
+        for here, before in nodes:  # which grows meanwhile
+            moves.append({})
+            for text, to in self.moves[here].items():
+                now, then = made_by(text), made_in(self.state[to])
+                if now is None or then is None:
+                    continue
+                after = to, before | now | then
+                if after not in numbers:
+                    if len(nodes) >= most:
+                        raise MonitorError(
+                            f"{len(detour.visit) + len(detour.do)} visits and dos at once are too "
+                            f"many here: there are more than {most:,} ways to have made some of "
+                            "them; ask for fewer"
+                        )
+                    numbers[after] = len(nodes)
+                    nodes.append(after)
+                moves[-1][text] = numbers[after]
+        whole = (1 << len(detour.visit) + len(detour.do)) - 1
+        left = [0] * len(nodes)
+        for number in reversed(range(len(nodes))):
+            here, parts = nodes[number]
+            ends = not self.moves[here]
+            left[number] = (
+                int(parts == whole) if ends else sum(left[n] for n in moves[number].values())
             )
-    return set(numbers)
+        if not any(left[:1]):
+            return None
+        return Subplans.of(moves, [self.state[here] for here, _ in nodes], left)
 
 
-class _History:
-    """The labels of the steps done, in blocks.
+def _made_in(detour: Detour, knowledge: Knowledge, state: int) -> int | None:
+    """The visits made in a state, as bits; None if the detour avoids it."""
+    if any(knowledge.value(state, atom) is not False for atom in detour.avoid):
+        return None
+    visited = (knowledge.value(state, atom) for atom in detour.visit)
+    return sum(1 << bit for bit, made in enumerate(visited) if made)
 
-    Full blocks are never changed, so that copies share them: adding a step and copying take
-    constant time.
-    """
 
-    __slots__ = ("_before", "_block", "_length")
-
-    _SIZE = 256
-
-    def __init__(self, labels: Iterable[int] = ()) -> None:
-        self._before: tuple[Any, ...] = ()  # (the blocks before, a full block)
-        self._block = array("I", bytes(array("I").itemsize * self._SIZE))
-        self._length = 0
-        for label in labels:
-            self.add(label)
-
-    def __len__(self) -> int:
-        return self._length
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.labels(),)  # flat: many blocks would be nested too deeply
-
-    def add(self, label: int) -> None:
-        at = self._length % self._SIZE
-        if at == 0 and self._length:
-            self._before = (self._before, self._block)
-            self._block = self._block[:]
-        self._block[at] = label
-        self._length += 1
-
-    def copy(self) -> _History:
-        other = _History()
-        other._before, other._block = self._before, self._block[:]
-        other._length = self._length
-        return other
-
-    def labels(self) -> list[int]:
-        blocks, before = [self._block], self._before
-        while before:
-            before, block = before
-            blocks.append(block)
-        return [label for block in reversed(blocks) for label in block][: self._length]
+def _made_by(detour: Detour, text: str | None) -> int | None:
+    """The dos that a subaction makes, as bits beside those of the visits; None if it is never."""
+    if any(_matches(pattern, text) for pattern in detour.never):
+        return None
+    bits = enumerate(detour.do, len(detour.visit))
+    return sum(1 << bit for bit, pattern in bits if _matches(pattern, text))
 
 
 class Monitor:
@@ -251,24 +296,12 @@ class Monitor:
         self.atoms = _text(entry, "atoms", where)
         if self.atoms not in ("exact", "own"):
             raise _broken(f"{where}: 'atoms' is {_shown(self.atoms)}, not exact or own")
-        facts, others = _atoms(entry, "facts", where), _atoms(entry, "others", where)
-        if len({*facts, *others}) < len(facts) + len(others):
-            raise _broken(f"{where}: an atom occurs twice in 'facts' and 'others'")
-        #: The number of each atom; None for one of which nothing is ever known.
-        self._facts: dict[str, int | None] = {text: n for n, text in enumerate(facts)}
-        self._facts |= dict.fromkeys(sorted(others))
+        self._knowledge = Knowledge(entry, where)
         states = _get(entry, "states", list, where)
-        _check_moves(states)
-        labels = _labels(states)
-        #: The text of each label; sorted, idling (None) first.
-        self._texts = tuple(None if text == IDLE else text for text in labels)
-        self._numbers = {text: number for number, text in enumerate(self._texts)}
-        self._walk = _read_walk(states, labels)
-        _check_ends(entry, states, self._walk)
-        self._known = _Known(states, len(facts))
+        self._open = _read_subplans(entry, states)
+        self._knowledge.read(states)
         self._most = max(MAX_NODES, _NODES_OF_STATE * len(states))
-        self._here = 0
-        self._history = _History()
+        self._here = self._step = 0
         self._promised = Detour()
 
     @classmethod
@@ -288,13 +321,9 @@ class Monitor:
         raise MonitorError(f"{path}: it does not fit into the memory")
 
     def copy(self) -> Monitor:
-        """A monitor of its own in the same place, for trying things out.
-
-        Constant time.  A copy of a monitor that has just been read does the whole mission again.
-        """
+        """A monitor of its own in the same place, for trying things out; constant time."""
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
-        other._history = self._history.copy()
         return other
 
     __copy__ = copy
@@ -302,25 +331,17 @@ class Monitor:
     @property
     def step(self) -> int:
         """How many steps are done."""
-        return len(self._history)
-
-    @property
-    def history(self) -> tuple[str | None, ...]:
-        """What the robot did, step by step; None is idling.
-
-        It is put together when it is asked for: O(steps done); `step` is their number.
-        """
-        return tuple(self._texts[label] for label in self._history.labels())
+        return self._step
 
     @property
     def finished(self) -> bool:
         """Whether the robot has done all its steps."""
-        return not self._walk.edges(self._here)
+        return not self._open.moves[self._here]
 
     @property
     def remaining(self) -> int:
         """How many own subplans are left, of those that keep every promise."""
-        return self._walk.left[self._here]
+        return self._open.left[self._here]
 
     @property
     def promised(self) -> Detour:
@@ -332,32 +353,25 @@ class Monitor:
 
         Nothing when it has finished.
         """
-        walk = self._walk
-        # Through a list: a tuple of known length costs the garbage collector nothing.
-        return tuple([self._texts[walk.label[edge]] for edge in walk.edges(self._here)])
+        return tuple(self._open.moves[self._here])
 
     def did(self, subaction: str | None) -> None:
         """Tell what the robot did in this step, as ``(move r1 a b)``; None or ``idle`` for idling.
 
-        Constant time; O(log allowed).
-
         Raises `NotAllowed`, and is then as it was before.
         """
-        is_known = isinstance(subaction, str) and subaction in self._numbers
+        moves = self._open.moves[self._here]
+        is_known = isinstance(subaction, str) and subaction in moves
         text = subaction if is_known else _subaction(subaction)
-        label = self._numbers.get(text, -1)
-        edges = self._walk.edges(self._here)
-        edge = bisect_left(self._walk.label, label, edges.start, edges.stop)
-        if edge == edges.stop or self._walk.label[edge] != label:
-            raise NotAllowed(self.robot, text, self.step, self.allowed())
-        self._history.add(label)
-        self._here = self._walk.target[edge]
+        if text not in moves:
+            raise NotAllowed(self.robot, text, self._step, self.allowed())
+        self._here = moves[text]
+        self._step += 1
 
     def known(self, atom: str) -> bool | None:
         """Whether an atom is true now, whatever the others did; None if that depends on them."""
-        text = atom if isinstance(atom, str) and atom in self._facts else _plain(atom)
-        self._check_atom(text)
-        return self._known.value(self._walk.state[self._here], self._facts[text])
+        text = atom if isinstance(atom, str) and atom in self._knowledge.atoms else _plain(atom)
+        return self._knowledge.value(self._open.state[self._here], text)
 
     def can(self, detour: Detour | None = None, /, **wanted: Texts) -> Answer:
         """Whether all this can still be had at once, promises kept.
@@ -370,14 +384,8 @@ class Monitor:
 
         Raises `MonitorError` beyond that: ask for fewer at once.
         """
-        walk = self._making((detour or Detour()) & Detour.of(**wanted))
-        if walk is None:
-            return Answer(None, 0)
-        node, subplan = 0, []
-        while edges := walk.edges(node):
-            subplan.append(self._texts[walk.label[edges.start]])
-            node = walk.target[edges.start]
-        return Answer(tuple(subplan), walk.left[0])
+        found = self._making((detour or Detour()) & Detour.of(**wanted))
+        return Answer(None, 0) if found is None else Answer(found.first(), found.left[0])
 
     def commit(self, detour: Detour | None = None, /, **wanted: Texts) -> None:
         """Promise it: from now on only what keeps the promise is allowed.
@@ -387,8 +395,8 @@ class Monitor:
         Raises `NotPossible`, and is then as it was before.
         """
         promise = (detour or Detour()) & Detour.of(**wanted)
-        walk = self._making(promise)
-        if walk is None:
+        found = self._making(promise)
+        if found is None:
             kept = " together with what was promised before" if self._promised != Detour() else ""
             raise NotPossible(
                 f"step {self.step + 1}: {self.robot} has no subplan left for this{kept}"
@@ -397,110 +405,13 @@ class Monitor:
         self._promised = Detour(
             *(tuple(dict.fromkeys(getattr(both, f.name))) for f in fields(both))
         )
-        self._walk, self._here = walk, 0
+        self._open, self._here = found, 0
 
-    def _making(self, detour: Detour) -> _Walk | None:
+    def _making(self, detour: Detour) -> Subplans | None:
         """The subplans from here on that make a detour and keep the promises; None if none do."""
         for atom in (*detour.visit, *detour.avoid):
-            self._check_atom(atom)
-        nodes, moves = self._explored(detour)
-        whole = (1 << len(detour.visit) + len(detour.do)) - 1
-        left = [0] * len(nodes)
-        for number in reversed(range(len(nodes))):
-            node, made = nodes[number]
-            if self._walk.edges(node):
-                left[number] = sum(left[to] for _, to in moves[number])
-            else:
-                left[number] = int(made == whole)
-        if not any(left[:1]):
-            return None
-        return _walk_of(moves, [self._walk.state[node] for node, _ in nodes], left)
-
-    def _explored(
-        self, detour: Detour
-    ) -> tuple[list[tuple[int, int]], list[list[tuple[int, int]]]]:
-        """What can be reached from here by moves that a detour does not forbid, step by step.
-
-        Nodes are pairs: one of the subplans that are left, and the parts of the detour that are
-        made by then (bits: the visits, then the dos).  Moves are pairs of a label and a node.
-        """
-        walk = self._walk
-        by_label = [_made_by(detour, text) for text in self._texts]
-        made_in = cache(partial(self._made_in, detour))
-        made = made_in(walk.state[self._here])
-        nodes = [(self._here, made)] if made is not None else []
-        numbers = {node: number for number, node in enumerate(nodes)}
-        moves: list[list[tuple[int, int]]] = []
-        for node, before in nodes:  # which grows meanwhile
-            moves.append([])
-            for edge in walk.edges(node):
-                label, to = walk.label[edge], walk.target[edge]
-                now, then = by_label[label], made_in(walk.state[to])
-                if now is None or then is None:
-                    continue
-                after = (to, before | now | then)
-                if after not in numbers:
-                    if len(nodes) >= self._most:
-                        raise MonitorError(
-                            f"{len(detour.visit) + len(detour.do)} visits and dos at once are too "
-                            f"many here: there are more than {self._most:,} ways to have made some "
-                            "of them; ask for fewer"
-                        )
-                    numbers[after] = len(nodes)
-                    nodes.append(after)
-                moves[-1].append((label, numbers[after]))
-        return nodes, moves
-
-    def _made_in(self, detour: Detour, state: int) -> int | None:
-        """The visits made in a state, as bits; None if the detour avoids it."""
-        values = partial(self._known.value, state)
-        if any(values(self._facts[atom]) is not False for atom in detour.avoid):
-            return None
-        visited = (values(self._facts[atom]) for atom in detour.visit)
-        return sum(1 << bit for bit, made in enumerate(visited) if made)
-
-    def _check_atom(self, atom: str) -> None:
-        if atom in self._facts:
-            return
-        head = _head(atom)
-        alike = [text for text in self._facts if _head(text) == head]
-        if alike:
-            more = " .." if len(alike) > _SHOWN else ""
-            similar = f"there are {', '.join(alike[:_SHOWN])}{more}"
-        else:
-            similar = f"none is ({_shown(head)} ..)"
-        raise MonitorError(f"{_shown(atom)} is no atom that can change: {similar}")
-
-
-def _head(atom: str) -> str:
-    return atom.strip("()").split(" ")[0]
-
-
-def _walk_of(
-    moves: Sequence[Sequence[tuple[int, int]]], state: Sequence[int], left: Sequence[int]
-) -> _Walk:
-    """The nodes from which a subplan is left; ``moves[n]`` are pairs (label, target), sorted."""
-    kept = [node for node, count in enumerate(left) if count]
-    number = dict(zip(kept, range(len(kept)), strict=True))
-    first, label, target = array("q", [0]), array("q"), array("q")
-    for node in kept:
-        for own, to in moves[node]:
-            if left[to]:
-                label.append(own)
-                target.append(number[to])
-        first.append(len(label))
-    counts: Sequence[int] = [left[node] for node in kept]
-    if counts[0] < 1 << 63:  # there are nowhere more left than at the start
-        counts = array("q", counts)
-    return _Walk(first, label, target, array("q", [state[node] for node in kept]), counts)
-
-
-def _made_by(detour: Detour, text: str | None) -> int | None:
-    """The dos that a subaction makes, as bits beside those of the visits; None if it is never."""
-    if any(_matches(pattern, text) for pattern in detour.never):
-        return None
-    bits = enumerate(detour.do, len(detour.visit))
-    return sum(1 << bit for bit, pattern in bits if _matches(pattern, text))
+            self._knowledge.value(0, atom)  # raises for what is no atom
+        return self._open.making(self._here, detour, self._knowledge, self._most)
 
 
 def _parsed(path: str, max_bytes: int) -> Any:
@@ -631,36 +542,28 @@ def _check_moves(states: Sequence[Any]) -> None:
             reached[to] = True
 
 
-def _labels(states: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The texts of all subactions, sorted, idling first."""
-    texts: dict[Any, int] = {}
-    for number, state in enumerate(states):
-        for text in state["next"]:
-            if text not in texts:
-                texts[text] = number
-                if text != IDLE:
-                    _check_plain(text, f"state {number}: 'next'")
-    return sorted(texts, key=lambda text: "" if text == IDLE else text)
+def _read_subplans(entry: Mapping[str, Any], states: Sequence[Any]) -> Subplans:
+    """The subplans of the states of a file.
 
-
-def _read_walk(states: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> _Walk:
-    """The subplans of the states.
-
-    Raises `MonitorError` where a state contradicts the number of subplans that are left.  States
-    are looked at backwards: the counts never take much more memory than those in the file.
+    Raises `MonitorError` unless the states are an automaton of subplans of one length, and the
+    counts of subplans agree.  States are looked at backwards: the counts never take much more
+    memory than those in the file.
     """
-    numbers = {text: number for number, text in enumerate(labels)}
-    moves = [sorted((numbers[text], to) for text, to in state["next"].items()) for state in states]
+    _check_moves(states)
+    texts: set[str] = set()
+    moves: list[dict[str | None, int]] = []
+    for number, state in enumerate(states):
+        for text in state["next"].keys() - texts:
+            if text != IDLE:
+                _check_plain(text, f"state {number}: 'next'")
+            texts.add(text)
+        following = ((None if text == IDLE else text, to) for text, to in state["next"].items())
+        moves.append(dict(sorted(following, key=lambda move: move[0] or "")))
     left = [1] * len(states)
     for number in reversed(range(len(states))):
         if moves[number]:
-            left[number] = sum(left[to] for _, to in moves[number])
+            left[number] = sum(left[to] for to in moves[number].values())
         _check_count(states[number], "left", left[number], f"state {number}")
-    return _walk_of(moves, range(len(states)), left)
-
-
-def _check_ends(entry: Mapping[str, Any], states: Sequence[Mapping[str, Any]], walk: _Walk) -> None:
-    """Raise unless all subplans have one length, and `steps` and `subplans` (where given) agree."""
     steps = max(state["step"] for state in states)
     for number, state in enumerate(states):
         if not state["next"] and state["step"] != steps:
@@ -668,7 +571,8 @@ def _check_ends(entry: Mapping[str, Any], states: Sequence[Mapping[str, Any]], w
     if "steps" in entry and _get(entry, "steps", int, "a robot's choices") != steps:
         raise MonitorError(f"'steps' is {_shown(entry['steps'])}, but the states have {steps}")
     if "subplans" in entry:
-        _check_count(entry, "subplans", walk.left[0], "a robot's choices")
+        _check_count(entry, "subplans", left[0], "a robot's choices")
+    return Subplans(moves, range(len(states)), left)
 
 
 def _check_count(record: Mapping[str, Any], key: str, count: int, where: str) -> None:

@@ -71,9 +71,10 @@ def test_each_own_subplan_is_drawn_equally_often() -> None:
     assert subplans > 3
     random, found = Random(5), Counter[tuple[str | None, ...]]()
     for _ in range(100 * subplans):
-        monitor = given.monitor.copy()
+        monitor, subplan = given.monitor.copy(), list[str | None]()
         while not monitor.finished:
-            monitor.did(drawn(monitor, random))
-        found[monitor.history] += 1
+            subplan.append(drawn(monitor, random))
+            monitor.did(subplan[-1])
+        found[tuple(subplan)] += 1
     assert len(found) == subplans
     assert all(60 < number < 145 for number in found.values()), found
