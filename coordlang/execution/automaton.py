@@ -8,7 +8,7 @@ step.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from itertools import pairwise
@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.joint.tables import Ints, ranges, unique_tuples
+from planners.joint.tables import Ints, ranges
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import OutOfMemory
 from planners.system.limits import memory_left, more_memory
@@ -135,50 +135,74 @@ def determinise(
         With an estimate, before the subsets fill the memory or when they have more than ``most``
         members.
     """
-    layers, start = _quotient(space, robot, truth)
+    nodes = (_nodes(space, robot, truth, number) for number in range(len(space.layers)))
+    layers, top = _merged(nodes)  # merging nodes changes no set of own continuations
     states: list[list[_State]] = []
-    subsets: list[tuple[int, ...]] = [(start,)]
+    subsets: list[Classes] = [(top[int(space.starts[0]) - space.layers[-1].start],)]
     members = 0
     for depth, layer in enumerate(reversed(layers)):
-        following: dict[tuple[int, ...], int] = {}
+        following: dict[Classes, int] = {}
         here: list[_State] = []
         for subset in subsets:
-            true = [layer[member][0] for member in subset]
+            known = [layer[member][0] for member in subset]
+            knowledge = Knowledge(
+                reduce(and_, (one.true for one in known)),
+                reduce(or_, (one.possible for one in known)),
+            )
             after = _after(layer, subset).items()
-            moves = {own: following.setdefault(to, len(following)) for own, to in after}
-            here.append((Knowledge(reduce(and_, true), reduce(or_, true)), moves))
+            moves = {own: (following.setdefault(to, len(following)),) for own, to in after}
+            here.append((knowledge, moves))
             members += len(subset)
             if len(here) % 1024 == 0:
                 _check(space, robot, members, most, depth, len(layers) - 1)
         states.append(here)
         subsets = list(following)
         _check(space, robot, members, most, depth, len(layers) - 1)
-    return _least(states)
+    return _numbered(_merged(reversed(states))[0][::-1])
 
 
-#: What is known in a state, and its moves to states of the next layer by their labels.
-_State = tuple[Knowledge, Mapping[int, int]]
-#: The same as what it is equal by: the moves as sorted pairs.
-_Behaviour = tuple[Knowledge, tuple[tuple[int, int], ...]]
+#: Numbers of states of a layer, sorted.
+Classes = tuple[int, ...]
+#: What is known in a state, and the states of the next layer to which each label leads.
+_State = tuple[Knowledge, Mapping[int, Sequence[int]]]
+#: The same of states that are merged; labels are sorted.
+_Class = tuple[Knowledge, dict[int, Classes]]
 
 
-def _least(states: Sequence[Sequence[_State]]) -> Automaton:
-    """The least automaton of a deterministic one in layers, the first of which has one state."""
-    merged: list[list[_Behaviour]] = []
-    class_below: list[int] = []
-    for layer in reversed(states):
-        number: dict[_Behaviour, int] = {}
-        class_here = []
+def _merged(layers: Iterable[Sequence[_State]]) -> tuple[list[list[_Class]], list[int]]:
+    """Make one of the states that know the same and lead by the same labels to the same states.
+
+    Layers come with the last one first.  Returns them in this order, and the number of the class of
+    each state of the one that came last.
+    """
+    merged: list[list[_Class]] = []
+    class_of: list[int] = []
+    for layer in layers:
+        number: dict[tuple[Knowledge, tuple[tuple[int, Classes], ...]], int] = {}
+        here = []
         for known, moves in layer:
-            after = tuple(sorted((own, class_below[to]) for own, to in moves.items()))
-            class_here.append(number.setdefault((known, after), len(number)))
-        class_below = class_here
-        merged.append(list(number))
-    merged.reverse()
-    return _numbered(merged)
+            after = [(own, {class_of[to] for to in targets}) for own, targets in moves.items()]
+            key = known, tuple((own, tuple(sorted(to))) for own, to in sorted(after))
+            here.append(number.setdefault(key, len(number)))
+        class_of = here
+        merged.append([(known, dict(moves)) for known, moves in number])
+    return merged, class_of
 
 
-def _numbered(merged: Sequence[Sequence[_Behaviour]]) -> Automaton:
+def _nodes(space: PlanSpace, robot: int, truth: Sequence[int] | None, number: int) -> list[_State]:
+    """The nodes of a layer of a plan space, with the robot's own labels."""
+    span, edges = space.layers[number], space.layer_edges(number)
+    below = space.layers[number - 1].start if number else 0
+    moves: list[dict[int, list[int]]] = [{} for _ in range(span.stop - span.start)]
+    source, target = (edges.source - span.start).tolist(), (edges.target - below).tolist()
+    labels = space.robot_labels(robot, edges.edges).tolist()
+    for node, label, to in zip(source, labels, target, strict=True):
+        moves[node].setdefault(label, []).append(to)
+    true = [0] * len(moves) if truth is None else truth[span.start : span.stop]
+    return [(Knowledge(own, own), move) for own, move in zip(true, moves, strict=True)]
+
+
+def _numbered(merged: Sequence[Sequence[_Class]]) -> Automaton:
     """Number the states in the order in which a walk by layers and labels meets them."""
     order = [0]
     bounds, first, label, target, known = [0], [0], [], [], []
@@ -188,7 +212,7 @@ def _numbered(merged: Sequence[Sequence[_Behaviour]]) -> Automaton:
         for state in order:
             knowledge, moves = layer[state]
             known.append(knowledge)
-            for own, to in moves:
+            for own, (to,) in moves.items():
                 label.append(own)
                 target.append(bounds[-1] + found.setdefault(to, len(found)))
             first.append(len(label))
@@ -206,41 +230,7 @@ def _numbered(merged: Sequence[Sequence[_Behaviour]]) -> Automaton:
     )
 
 
-#: Nodes of one layer in classes: their true facts, and the classes to which each label leads.
-_Layer = list[tuple[int, dict[int, tuple[int, ...]]]]
-
-
-def _quotient(
-    space: PlanSpace, robot: int, truth: Sequence[int] | None
-) -> tuple[list[_Layer], int]:
-    """The layers in classes, the goal's first, and the class of the start.
-
-    Nodes are one class if they agree on ``truth`` and lead by the same own labels to the same
-    classes.  Merging them changes no set of own continuations (a bisimulation), and makes subsets
-    small.
-    """
-    layers: list[_Layer] = []
-    class_of = np.zeros(len(space), np.int64)  # of each node, within its layer
-    for number, span in enumerate(space.layers):
-        edges = space.layer_edges(number)
-        own = space.robot_labels(robot, edges.edges)
-        table = np.column_stack((edges.source - span.start, own, class_of[edges.target]))
-        table, _ = unique_tuples(table, [int(column.max(initial=0)) + 1 for column in table.T])
-        moves: list[dict[int, list[int]]] = [{} for _ in range(span.stop - span.start)]
-        for node, label, to in table.tolist():  # sorted
-            moves[node].setdefault(label, []).append(to)
-        classes: dict[tuple[int, tuple[tuple[int, tuple[int, ...]], ...]], int] = {}
-        numbers = []
-        for node, move in enumerate(moves, span.start):
-            after = tuple((label, tuple(to)) for label, to in move.items())
-            key = truth[node] if truth is not None else 0, after
-            numbers.append(classes.setdefault(key, len(classes)))
-        class_of[span] = numbers
-        layers.append([(true, dict(after)) for true, after in classes])
-    return layers, int(class_of[space.starts[0]])
-
-
-def _after(layer: _Layer, subset: tuple[int, ...]) -> dict[int, tuple[int, ...]]:
+def _after(layer: Sequence[_Class], subset: Classes) -> dict[int, Classes]:
     """Where a subset of classes leads by each label."""
     if len(subset) == 1:
         return layer[subset[0]][1]
