@@ -14,7 +14,6 @@ import numpy as np
 
 from planners.joint.model import JointModel, Options, PlanningTask, Steps
 from planners.joint.tables import Ints, Rows
-from planners.search.cost_limit import CostLimit
 from planners.search.exact_bound import ExactBound, exact_bound
 from planners.search.goals import FAR
 from planners.search.heuristics import Heuristic
@@ -43,11 +42,6 @@ _TRIED = 4
 #: How a round ended: the goal was met, or more joint steps were composed than are tried without
 #: exact bounds.
 _MET, _GROWN = -1, -2
-#: As many times more joint steps are composed where plans of the least cost that may suffice are
-#: looked for, or of not much more: mostly only they are met.
-_CHEAP = 5
-#: Limits of the cost that are tried.
-_LIMITS = 10
 #: Bytes of the states that joint steps lead to, composed at a time.
 _BYTES = 1 << 28
 
@@ -100,12 +94,8 @@ class BoundedSearch:
         #: What a solver says of optimal plans, once it was asked.
         self.exact: ExactBound | None = None
         self._optimal: OptimalStates | None = None
-        #: How many times the probe may be composed, after what was composed before; 0: no limit.
-        self._share = int(heuristic.exact)
-        self._before = 0
-        self._costs = (
-            CostLimit(heuristic.cost_left) if heuristic.cost_left and heuristic.value else None
-        )
+        #: Whether no more joint steps may be composed than the probe says.
+        self._limited = heuristic.exact
 
     def run(self) -> None:
         """Search, in as many rounds as it takes.
@@ -114,8 +104,6 @@ class BoundedSearch:
         """
         start = self._numbers(self._task.init[None, :])
         following = int(self._h[start[0]]) if self._heuristic.value else FAR - 1
-        if self._costs is not None and following < FAR and self._cheap(self._costs, start):
-            return
         work = 0
         slow = 1
         while following < FAR:
@@ -140,32 +128,10 @@ class BoundedSearch:
             ),
         )
 
-    def _cheap(self, costs: CostLimit, start: Ints) -> bool:
-        """Whether the least makespan that may suffice does, at the least cost or not much more.
-
-        Every cost is tried from the least one that may suffice: where the goal is met, nothing is
-        shorter, and of the plans of that length none is cheaper.
-        """
-        self.bound, most = int(self._h[start[0]]), None
-        self._share = _CHEAP
-        found = FAR
-        for _ in range(_LIMITS):
-            costs.begin(start, most)
-            if not costs.most:
-                break  # nothing is known of costs
-            found = self._round(start)
-            if found in (_MET, _GROWN) or costs.beyond >= FAR:
-                break
-            most = costs.beyond
-        self._share, self._before = int(self._heuristic.exact), self.composed
-        if found != _MET:
-            self._costs = None
-        return found == _MET
-
     def _bounded_exactly(self) -> int:
         """Ask the solver for the optimal cost, if it may pay; what the next round is bounded by."""
         most = _TRIED * self._probe
-        self._share = 0
+        self._limited = False
         at_least = self.bound if self.bound < FAR - 1 else 0
         if self._model.cost == "makespan" and at_least:
             last, left = self.table.rows(self.states[-1]), at_least - (len(self.states) - 1)
@@ -211,11 +177,11 @@ class BoundedSearch:
     @property
     def _probe(self) -> int:
         """Joint steps that may be composed, where they are limited."""
-        return self._share * probe_size(self._model, self.bound, self._pieces)
+        return probe_size(self._model, self.bound, self._pieces)
 
     def edges_into(self, depth: int) -> Edges:
         """The joint steps into a layer of the last round, composed again, however many they are."""
-        self._share = 0
+        self._limited = False
         return self._expand(self.states[depth - 1], depth)[0]
 
     def so_far(self) -> str:
@@ -239,15 +205,11 @@ class BoundedSearch:
             late = h > self.bound - depth
             beyond = min(beyond, low + depth, int(h[late].min(initial=FAR)) + depth)
             source = numbers[steps.source]
-            if self._costs is not None:
-                late |= ~self._costs.within(source, target, steps.cost)
             into = target[~late]
             self._depth[into] = np.minimum(self._depth[into], depth)
             edges = Edges(source, target, steps.labels, steps.cost)
             edges = edges.only(~late & (self._depth[target] == depth))
             parts.append(edges.compact())
-            if self._costs is not None:
-                self._costs.pay(edges.source, edges.target, edges.cost)
         return joined_edges(parts, len(self._model.robots)), beyond
 
     def _steps(self, states: Ints, depth: int) -> Iterator[tuple[Ints, Steps, int]]:
@@ -259,7 +221,7 @@ class BoundedSearch:
 
         def only(rows: Rows, options: Options) -> Options:
             nonlocal low
-            if self._share and _combinations(options) > _TOO_MANY * self._probe:
+            if self._limited and _combinations(options) > _TOO_MANY * self._probe:
                 raise _GrownError
             if self.exact is not None:
                 options = self.exact.only(depth - 1, rows, options)
@@ -267,17 +229,17 @@ class BoundedSearch:
                 options, low = self._heuristic.in_time(rows, options, self.bound - depth)
             return options
 
-        start, size = 0, _FIRST_PROBED if self._share else _FIRST
+        start, size = 0, _FIRST_PROBED if self._limited else _FIRST
         most = max(1, min(self._pieces.steps, _BYTES // (8 * self._model.codec.width)))
-        if self._share:
+        if self._limited:
             most = min(most, self._probe)
         while start < len(states):
-            if self._share and self.composed - self._before > self._probe:
+            if self._limited and self.composed > self._probe:
                 raise _GrownError
             numbers = states[start : start + size]
             steps = self._model.successors(self.table.rows(numbers), only)
             self.composed += len(steps)
-            if self._share and len(steps) > self._probe:
+            if self._limited and len(steps) > self._probe:
                 raise _GrownError  # bounds of so many states take long
             yield numbers, steps, low
             start += size
@@ -292,8 +254,6 @@ class BoundedSearch:
         self._h, self._depth = grown(self._h, size, 0), grown(self._depth, size, _NEVER)
         if self._heuristic.value:
             self._h[before:size] = self._heuristic.value(new)
-        if self._costs is not None:
-            self._costs.enter(before, new)
         return numbers
 
 

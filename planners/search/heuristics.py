@@ -84,15 +84,13 @@ class Heuristic:
     Where nothing is known (``value`` None) all states are searched, in one round.  ``in_time``
     keeps choices after which a robot's own variables need at most so many joint steps more, and
     says the least number that some other choice needs.  ``exact``: once the search has grown, a SAT
-    solver finds the optimal cost and what leads to it.  ``cost_left`` is a lower bound on the
-    second cost component that is left.
+    solver finds the optimal cost and what leads to it.
     """
 
     name: str
     value: Values | None = None
     in_time: Callable[[Rows, Options, int], tuple[Options, int]] | None = None
     exact: bool = False
-    cost_left: Values | None = None
 
 
 def search_heuristic(
@@ -122,8 +120,7 @@ def search_heuristic(
         return np.maximum(projections.value(rows), own(rows))
 
     value = projections.value if chosen == "projections" else both
-    cost_left = None if model.cost == "makespan" else projections.cost_left
-    return Heuristic(chosen, value, projections.in_time, exact, cost_left)
+    return Heuristic(chosen, value, projections.in_time, exact)
 
 
 def _as_good(model: JointModel, task: PlanningTask, one: Values, other: Values) -> bool:

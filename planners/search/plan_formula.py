@@ -24,7 +24,6 @@ from planners.joint.step_clauses import Clause, clauses
 from planners.joint.tables import Ints, Rows
 from planners.pddl.formula_tree import Leaf, negated
 from planners.pddl.lifted import TRUE, Formula
-from planners.search.dominated_labels import dominated_pairs
 from planners.search.mutexes import Pair
 from planners.search.questions import FixedPlans, Literals, OutOfEffort, Plan, Questions
 from planners.search.state_variables import StateVariable
@@ -52,8 +51,7 @@ def step_formula(
 ) -> StepFormula:
     """The clauses of a step whose state has one value of each variable, and none of the pairs.
 
-    These are asked for when all conditions are written.  Where costs count, the next step is such
-    that both may be part of a cheapest plan, as far as pairs of labels say.
+    These are asked for when all conditions are written.
 
     Raises `TooManyClauses`.
     """
@@ -106,7 +104,7 @@ class _Builder:
                 self.clauses.append((-(one + 1),))
             elif one not in known or known[one] != known.get(other):
                 self.clauses.append((-(one + 1), -(other + 1)))
-        following = [*self._facts_follow(), *self._not_dominated(variables)]
+        following = self._facts_follow()
         # Variables of the next state come after all of this step's.
         shifted = [
             tuple(self._next(lit) if is_next else lit for lit, is_next in clause)
@@ -217,23 +215,6 @@ class _Builder:
                 (-self._label(robot, label), self._implied[key]) for label in labels.tolist()
             ]
         return self._implied[key]
-
-    def _not_dominated(
-        self, variables: Sequence[StateVariable]
-    ) -> Iterator[tuple[tuple[int, bool], ...]]:
-        """Labels that no cheapest plan has one after the other; with the same second ones at once.
-
-        A plan that has them costs more than another one of as many steps.
-        """
-        for robot, pairs in enumerate(dominated_pairs(self._model, variables)):
-            rows, row_class = np.unique(pairs, axis=0, return_inverse=True)
-            for number in np.flatnonzero(rows.any(axis=1)).tolist():
-                first = np.flatnonzero(row_class.reshape(-1) == number)
-                second = np.flatnonzero(rows[number])
-                yield (
-                    (-self._one_of(robot, first), False),
-                    (-self._one_of(robot, second), True),
-                )
 
     def _facts_follow(self) -> list[tuple[tuple[int, bool], ...]]:
         """What is true in the next state; added facts are, whatever deletes them, too."""

@@ -10,13 +10,11 @@ and consistent, and so is the largest one of all variables.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from heapq import heappop, heappush
 
 import numpy as np
 
-from planners.joint.composition import ComposingStepper
 from planners.joint.model import Goal, JointModel, Options
 from planners.joint.states import TrueFacts
 from planners.joint.tables import Ints, Rows
@@ -46,10 +44,8 @@ class Projections:
         #: Per fact the distance of the variable with this value, 0 where it has none.
         self._of_fact: Ints = np.zeros(facts, np.int64)
         self._own: list[list[_OwnVariable]] = [[] for _ in model.robots]
-        #: Per robot and fact what the robot pays at least for its own variables.
-        self._costs: Ints = np.zeros((len(model.robots), facts), np.int64)
         for variable in variables:
-            distance = _distances(variable, wanted, lambda _: 1)
+            distance = _distances(variable, wanted)
             if not any(distance.values()):
                 continue
             table = np.zeros(facts, np.int64)
@@ -58,21 +54,6 @@ class Projections:
             owner = _owner(model, variable)
             if owner is not None:
                 self._own[owner].append(_OwnVariable(table, _after(model, owner, variable, table)))
-                paid = _distances(variable, wanted, _cost_of(model, owner))
-                own = self._costs[owner]
-                own[list(paid)] = np.maximum(own[list(paid)], list(paid.values()))
-
-    def cost_left(self, rows: Rows) -> Ints:
-        """A lower bound on the second cost component of each state's plans.
-
-        Of every robot what the most expensive one of its own variables needs, added up: no action
-        that another robot chooses changes them.
-        """
-        true = TrueFacts.of(self._codec.facts_part(rows))
-        total = np.zeros(len(rows), np.int64)
-        for table in self._costs:
-            total += true.reduced(np.maximum, table, 0)
-        return total
 
     def value(self, rows: Rows) -> Ints:
         """The lower bound for each state, `FAR` where the goal cannot be reached."""
@@ -102,38 +83,26 @@ class Projections:
         return kept, beyond
 
 
-def _distances(
-    variable: StateVariable, wanted: frozenset[int], cost: Callable[[int], int]
-) -> dict[int, int]:
-    """Least costs from all values to the wanted ones; of actions, by number, ``cost`` says it."""
+def _distances(variable: StateVariable, wanted: frozenset[int]) -> dict[int, int]:
+    """The least number of changes from each value to the wanted one."""
     goals = [fact for fact in variable.facts if fact in wanted]
     if not goals:
         return dict.fromkeys(variable.facts, 0)
     found = dict.fromkeys(variable.facts, FAR)
     if len(goals) > 1:
         return found
-    before: dict[int, list[tuple[int, int]]] = defaultdict(list)
-    for number, (needs, value) in variable.changes.items():
+    before: dict[int, list[int]] = defaultdict(list)
+    for needs, value in variable.changes.values():
         if len(needs) == 1:  # with more it is never applicable
-            before[value].append((needs[0], cost(number)))
+            before[value].append(needs[0])
     found[goals[0]] = 0
-    queue = [(0, goals[0])]
-    while queue:
-        far, value = heappop(queue)
-        for other, step in before[value]:
-            if far + step < found[other]:
-                found[other] = far + step
-                heappush(queue, (far + step, other))
+    queue = [goals[0]]
+    for value in queue:
+        for other in before[value]:
+            if found[other] == FAR:
+                found[other] = found[value] + 1
+                queue.append(other)
     return found
-
-
-def _cost_of(model: JointModel, robot: int) -> Callable[[int], int]:
-    """The second cost component of a robot's own actions, by number; 0 where it is not known."""
-    if not isinstance(model.stepper, ComposingStepper):
-        return lambda _: 0
-    number_of = {text: number for number, text in enumerate(model.labels[robot])}
-    costs = model.stepper.costs[robot]
-    return lambda number: int(costs[number_of[model.actions[number].label]])
 
 
 def _owner(model: JointModel, variable: StateVariable) -> int | None:

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The bounded search against the blind one: the same plan space, whatever it is bounded by.
 
-What bounds it (heuristics, mutexes, the solver's formula, labels that cheaper ones dominate) loses
-a plan here if it is wrong.
+What bounds it (heuristics, mutexes, the solver's formula) loses a plan here if it is wrong.
 """
 
 from __future__ import annotations
@@ -20,14 +19,11 @@ from planners.joint.model import FullState, PlanningTask
 from planners.loading import PlanningInstance, load
 from planners.pddl.lifted import Atom
 from planners.pddl.model_options import Cost, ModelOptions
-from planners.search.dominated_labels import dominated_pairs
 from planners.search.heuristics import CHOICES
 from planners.search.optimal_plans import search, search_with_effort
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
-from planners.search.projections import Projections
 from planners.search.reachable import PIECES
-from planners.search.state_variables import state_variables
 from planners.system.errors import BadInput, ProvedImpossible
 from tests.support import blind_search
 from tests.support.domains import DOMAINS, world_of
@@ -173,52 +169,6 @@ def test_bounds_lose_no_optimal_plan(family: str, seeds: range) -> None:
     assert min(met["solved"], met["unsolvable"]) >= 5
 
 
-def test_no_optimal_plan_has_a_dominated_pair_of_labels() -> None:
-    """That is what lets the search leave them out."""
-    met: Counter[str] = Counter()
-    families = (FAMILIES["rooms"], FAMILIES["any"])
-    for make, seed in product(families, range(60)):
-        loaded = make(seed)
-        if loaded is None or loaded.model.is_joint_action:
-            continue
-        model, task = loaded.model, loaded.tasks[0]
-        pairs = dominated_pairs(model, state_variables(model, task.init))
-        try:
-            space = blind_search.search(model, task)
-        except (BadInput, ProvedImpossible):
-            continue
-        for node in range(len(space)):
-            after = space.labels[space.first[node] : space.first[node + 1]]
-            for labels, robot in product(space.labels[space.target == node], range(space.robots)):
-                assert not pairs[robot][labels[robot], after[:, robot]].any()
-                met["steps"] += len(after)
-        met["models"] += any(own.any() for own in pairs)
-    assert met["models"] >= 20
-    assert met["steps"] >= 500
-
-
-def test_the_cost_that_is_left_is_a_lower_bound() -> None:
-    checked = tight = 0
-    for loaded in (random_instance(seed, "makespan+actions") for seed in range(100)):
-        if loaded is None:
-            continue
-        model, task = loaded.model, loaded.tasks[0]
-        try:
-            space = blind_search.search(model, task)
-        except (BadInput, ProvedImpossible):
-            continue
-        left = np.zeros(len(space), np.int64)
-        for layer in space.edges_by_layer():
-            left[layer.source] = space.cost[layer.edges] + left[layer.target]
-        projections = Projections(model, task.goal, state_variables(model, task.init))
-        bound = projections.cost_left(space.rows[space.state])
-        assert (bound <= left).all()
-        checked += len(space)
-        tight += int((bound[left > 0] == left[left > 0]).sum())
-    assert tight > 5
-    assert checked > 50
-
-
 def test_steps_are_composed_again_however_many_there_were() -> None:
     """Those on the way back count for no limit of the way there."""
     files = DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "corners-6x6.pddl"]
@@ -240,18 +190,18 @@ def test_on_open_grids_no_solver_is_asked() -> None:
 
 
 @pytest.mark.parametrize(
-    ("init", "goal", "cost", "rounds"),
+    ("init", "goal", "cost"),
     [
         # Each goes its own way, and nobody pays for more.
-        (("c0-0", "c2-0"), ("c0-2", "c2-2"), (2, 4), (1, 1)),
+        (("c0-0", "c2-0"), ("c0-2", "c2-2"), (2, 4)),
         # r2 is at its goal, and makes way: two actions more.
-        (("c0-0", "c0-1"), ("c0-2", "c0-1"), (2, 4), (2, 2)),
+        (("c0-0", "c0-1"), ("c0-2", "c0-1"), (2, 4)),
         # They trade places, and one goes round: the least makespan is not what bounds say.
-        (("c0-0", "c0-2"), ("c0-2", "c0-0"), (4, 6), (3, 99)),
+        (("c0-0", "c0-2"), ("c0-2", "c0-0"), (4, 6)),
     ],
 )
-def test_cheap_plans_first(
-    init: tuple[str, str], goal: tuple[str, str], cost: tuple[int, int], rounds: tuple[int, int]
+def test_least_makespan_then_least_cost(
+    init: tuple[str, str], goal: tuple[str, str], cost: tuple[int, int]
 ) -> None:
     files = DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "gw4-3x3.pddl"]
     model = load(*files, ModelOptions(cost="makespan+actions")).model
@@ -261,9 +211,8 @@ def test_cheap_plans_first(
 
     goals = FullState(tuple(model.codec.true_facts(model.state(state(goal)))))
     task = PlanningTask("by hand", model.state(state(init)), goals)
-    found, effort = search_with_effort(model, task, heuristic="projections")
+    found = search(model, task, heuristic="projections")
     assert found.cost_of(0) == cost
-    assert rounds[0] <= effort.rounds <= rounds[1]
     twin = blind_search.search(model, task)
     equal(found, twin)
     equal(search(model, task, heuristic="manhattan"), twin)
