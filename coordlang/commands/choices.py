@@ -4,10 +4,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
-from itertools import zip_longest
 from math import prod
 from os import fspath
 from typing import Any
@@ -15,20 +13,13 @@ from typing import Any
 import click
 
 from coordlang.commands.inputs import Arguments, InTask, public
-from coordlang.commands.layout import alike, named, packed, wrapped
+from coordlang.commands.layout import alike, columns, named, wrapped
 from coordlang.commands.options import File
 from coordlang.commands.records import ChoicesOptions
 from coordlang.commands.terminal import REFUTED, covered_code, echo, line_width, note, write
 from coordlang.commands.witness import witness_text
-from coordlang.execution.choices import (
-    MOST,
-    RobotChoices,
-    SentenceChoices,
-    monitor,
-    to_bytes,
-    to_data,
-)
-from coordlang.execution.choices import choices as choices_under
+from coordlang.execution import choices as execution
+from coordlang.execution.choices import RobotChoices, SentenceChoices, to_bytes
 from coordlang.execution.drawing import choices_dot, distinguishing
 from coordlang.execution.monitor import Answer, Monitor, MonitorError, NotAllowed
 from coordlang.execution.task_language import TaskLanguage
@@ -47,9 +38,6 @@ from planners.system.writing import write_atomically
 _ADDITIONS = 1_000_000
 #: States of an automaton beyond which a table is cut.
 STATES_SHOWN = 40
-_MAY_DO = "may do"
-#: Characters that what is known has at least beside what may be done.
-_LEAST_ROOM = 30
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -59,14 +47,10 @@ class RobotsChoices(InTask):
     ``chosen`` are the numbers of the robots that are shown and saved.
     """
 
+    used: TaskLanguage
     found: SentenceChoices
     chosen: tuple[int, ...]
     shown = ("sentence", "subplans", "guaranteed", "covered")
-
-    @property
-    def used(self) -> TaskLanguage:  # type: ignore[override]
-        """The language in the task."""
-        return self.found.task_language
 
     @property
     def robots(self) -> tuple[str, ...]:
@@ -84,22 +68,6 @@ class RobotsChoices(InTask):
         return self.found.guaranteed
 
     @property
-    def failure(self) -> Fraction | None:
-        """How often robots that choose by themselves under the sentence miscoordinate.
-
-        Each draws one of the plans with the sentence, uniformly.  None where it is too much to
-        count.
-        """
-        if self.guaranteed:
-            return Fraction(0)
-        try:
-            return failure_of_sentence(
-                self.used.space, self.used.start, self.found.fits, _ADDITIONS
-            )
-        except TooManyToCount:
-            return None
-
-    @property
     def witness(self) -> Miscoordination | None:
         """A combination that is no optimal plan, or None."""
         return self.found.mixtures.witness if self.found.mixtures else None
@@ -111,46 +79,22 @@ class RobotsChoices(InTask):
         return dict(zip(self.robots, counts, strict=True))
 
     @property
-    def plans(self) -> int:
-        """The exact number of plans that the sentence leaves open."""
-        return Plans.of(self.found.fits).count
-
-    @property
-    def combinations(self) -> int:
-        """The exact number of combinations of one subplan of every robot."""
-        return prod(own.automaton.count for own in self.found.robots)
-
-    @property
     def combinations_walked(self) -> int | None:
         """The number of nodes walked to check every combination, None where that was left out."""
         return self.found.mixtures.nodes if self.found.mixtures else None
 
     def monitor(self, robot: str) -> Monitor:
-        """A run-time monitor of one robot.
-
-        Raises
-        ------
-        UsageError
-            For a robot that there is none of.
-        """
+        """A run-time monitor of one robot; `UsageError` if there is no such robot."""
         (number,) = _numbers(self.used.model.robots, robot)
-        return monitor(self.found, self.used.model.robots[number])
+        return execution.monitor(self.found, self.used.model.robots[number])
 
     def data(self) -> dict[str, Any]:
         """The data of a choices file (docs/formats.md)."""
-        return to_data(self.found, self.chosen)
-
-    def text(self) -> str:
-        """The text of a choices file."""
-        return to_bytes(self.found, self.chosen).decode()
+        return execution.to_data(self.found, self.chosen)
 
     def save(self, path: File) -> None:
         """Write a choices file, for `Monitor.read` on the robot; complete or not at all."""
         write_atomically(fspath(path), to_bytes(self.found, self.chosen))
-
-    def dot(self) -> str:
-        """The automata in the language of Graphviz."""
-        return choices_dot(self.found, self.chosen)
 
     def _repr_html_(self) -> str:
         rows = [(robot, f"{number:,}") for robot, number in self.subplans.items()]
@@ -173,8 +117,8 @@ def choices(files: Arguments, options: ChoicesOptions) -> RobotsChoices:
     said = files.needed("SENTENCE")
     used = files.task().used
     chosen = _numbers(used.model.robots, options.robot) or tuple(range(len(used.model.robots)))
-    found = choices_under(used, used.words_of(said), most=None if options.check else MOST)
-    return RobotsChoices(found, chosen)
+    most = None if options.check else execution.MOST
+    return RobotsChoices(used, execution.choices(used, used.words_of(said), most=most), chosen)
 
 
 def _numbers(known: tuple[str, ...], whose: str | Sequence[str]) -> tuple[int, ...]:
@@ -190,56 +134,65 @@ def _numbers(known: tuple[str, ...], whose: str | Sequence[str]) -> tuple[int, .
 def show_choices(found: RobotsChoices, options: ChoicesOptions) -> int:
     """Print or write the choices, or what one robot may do next."""
     form, code = options.form, 0
-    if options.history or any(_detours(options).values()):
+    detours = {name: getattr(options, name) for name in ("visit", "avoid", "do", "never")}
+    if options.history or any(detours.values()):
         if len(found.robots) != 1 or form == "dot":
             raise click.UsageError(
                 "--history, --visit, --avoid, --do and --never ask about one --robot, "
                 "as text or JSON"
             )
-        at, answer = _followed(found, options)
+        at, answer = _followed(found, options.history, detours)
         text = _monitor_text(at, answer) if form == "text" else _monitor_json(at, answer)
         code = REFUTED if answer is not None and not answer else 0
     elif form == "text":
         text = _text(found, line_width(), is_checked=options.check)
+    elif form == "dot":
+        text = choices_dot(found.found, found.chosen)
     else:
-        text = found.dot() if form == "dot" else found.text()
+        text = to_bytes(found.found, found.chosen).decode()
     write(text, options.output)
     return max(code, _guarantee_code(found, options.check))
 
 
 def _guarantee_code(found: RobotsChoices, check: bool) -> int:
     """The exit code of what is guaranteed; writes to stderr what is not."""
-    claimed = found.tolerance is not None and found.tolerance.may_fail
-    tolerated = found.covered and not check and claimed
-    if found.witness is not None and tolerated:
-        share = "" if found.failure is None else f" in {percent(float(found.failure))} of all runs"
-        echo(f"choices of this task miscoordinate{share}, for example:", err=True)
+    is_claimed = found.tolerance is not None and found.tolerance.may_fail
+    is_tolerated = found.covered and not check and is_claimed
+    if found.witness is not None:
+        if is_tolerated:
+            echo(f"choices of this task miscoordinate{_share(found)}, for example:", err=True)
+        else:
+            why = "the language does not cover it"
+            if found.covered:
+                why = "the file holds no coordination language"
+            echo(f"coordlang: refuted: choices of this task miscoordinate; {why}", err=True)
         echo(witness_text(found.witness, line_width(err=True)), err=True)
-    elif found.witness is not None:
-        why = "the language does not cover it"
-        if found.covered:
-            why = "the file holds no coordination language"
-        echo(f"coordlang: refuted: choices of this task miscoordinate; {why}", err=True)
-        echo(witness_text(found.witness, line_width(err=True)), err=True)
-        return REFUTED
+        if not is_tolerated:
+            return REFUTED
     if check and not found.covered:
         note("the language does not cover this task; --check proved this sentence")
         return 0
     return covered_code(found.covered, found.tolerance)
 
 
-def _detours(options: ChoicesOptions) -> dict[str, tuple[str, ...]]:
-    """What the robot is asked for, by kind."""
-    return {name: getattr(options, name) for name in ("visit", "avoid", "do", "never")}
+def _share(found: RobotsChoices) -> str:
+    """How often robots that draw plans of the sentence fail; empty where it is not counted."""
+    used = found.used
+    try:
+        share = failure_of_sentence(used.space, used.start, found.found.fits, _ADDITIONS)
+    except TooManyToCount:
+        return ""
+    return f" in {percent(float(share))} of all runs"
 
 
-def _followed(found: RobotsChoices, options: ChoicesOptions) -> tuple[Monitor, Answer | None]:
+def _followed(
+    found: RobotsChoices, history: tuple[str, ...], detours: dict[str, tuple[str, ...]]
+) -> tuple[Monitor, Answer | None]:
     """A monitor that followed what the robot did, and its answer to the detours, if any."""
     try:
         at = found.monitor(found.robots[0])
-        for subaction in options.history:
+        for subaction in history:
             at.did(subaction)
-        detours = _detours(options)
         return at, at.can(**detours) if any(detours.values()) else None
     except NotAllowed as error:
         raise Refuted(str(error), remedy="After that nothing is guaranteed any more.") from None
@@ -261,10 +214,8 @@ def _monitor_text(at: Monitor, answer: Answer | None) -> str:
     elif answer is not None:
         subplans = counted(answer.subplans, "subplan")
         lines.append(f"the detour is possible in {subplans}, the first of them:")
-        lines += [
-            f"  {step:>4}  {text or 'idle'}"
-            for step, text in enumerate(answer.subplan or (), at.step + 1)
-        ]
+        steps = enumerate(answer.subplan or (), at.step + 1)
+        lines += [f"  {step:>4}  {text or 'idle'}" for step, text in steps]
     return "\n".join(lines) + "\n"
 
 
@@ -285,89 +236,52 @@ def _monitor_json(at: Monitor, answer: Answer | None) -> str:
 
 def _text(found: RobotsChoices, width: int, *, is_checked: bool) -> str:
     """Each robot's automaton as a table; robots whose automata are equal are shown together."""
-    used, mixtures = found.found.task_language, found.found.mixtures
+    used, mixtures = found.used, found.found.mixtures
+    plans = counted(Plans.of(found.found.fits).count, "plan")
     lines = [
         *wrapped(f"The task {describe(used.space, used.task)}", width, "", "  "),
-        f'"{found.sentence}" leaves {counted(found.plans, "plan")} open.',
+        f'"{found.sentence}" leaves {plans} open.',
     ]
     if is_checked and mixtures is not None and mixtures.holds:
-        number = counted(found.combinations, "combination")
+        every = counted(prod(own.automaton.count for own in found.found.robots), "combination")
         nodes = counted(mixtures.nodes, "node")
         lines.append(
-            f"checked: {number} of own subplans, all {used.model.kept_plans} ({nodes} walked)"
+            f"checked: {every} of own subplans, all {used.model.kept_plans} ({nodes} walked)"
         )
     tables = [_table(found, found.found.robots[robot], width) for robot in found.chosen]
     for group in alike(tables):
-        robots = named([used.model.robots[found.chosen[number]] for number in group])
+        robots = named([found.robots[number] for number in group])
         may, table = "may" if len(group) == 1 else "may each", tables[group[0]]
         lines += ["", *wrapped(f"{robots} {may} {table[0]}", width, "", "  "), *table[1:]]
     return "\n".join(lines) + "\n"
 
 
 def _table(found: RobotsChoices, own: RobotChoices, width: int) -> list[str]:
-    """The automaton state by state: what may be done there, where it leads, what is known there."""
-    automaton = own.automaton
-    subplans = counted(automaton.count, "subplan")
-    states = counted(len(automaton), "state")
-    rows = _rows(found, own)[:STATES_SHOWN]
-    lines = [f"follow {subplans} ({states}):", *(_row_lines(rows, width) if rows else ())]
+    """The automaton state by state: what may be done there, where it leads, what is known there.
+
+    Alternatives have a line each where they would take more than half of the width.
+    """
+    model, automaton = found.used.model, own.automaton
+    subplans, states = counted(automaton.count, "subplan"), counted(len(automaton), "state")
+    lines = [f"follow {subplans} ({states}):"]
+    rows: list[tuple[str, str, str, list[str], str]] = []
+    for step, layer in enumerate(automaton.layers[:-1], 1):
+        if layer.start >= STATES_SHOWN:
+            break
+        for state, atoms in zip(layer, distinguishing(found.found, own, layer), strict=True):
+            moves = [
+                f"{model.label_text(own.robot, label) or 'idle'} -> {to}"
+                for label, to in automaton.moves(state)
+            ]
+            left = f"{automaton.left[state]:,}"
+            rows.append((str(step), str(state), left, moves, " ".join(atoms)))
+    if rows := rows[:STATES_SHOWN]:
+        widest = max(len(" | ".join(moves)) for *_, moves, _ in rows)
+        mark = " | " if widest <= width // 2 else "\n| "
+        head = ("step", "state", "left", "may do", "knows")
+        cells = [(*row[:3], mark.join(row[3]), row[4]) for row in rows]
+        lines += columns([head, *cells], width, numbers=3)
     rest = automaton.layers[-1].start - len(rows)
     if rest > 0:
         lines.append(f"  .. and {counted(rest, 'state')} more; --format json has all of them")
     return lines
-
-
-def _row_lines(rows: Sequence[_Row], width: int) -> Iterator[str]:
-    """Columns as wide as they need be; broken into lines where they do not fit.
-
-    Then each alternative has a line of its own, and so many atoms as fit stand beside it.
-    """
-    head = ("step", "state", "left")
-    numbers = [
-        max(map(len, column)) for column in zip(head, *(row.numbers for row in rows), strict=True)
-    ]
-    indent = sum(numbers) + 2 * len(numbers) + 2
-    whole = [(" | ".join(row.moves), " ".join(row.knows)) for row in rows]
-    broken = indent + max(len(m) for m, _ in whole) + 2 + max(len(k) for _, k in whole) > width
-    shown = [
-        (row.moves[:1] + tuple(f"| {move}" for move in row.moves[1:]) if broken else (moves,), row)
-        for row, (moves, _) in zip(rows, whole, strict=True)
-    ]
-    may_do = max(len(_MAY_DO), *(len(line) for lines, _ in shown for line in lines))
-    room = max(_LEAST_ROOM, width - indent - may_do - 2) if broken else width
-
-    def line(left: Sequence[str], move: str, atoms: str) -> str:
-        cells = [cell.rjust(size) for cell, size in zip(left, numbers, strict=True)]
-        return "  ".join(["", *cells, move.ljust(may_do), atoms]).rstrip()
-
-    yield line(head, _MAY_DO, "knows")
-    for moves, row in shown:
-        atoms = packed(row.knows, room, "", "") if broken else [" ".join(row.knows)]
-        for number, (move, known) in enumerate(zip_longest(moves, atoms, fillvalue="")):
-            yield line(row.numbers if number == 0 else ("",) * len(head), move, known)
-
-
-@dataclass(frozen=True, slots=True)
-class _Row:
-    """One state of an automaton: its step, number and subplans left, moves, and what is known."""
-
-    numbers: tuple[str, str, str]
-    moves: tuple[str, ...]
-    knows: tuple[str, ...]
-
-
-def _rows(found: RobotsChoices, own: RobotChoices) -> list[_Row]:
-    """A row for each state in which something may be done, of the first steps."""
-    model, automaton = found.found.task_language.model, own.automaton
-    rows = []
-    for step, states in enumerate(automaton.layers[:-1], 1):
-        if states.start >= STATES_SHOWN:
-            break
-        for state, atoms in zip(states, distinguishing(found.found, own, states), strict=True):
-            moves = tuple(
-                f"{model.label_text(own.robot, label) or 'idle'} -> {to}"
-                for label, to in automaton.moves(state)
-            )
-            numbers = str(step), str(state), f"{automaton.left[state]:,}"
-            rows.append(_Row(numbers, moves, tuple(atoms)))
-    return rows

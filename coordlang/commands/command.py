@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any, get_args, get_origin
 
 import click
-from click.shell_completion import CompletionItem
 
 from coordlang.commands.options import CommandOptions, Kept, Limits, OutputFile
 from coordlang.commands.terminal import echo, line_width, note, working
@@ -26,21 +25,8 @@ from planners.system.options import Given, options_of, record_from
 _PDDL = ("DOMAIN", "PROBLEM", "PROBLEMS...")
 #: Options whose metavar has one of these name a file that is read or written.
 _FILES = ("FILE", "LANGUAGE", "PROBLEM", "RECORD", "RUN.json")
-
-
-class _Named(click.ParamType):  # type: ignore[type-arg]  # generic in newer versions only
-    """Text that names a ``file`` or a ``dir``: shells complete it, and nothing is checked yet."""
-
-    def __init__(self, kind: str) -> None:
-        self.name = kind
-
-    def shell_complete(
-        self, ctx: click.Context, param: click.Parameter, incomplete: str
-    ) -> list[CompletionItem]:
-        return [CompletionItem(incomplete, type=self.name)]
-
-
-FILE, FOLDER = _Named("file"), _Named("dir")
+#: The name of a file: shells complete it, and nothing is checked yet.
+FILE = click.Path(readable=False)
 
 
 def command_of(
@@ -59,8 +45,6 @@ def command_of(
     def called(arguments: tuple[str, ...] = (), **values: object) -> int | None:
         given = {key: value for key, value in values.items() if _was_given(key)}
         read = _positional(record, named, arguments, given)
-        files = _read_files(arguments, given.get("factored"))
-        _check_outputs(on_cli, given, files)
         own, kept, limits = (
             {each.name: given[each.name] for each in options_of(kind) if each.name in given}
             for kind in (record, Kept, Limits)
@@ -74,7 +58,9 @@ def command_of(
                     if key in named and named[key].kind == Callable[[str], None]:
                         own[key] = value
                 options = record_from(record, own, name, on_cli=True)
-                check_outputs(options.outputs(), files)
+                given_files = [(each, given[each.name]) for each in on_cli if each.name in given]
+                outputs = [*_named_outputs(given_files), *options.outputs()]
+                check_outputs(outputs, _read_files(arguments, given_files))
                 result = getattr(module, name).with_record(options, **read)
             shown: int | None = getattr(module, f"show_{name}")(result, options)
             return shown
@@ -82,6 +68,12 @@ def command_of(
     argument = click.Argument(["arguments"], nargs=-1, type=FILE, metavar=record.takes)
     params = [*([argument] if record.takes else []), *map(_click_option, on_cli)]
     return click.Command(name, params=params, callback=called, help=record.__doc__)
+
+
+def _was_given(name: str) -> bool:
+    """Whether this parameter of the command stands on the command line."""
+    source = click.get_current_context().get_parameter_source(name)
+    return source is click.core.ParameterSource.COMMANDLINE
 
 
 def _positional(
@@ -145,45 +137,50 @@ def _keeping() -> Iterator[None]:
         yield
 
 
-def _was_given(name: str) -> bool:
-    """Whether this parameter of the command stands on the command line."""
-    source = click.get_current_context().get_parameter_source(name)
-    return source is click.core.ParameterSource.COMMANDLINE
+@contextmanager
+def _said(resume: object) -> Iterator[None]:
+    """Say what a block that ends early keeps, and show the plans that an error is about."""
+    try:
+        yield
+    except (KeyboardInterrupt, OutOfTime):
+        if resume is not None:
+            note(f"finished jobs are kept in {resume}: the same command goes on from there")
+        raise
+    except CoordlangError as error:
+        if (witness := getattr(error, "witness", None)) is not None:
+            from coordlang.commands.witness import witness_text
+
+            echo(witness_text(witness, line_width(err=True)), err=True)
+        raise
 
 
-def _read_files(arguments: tuple[str, ...], factored: object) -> list[str]:
-    """Files that no output may overwrite: the arguments, and what is read beside them."""
-    folder = [] if factored is None else map(str, Path(str(factored)).glob("*.pddl"))
-    beside = [str(Path(problem).parent / "coordinates.json") for problem in arguments]
-    return [*arguments, *beside, *folder]
+def _paths(value: object) -> list[str]:
+    return [*map(str, value)] if isinstance(value, tuple) else [str(value)]
 
 
-def _check_outputs(named: Iterable[Given], given: dict[str, object], inputs: list[str]) -> None:
-    """Refuse files that cannot be written, or that would overwrite one that is read."""
-    outputs: list[OutputFile] = []
-    for each in named:
-        value = given.get(each.name)
-        if value is None:
-            continue
-        paths = [*map(str, value)] if isinstance(value, tuple) else [str(value)]
-        if each.option.is_output:
-            outputs += _outputs_of(each, paths)
-        elif _names_file(each):
-            inputs += paths
-    check_outputs(outputs, inputs)
+def _read_files(arguments: tuple[str, ...], given: Iterable[tuple[Given, object]]) -> list[str]:
+    """Files that no output may overwrite: arguments, what is read beside them, those of options."""
+    read = [*arguments, *(str(Path(path).parent / "coordinates.json") for path in arguments)]
+    for each, value in given:
+        if each.name == "factored":
+            read += map(str, Path(str(value)).glob("*.pddl"))
+        elif _names_file(each) and not each.option.is_output:
+            read += _paths(value)
+    return read
 
 
-def _outputs_of(given: Given, paths: list[str]) -> Iterator[OutputFile]:
-    """The files that an option names, or that are written into its folder."""
-    for number, path in enumerate(paths, 1):
-        spelling = given.spelling if len(paths) == 1 else f"{given.spelling} {number}"
-        if given.option.metavar == "DIR":
-            for file in given.option.files:
+def _named_outputs(given: Iterable[tuple[Given, object]]) -> Iterator[OutputFile]:
+    """The files that options name, or that are written into a folder that one names."""
+    for each, value in given:
+        paths = _paths(value) if each.option.is_output else []
+        for number, path in enumerate(paths, 1):
+            spelling = each.spelling if len(paths) == 1 else f"{each.spelling} {number}"
+            if each.name != "output" and path == "-":
+                raise UsageError(f"{spelling} -: this cannot go to stdout", remedy="Name a file.")
+            if each.option.metavar != "DIR":
+                yield OutputFile(spelling, path)
+            for file in each.option.files:
                 yield OutputFile(spelling, os.path.join(path, file) if path else "", True)
-            continue
-        if given.name != "output" and path == "-":
-            raise UsageError(f"{spelling} -: this cannot go to stdout", remedy="Name a file.")
-        yield OutputFile(spelling, path)
 
 
 def check_outputs(outputs: Iterable[OutputFile], inputs: Iterable[str]) -> None:
@@ -216,25 +213,8 @@ def check_outputs(outputs: Iterable[OutputFile], inputs: Iterable[str]) -> None:
             )
 
 
-@contextmanager
-def _said(resume: object) -> Iterator[None]:
-    """Say what a block that ends early keeps, and show the plans that an error is about."""
-    try:
-        yield
-    except (KeyboardInterrupt, OutOfTime):
-        if resume is not None:
-            note(f"finished jobs are kept in {resume}: the same command goes on from there")
-        raise
-    except CoordlangError as error:
-        if (witness := getattr(error, "witness", None)) is not None:
-            from coordlang.commands.witness import witness_text
-
-            echo(witness_text(witness, line_width(err=True)), err=True)
-        raise
-
-
 def _names_file(given: Given) -> bool:
-    return any(part in (given.option.metavar or "") for part in _FILES)
+    return any(part in (given.option.metavar or "") for part in (*_FILES, "DIR"))
 
 
 def _click_option(given: Given) -> click.Option:
@@ -254,8 +234,6 @@ def _click_option(given: Given) -> click.Option:
         keywords["type"] = given.kind  # the record checks the range
     elif get_origin(given.kind) is tuple and Ellipsis not in get_args(given.kind):
         keywords["nargs"] = len(get_args(given.kind))
-    elif described.metavar == "DIR":
-        keywords["type"] = FOLDER
     elif _names_file(given):
         keywords["type"] = FILE
     is_shown = given.default not in (None, ()) and not isinstance(given.default, bool)

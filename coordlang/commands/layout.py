@@ -1,83 +1,46 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lines of text no wider than a page: atoms are never broken, columns stay aligned."""
+"""Lines of text no wider than a page: atoms are never broken."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+import textwrap
+from collections.abc import Iterator, Sequence
+from itertools import zip_longest
 
 #: Characters of a line where the output is no terminal.
 WIDTH = 120
-
-#: An atom or action, with what it holds in brackets, or any other piece of text.
-_PIECE = re.compile(r"\((?:[^()]|\([^()]*\))*\)\S*|\S+")
-
-#: An atom without brackets in it, with the brackets around it, or any other piece.
-_ATOM = re.compile(r"\([^()]*\)\S*|\S+")
-#: The space after a part of a sentence.
-_CLAUSE_END = re.compile(r"(?<=[,;]) ")
+#: A space at which no line is broken.
+HELD = "\xa0"
+#: Characters that the last column of a table has at least.
+_LEAST_ROOM = 30
+_ATOM = re.compile(r"(?:\((?:not|last \S+) )?\([^()]*\)")
 
 
 def wrapped(text: str, width: int, indent: str, further: str) -> list[str]:
     """Text in lines: the first one begins with ``indent``, the others with ``further``.
 
-    Text that fits into one line is left as it is.  Atoms are not broken: one that is wider than a
-    line has a line of its own.
+    Atoms and actions are not broken: one that is wider than a line has a line of its own.
     """
-    if len(indent) + len(text) <= width:
-        return [indent + text]
-    return packed(_pieces(text, width - len(further)), width, indent, further)
+    held = _ATOM.sub(lambda found: found[0].replace(" ", HELD), text)
+    lines = textwrap.wrap(
+        held,
+        width,
+        initial_indent=indent,
+        subsequent_indent=further,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return [line.replace(HELD, " ") for line in lines] or [indent.rstrip()]
 
 
-def _pieces(text: str, room: int) -> list[str]:
-    """What is not broken: atoms and other words; of a formula that is too wide its atoms."""
-    return [
-        part
-        for piece in _PIECE.findall(text)
-        for part in ([piece] if len(piece) <= room else _ATOM.findall(piece))
-    ]
-
-
-def fitted(text: str, width: int, further: int = 4) -> str:
-    """Text whose lines are no wider than a page: the rest of a wider one stands ``further`` in.
-
-    Lines are broken after commas and semicolons, where that suffices.
-    """
-    lines: list[str] = []
+def fitted(text: str, width: int) -> str:
+    """Text whose lines are no wider than a page: the rest of a wider one stands four columns in."""
+    lines = []
     for line in text.split("\n"):
-        body = line.lstrip()
-        indent = line[: len(line) - len(body)]
-        inner = indent + further * " "
-        if len(line) <= width:
-            lines.append(line)
-            continue
-        pieces: list[str] = []
-        for clause in _CLAUSE_END.split(body):
-            fits = len(inner) + len(clause) <= width
-            pieces += [clause] if fits else _pieces(clause, width - len(inner))
-        lines += packed(pieces, width, indent, inner)
+        indent = line[: len(line) - len(line.lstrip())]
+        lines += wrapped(line.lstrip(), width, indent, f"{indent}    ")
     return "\n".join(lines)
-
-
-def packed(
-    pieces: Iterable[str], width: int, indent: str, further: str, gap: str = " "
-) -> list[str]:
-    """Pieces in lines, as many as fit into each."""
-    lines: list[str] = []
-    line = indent
-    empty = True
-    for piece in pieces:
-        if not empty and len(line) + len(gap) + len(piece.rstrip()) > width:
-            lines.append(line.rstrip())
-            line, empty = further, True
-        line += piece if empty else gap + piece
-        empty = False
-    return [*lines, line.rstrip()]
-
-
-def atoms_of(key: str) -> list[str]:
-    """The atoms of a state, in the order of its text."""
-    return _PIECE.findall(key)
 
 
 def named(robots: Sequence[str]) -> str:
@@ -92,3 +55,23 @@ def alike(items: Sequence[object]) -> Iterator[list[int]]:
     while left:
         yield [n for n in left if items[n] == items[left[0]]]
         left = [n for n in left if items[n] != items[left[0]]]
+
+
+def columns(rows: Sequence[Sequence[str]], width: int, numbers: int) -> Iterator[str]:
+    """Rows of cells as lines, the first ``numbers`` columns to the right.
+
+    A column is as wide as its widest line; the last one is wrapped where it does not fit.
+    """
+    *sizes, _ = (
+        max(len(line) for cell in column for line in cell.split("\n"))
+        for column in zip(*rows, strict=True)
+    )
+    room = max(_LEAST_ROOM, width - sum(sizes) - 2 * len(sizes) - 2)
+    for row in rows:
+        cells = [*(cell.split("\n") for cell in row[:-1]), wrapped(row[-1], room, "", "")]
+        for *left, last in zip_longest(*cells, fillvalue=""):
+            padded = [
+                text.rjust(size) if column < numbers else text.ljust(size)
+                for column, (text, size) in enumerate(zip(left, sizes, strict=True))
+            ]
+            yield "  ".join(["", *padded, last]).rstrip()

@@ -7,7 +7,6 @@ Data goes to stdout, logs and progress to stderr.  Exit codes are an interface (
 from __future__ import annotations
 
 import errno
-import json
 import os
 import signal
 import sys
@@ -110,6 +109,8 @@ def run(arguments: list[str], interruptions: Interruptions | None = None) -> int
                 _show("".join(traceback.format_exception(error)))
             _show(text)
             if wants_json(arguments) and not output.written:
+                from coordlang.commands.schema import error_json
+
                 echo(error_json(known))
                 if sys.stdout is not None:
                     sys.stdout.flush()
@@ -171,18 +172,17 @@ def failure_of(error: BaseException, number: int | None) -> tuple[str, Coordlang
     none has.  Where one has, it is what ended the work, whatever error a library made of it.  So is
     memory that is used up.
     """
-    match error:
-        case KeyboardInterrupt() | click.Abort():
-            return _interrupted(number)
-        case Exception() if number is not None:
-            return _interrupted(number)
-        case click.ClickException():
-            return _usage(error)
-        case OSError() if error.errno in _UNWRITABLE:
-            what = f"the output cannot be written: {error.strerror}"
-            return _other(what, UsageError.exit_code, "Make room, or name another file.")
-        case CoordlangError():
-            return f"coordlang: {error}\n", error
+    if number is not None or isinstance(error, KeyboardInterrupt | click.Abort):
+        by = "" if number in (None, signal.SIGINT) else f" by {signal.Signals(number).name}"
+        code = INTERRUPTED if number is None else SIGNALS + number
+        return _other(f"interrupted{by}", code, "Start it again.")
+    if isinstance(error, click.ClickException):
+        return _usage(error)
+    if isinstance(error, OSError) and error.errno in _UNWRITABLE:
+        what = f"the output cannot be written: {error.strerror}"
+        return _other(what, UsageError.exit_code, "Make room, or name another file.")
+    if isinstance(error, CoordlangError):
+        return f"coordlang: {error}\n", error
     if lacks_memory(error):
         remedy = "Use a smaller task, or a larger --memory-limit."
         return _other("out of memory", OutOfMemory.exit_code, remedy)
@@ -190,35 +190,11 @@ def failure_of(error: BaseException, number: int | None) -> tuple[str, Coordlang
     return _other(what, CoordlangError.exit_code, "This is a bug; --debug shows where.")
 
 
-def error_json(error: CoordlangError) -> str:
-    """The object that ``--json`` gives in place of an answer (docs/formats.md)."""
-    place = error.position
-    position = None
-    if place is not None:
-        line, column = (place.line, place.column) if place.line else (None, None)
-        position = {"file": sentence(place.file), "line": line, "column": column}
-    entry: dict[str, Any] = {
-        "message": sentence(error.what),
-        "position": position,
-        "remedy": None if error.remedy is None else sentence(error.remedy, keep="\n"),
-        "exit_code": error.exit_code,
-    }
-    if error.reached is not None:
-        entry["reached"] = sentence(error.reached)
-    return json.dumps({"error": entry})
-
-
 def wants_json(arguments: Sequence[str]) -> bool:
     """Whether these arguments ask for JSON, ``--json`` or ``--format json``."""
     before = list(arguments[: arguments.index("--")] if "--" in arguments else arguments)
     is_short = not {"--json", "--format=json"}.isdisjoint(before)
     return is_short or ("--format", "json") in pairwise(before)
-
-
-def _interrupted(number: int | None) -> tuple[str, CoordlangError]:
-    by = "" if number in (None, signal.SIGINT) else f" by {signal.Signals(number).name}"
-    code = INTERRUPTED if number is None else SIGNALS + number
-    return _other(f"interrupted{by}", code, "Start it again.")
 
 
 def _usage(error: click.ClickException) -> tuple[str, CoordlangError]:

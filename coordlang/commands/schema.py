@@ -12,7 +12,9 @@ import msgspec
 from msgspec import Meta
 
 from coordlang.commands.terminal import echo
+from planners.system.errors import CoordlangError
 from planners.system.files import FileFormat
+from planners.system.messages import sentence
 
 #: The modules whose ``json_schema`` describes a file format.
 SCHEMAS = {
@@ -36,7 +38,7 @@ class ErrorPosition(msgspec.Struct, frozen=True):
     column: Annotated[int | None, Meta(description="Null where the line is.")]
 
 
-class ErrorEntry(msgspec.Struct, frozen=True):
+class ErrorEntry(msgspec.Struct, frozen=True, omit_defaults=True):
     """What is wrong."""
 
     message: Annotated[str, Meta(description="What is wrong, in one sentence.")]
@@ -52,6 +54,23 @@ class ErrorObject(msgspec.Struct, frozen=True):
     """An error in place of an answer.  Keys that are not listed here are ignored by readers."""
 
     error: ErrorEntry
+
+
+def error_json(error: CoordlangError) -> str:
+    """The object that ``--json`` gives in place of an answer (docs/formats.md)."""
+    place, remedy, reached = error.position, error.remedy, error.reached
+    position = None
+    if place is not None:
+        line, column = (place.line, place.column) if place.line else (None, None)
+        position = ErrorPosition(sentence(place.file), line, column)
+    entry = ErrorEntry(
+        sentence(error.what),
+        position,
+        None if remedy is None else sentence(remedy, keep="\n"),
+        error.exit_code,
+        None if reached is None else sentence(reached),
+    )
+    return msgspec.json.encode(ErrorObject(entry)).decode()
 
 
 def json_schema() -> dict[str, Any]:

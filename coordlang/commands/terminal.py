@@ -12,13 +12,14 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from time import monotonic
 from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
 from coordlang.commands.layout import WIDTH
-from planners.system.limits import Underway, underway
+from planners.system.limits import stop_clock, underway
 from planners.system.messages import visible
 from planners.system.signals import Interrupted
 
@@ -76,6 +77,22 @@ def write(text: str, output: str | None) -> None:
         echo(text, nl=False)
     else:
         write_atomically(output, text.encode())
+
+
+def save(data: bytes, output: str) -> Callable[[str], None]:
+    """Write an answer to its file, or to stdout for ``-``; the work is done, and no limit holds.
+
+    Returns what writes lines for people: to the other one of stdout and stderr.
+    """
+    from planners.system.writing import write_compressed
+
+    stop_clock()
+    to_stdout = output == "-"
+    if to_stdout:
+        echo(data.decode(), nl=False)
+    else:
+        write_compressed(output, data, level=6)
+    return partial(echo, err=to_stdout)
 
 
 def show_answer(found: Any, *, as_json: bool) -> None:
@@ -168,41 +185,31 @@ class _Spinner(threading.Thread):
     def __init__(self, message: str) -> None:
         super().__init__(daemon=True)
         self.ended = threading.Event()
-        self._message = message
-        self._begin = monotonic()
-        #: What was under way at the last look, when that was, and its work so far.
-        self._seen: tuple[Underway | None, float, int] = None, 0.0, 0
+        self.message = message
 
     def say(self, message: str) -> None:
-        self._message = message
+        self.message = message
 
     def run(self) -> None:
+        begin = monotonic()
         if self.ended.wait(_DELAY):
             return
         from rich.console import Console
         from rich.text import Text
 
-        with Console(stderr=True).status(Text(self._text())) as status:
-            while not self.ended.wait(_INTERVAL):
-                status.update(Text(self._text()))
+        with Console(stderr=True).status("") as status:
+            wait = 0.0
+            while not self.ended.wait(wait):
+                seconds, wait = monotonic() - begin, _INTERVAL
+                status.update(Text(f"{visible(self._text())} .. {seconds:.0f} s"))
 
     def _text(self) -> str:
-        parts, part = [self._message], underway()
+        part = underway()
         # The work goes on while it is asked: what cannot be read just now is left out.
         with suppress(ValueError, IndexError, KeyError, RuntimeError, StopIteration):
-            if part is not None and (so_far := part.so_far()) not in self._message:
-                parts.append(so_far + self._rate(part))
-        return f"{visible(': '.join(parts))} .. {monotonic() - self._begin:.0f} s"
-
-    def _rate(self, part: Underway) -> str:
-        """Its work in a second since the last look; empty at the first one."""
-        if part.work is None:
-            return ""
-        (known, begin, before), now, work = self._seen, monotonic(), part.work()
-        self._seen = part, now, work
-        if known is not part or now <= begin:
-            return ""
-        return f", {(work - before) / (now - begin):,.0f} {part.unit} a second"
+            if part is not None and (so_far := part.so_far()) not in self.message:
+                return f"{self.message}: {so_far}"
+        return self.message
 
 
 def whatever_stderr() -> TextIO:

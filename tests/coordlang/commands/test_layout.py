@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from coordlang.commands import terminal
-from coordlang.commands.layout import WIDTH, alike, atoms_of, fitted, named, packed, wrapped
+from coordlang.commands.layout import WIDTH, alike, columns, fitted, named, wrapped
 from coordlang.commands.witness import witness_data, witness_text
 from coordlang.required.miscoordination import Miscoordination, Step
+from planners.joint.states import split_atoms
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
 
@@ -57,7 +58,7 @@ def test_equal_plans_are_shown_once() -> None:
 def test_lines_fit(width: int) -> None:
     text = witness_text(seven(), width)
     assert max(map(len, text.split("\n"))) <= width
-    for atom in atoms_of(seven().states[0][0]):
+    for atom in split_atoms(seven().states[0][0]):
         assert atom in text.replace("\n", "")
 
 
@@ -68,15 +69,21 @@ def test_json_has_all_of_it() -> None:
 
 
 def test_atoms_are_not_broken() -> None:
-    text = "state (at r1 c0-0) (at r2 (x y)) end"
+    text = "state (at r1 c0-0) (last r2 (go r2 b)) (not (free r1)) end"
     assert wrapped(text, 80, "  ", "    ") == ["  " + text]
     assert wrapped(text, 20, "  ", "    ") == [
         "  state (at r1 c0-0)",
-        "    (at r2 (x y))",
+        "    (last r2 (go r2 b))",
+        "    (not (free r1))",
         "    end",
     ]
-    assert atoms_of("(at r1 c0-0) (free r1)") == ["(at r1 c0-0)", "(free r1)"]
-    assert packed([], 20, "  ", "") == [""]
+    assert wrapped("", 20, "  ", "") == [""]
+    rows = [("n", "does", "knows"), ("10", "a\n| b", "(at r1 c0-0) (at r2 c0-1) (at r3 c2-2)")]
+    assert [*columns(rows, 20, 1)] == [
+        "   n  does  knows",
+        "  10  a     (at r1 c0-0) (at r2 c0-1)",
+        "      | b   (at r3 c2-2)",
+    ]
 
 
 def test_names_and_groups() -> None:
@@ -115,16 +122,10 @@ def test_tables_of_choices_fit(coordlang: Command, tmp_path: object) -> None:
     assert out.count("may ") >= 3
 
 
-def test_long_lines_are_broken_between_clauses() -> None:
-    text = "short\n  r1: move a b, move b c, move c d.\n  (at r1 a) (at r2 b)"
-    assert fitted(text, 18).split("\n") == [
-        "short",
-        "  r1: move a b,",
-        "      move b c,",
-        "      move c d.",
-        "  (at r1 a)",
-        "      (at r2 b)",
-    ]
+def test_long_lines_are_broken() -> None:
+    text = "short\n  r1: move it, and stay.\n  (at r1 a) (at r2 b)"
+    shown = ["short", "  r1: move it, and", "      stay.", "  (at r1 a)", "      (at r2 b)"]
+    assert fitted(text, 18).split("\n") == shown
     assert fitted(text, 100) == text
 
 

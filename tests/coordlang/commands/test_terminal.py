@@ -61,14 +61,14 @@ def test_progress_on_a_terminal() -> None:
 
 
 def test_how_far_the_work_got() -> None:
-    """That of the innermost block, with its rate; what cannot be read just now is left out."""
+    """That of the innermost block; what cannot be read just now is left out."""
     code = CODE.split("with terminal.working")[0] + (
         "from planners.system.limits import reaching\n"
         "terminal._INTERVAL = 0.05\n"
         "done, layers = 0, []\n"
         "with terminal.working('searching'), reaching(lambda: 'the whole', 'less'):\n"
         "    time.sleep(0.5)\n"
-        "    with reaching(lambda: f'{done} states', 'less', lambda: done, 'joint steps'):\n"
+        "    with reaching(lambda: f'{done} states', 'less'):\n"
         "        for done in range(50):\n"
         "            time.sleep(0.02)\n"
         "    with reaching(lambda: f'{layers[-1]} states', 'less'):\n"
@@ -76,8 +76,8 @@ def test_how_far_the_work_got() -> None:
     )
     _, shown = on_a_terminal(code)
     assert "searching: the whole .. 0 s" in shown
-    rates = re.findall(r"searching: (\d+) states, (\d+) joint steps a second .. \d s", shown)
-    assert any(int(done) > 10 and 5 < int(rate) < 51 for done, rate in rates)
+    done = re.findall(r"searching: (\d+) states .. \d s", shown)
+    assert any(int(number) > 10 for number in done)
     assert "searching .. 1 s" in shown or "searching .. 2 s" in shown
 
 
@@ -96,7 +96,6 @@ def test_how_far_a_search_got(tmp_path: Path) -> None:
     out, shown = on_a_terminal(code)
     assert out.strip().isdigit()
     assert re.search(r"finding all optimal plans: [\d,]+ states within \d+ steps", shown)
-    assert "joint steps a second" in shown
 
 
 @pytest.mark.thorough
