@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from math import prod
 from os import fspath
 from typing import Any
@@ -66,6 +67,17 @@ class RobotsChoices(InTask):
     def guaranteed(self) -> bool:
         """Whether every combination of choices is an optimal plan."""
         return self.found.guaranteed
+
+    @property
+    def failure(self) -> Fraction | None:
+        """How often robots fail that draw plans of the sentence; None: too much to count."""
+        if self.guaranteed:
+            return Fraction(0)
+        used = self.used
+        try:
+            return failure_of_sentence(used.space, used.start, self.found.fits, _ADDITIONS)
+        except TooManyToCount:
+            return None
 
     @property
     def witness(self) -> Miscoordination | None:
@@ -160,7 +172,9 @@ def _guarantee_code(found: RobotsChoices, check: bool) -> int:
     is_tolerated = found.covered and not check and is_claimed
     if found.witness is not None:
         if is_tolerated:
-            echo(f"choices of this task miscoordinate{_share(found)}, for example:", err=True)
+            failure = found.failure
+            share = "" if failure is None else f" in {percent(float(failure))} of all runs"
+            echo(f"choices of this task miscoordinate{share}, for example:", err=True)
         else:
             why = "the language does not cover it"
             if found.covered:
@@ -173,16 +187,6 @@ def _guarantee_code(found: RobotsChoices, check: bool) -> int:
         note("the language does not cover this task; --check proved this sentence")
         return 0
     return covered_code(found.covered, found.tolerance)
-
-
-def _share(found: RobotsChoices) -> str:
-    """How often robots that draw plans of the sentence fail; empty where it is not counted."""
-    used = found.used
-    try:
-        share = failure_of_sentence(used.space, used.start, found.found.fits, _ADDITIONS)
-    except TooManyToCount:
-        return ""
-    return f" in {percent(float(share))} of all runs"
 
 
 def _followed(

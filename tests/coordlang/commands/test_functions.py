@@ -230,7 +230,6 @@ def test_choices(tmp_path: Path) -> None:
     found = coordlang.choices(built.language, *CELLS, "w1 w0")
     assert found.guaranteed
     assert found.subplans == {"r1": 1, "r2": 2}
-    assert found.combinations == 2
     robot = found.monitor("R2")
     assert robot.allowed() == (None, "(move r2 b a)")
     path = tmp_path / "r2.json"
