@@ -12,14 +12,13 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import partial
 from time import monotonic
 from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
 from coordlang.commands.layout import WIDTH
-from planners.system.limits import stop_clock, underway
+from planners.system.limits import underway
 from planners.system.messages import visible
 from planners.system.signals import Interrupted
 
@@ -77,22 +76,6 @@ def write(text: str, output: str | None) -> None:
         echo(text, nl=False)
     else:
         write_atomically(output, text.encode())
-
-
-def save(data: bytes, output: str) -> Callable[[str], None]:
-    """Write an answer to its file, or to stdout for ``-``; the work is done, and no limit holds.
-
-    Returns what writes lines for people: to the other one of stdout and stderr.
-    """
-    from planners.system.writing import write_compressed
-
-    stop_clock()
-    to_stdout = output == "-"
-    if to_stdout:
-        echo(data.decode(), nl=False)
-    else:
-        write_compressed(output, data, level=6)
-    return partial(echo, err=to_stdout)
 
 
 def show_answer(found: Any, *, as_json: bool) -> None:
