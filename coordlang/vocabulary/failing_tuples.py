@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from coordlang.language.warping import Clause
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.counterexamples import Counterexamples
-from coordlang.vocabulary.distinct_rows import MULTIPLIER, DistinctRows, row_keys
 from coordlang.vocabulary.job import Evidence
 from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
@@ -31,8 +30,8 @@ _RETURNED = 800
 _LEAST = 20
 #: Tuples whose warping paths are looked for, for each clause that is returned.
 _WARPED = 10
-#: Tuples, for each partition, that are compared together: some megabytes.
-_TOGETHER = 300_000
+#: An odd multiplier: what is equal has equal keys, other things nearly never.
+_MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)
 #: Cost of a cell that no warping path of equal words passes.
 _NO_PATH = 10**4
 
@@ -59,59 +58,16 @@ class _Table:
         (length, robots, tuples) the states: what is looked at together lies together.
     source
         (tuples, 2) the number of a batch and the row in it.
-    begins, begin
-        Distinct first two steps of tuples: the shared state, and the next of each robot; and which
-        of these each tuple has (tuples).
-    ends, end
-        Distinct last two steps: each robot's last state, and the one before; and which of these
-        each tuple has (tuples).
     """
 
     states: Ints
     by_step: Ints
     source: Ints
-    begins: DistinctRows
-    begin: Ints
-    ends: DistinctRows
-    end: Ints
 
     @classmethod
-    def of(cls, states: Ints, source: Ints, before: _Table | None) -> _Table:
-        """A table with more tuples than the one before."""
-        robots = states.shape[1]
-        begins = DistinctRows.none(1 + robots) if before is None else before.begins
-        ends = DistinctRows.none(2 * robots) if before is None else before.ends
-        begins, begin = begins.numbered(np.column_stack((states[:, 0, 0], states[:, :, 1])))
-        ends, end = ends.numbered(np.column_stack((states[:, :, -1], states[:, :, -2])))
-        if before is not None:
-            states = np.concatenate((before.states, states))
-            source = np.concatenate((before.source, source))
-            begin = np.concatenate((before.begin, begin))
-            end = np.concatenate((before.end, end))
-        by_step = np.ascontiguousarray(states.transpose(2, 1, 0))
-        return cls(states, by_step, source, begins, begin, ends, end)
-
-    def agreeing(self, words: Ints) -> tuple[Ints, Ints]:
-        """`agreeing_rows` under some partitions (partitions, states): partitions, and tuples."""
-        words = words.astype(np.int32)
-        begin = words.take(self.begins.rows.T, axis=1)
-        later = _part_later(begin[:, 0], begin[:, 1:].swapaxes(0, 1))
-        robots = self.states.shape[1]
-        end = words.take(self.ends.rows.T, axis=1).swapaxes(0, 1)
-        shared = (end[:robots] == end[0]).all(axis=0) & _part_later(end[0], end[robots:])
-        tuples = max(1, len(self.states))
-        together = max(1, _TOGETHER // tuples)
-        found = []
-        for first in range(0, len(words), together):
-            some = slice(first, first + together)
-            both = later[some].take(self.begin, axis=1)
-            both &= shared[some].take(self.end, axis=1)
-            partition, rows = divmod(np.flatnonzero(both) + first * tuples, tuples)
-            states = self.by_step.take(rows, axis=2) + partition * words.shape[1]
-            of_one = agree(words.ravel(), states)
-            found.append((partition[of_one], rows[of_one]))
-        partitions, tuples_of = zip(*found, strict=True)
-        return np.concatenate(partitions), np.concatenate(tuples_of)
+    def of(cls, states: Ints, source: Ints) -> _Table:
+        """The table of some tuples."""
+        return cls(states, np.ascontiguousarray(states.transpose(2, 1, 0)), source)
 
 
 @dataclass(slots=True)
@@ -194,14 +150,13 @@ class FailingTuples:
         """
         found: list[Agreeing] = []
         looked_at = self._images if images is None else images
-        words = np.stack([word[to] for to in looked_at])
         for length, table in sorted(self._tables.items()):
             if sum(len(shorter.rows) for shorter in found) >= enough:
                 break
-            image, row = table.agreeing(words)
-            numbers, first = np.unique(image, return_index=True)
-            for number, rows in zip(numbers.tolist(), np.split(row, first[1:]), strict=False):
-                found.append(Agreeing(length, looked_at[number], rows))
+            for to in looked_at:
+                rows = agreeing_rows(word[to], table.by_step)
+                if len(rows):
+                    found.append(Agreeing(length, to, rows))
         return found
 
     def codes(
@@ -284,7 +239,10 @@ class FailingTuples:
     def _append(self, length: int, states: Ints, source: Ints) -> None:
         if not len(states):
             return
-        self._tables[length] = _Table.of(states, source, self._tables.get(length))
+        if (known := self._tables.get(length)) is not None:
+            states = np.concatenate((known.states, states))
+            source = np.concatenate((known.source, source))
+        self._tables[length] = _Table.of(states, source)
 
 
 def _different_part(states: Ints) -> tuple[Ints, Ints]:
@@ -300,8 +258,11 @@ def _different_part(states: Ints) -> tuple[Ints, Ints]:
 
 def _keys(states: Ints) -> Ints:
     """A number for each tuple that does not depend on the order of its sequences."""
-    code = row_keys(states.transpose(2, 0, 1))
-    key: Ints = (code.sum(axis=1, dtype=np.uint64) * MULTIPLIER).view(np.int64)
+    code = np.zeros(states.shape[:2], np.uint64)
+    for step in range(states.shape[2]):
+        code = (code ^ (states[:, :, step].astype(np.uint64) + np.uint64(1))) * _MULTIPLIER
+        code ^= code >> np.uint64(29)
+    key: Ints = (code.sum(axis=1, dtype=np.uint64) * _MULTIPLIER).view(np.int64)
     return key
 
 
@@ -354,7 +315,7 @@ def sequences_agree(words: Ints) -> Bools:
     before = named[0]
     code = before.copy()
     for here in named[1:]:
-        np.copyto(code, code * MULTIPLIER + here, where=here != before)
+        np.copyto(code, code * _MULTIPLIER + here, where=here != before)
         before = here
     agree: Bools = (code == code[:1]).all(axis=0)
     return agree

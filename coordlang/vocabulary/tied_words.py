@@ -21,7 +21,6 @@ from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.loop import Budget, Languages, find
 from coordlang.vocabulary.orbit_words import OrbitWords
-from coordlang.vocabulary.recent_tuples import RecentTuples
 from coordlang.vocabulary.sat import Undecided, satisfiable
 from planners.joint.tables import Ints
 from planners.search.sat import SolverName, sat_solver
@@ -33,8 +32,6 @@ _TRIED = 600
 #: Clauses that are taken of a refuted partition, before their images; and failing tuples after
 #: which longer ones are not looked for.
 _AT_ONCE, _ENOUGH = 100, 300
-#: All failing tuples are asked where fewer of the recent ones agree.
-_FEW = 100
 #: Abstractions with more abstract states tie too few states to be looked at with symmetries.
 _TIED = 2
 #: A solver that is quick on many easy problems with many solutions.
@@ -241,13 +238,13 @@ class TiedWords:
             if words is None:
                 return None
             elements = [self._group.elements[h] for h in kind.action.subgroup]
-            kind.problem = _Orbits.of(words, elements, RecentTuples(self._refuter, _ENOUGH, _FEW))
+            kind.problem = _Orbits.of(words, elements)
         problem = kind.problem
         images = self._group.right_cosets(frozenset(kind.action.words))
 
         def holds(partition: Assignment) -> bool:
             word = self._languages.word(partition)
-            agreeing = problem.recent.agreeing(word, images)
+            agreeing = self._refuter.agreeing(word, images, _ENOUGH)
             if agreeing:
                 kind.rounds += 1
                 self._languages.rounds += 1
@@ -265,8 +262,8 @@ class _Orbits:
     A state's variable for a word is that of its orbit's first state for the word that goes there.
     """
 
-    def __init__(self, size: int, recent: RecentTuples) -> None:
-        self.size, self.recent = size, recent
+    def __init__(self, size: int) -> None:
+        self.size = size
         self._solver = sat_solver(_SOLVER)
         self._last = self._last_word = 0
         self._word: dict[int, dict[int, int]] = {}
@@ -275,9 +272,9 @@ class _Orbits:
         self._elements: list[Ints] = []
 
     @classmethod
-    def of(cls, kind: OrbitWords, elements: Sequence[Ints], recent: RecentTuples) -> _Orbits:
+    def of(cls, kind: OrbitWords, elements: Sequence[Ints]) -> _Orbits:
         """The problem of a kind; ``elements`` are the symmetries of its subgroup."""
-        problem = cls(kind.size, recent)
+        problem = cls(kind.size)
         problem._elements = list(elements)
         for members, words in zip(kind.members, kind.words, strict=True):
             variables = [problem._new() for _ in words]

@@ -15,9 +15,7 @@ from coordlang.language.sentences import sentence
 from coordlang.language.warping import separation_clause
 from coordlang.required.choices import Choices
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
-from coordlang.vocabulary import failing_tuples
 from coordlang.vocabulary.counterexamples import Mixtures, many_counterexamples
-from coordlang.vocabulary.distinct_rows import DistinctRows
 from coordlang.vocabulary.failing_tuples import FailingTuples, agreeing_rows
 from planners.search.plan_space import PlanSpace
 from tests.support.domains import all_tasks
@@ -90,40 +88,6 @@ def test_rows_that_agree_are_those_of_all_steps(
         for row in agreeing_rows(word, by_step).tolist()
     ]
     assert found == expected
-
-
-@given(st.integers(2, 3), st.integers(2, 5), st.integers(1, 4), st.integers(0, 2**32 - 1))
-def test_tables_agree_as_their_rows_do(robots: int, length: int, words: int, seed: int) -> None:
-    """Asking distinct first and last steps once is asking every row; however a table has grown."""
-    random = np.random.default_rng(seed)
-    table = None
-    for rows in random.integers(1, 30, size=3).tolist():
-        states = random.integers(5, size=(rows, robots, length))
-        states[:, :, 0] = states[:, :1, 0]
-        table = failing_tuples._Table.of(states, np.zeros((rows, 2), np.int64), table)
-        partitions = random.integers(words, size=(4, 5))
-        expected = [
-            (number, row)
-            for number, word in enumerate(partitions)
-            for row in agreeing_rows(word, table.by_step).tolist()
-        ]
-        for together in (1, 50, 10**6):
-            with pytest.MonkeyPatch.context() as patch:
-                patch.setattr(failing_tuples, "_TOGETHER", together)
-                found = table.agreeing(partitions)
-            assert [*zip(*(part.tolist() for part in found), strict=True)] == expected
-
-
-@given(st.lists(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 2)), max_size=12), max_size=5))
-def test_distinct_rows_are_numbered(tables: list[list[tuple[int, int]]]) -> None:
-    """Each row of every table by its number, and no row has two."""
-    known = DistinctRows.none(2)
-    for table in tables:
-        before = known.rows
-        known, numbers = known.numbered(np.array(table, np.int64).reshape(-1, 2))
-        assert known.rows[: len(before)].tolist() == before.tolist()
-        assert [tuple(known.rows[number].tolist()) for number in numbers.tolist()] == table
-        assert len({tuple(row) for row in known.rows.tolist()}) == len(known.rows)
 
 
 def test_images_under_symmetries_are_known() -> None:

@@ -17,11 +17,9 @@ from coordlang.language.partition import Partition
 from coordlang.symmetry.subgroups import group_table
 from coordlang.verification.by_definition import verify_candidates
 from coordlang.vocabulary.abstractions import abstractions
-from coordlang.vocabulary.failing_tuples import agree
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.loop import Budget, Languages
 from coordlang.vocabulary.orbit_words import OrbitWords
-from coordlang.vocabulary.recent_tuples import RecentTuples
 from coordlang.vocabulary.tied_words import TiedWords, _Kind, _Kinds, _Orbits
 from planners.parallel.workers import Workers
 from tests.support.domains import all_tasks
@@ -89,7 +87,6 @@ def test_partitions_of_a_kind_are_found_iff_there_are_some(seed: int) -> None:
     group = group_table([np.arange(6), one, other, one[other]])
     subgroups = group.subgroups(frozenset(range(4)), 10)
     actions = [action for h in subgroups for action in group.word_actions(h, 3, 10)]
-    recent = RecentTuples(Languages.of(job_of("gw1-2x2")).refuter, 1)
     answers = Counter[bool]()
     for action, tied in product(actions, (None, np.array([0, 1, 0, 1, 2, 3]))):
         kind = OrbitWords.of(range(6), group, action, 3, tied)
@@ -99,7 +96,7 @@ def test_partitions_of_a_kind_are_found_iff_there_are_some(seed: int) -> None:
             tuple(kind.partition(np.array(choice)).tolist())
             for choice in product(*(range(len(words)) for words in kind.words))
         }
-        problem = _Orbits.of(kind, [group.elements[h] for h in action.subgroup], recent)
+        problem = _Orbits.of(kind, [group.elements[h] for h in action.subgroup])
         for _ in range(4):
             pairs = [[random.sample(range(6), 2) for _ in range(2)] for _ in range(2)]
             codes = [[min(pair) * 6 + max(pair) for pair in clause] for clause in pairs]
@@ -149,27 +146,6 @@ def test_kinds_rule_out_others() -> None:
     assert not _Kind(nothing, one).rules_out(_Kind(action))
     assert _Kind(action).rules_out(_Kind(action, one))
     assert not _Kind(action, one).rules_out(_Kind(action))
-
-
-@pytest.mark.parametrize("least", [1, 20])
-def test_recent_tuples_are_some_of_those_that_agree(least: int) -> None:
-    """None iff the partition is a language for the tuples known; each agrees, none twice."""
-    refuter, random = Languages.of(job_of("gw2-2x3")).refuter, np.random.default_rng(0)
-    recent = RecentTuples(refuter, 50, least)
-    sizes: Counter[bool] = Counter()
-    for words in (1, 2, 3, 4, 6, 9, 14, 30) * 4:
-        word = random.integers(words, size=len(refuter.pool.images[0]))
-        known = recent.agreeing(word)
-        every = refuter.agreeing(word)
-        assert bool(known) == bool(every)
-        here = {(f.length, f.to.tobytes(), row) for f in known for row in f.rows.tolist()}
-        assert len(here) == sum(len(f.rows) for f in known)
-        assert here <= {(f.length, f.to.tobytes(), row) for f in every for row in f.rows.tolist()}
-        for some in known:
-            sequences = refuter.pool.sequences(some, some.rows)
-            assert agree(word, sequences.transpose(2, 1, 0)).all()
-        sizes[len(here) < sum(len(f.rows) for f in every)] += 1
-    assert min(sizes[True], sizes[False]) >= 1, sizes
 
 
 def job_of(stem: str) -> Job:
