@@ -21,7 +21,7 @@ import numpy as np
 from coordlang.required.choices import Choices
 from coordlang.vocabulary.sat import Undecided
 from coordlang.vocabulary.sentence_sets import NOTHING, Words
-from coordlang.vocabulary.spoken_choices import SpokenChoices, Step
+from coordlang.vocabulary.spoken_choices import SpokenChoices
 from planners.joint.tables import Ints
 from planners.search.edge_index import EdgeTrees
 
@@ -33,6 +33,9 @@ _KEPT = 1_000_000
 _EFFORT = 5
 #: What each robot can still do and say: words that others have not said yet, and a set.
 _Ahead = tuple[tuple[Words, int], ...]
+#: A step that a robot can make: its label, its code, where the robot is then, and all sentences of
+#: plans that go on so, with those words that others have not said yet.
+_Option = tuple[int, Words, tuple[Words, int], int]
 #: Plans of which a mixture is made, as edges.
 _Plans = tuple[tuple[int, ...], ...]
 #: Draws in a row that bring nothing new, after which a node is left.
@@ -178,6 +181,7 @@ class Mixtures:
         self._spoken = SpokenChoices(self._choices)
         self._safe: set[tuple[int, _Ahead]] = set()
         self._shared: dict[_Ahead, tuple[Words, int]] = {}
+        self._options: dict[tuple[Words, int], list[_Option]] = {}
         #: How often the next steps of a mixture were looked at.
         self.visited = 0
         self._steps_left = sys.maxsize
@@ -198,7 +202,7 @@ class Mixtures:
 
     def say(self, word: Ints, steps: int = sys.maxsize) -> None:
         """Set the word of each node (nodes), and how many steps of robots may be looked at."""
-        if len(self._shared) + len(self._safe) + len(self._spoken) > _KEPT:
+        if len(self._shared) + len(self._safe) + len(self._options) + len(self._spoken) > _KEPT:
             self._forget()
         self._spoken.say(word)
         self.visited, self._steps_left = 0, steps
@@ -260,38 +264,54 @@ class Mixtures:
     ) -> Iterator[tuple[list[Words], _Ahead, int | None]]:
         """Steps of the mixture after which the robots have a sentence in common.
 
+        Before them each can say what all can say: only robots that have made theirs restrict it.
+
         Each robot's code, where they are then, and the node that the mixture reaches: None where it
         fails, whatever robots do that have no code yet.
         """
-        spoken, robots = self._spoken, len(ahead)
+        robots, words = len(ahead), self._spoken.words
 
-        def drawn(own: int) -> Iterator[Step]:
-            steps = spoken.steps(own)
-            return iter(steps if random is None else random.sample(steps, len(steps)))
+        def drawn(robot: int) -> Iterator[_Option]:
+            options = self._options_of(ahead[robot])
+            return iter(options if random is None else random.sample(options, len(options)))
 
-        none: list[Words] = [()] * robots
-        open_steps = [(drawn(ahead[0][1]), none, ahead, self._edges.of(node))]
+        chosen: list[_Option] = []
+        open_steps = [(drawn(0), -1, self._edges.of(node))]
         while open_steps:
-            steps, codes, reached, prefixes = open_steps[-1]
-            step = next(steps, None)
-            if step is None:
+            options, left, prefixes = open_steps[-1]
+            robot = len(open_steps) - 1
+            del chosen[robot:]
+            option = next(options, None)
+            if option is None:
                 open_steps.pop()
                 continue
             self._steps_left -= 1
             if self._steps_left < 0:
                 raise Undecided
-            robot = len(open_steps) - 1
-            label, entered, after = step
-            words = reached[robot][0] + entered
-            moved = (*reached[:robot], (words, after), *reached[robot + 1 :])
-            if self._common(moved)[1] == NOTHING:
+            label, _, _, said = option
+            left = said if left < 0 else words.common(left, said)
+            if left == NOTHING:
                 continue
-            chosen = [*codes[:robot], (spoken.code_of(step),), *codes[robot + 1 :]]
+            chosen.append(option)
             below = prefixes.get(label)
-            if below is None or len(open_steps) == robots:
-                yield chosen, moved, below
+            if below is None or len(chosen) == robots:
+                codes = [code for _, code, _, _ in chosen] + [()] * (robots - len(chosen))
+                yield codes, (*(at for _, _, at, _ in chosen), *ahead[len(chosen) :]), below
             else:
-                open_steps.append((drawn(moved[robot + 1][1]), chosen, moved, below))
+                open_steps.append((drawn(robot + 1), left, below))
+
+    def _options_of(self, ahead: tuple[Words, int]) -> list[_Option]:
+        """The next steps of a robot that has said some words and has a set."""
+        known = self._options.get(ahead)
+        if known is None:
+            spoken, (words, own) = self._spoken, ahead
+            known = self._options[ahead] = []
+            for step in spoken.steps(own):
+                label, entered, after = step
+                said = words + entered
+                sentences = spoken.words.before(said, spoken.sentences(after))
+                known.append((label, (spoken.code_of(step),), (said, after), sentences))
+        return known
 
     def _common(self, ahead: _Ahead) -> tuple[Words, int]:
         """What the robot that is ahead of all has said, and what all can say after it."""
