@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from coordlang.language.warping import Clause
 from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome, word_count
-from coordlang.vocabulary.loop import Budget, Languages, between, close_bounds, find
+from coordlang.vocabulary.loop import Budget, Languages, close_bounds, find
 from coordlang.vocabulary.merging import merged
 from coordlang.vocabulary.partitions import Partitions, Refutation
 from coordlang.vocabulary.sat import Undecided
@@ -38,8 +38,10 @@ _MERGES = 5
 _PAIRS, _FIRST_PAIRS = 1_000, 30
 #: Effort that is not enough for a tenth of the first failing plans is not begun with.
 _BEGINNING = 10
-#: What may be spent on each number, from below and between the bounds, before words are merged.
+#: What may be spent on each number at first.
 _SOON = Budget(rounds=10, conflicts=2_000)
+#: Words fewer than those of a language near which one is looked for, as a share of them.
+_SHARE = 4
 #: Merges in a row that fail before something else is tried.
 _VAIN = 15
 #: Merged words are verified once they are so many times the last ones that were.
@@ -140,24 +142,32 @@ class MinimalSearch:
             return
         if self._pairs // _FIRST_PAIRS > _BEGINNING * self._most:
             return
-        self._close_in_soon()
+        while self.lower < self.upper and not self._is_spent and self.decide(self.lower, _SOON):
+            pass
+        self._try_abstractions()
         self.merge(_VAIN)
+        self._descend(_SOON)
         known = self.best
         close_bounds(
-            lambda: (self.lower, self.upper), self._decide_or_merge, lambda: self._is_spent
+            lambda: (self.lower, self.upper), self._decide_or_descend, lambda: self._is_spent
         )
         if self.best is known and not self._is_spent:
             # Merged words tell more states apart than a language must: fewer leave more plans open.
             self.decide(self.lower, Budget())
 
-    def _close_in_soon(self) -> None:
-        """Decide numbers while that is quick: from below, then between the bounds."""
-        while self.lower < self.upper and not self._is_spent and self.decide(self.lower, _SOON):
-            pass
-        self._try_abstractions()
-        while self.lower < self.upper and not self._is_spent:
-            if not self._find_or_refute(between(self.lower, self.upper), _SOON):
-                break
+    def _descend(self, budget: Budget) -> None:
+        """Look for languages with fewer words near the best one, as long as some are found.
+
+        A quarter fewer, and where there are none within the budget half as many fewer each time.
+        """
+        share = _SHARE
+        while self.lower < self.upper and self.best is not None and not self._is_spent:
+            fewer = max(1, self.upper // share)
+            if self._find_or_refute(max(self.lower, self.upper - fewer), budget, self.best):
+                continue
+            if fewer == 1:
+                return
+            share *= 2
 
     def _try_abstractions(self) -> None:
         """Take the first abstraction whose abstract states, each with a word, are a language."""
@@ -214,13 +224,16 @@ class MinimalSearch:
             self._offer(coarsest)
         self._merging = self.best, self._merging[1]
 
-    def _decide_or_merge(self, size: int, budget: Budget) -> bool:
-        """`decide`; where a number between the bounds takes long, merging goes on."""
-        if self.decide(size, budget):
+    def _decide_or_descend(self, size: int, budget: Budget) -> bool:
+        """`decide`; between the bounds languages are looked for that are alike or near."""
+        if size == self.lower:
+            return self.decide(size, budget)
+        if self._finds_tied(size, budget.rounds):
             return True
-        if size > self.lower:
-            self.merge(_VAIN)
-        return False
+        bounds = self.lower, self.upper
+        self.merge(_VAIN)
+        self._descend(budget)
+        return bounds != (self.lower, self.upper)
 
     def decide(self, size: int, budget: Budget) -> bool:
         """Find a language with ``size`` words, or prove that there is none.
@@ -233,10 +246,11 @@ class MinimalSearch:
             return True
         return size == self.lower == self.upper - 1 and self._finds_tied(size, budget.rounds)
 
-    def _find_or_refute(self, size: int, budget: Budget) -> bool:
-        """`decide` among all partitions."""
+    def _find_or_refute(self, size: int, budget: Budget, near: Assignment | None = None) -> bool:
+        """`decide` among all partitions, those ``near`` a language first."""
         try:
-            refuted = self._refuted_within(size, budget) or self._refuted(size, budget)
+            refuted = self._refuted_within(size, budget) if near is None else None
+            refuted = refuted or self._refuted(size, budget, near)
         except Undecided:
             return False
         if refuted is not None:
@@ -245,20 +259,21 @@ class MinimalSearch:
             self.lower = size + 1
         return True
 
-    def _refuted(self, size: int, budget: Budget) -> Refutation | None:
+    def _refuted(self, size: int, budget: Budget, near: Assignment | None) -> Refutation | None:
         """That there is no language with so few words; None, and one is offered, if there is."""
 
         def partition(conflicts: int) -> dict[int, int] | None:
             if self._is_spent:
                 raise Undecided
-            return self._partitions.find(size, min(conflicts, self._most - self.work))
+            return self._partitions.find(size, min(conflicts, self._most - self.work), near)
 
         found = find(partition, self._holds, budget)
         self._partitions.drop(size)
         if found is None:
             return Refutation.of(size, self.languages.known)
         self._offer(found)
-        self.merge(_VAIN)
+        if near is None:
+            self.merge(_VAIN)
         return None
 
     def _finds_tied(self, size: int, rounds: int) -> bool:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from coordlang.vocabulary.clauses import (
     most_frequent_pairs,
     without_implied,
 )
-from coordlang.vocabulary.job import Evidence
+from coordlang.vocabulary.job import Assignment, Evidence
 from coordlang.vocabulary.loop import ProblemsBySize
 from coordlang.vocabulary.necessary_clauses import NecessaryClauses
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
@@ -54,10 +55,10 @@ class Refutation:
 
 
 class Partitions:
-    """Partitions that satisfy all known clauses, by two solvers.
+    """Partitions that satisfy all known clauses, by three solvers.
 
     The second one is allowed only one of symmetric partitions: proofs are ten times shorter, but
-    partitions harder to find.
+    partitions harder to find.  The third one keeps near a language with more words.
 
     Parameters
     ----------
@@ -87,8 +88,12 @@ class Partitions:
         self._hard: set[int] = set()
         self._all = ProblemsBySize(self._start, require)
         self._up_to_symmetry = ProblemsBySize(self._start_up_to_symmetry, require)
+        self._near = ProblemsBySize(self._start_near, require)
+        self._language: Assignment = {}
 
-    def find(self, size: int, conflicts: int) -> dict[int, int] | None:
+    def find(
+        self, size: int, conflicts: int, near: Assignment | None = None
+    ) -> dict[int, int] | None:
         """A partition into ``size`` words, or None if there is none.
 
         Parameters
@@ -97,12 +102,19 @@ class Partitions:
             The number of words.
         conflicts
             Conflicts of the solver that are allowed.
+        near
+            A language: partitions are looked for that keep its words where clauses allow it.
 
         Raises
         ------
         Undecided
             After so many conflicts.
         """
+        if near is not None:
+            if near is not self._language:
+                self._near.close()
+                self._language = near
+            return self._solved(self._near.under(size, self._clauses), conflicts)
         if size not in self._hard:
             with suppress(Undecided):
                 return self._solved(self._all.under(size, self._clauses), _EASY)
@@ -119,13 +131,13 @@ class Partitions:
 
     def drop(self, size: int) -> None:
         """Forget a number of words that is decided."""
-        self._all.drop(size)
-        self._up_to_symmetry.drop(size)
+        for problems in (self._all, self._up_to_symmetry, self._near):
+            problems.drop(size)
 
     def close(self) -> None:
         """Give back what the solvers hold."""
-        self._all.close()
-        self._up_to_symmetry.close()
+        for problems in (self._all, self._up_to_symmetry, self._near):
+            problems.close()
 
     def _start(
         self, size: int, known: Sequence[Clause], solver: SolverName = "cadical153"
@@ -143,4 +155,14 @@ class Partitions:
         problem = self._start(size, known, "glucose42")
         pairs = most_frequent_pairs(known, _COMPARED_PAIRS)
         problem.add_lex_leaders(self._permutations, pairs)
+        return problem
+
+    def _start_near(self, size: int, known: Sequence[Clause]) -> PartitionProblem:
+        problem = PartitionProblem(self._states, size, "glucose42", named=False)
+        states_of = Counter(self._language.values())
+        largest = {word: n for n, (word, _) in enumerate(states_of.most_common(size))}
+        kept = {state: largest.get(word) for state, word in self._language.items()}
+        problem.prefer({state: word for state, word in kept.items() if word is not None})
+        for clause in known:
+            problem.separate_one(clause)
         return problem

@@ -56,6 +56,12 @@ class PartitionProblem:
         for own, word in zip(self._word[state], words, strict=True):
             self._solver.add_clause([-own, self._word[other][word]])
 
+    def prefer(self, kept: Mapping[int, int]) -> None:
+        """Try first to give these states these words; not with CaDiCaL."""
+        wanted = {self._word[state][word] for state, word in kept.items()}
+        every = (variable for own in self._word.values() for variable in own)
+        self._solver.set_phases([v if v in wanted else -v for v in every])
+
     def separate_one(self, clause: Iterable[Pair]) -> None:
         """Require that one of these pairs of states lies in different words."""
         self._solver.add_clause([self._separate(p) for p in sorted(clause)])
