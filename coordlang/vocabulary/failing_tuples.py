@@ -150,13 +150,14 @@ class FailingTuples:
         """
         found: list[Agreeing] = []
         looked_at = self._images if images is None else images
+        words = np.stack([word[to] for to in looked_at])
         for length, table in sorted(self._tables.items()):
             if sum(len(shorter.rows) for shorter in found) >= enough:
                 break
-            for to in looked_at:
-                rows = agreeing_rows(word[to], table.by_step)
-                if len(rows):
-                    found.append(Agreeing(length, to, rows))
+            image, row = agreeing_rows(words, table.by_step)
+            numbers, first = np.unique(image, return_index=True)
+            for number, rows in zip(numbers.tolist(), np.split(row, first[1:]), strict=False):
+                found.append(Agreeing(length, looked_at[number], rows))
         return found
 
     def codes(
@@ -266,24 +267,32 @@ def _keys(states: Ints) -> Ints:
     return key
 
 
-def agreeing_rows(word: Ints, by_step: Ints) -> Ints:
-    """The tuples all of whose sequences have one sentence; rarely others.
+def agreeing_rows(words: Ints, by_step: Ints) -> tuple[Ints, Ints]:
+    """The tuples all of whose sequences have one sentence under some partition; rarely others.
 
     Most have two sequences that part at once, on their first step or their last one.
 
     Parameters
     ----------
-    word
-        (states) the word of each state number.
+    words
+        (partitions, states) the word of each state number.
     by_step
         (length, robots, tuples) the states; the sequences of a tuple begin in one state.
+
+    Returns
+    -------
+    tuple[Ints, Ints]
+        The partitions, in order, and the rows of the tuples.
     """
-    word = word.astype(np.int32)
-    rows = np.flatnonzero(_part_later(word.take(by_step[0, 0]), word.take(by_step[1])))
-    end, before = (word.take(by_step[step].take(rows, axis=1)) for step in (-1, -2))
-    rows = rows[(end == end[0]).all(axis=0) & _part_later(end[0], before)]
-    found: Ints = rows[agree(word, by_step.take(rows, axis=2))]
-    return found
+    states, words = words.shape[1], words.astype(np.int32)
+    beside = words.take(by_step[1], axis=1).swapaxes(0, 1)
+    partition, rows = np.nonzero(_part_later(words.take(by_step[0, 0], axis=1), beside))
+    flat, of_partition = words.ravel(), partition * states
+    end, before = (flat.take(by_step[step].take(rows, axis=1) + of_partition) for step in (-1, -2))
+    kept = (end == end[0]).all(axis=0) & _part_later(end[0], before)
+    partition, rows = partition[kept], rows[kept]
+    of_one = agree(flat, by_step.take(rows, axis=2) + partition * states)
+    return partition[of_one], rows[of_one]
 
 
 def _part_later(shared: Ints, beside: Ints) -> Bools:

@@ -82,11 +82,8 @@ def test_rows_that_agree_are_those_of_all_steps(
         for row in range(40)
         if has_one_sentence(by_step[:, :, row].T.tolist(), word)
     ]
-    found = [
-        (number, row)
-        for number, word in enumerate(table)
-        for row in agreeing_rows(word, by_step).tolist()
-    ]
+    partitions, rows = agreeing_rows(table, by_step)
+    found = list(zip(partitions.tolist(), rows.tolist(), strict=True))
     assert found == expected
 
 
