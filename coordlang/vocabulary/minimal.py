@@ -225,15 +225,14 @@ class MinimalSearch:
         self._merging = self.best, self._merging[1]
 
     def _decide_or_descend(self, size: int, budget: Budget) -> bool:
-        """`decide`; between the bounds languages are looked for that are alike or near."""
+        """`decide`; between the bounds, look for languages near the best one, then tied ones."""
         if size == self.lower:
             return self.decide(size, budget)
-        if self._finds_tied(size, budget.rounds):
-            return True
         bounds = self.lower, self.upper
-        self.merge(_VAIN)
         self._descend(budget)
-        return bounds != (self.lower, self.upper)
+        if bounds == (self.lower, self.upper):
+            self.merge(_VAIN)
+        return bounds != (self.lower, self.upper) or self._finds_tied(size, budget.rounds)
 
     def decide(self, size: int, budget: Budget) -> bool:
         """Find a language with ``size`` words, or prove that there is none.
