@@ -20,8 +20,8 @@ import pytest
 
 from tests.support.cluster import ENVIRONMENT, needs_distributed, running_cluster
 from tests.support.domains import ROOT
+from tests.support.jobs import until
 from tests.support.pages import DOCS
-from tests.support.processes import until
 
 PAGE = (DOCS / "cluster.md").read_text()
 

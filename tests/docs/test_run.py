@@ -8,9 +8,8 @@ from typing import Any
 
 import pytest
 
-from tests.support.console import matches, run_command, run_python
 from tests.support.domains import ROOT
-from tests.support.pages import PAGES, blocks, commands
+from tests.support.pages import PAGES, blocks, commands, matches, run_command, run_python
 
 
 def test_matches() -> None:

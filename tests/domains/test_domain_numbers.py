@@ -14,14 +14,15 @@ from generate import Scenario, problem_text
 from gridmap import GridMap, open_grid, ring, three_cells
 
 from planners.loading import build
-from planners.pddl import parse_problem, read_domain
+from planners.pddl import parse_problem
 from planners.pddl.formula_tree import conjuncts
 from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import plan_spaces
 from planners.search.plan_space import PlanSpace
-from planners.search.plans import Plans, counts
+from planners.search.plans import counts
 from planners.search.reachable import Space, explore
-from tests.support.domains import DOMAINS, Worlds
+from tests.support.domains import DOMAINS, Worlds, read
+from tests.support.pages import table
 
 #: Table 1 of the paper: problem, tasks, states.
 ALL_TASKS = [
@@ -50,11 +51,17 @@ def to_every_state(space: Space) -> PlanSpace:
     return plans
 
 
+def in_the_readme(problem: str) -> int:
+    (found,) = (row for row in table("grid", "problem") if row["problem"] == problem)
+    return int(found["tasks"])
+
+
 @pytest.mark.parametrize(("problem", "tasks", "states"), ALL_TASKS)
 def test_table_1_all_tasks(world: Worlds, problem: str, tasks: int, states: int) -> None:
     space = world("grid", problem).space
     assert len(space) == states
     assert len(to_every_state(space).starts) == tasks
+    assert in_the_readme(problem) == tasks
 
 
 @pytest.mark.parametrize("style", STYLES)
@@ -64,6 +71,7 @@ def test_table_1_filtered_tasks(
 ) -> None:
     here = world(style, problem)
     assert len(here.space) == states
+    assert in_the_readme(problem) == tasks
     data = json.loads((DOMAINS / "grid" / f"{problem}.tasks.json").read_text())
     assert (data["format"], data["version"]) == ("coordlang/tasks", 1)
     pairs = [(tuple(task["init"]), tuple(task["goal"])) for task in data["tasks"]]
@@ -76,14 +84,11 @@ def test_table_1_filtered_tasks(
 
 def farthest(init: tuple[str, ...], goal: tuple[str, ...]) -> int:
     """The greatest Manhattan distance of a robot, from the atoms' text."""
-    numbers: list[list[list[int]]] = [
-        [[int(n) for n in re.findall(r"\d+", atom)] for atom in state] for state in (init, goal)
-    ]
-    return max(
-        abs(a[1] - b[1]) + abs(a[2] - b[2])
-        for a, b in zip(numbers[0], numbers[1], strict=True)
-        if a[0] == b[0]
+    (a, b) = (
+        {n[0]: n[1:] for n in (tuple(map(int, re.findall(r"\d+", atom))) for atom in state)}
+        for state in (init, goal)
     )
+    return max(abs(a[r][0] - b[r][0]) + abs(a[r][1] - b[r][1]) for r in a)
 
 
 @pytest.mark.parametrize(
@@ -110,19 +115,11 @@ def test_joint_schemas_are_disjoint(world: Worlds, problem: str) -> None:
 
 def steps(space: Space) -> set[tuple[int, tuple[str | None, ...], int]]:
     """(state, where each robot moves, next state); a step that is there twice is an error."""
-    found = [
-        (
-            source,
-            tuple(text and text.split()[-1] for text in space.model.texts(labels)),
-            int(target),
-        )
-        for source in range(len(space))
-        for labels, target in zip(
-            space.labels[space.first[source] : space.first[source + 1]],
-            space.target[space.first[source] : space.first[source + 1]],
-            strict=True,
-        )
+    sources = np.repeat(np.arange(len(space)), np.diff(space.first)).tolist()
+    texts = [
+        tuple(text and text.split()[-1] for text in space.model.texts(own)) for own in space.labels
     ]
+    found = [*zip(sources, texts, space.target.tolist(), strict=True)]
     assert len(set(found)) == len(found)
     return set(found)
 
@@ -163,7 +160,7 @@ def naive_steps(grid: GridMap, state: tuple[str, ...]) -> set[tuple[str, ...]]:
 )
 def test_the_grid_domain_against_its_rules(grid: GridMap, starts: tuple[str, ...]) -> None:
     robots = len(starts)
-    domain = read_domain(DOMAINS / "grid" / "domain.pddl")
+    domain, _ = read("grid", "gw1-2x2")
     text = problem_text(Scenario("naive", grid, starts, starts), "grid")
     loaded = build(domain, [parse_problem(Source("naive", text), domain)])
     space = explore(loaded.model, loaded.tasks[0].init[None, :])
@@ -183,29 +180,3 @@ def test_the_grid_domain_against_its_rules(grid: GridMap, starts: tuple[str, ...
         ]
         assert len(state) == robots
         assert Counter(after) == Counter(naive_steps(grid, state))
-
-
-def test_who_uses_the_passing_place_of_the_corridor(world: Worlds) -> None:
-    here = world("corridor", "problem")
-    aside = Counter(
-        tuple(
-            any(text and text.endswith(" c0-4)") for text in column)
-            for column in zip(*texts, strict=True)
-        )
-        for plan in Plans.of(here.plans)
-        for texts in [[here.loaded.model.texts(labels) for labels in plan]]
-    )
-    assert aside == {(True, False): 16, (False, True): 16}
-
-
-@pytest.mark.parametrize(
-    ("problem", "tasks"), [*((r[0], r[1]) for r in ALL_TASKS), *((r[0], r[1]) for r in FILTERED)]
-)
-def test_the_numbers_of_tasks_in_the_readme(problem: str, tasks: int) -> None:
-    text = (DOMAINS / "grid" / "README.md").read_text()
-    assert re.search(rf"^\| {problem} \| \d+ \| {tasks} \|", text, re.MULTILINE)
-
-
-def test_problems_of_one_folder_name_their_domain() -> None:
-    for path in sorted(DOMAINS.glob("*/domain.pddl")):
-        assert read_domain(path).name == path.parent.name

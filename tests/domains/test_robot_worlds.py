@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
@@ -13,15 +14,14 @@ from coordlang.commands.building import build_language
 from coordlang.required.miscoordination import Inseparable, miscoordination
 from coordlang.verification.by_definition import verify
 from planners.classical.fast_downward import optimal_cost
-from planners.loading import load
+from planners.loading import PlanningInstance, build
+from planners.pddl import read_domain
 from planners.pddl.model_options import Cost, ModelOptions
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from planners.system.limits import time_limit
-from tests.support.console import run_command
-from tests.support.domains import DOMAINS, Worlds
-from tests.support.pages import blocks, commands, links
-from tests.support.readme_tables import Row, candidates, files, tables
+from tests.support.domains import DOMAINS, Worlds, read
+from tests.support.pages import Row, blocks, candidates, commands, links, run_command, table
 
 #: The folders, and how the robots are found in each.
 WORLDS = {
@@ -36,11 +36,15 @@ WORLDS = {
     "flags": ":agent of type robot",
 }
 
+#: Columns of numbers of plans, under another cost.
+COSTS: dict[Cost, str] = {
+    "makespan+actions": "with fewest actions",
+    "makespan+cost": "with least fuel",
+}
 #: The maps, whose tables have fewer columns.
 MAPS = ("grid", "grid-joint", "three-cells", "t-map", "corridor")
-PROBLEMS = [(folder, row) for folder in (*WORLDS, *MAPS) for row in tables(folder, "problem")]
-LANGUAGES = [(folder, row) for folder in (*WORLDS, *MAPS) for row in tables(folder, "language for")]
-by_world = pytest.mark.parametrize("folder", WORLDS)
+PROBLEMS = [(folder, row) for folder in (*WORLDS, *MAPS) for row in table(folder, "problem")]
+LANGUAGES = [(folder, row) for folder in (*WORLDS, *MAPS) for row in table(folder, "language for")]
 
 
 def marks(folder: str, row: Row) -> list[pytest.MarkDecorator]:
@@ -49,12 +53,15 @@ def marks(folder: str, row: Row) -> list[pytest.MarkDecorator]:
     return [pytest.mark.thorough, *large] if folder in MAPS else []
 
 
-# What the README files say
-
-
-def test_every_problem_is_in_a_readme() -> None:
+def test_every_folder_is_described() -> None:
     there = {(p.parent.name, p.stem) for p in DOMAINS.glob("*/*.pddl") if p.stem != "domain"}
     assert {(folder, row["problem"]) for folder, row in PROBLEMS} == there
+    names = {path.parent.name: read_domain(path).name for path in DOMAINS.glob("*/domain.pddl")}
+    assert all(name == folder for folder, name in names.items())
+    for readme in DOMAINS.glob("*/README.md"):
+        assert re.search(
+            "What the words mean here|#what-the-words-mean-here", readme.read_text()
+        ), readme
 
 
 @pytest.mark.parametrize(
@@ -68,17 +75,19 @@ def test_the_table_of_problems(world: Worlds, folder: str, row: Row) -> None:
     assert Plans.of(here.plans).count == int(row["optimal plans"])
     if folder in WORLDS:
         assert len(here.loaded.model.robots) == int(row["robots"])
-        fewest = plans_under(folder, row["problem"], "makespan+actions")
-        assert fewest == int(row["with fewest actions"])
+        assert here.loaded.team.by == WORLDS[folder]
+        for cost, column in COSTS.items():
+            if column in row:
+                loaded = loaded_under(folder, row, cost)
+                plans = Plans.of(search(loaded.model, loaded.tasks[0]))
+                assert plans.count == int(row[column])
         required = miscoordination(here.plans, 0) is not None
         assert row["coordination"] == ("required" if required else "not required")
-    if "with least fuel" in row:
-        assert plans_under(folder, row["problem"], "makespan+cost") == int(row["with least fuel"])
 
 
-def plans_under(folder: str, problem: str, cost: Cost) -> int:
-    loaded = load(*files(folder, problem), ModelOptions(cost=cost))
-    return Plans.of(search(loaded.model, loaded.tasks[0])).count
+def loaded_under(folder: str, row: Row, cost: Cost) -> PlanningInstance:
+    domain, problem = read(folder, row["problem"])
+    return build(domain, [problem], ModelOptions(cost=cost))
 
 
 @pytest.mark.parametrize(
@@ -119,28 +128,21 @@ def test_the_commands_in_the_readme(
         run_command(command, folder, monkeypatch)
 
 
-@by_world
-def test_the_picture(folder: str) -> None:
-    page = DOMAINS / folder / "README.md"
-    assert f"{folder}.svg" in links(page)
+@pytest.mark.parametrize("folder", WORLDS)
+def test_the_picture_and_a_problem_of_each_kind(world: Worlds, folder: str) -> None:
+    assert f"{folder}.svg" in links(DOMAINS / folder / "README.md")
+    svg = "{http://www.w3.org/2000/svg}"
     root = ElementTree.parse(DOMAINS / folder / f"{folder}.svg").getroot()
-    shown = [element.text for element in root.iter("{http://www.w3.org/2000/svg}text")]
-    title = root.findtext("{http://www.w3.org/2000/svg}title") or ""
-    name, _, problem = title.partition(": ")
+    shown = [element.text for element in root.iter(f"{svg}text")]
+    name, _, problem = (root.findtext(f"{svg}title") or "").partition(": ")
     assert name == folder
     # Every robot carries its name, so that no colour has to be told from another one.
-    assert set(load(*files(folder, problem)).model.robots) <= set(shown)
-
-
-@by_world
-def test_there_is_a_problem_of_each_kind(folder: str) -> None:
+    assert set(world(folder, problem).loaded.model.robots) <= set(shown)
     rows = [row for other, row in PROBLEMS if other == folder]
     assert {row["coordination"] for row in rows} == {"required", "not required"}
+    assert all("with fewest actions" in row for row in rows)
     assert 2 <= len(rows) <= 4
     assert all(10 <= int(row["states"]) <= 2000 for row in rows)
-
-
-# Fast Downward
 
 
 @pytest.mark.thorough
@@ -157,22 +159,12 @@ def test_there_is_a_problem_of_each_kind(folder: str) -> None:
     ],
 )
 def test_fast_downward_agrees(folder: str, row: Row) -> None:
-    costs: list[Cost] = ["makespan+actions", "makespan+cost"]
-    for cost in costs[: 1 + ("with least fuel" in row)]:
-        loaded = load(*files(folder, row["problem"]), ModelOptions(cost=cost))
-        ours = search(loaded.model, loaded.tasks[0]).cost_of(0)
-        with time_limit(60):
-            assert optimal_cost(loaded.model, loaded.tasks[0]).cost == ours
-
-
-# How robots are found
-
-
-@by_world
-def test_who_the_robots_are(folder: str) -> None:
-    for other, row in PROBLEMS:
-        if other == folder:
-            assert load(*files(folder, row["problem"])).team.by == WORLDS[folder]
+    for cost, column in COSTS.items():
+        if column in row:
+            loaded = loaded_under(folder, row, cost)
+            ours = search(loaded.model, loaded.tasks[0]).cost_of(0)
+            with time_limit(60):
+                assert optimal_cost(loaded.model, loaded.tasks[0]).cost == ours
 
 
 def test_no_state_tells_who_holds_the_switch() -> None:

@@ -8,20 +8,16 @@ coordination.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import pytest
 
 from coordlang.commands.building import build_language
-from coordlang.language.candidates import Candidates
 from coordlang.language.words import Language
-from coordlang.verification.by_definition import Verdict, verify
+from coordlang.verification.by_definition import verify
 from planners.joint.states import split_atoms
-from tests.support.domains import DOMAINS
 from tests.support.foreign_tasks import Feature, Plan, agreement, exactly, who, who_does_what
-from tests.support.readme_tables import Row, candidates
+from tests.support.pages import candidates
 
 #: Says of a state, given as its atoms, whether it belongs to a word.
 Word = Callable[[frozenset[str]], bool]
@@ -45,71 +41,55 @@ def either(*words: Word) -> Word:
     return lambda atoms: any(word(atoms) for word in words)
 
 
-@dataclass(frozen=True)
-class Meaning:
-    """A language of ``len(words) + 1`` words, as a README describes it: the other word holds the
-    rest.
-    """
-
-    folder: str
-    problem: str
-    tasks: str
-    options: str
-    words: tuple[Word, ...]
-
-    @property
-    def row(self) -> Row:
-        return {"language for": self.problem, "--tasks": self.tasks, "options": self.options}
-
-
 CARRYING = ("(holds arm1 red)", "(holds arm2 blue)")
 OWN = "its own"
 BESIDE = has("(holds r1 back)", "(tray-at parlour)")
-MEANINGS = [
-    Meaning("three-cells", "problem", "all", "", (has("(at r2 a)"), has("(at r2 b)"))),
-    Meaning(
+#: Folder, problem, tasks, options, and what a README says of all words but one, which holds the rest.
+MEANINGS: list[tuple[str, str, str, str, tuple[Word, ...]]] = [
+    ("three-cells", "problem", "all", "", (has("(at r2 a)"), has("(at r2 b)"))),
+    (
         *("t-map", "problem", "all", ""),
         (has("(at r1 c1-1)", "(at r2 c0-1)"), has("(at r1 c1-1)", "(at r2 c1-0)")),
     ),
-    Meaning("corridor", "problem", OWN, "", (has("(at r1 c0-4)"),)),
-    Meaning(
+    ("corridor", "problem", OWN, "", (has("(at r1 c0-4)"),)),
+    (
         *("charger", "three-robots", OWN, "--cost makespan+actions"),
         (only("r1"), only("r2"), has("(charged r3)", without=("(charged r1)", "(charged r2)"))),
     ),
-    Meaning(
+    (
         *("elevator", "two-calls", OWN, ""),
         (has("(stops second)", "(outside r1)", "(outside r2)"),),
     ),
-    Meaning(
+    (
         *("handover", "two-doors", OWN, ""),
         (has("(at r1 west-south)", "(at r2 east-south)", "(holds r2 box)"),),
     ),
-    Meaning(
+    (
         *("handover", "exchange", OWN, ""),
         (lambda s: sum("west" in a and "lies" in a for a in s) == 2,),
     ),
-    Meaning(
+    (
         *("lock", "both-in", "all", ""),
         (
             either(has("(at r1 yard)", "(at r2 yard)"), has("(at r1 hall)", "(at r2 hall)")),
             either(has("(at r1 lock)", "(at r2 yard)"), has("(at r1 hall)", "(at r2 lock)")),
         ),
     ),
-    Meaning(
+    (
         *("lock", "three-robots", OWN, "--remember-actions --cost makespan+actions"),
         (lambda s: any(a.startswith("(last r2 (hold") for a in s),),
     ),
-    Meaning(
+    (
         *("push-box", "around", "all", ""),
         tuple(has(f"(at r1 {p})", f"(at r2 {p})", f"(stands box {p})") for p in ("store", "yard")),
     ),
-    Meaning(
+    (
         *("push-box", "around", OWN, ""),
         (has("(at r1 yard)", "(at r2 yard)", "(stands box yard)"),),
     ),
-    Meaning("tray", "serve", OWN, "", (BESIDE,)),
-    Meaning("tray", "three-robots", OWN, "", (BESIDE,)),
-    Meaning(
+    ("tray", "serve", OWN, "", (BESIDE,)),
+    ("tray", "three-robots", OWN, "", (BESIDE,)),
+    (
         *("two-arms", "exchange", "exchange.tasks.json", ""),
         (
             has("(over arm1 back)", "(over arm2 front)", *CARRYING),
@@ -119,33 +99,31 @@ MEANINGS = [
             ),
         ),
     ),
-    Meaning(
+    (
         *("vans", "one-van", "one-van.tasks.json", ""),
         (has("(aboard d1 v1)", without=("(at v1 depot)",)),),
     ),
 ]
 
 
-def verdict(meaning: Meaning, tasks: Candidates) -> Verdict:
+@pytest.mark.parametrize(("folder", "problem", "tasks", "options", "words"), MEANINGS)
+def test_the_words_of_the_readme_are_a_smallest_language(
+    folder: str, problem: str, tasks: str, options: str, words: tuple[Word, ...]
+) -> None:
+    given = candidates(folder, {"language for": problem, "--tasks": tasks, "options": options})
     states = {}
-    for key in map(tasks.model.codec.key, tasks.rows):
-        mine = [n for n, word in enumerate(meaning.words) if word(frozenset(split_atoms(key)))]
+    for key in map(given.model.codec.key, given.rows):
+        mine = [n for n, word in enumerate(words) if word(frozenset(split_atoms(key)))]
         assert len(mine) <= 1, "words do not overlap"
         if mine:
             states[key] = f"w{mine[0]}"
-    names = (*(f"w{n}" for n in range(len(meaning.words))), "rest")
+    names = (*(f"w{n}" for n in range(len(words))), "rest")
     assert set(states.values()) == set(names[:-1]), "no word is empty"
-    return verify(Language(names, states, "rest").partition(tasks.model), tasks.spaces)
-
-
-@pytest.mark.parametrize("meaning", MEANINGS, ids=lambda m: f"{m.folder}-{m.problem}-{m.tasks}")
-def test_the_words_of_the_readme_are_a_smallest_language(meaning: Meaning) -> None:
-    tasks = candidates(meaning.folder, meaning.row)
-    found = verdict(meaning, tasks)
+    found = verify(Language(names, states, "rest").partition(given.model), given.spaces)
     assert found.holds, found.witness
-    guarantee = build_language(tasks, "minimal").language.guarantee
+    guarantee = build_language(given, "minimal").language.guarantee
     assert guarantee.proved_minimal
-    assert guarantee.size == len(meaning.words) + 1
+    assert guarantee.size == len(words) + 1
 
 
 def moves(plan: Plan) -> frozenset[tuple[int, str]]:
@@ -192,9 +170,3 @@ def test_what_the_sentences_tell(
     assert figures["different"] > 0
     assert figures["told"] == figures["different"]
     assert (figures["left"] > 0) == leaves
-
-
-def test_every_readme_says_what_words_mean() -> None:
-    for readme in sorted(DOMAINS.glob("*/README.md")):
-        text = readme.read_text()
-        assert re.search("What the words mean here|#what-the-words-mean-here", text), readme

@@ -20,7 +20,7 @@ from planners.system.signals import ENDING, Interrupted, postponed_signals
 from planners.system.writing import write_atomically
 from tests.support.command import own_process
 from tests.support.domains import DOMAINS
-from tests.support.processes import until
+from tests.support.jobs import until
 
 FILES = [str(DOMAINS / "grid" / name) for name in ("domain.pddl", "gw1-2x2.pddl")]
 #: Runs the command line, and sends itself a signal when a module of this name is imported, or the

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Jobs for tests, done by other processes: functions that can be sent by name."""
+"""Jobs for tests, done by other processes: functions that can be sent by name, and waiting for them."""
 
 from __future__ import annotations
 
 import os
 import signal
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -70,3 +70,24 @@ def batch(
     """These jobs, each large enough for processes."""
     listed = list(jobs)
     return Batch("a test", function, shared, listed, digest(shared), efforts or [1e6] * len(listed))
+
+
+def until(condition: Callable[[], object], seconds: float = 60) -> None:
+    """Wait for it."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def runs(pid: int) -> bool:
+    """Whether there is such a process, and it is no zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def workers(folder: Path) -> list[int]:
+    """The processes that `waits` and `removes` have met."""
+    return [int(path.name.split("-")[1]) for path in folder.glob("pid-*")]

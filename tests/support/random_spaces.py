@@ -1,19 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plan spaces of random candidate tasks, small enough for the walks that are twins."""
+"""Random models of all kinds (STRIPS with two and three robots, MA-PDDL, plain and joint actions),
+and plan spaces of their tasks, small enough for the walks that are twins.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
 from random import Random
-from typing import Any
+from typing import Any, get_args
 
+import numpy as np
 import pytest
 
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.required.miscoordination import inseparable
-from planners.pddl.model_options import ModelOptions
+from planners.joint.model import JointModel, PlanningTask
+from planners.loading import PlanningInstance, build
+from planners.pddl.lifted import Domain, Problem
+from planners.pddl.model_options import Cost, ModelOptions
+from planners.search.optimal_plans import plan_spaces
 from planners.search.plan_space import PlanSpace
+from planners.search.reachable import Space, explore
 from planners.system.errors import BadInput, ProvedImpossible
 from tests.support.random_models import random_model
 from tests.support.random_pddl import random_model as random_pddl
@@ -32,14 +40,47 @@ def candidates_of(seed: int, robots: int) -> Candidates:
     return all_pairs(domain, [problem], options)
 
 
-def candidates_of_kinds(seed: int) -> Candidates:
+def of_any_kind(seed: int, random: Random) -> tuple[Domain, Problem, ModelOptions]:
     """MA-PDDL with formulas, plain PDDL with shared actions, joint-action PDDL with drift."""
-    random = Random(seed)
     text = random_pddl(seed, random.choice(["agent", "plain", "joint"]))
-    domain, problem = parsed(text.domain, text.problem)
     options = ModelOptions(unowned=text.unowned, remember_actions=random.random() < 0.3)
-    make = from_problems if random.random() < 0.3 else all_pairs
-    return make(domain, [problem], options)
+    return (*parsed(text.domain, text.problem), options)
+
+
+def candidates_of_kinds(seed: int) -> Candidates:
+    random = Random(seed)
+    domain, problem, options = of_any_kind(seed, random)
+    return (from_problems if random.random() < 0.3 else all_pairs)(domain, [problem], options)
+
+
+def random_instance(seed: int, cost: Cost | None = None) -> PlanningInstance | None:
+    """The model of a seed, under ``cost`` or a random one; None where it is refused."""
+    random = Random(seed)
+    try:
+        if seed % 2:
+            domain, problem, options = random_model(seed, random.choice((2, 3)))
+        else:
+            domain, problem, options = of_any_kind(seed, random)
+        chosen = random.choice(get_args(Cost)) if cost is None else cost
+        return build(domain, [problem], replace(options, cost=chosen))
+    except BadInput:
+        return None
+
+
+def explored(loaded: PlanningInstance) -> Space | None:
+    """All reachable states; None where joint actions cannot be told apart."""
+    try:
+        return explore(loaded.model, loaded.tasks[0].init[None, :])
+    except BadInput:
+        return None
+
+
+def blind_search(model: JointModel, task: PlanningTask) -> PlanSpace:
+    """All optimal plans by exploring every reachable state, without any bound."""
+    init = task.init[None, :]
+    (found,) = plan_spaces(explore(model, init), [(task.goal, init)])
+    used, state = np.unique(found.state, return_inverse=True)
+    return replace(found, rows=found.rows[used], state=state)
 
 
 def random_spaces(

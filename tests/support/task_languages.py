@@ -1,33 +1,50 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Languages in tasks: of shipped worlds, built or the paper's own, and of random models."""
+"""Languages in tasks: of shipped worlds, built or the paper's own, and of random models; and what a
+naive twin lists of each of their sentences.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache
-from itertools import count
+from itertools import combinations, count
 from random import Random
 
+import numpy as np
 import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
-from coordlang.language.candidates import Candidates, from_listed, from_problems
+from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
 from coordlang.language.listed import ListedTask
 from coordlang.language.partition import Partition
 from coordlang.language.words import Language
 from coordlang.required.miscoordination import Inseparable
+from coordlang.verification.by_definition import verify
 from planners.loading import build
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
+from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans
 from planners.search.reachable import explore
 from planners.system.errors import ProvedImpossible
+from tests.support import naive
 from tests.support.domains import DOMAINS, all_tasks, own_task
-from tests.support.random_chores import random_chores
-from tests.support.random_models import graph_text, random_model
+from tests.support.naive_choices import Listed, listed
+from tests.support.random_models import graph_text, random_chores, random_model
 from tests.support.texts import parsed
 
+#: (robots, random models): some always, more of them in CI.
+RANDOM = [(2, 25), (3, 25), *(pytest.param(n, 120, marks=pytest.mark.thorough) for n in (2, 3))]
+#: The same for comparisons with what a twin lists, most of them with ``-m slow``.
+RUNS = [
+    *((2, 20), (3, 16)),
+    *(pytest.param(*many, marks=pytest.mark.slow) for many in ((2, 400), (3, 250))),
+]
+#: Robots -> (plans of one task, combinations of one sentence) that the twin lists at most.
+SIZES = {2: (200, 400), 3: (120, 400)}
 #: Every shipped domain; of the many maps that differ in size only, some.
 SHIPPED = [
     f"{path.parent.name}/{path.stem}"
@@ -38,6 +55,29 @@ SHIPPED = [
         or path.stem in ("corners-4x4", "gw2-2x3", "gwb5-3x3", "three-cells")
     )
 ] + ["grid/three-robots-3x3"]
+
+
+class Unsuitable(Exception):
+    """A random model without a solvable task, without a language, or with too much to list."""
+
+
+def in_words(
+    language: Language | None, table: Partition, space: PlanSpace, task: int
+) -> TaskLanguage:
+    word = table.word_of(space.rows)[space.state]
+    return TaskLanguage(language, table, space, task, word, True)  # type: ignore[arg-type]
+
+
+def language_of(words: dict[str, str], names: tuple[str, ...]) -> Language:
+    return Language(names, words, names[0])
+
+
+def random_language(random: Random, candidates: Candidates) -> Language:
+    """Some of the states, each with a random word of a few: no coordination language, mostly."""
+    names = tuple(f"w{n}" for n in range(random.randint(1, 4)))
+    keys = [candidates.model.codec.key(row) for row in candidates.rows]
+    mapped = random.sample(keys, random.randint(1, len(keys)))
+    return language_of({key: random.choice(names) for key in sorted(mapped)}, names)
 
 
 @cache
@@ -52,7 +92,7 @@ def shipped(name: str) -> tuple[Candidates, TaskLanguage]:
             language = build_language(candidates, "greedy").language
         except Inseparable:
             continue
-        return candidates, in_its_task(candidates, language)
+        return candidates, next(languages_in_tasks(language, candidates))
     raise AssertionError(name)
 
 
@@ -71,7 +111,7 @@ def three_cells() -> TaskLanguage:
     optimal plans.
     """
     candidates = own_task("three-cells")
-    return next(iter(languages_in_tasks(where_r2_is(candidates), candidates)))
+    return next(languages_in_tasks(where_r2_is(candidates), candidates))
 
 
 @cache
@@ -81,19 +121,6 @@ def task_languages(
     """Every candidate task with a language that a method makes."""
     candidates = (all_tasks if everything else own_task)(folder, stem)
     return tuple(languages_in_tasks(build_language(candidates, method).language, candidates))
-
-
-class Unsuitable(Exception):
-    """A random model without a task that can be solved, or with too many plans to list."""
-
-
-#: (robots, random models): some always, more of them in CI.
-RANDOM = [
-    (2, 25),
-    (3, 25),
-    pytest.param(2, 120, marks=pytest.mark.thorough),
-    pytest.param(3, 120, marks=pytest.mark.thorough),
-]
 
 
 @cache
@@ -142,7 +169,7 @@ def random_task_language(seed: int, robots: int) -> tuple[Candidates, TaskLangua
     mapped = [n for n in used if random.random() < 0.9] or used[:1]
     partition = {n: random.randrange(size) for n in mapped}
     language = Language.of(Partition.of_states(candidates.rows, partition), candidates.model)
-    return candidates, in_its_task(candidates, language)
+    return candidates, next(languages_in_tasks(language, candidates))
 
 
 def long_task(
@@ -172,6 +199,93 @@ def long_task(
     return ListedTask(tuple(codec.decode(space.rows[start])), tuple(literals))
 
 
-def in_its_task(candidates: Candidates, language: Language) -> TaskLanguage:
-    space, table = candidates.spaces[0], language.partition(candidates.model)
-    return TaskLanguage(language, table, space, 0, table.word_of(space.rows)[space.state], True)
+def candidates_of(seed: int, robots: int) -> Candidates:
+    """A random model with all pairs of its states, or with one task and a partial goal; half of
+    them chores.
+    """
+    chores = seed % 2 == 0
+    domain, problem, options = (random_chores if chores else random_model)(seed, robots)
+    if seed % 5 == 0:
+        options = replace(options, remember_actions=True)
+    make = all_pairs if seed % 3 and not chores else from_problems
+    try:
+        found = make(domain, [problem], options)
+    except ProvedImpossible:
+        raise Unsuitable from None
+    if not 0 < found.count <= 120 or max(map(len, found.spaces)) > (1000 if robots == 2 else 60):
+        raise Unsuitable
+    return found
+
+
+def tasks_of(candidates: Candidates, seed: int) -> list[tuple[PlanSpace, int]]:
+    """Eight of the candidate tasks, those with most choices first."""
+    tasks = [(space, task) for space in candidates.spaces for task in range(len(space.starts))]
+    Random(seed).shuffle(tasks)
+    return sorted(tasks, key=lambda t: -int(t[0].layer[t[0].starts[t[1]]]))[:8]
+
+
+def in_built_languages(seed: int, robots: int) -> Iterator[TaskLanguage]:
+    """A built and verified language in some of its candidate tasks; most of them with as few words
+    as merging gives.
+    """
+    candidates = candidates_of(seed, robots)
+    small = len(candidates.rows) <= 8
+    method = ["greedy", "minimal", "exhaustive"][seed // 7 % 3] if small else "greedy"
+    try:
+        language = build_language(candidates, method).language
+    except Inseparable:
+        raise Unsuitable from None
+    table = language.partition(candidates.model)
+    if seed // 11 % 4:
+        table = merged(table, candidates, seed)
+    for space, task in tasks_of(candidates, seed):
+        yield in_words(language, table, space, task)
+
+
+def merged(table: Partition, candidates: Candidates, seed: int) -> Partition:
+    """Words merged at random as long as it stays a language: sentences then leave more open, and
+    mix more.
+    """
+    words = list(range(len(table.words)))
+    pairs = list(combinations(words, 2))
+    Random(seed).shuffle(pairs)
+    for a, b in pairs[: 40 if len(candidates.model.robots) == 2 else 12]:
+        coarser = replace(
+            table,
+            word=np.where(table.word == b, a, table.word),
+            default=a if table.default == b else table.default,
+        )
+        if verify(coarser, candidates.spaces).holds:
+            table = coarser
+    return table
+
+
+def in_random_words(seed: int, robots: int) -> Iterator[TaskLanguage]:
+    """A partition at random, which may be no language, in some candidate tasks."""
+    candidates = candidates_of(seed, robots)
+    random = Random(seed)
+    size = random.randint(1, 3)
+    word = np.array([random.randrange(size) for _ in candidates.rows])
+    table = Partition(tuple(f"w{n}" for n in range(size)), candidates.rows, word, 0)
+    for space, task in tasks_of(candidates, seed):
+        yield in_words(None, table, space, task)
+
+
+def with_twins(
+    make: Callable[[int, int], Iterator[TaskLanguage]], robots: int, models: int
+) -> Iterator[tuple[int, TaskLanguage, tuple[int, ...], Listed]]:
+    """(seed, task, sentence, what is listed of it) over many random models."""
+    for seed in range(models):
+        with suppress(Unsuitable):
+            for task_language in make(seed, robots):
+                with suppress(naive.TooLarge):
+                    for words, twin in list(listed(task_language, *SIZES[robots])):
+                        yield seed, task_language, words, twin
+
+
+def sentence_of(task_language: TaskLanguage) -> str:
+    plan = next(iter(Plans.of(task_language.space, task_language.task)))
+    states = Plans(task_language.space, task_language.start, []).states(plan)
+    return task_language.text(
+        naive.sentence(task_language.partition.word_of(task_language.space.rows[states]).tolist())
+    )

@@ -27,15 +27,15 @@ from planners.system.errors import OutOfMemory
 from tests.support import naive
 from tests.support.domains import read
 from tests.support.naive_choices import Listed, accepted, listed
-from tests.support.random_choices import (
+from tests.support.random_models import CHORES
+from tests.support.task_languages import (
     RUNS,
     in_built_languages,
     in_random_words,
     sentence_of,
+    shipped,
     with_twins,
 )
-from tests.support.random_chores import DOMAIN
-from tests.support.task_languages import shipped
 
 
 def moves(automaton: Automaton) -> list[dict[int, int]]:
@@ -267,7 +267,7 @@ def test_choices_may_leave_the_sentence(robots: int) -> None:
         f"(:init {' '.join(f'(mine {r} c{i}) (gets c{i} t{i})' for r, i in items)})"
         f"(:goal (and {' '.join(f'(got t{i})' for _, i in items)})))"
     )
-    domain = parse_domain(Source("d", DOMAIN))
+    domain = parse_domain(Source("d", CHORES))
     candidates = from_problems(domain, [parse_problem(Source("p", text), domain)])
     space, codec = candidates.spaces[0], candidates.model.codec
     begun = [

@@ -22,8 +22,7 @@ from coordlang.execution.choices import SentenceChoices, choices, monitor, to_by
 from coordlang.execution.monitor import Detour, Monitor, MonitorError, NotAllowed, NotPossible
 from coordlang.execution.task_language import TaskLanguage
 from tests.support.naive_choices import Known, Listed, Own
-from tests.support.random_choices import RUNS, in_built_languages, with_twins
-from tests.support.task_languages import shipped
+from tests.support.task_languages import RUNS, in_built_languages, shipped, with_twins
 
 
 @pytest.fixture(scope="module")

@@ -22,8 +22,8 @@ from planners.system.errors import ProvedImpossible
 from tests.support import naive
 from tests.support.command import Command
 from tests.support.domains import DOMAINS, all_tasks
-from tests.support.languages import random_language
 from tests.support.random_models import random_model
+from tests.support.task_languages import random_language
 
 
 def by_sentence(task_language: TaskLanguage, most: int) -> dict[tuple[int, ...], list[Plan]]:

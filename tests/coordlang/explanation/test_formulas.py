@@ -30,8 +30,8 @@ from planners.pddl.model_options import ModelOptions
 from planners.search.reachable import explore
 from planners.system.errors import ProvedImpossible
 from tests.support.domains import DOMAINS, all_tasks
-from tests.support.languages import language_of, random_language
 from tests.support.random_models import random_model
+from tests.support.task_languages import language_of, random_language
 
 
 def listed(conjunction: tuple[str, ...], atoms: set[str]) -> bool:

@@ -41,8 +41,7 @@ from tests.support.command import Command, own_process
 from tests.support.domains import DOMAINS
 from tests.support.naive_classical import optimal_plans
 from tests.support.other_planners import rows as answers
-from tests.support.random_chores import random_chores
-from tests.support.random_models import random_model
+from tests.support.random_models import random_chores, random_model
 from tests.support.task_languages import task_languages
 
 FORMS = {"explicit": 100_000, "select-then-apply": 0}

@@ -17,10 +17,9 @@ from planners.pddl import parse_domain, parse_problem, read_domain
 from planners.pddl.sexpr import Source
 from planners.search.plans import Plans, counts
 from planners.system.errors import ProvedImpossible
-from tests.support import slow_symmetry
 from tests.support.domains import DOMAINS, all_tasks
 from tests.support.random_models import random_model
-from tests.support.symmetric_worlds import GRID, world
+from tests.support.symmetric_worlds import GRID, state_symmetries, world
 
 
 def random_world(random: Random) -> Candidates | None:
@@ -69,7 +68,7 @@ def test_the_group_that_the_slow_twin_finds() -> None:
         if candidates is None:
             continue
         group = symmetry_group(candidates, largest=1_000)
-        assert elements(group) == slow_symmetry.state_symmetries(candidates, 100_000)
+        assert elements(group) == state_symmetries(candidates)
         assert not group.dropped
         sizes.append(len(group.symmetries))
     assert sum(size > 1 for size in sizes) >= 8
@@ -90,7 +89,7 @@ def test_the_group_of_unstructured_models(robots: int) -> None:
         if not 0 < candidates.count <= 3_000:
             continue
         group = symmetry_group(candidates)
-        assert elements(group) == slow_symmetry.state_symmetries(candidates, 100_000)
+        assert elements(group) == state_symmetries(candidates)
         found += bool(group.symmetries)
     assert found >= 2
 
@@ -111,7 +110,7 @@ def test_the_group_of_unstructured_models(robots: int) -> None:
 def test_the_group_of_shipped_domains(folder: str, stem: str) -> None:
     candidates = all_tasks(folder, stem)
     group = symmetry_group(candidates)
-    assert elements(group) == slow_symmetry.state_symmetries(candidates, 200_000)
+    assert elements(group) == state_symmetries(candidates)
     assert is_group(elements(group))
     assert not group.dropped
 

@@ -33,8 +33,8 @@ from tests.support.classical_models import (
     written,
 )
 from tests.support.naive_classical import optimal_plans
+from tests.support.random_models import random_threes
 from tests.support.random_pddl import KINDS, Kind, random_model
-from tests.support.random_threes import random_threes
 from tests.support.texts import model_of, parsed
 
 #: Two ground actions of joint-action PDDL with the same parts: where both are possible they are one

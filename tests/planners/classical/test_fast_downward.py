@@ -26,7 +26,7 @@ from planners.system.errors import OutOfMemory, OutOfTime
 from planners.system.limits import time_limit
 from tests.support.classical_models import FORMS, MODELS, read
 from tests.support.domains import ROOT
-from tests.support.processes import until
+from tests.support.jobs import until
 
 #: Lamps along a corridor that put out their neighbours: more states than anybody searches in the
 #: time of a test.

@@ -16,8 +16,8 @@ from planners.grounding.reachability import reachable_arguments
 from planners.joint.model import own_text
 from planners.pddl.lifted import Atom, Domain
 from tests.support.joint_twin import built, check_model, twin_of
+from tests.support.random_models import random_threes
 from tests.support.random_pddl import KINDS, Kind, RandomModel, random_model
-from tests.support.random_threes import random_threes
 
 
 @pytest.fixture(autouse=True, scope="module")

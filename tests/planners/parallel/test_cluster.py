@@ -25,8 +25,7 @@ from planners.system.limits import time_limit
 from tests.support import jobs
 from tests.support.cluster import ENVIRONMENT, Cluster, needs_distributed, running_cluster
 from tests.support.domains import ROOT
-from tests.support.jobs import batch
-from tests.support.processes import until, workers
+from tests.support.jobs import batch, until, workers
 
 pytestmark = needs_distributed
 

@@ -19,8 +19,7 @@ from planners.system.errors import BadInput, OutOfMemory, OutOfTime, UsageError
 from planners.system.limits import address_space, limited_memory, time_limit
 from tests.support import jobs
 from tests.support.domains import ROOT
-from tests.support.jobs import batch
-from tests.support.processes import runs, until, workers
+from tests.support.jobs import batch, runs, until, workers
 
 TWO = Workers(2)
 #: How a script begins that has jobs done by two processes.

@@ -25,10 +25,9 @@ from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 from planners.search.reachable import PIECES
 from planners.system.errors import BadInput, ProvedImpossible
-from tests.support import blind_search
 from tests.support.domains import DOMAINS, world_of
-from tests.support.random_instances import random_instance
-from tests.support.random_threes import random_threes
+from tests.support.random_models import random_threes
+from tests.support.random_spaces import blind_search, random_instance
 from tests.support.texts import model_of
 
 #: Searches that ask the solver at once, with effort for all or some of its answers, and one that
@@ -130,7 +129,7 @@ def compared(models: Iterable[PlanningInstance | None]) -> Counter[str]:
         if loaded.domain.name == "rooms":  # made for what the solver is asked
             searches = [(asking, "auto") for asking in ASKING[number % 2 :: 2]]
         try:
-            twin = blind_search.search(model, task)
+            twin = blind_search(model, task)
         except BadInput:  # joint actions that no robot can tell apart, somewhere
             continue
         except ProvedImpossible:
@@ -178,7 +177,7 @@ def test_steps_are_composed_again_however_many_there_were() -> None:
         pieces = replace(PIECES, probe=probe, kept=0)
         found, effort = search_with_effort(loaded.model, loaded.tasks[0], pieces)
         again += effort.steps > probe and "SAT" not in effort.heuristic
-        equal(found, blind_search.search(loaded.model, loaded.tasks[0]))
+        equal(found, blind_search(loaded.model, loaded.tasks[0]))
     assert again
 
 

@@ -20,7 +20,7 @@ from planners.search.reachable import Space, explore
 from planners.search.state_variables import StateVariable, state_variables
 from planners.system.errors import UsageError
 from tests.support.domains import DOMAINS
-from tests.support.random_instances import explored, random_instance
+from tests.support.random_spaces import explored, random_instance
 from tests.support.texts import model_of
 
 
