@@ -19,6 +19,8 @@ from planners.joint.tables import Bools
 from planners.search.plan_space import PlanSpace
 
 Nodes = tuple[int, ...]
+#: For each node the next one by the labels of the step.
+Steps = list[dict[Nodes, int]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,16 +35,41 @@ class Walk:
     divergences: Divergences
 
 
+def steps_of(space: PlanSpace) -> Steps:
+    steps: Steps = [{} for _ in range(len(space))]
+    table = zip(space.sources.tolist(), space.labels.tolist(), space.target.tolist(), strict=True)
+    for node, labels, target in table:
+        steps[node][tuple(labels)] = target
+    return steps
+
+
+def first_break(steps: Steps, robots: int, start: int, *, together: bool) -> int | None:
+    """The least step after which a mixture of plans from a node begins no optimal plan; with
+    ``together`` of plans in the same states only.
+    """
+    layer, step = {((start,) * robots, start)}, 0
+    while layer:
+        after = set()
+        for plans, mixture in layer:
+            for chosen in product(*(steps[node].items() for node in plans)):
+                ends = tuple(target for _, target in chosen)
+                if together and len({*ends}) > 1:
+                    continue
+                mixed = tuple(labels[robot] for robot, (labels, _) in enumerate(chosen))
+                if mixed not in steps[mixture]:
+                    return step
+                after.add((ends, steps[mixture][mixed]))
+        layer, step = after, step + 1
+    return None
+
+
 def walk(space: PlanSpace) -> Walk:
     """Walk from every node ``p`` of the plan space with all plans and the mixture in ``p``.
 
     Where no plans are inseparable (`inseparable`), the divergences at ``p`` depend on ``p`` only,
     whatever was done before: the proof is in docs/concepts.md.
     """
-    steps: list[dict[Nodes, int]] = [{} for _ in range(len(space))]
-    table = zip(space.sources.tolist(), space.labels.tolist(), space.target.tolist(), strict=True)
-    for node, labels, target in table:
-        steps[node][tuple(labels)] = target
+    steps = steps_of(space)
     known: dict[tuple[Nodes, int], bool] = {}
 
     def moves(plans: Nodes, mixture: int) -> Iterator[tuple[Nodes, int | None]]:

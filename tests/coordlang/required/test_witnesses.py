@@ -16,8 +16,8 @@ from coordlang.required.witnesses import witness_in_same_states
 from planners.check.validate import Verdict, validate
 from planners.joint.model import JointModel
 from planners.search.plan_space import PlanSpace
+from tests.support.composition_walk import first_break, steps_of
 from tests.support.random_spaces import random_spaces, runs
-from tests.support.witness_walk import walk_to_a_witness
 
 
 def breaks(candidates: Candidates, space: PlanSpace, found: Miscoordination) -> None:
@@ -69,10 +69,13 @@ def goes(space: PlanSpace, node: int, found: Miscoordination) -> bool:
 def test_breaks_equal_the_walk(robots: int | None, seeds: range) -> None:
     answers: Counter[tuple[str, bool]] = Counter()
     for candidates, space in random_spaces(seeds, robots):
-        starts = np.unique(space.starts)
-        together = walk_to_a_witness(space, starts, together=True)
+        steps = steps_of(space)
+        together = all(
+            first_break(steps, space.robots, start, together=True) is None
+            for start in np.unique(space.starts).tolist()
+        )
         shown = inseparable(space)
-        assert (shown is None) == (together is None) == (witness_in_same_states(space) is None)
+        assert (shown is None) == together == (witness_in_same_states(space) is None)
         answers["inseparable", shown is not None] += 1
         if shown is not None:
             breaks(candidates, space, shown)
@@ -80,12 +83,12 @@ def test_breaks_equal_the_walk(robots: int | None, seeds: range) -> None:
         requires = Choices(space).requires[space.starts]
         some = [*np.flatnonzero(requires)[:4].tolist(), *np.flatnonzero(~requires)[:2].tolist()]
         for task in some:
-            twin = walk_to_a_witness(space, space.starts[[task]], together=False)
+            twin = first_break(steps, space.robots, int(space.starts[task]), together=False)
             found = miscoordination(space, task)
             assert (found is None) == (twin is None)
             answers["break", found is not None] += 1
-            if found is not None and twin is not None:
-                assert found.step == len(twin.edges) - 1
+            if found is not None:
+                assert found.step == twin
                 breaks(candidates, space, found)
     print(f"{robots or 'any'} robots: {dict(answers)}")
     for kind in ("inseparable", "break"):
