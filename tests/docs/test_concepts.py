@@ -8,19 +8,16 @@ import re
 from itertools import product
 
 from coordlang.required.miscoordination import inseparable, miscoordination
-from planners.loading import build
-from planners.pddl import parse_domain, parse_problem
-from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
-from planners.search.plans import Plan, Plans
+from planners.search.plans import Plans
+from tests.support import naive
 from tests.support.domains import ROOT
 from tests.support.pages import DOCS, code, prose, rows, sections
+from tests.support.texts import model_of
 
 
-def joint_space(
-    actions: list[tuple[str, str, str]], robots: int, goal: str, init: str = ""
-) -> PlanSpace:
+def joint_space(actions: list[tuple[str, str, str]], robots: int, goal: str) -> PlanSpace:
     """Joint-action PDDL from (subactions, precondition, effect); ``-`` is idling, facts are p0 ..
     p9.
     """
@@ -34,21 +31,12 @@ def joint_space(
             f"(:action j{number} :parameters ()\n{comments}\n :precondition (and {before}) :effect (and {after}))"
         )
     predicates = " ".join(f"(p{n})" for n in range(10))
-    domain = parse_domain(
-        Source("d", f"(define (domain d) (:predicates {predicates})\n" + "\n".join(text) + ")")
+    loaded = model_of(
+        f"(define (domain d) (:predicates {predicates})\n" + "\n".join(text) + ")",
+        f"(define (problem p) (:domain d) (:init) (:goal (and {goal})))",
     )
-    problem = parse_problem(
-        Source("p", f"(define (problem p) (:domain d) (:init {init}) (:goal (and {goal})))"), domain
-    )
-    loaded = build(domain, [problem])
     assert len(loaded.model.robots) == robots
     return search(loaded.model, loaded.tasks[0])
-
-
-def mixture(plans: tuple[Plan, ...]) -> Plan:
-    return tuple(
-        tuple(step[i] for i, step in enumerate(steps)) for steps in zip(*plans, strict=True)
-    )
 
 
 def test_two_actions_of_one_effect() -> None:
@@ -72,19 +60,12 @@ def test_failing_after_the_plans_have_met() -> None:
     finish = [("finish -", "(p2) (p0)", "(p3)"), ("- finish", "(p2) (not (p0))", "(p3)")]
     space = joint_space(flip + finish, 2, "(p3)")
     plans = Plans.of(space)
-    model = space.model
-    idle = "idle"
-    by_text = {
-        tuple(tuple(t or idle for t in model.texts(step)) for step in plan): plan for plan in plans
-    }
-    first = by_text[(("(flip)", idle), (idle, idle), ("(finish)", idle))]
-    second = by_text[((idle, idle), (idle, "(flip)"), ("(finish)", idle))]
-    mixed = mixture((second, first))
-    assert tuple(tuple(t or idle for t in model.texts(s)) for s in mixed) == (
-        (idle, idle),
-        (idle, idle),
-        ("(finish)", idle),
-    )
+    by_text = {tuple(map(space.model.texts, plan)): plan for plan in plans}
+    first = by_text[(("(flip)", None), (None, None), ("(finish)", None))]
+    second = by_text[((None, None), (None, "(flip)"), ("(finish)", None))]
+    mixed = naive.mixture((second, first))
+    waits = (None, None)
+    assert [*map(space.model.texts, mixed)] == [waits, waits, ("(finish)", None)]
     assert plans.states(first)[1] != plans.states(second)[1]
     assert plans.states(first)[2] == plans.states(second)[2]
     assert plans.rank(mixed) is None
@@ -102,8 +83,8 @@ def test_three_robots_need_three_plans() -> None:
     same = [plan for plan in plans if len(set(plan[0])) == 1]
     assert len(same) == 3
     for two in product(same, repeat=2):
-        assert all(mixture(chosen) in everything for chosen in product(two, repeat=3))
-    assert mixture((same[0], same[1], same[2])) not in everything
+        assert all(naive.mixture(chosen) in everything for chosen in product(two, repeat=3))
+    assert naive.mixture(tuple(same)) not in everything
     assert miscoordination(space, 0) is not None
 
 
@@ -118,21 +99,12 @@ def test_names_of_the_table_exist() -> None:
 
 def test_propositions_that_docstrings_cite_are_there() -> None:
     page = prose(DOCS / "concepts.md")
-    real = {
-        int(number)
-        for number in re.findall(
-            r"^(?:- \*[^*]+\* )?\*\*Proposition (\d+)\.?\*\*", page, re.MULTILINE
-        )
-    }
-    cited = {
-        int(number)
-        for package in ("planners", "coordlang")
-        for path in (ROOT / package).rglob("*.py")
-        for found in re.findall(
-            r"Propositions? ([\d, and]+)\s+of\s+docs/concepts", path.read_text()
-        )
-        for number in re.findall(r"\d+", found)
-    }
+    stated = re.findall(r"(?m)^(?:- \*[^*]+\* )?\*\*Proposition (\d+)\.?\*\*", page)
+    real = {*map(int, stated)}
+    paths = [path for name in ("planners", "coordlang") for path in (ROOT / name).rglob("*.py")]
+    text = "\n".join(path.read_text() for path in paths)
+    citing = re.findall(r"Propositions? ([\d, and]+)\s+of\s+docs/concepts", text)
+    cited = {int(number) for found in citing for number in re.findall(r"\d+", found)}
     assert real == set(range(1, len(real) + 1))
     assert len(cited) > 5
     assert cited <= real

@@ -3,17 +3,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
-from coordlang.commands.main import run
-from planners.loading import build
-from planners.pddl import parse_domain, parse_problem
+from planners.pddl import parse_domain
 from planners.pddl.sexpr import Source
-from planners.system.errors import Unsupported
+from planners.system.errors import BadInput, Unsupported
 from tests.support.domains import ROOT
 from tests.support.pages import DOCS, blocks, code, links, rows, sections
+from tests.support.texts import model_of
 
 PAGE = DOCS / "pddl.md"
 REFUSED = rows(sections(PAGE)["What is not supported"])
@@ -31,36 +28,26 @@ def texts(where: str = "", example: str = "") -> tuple[str, str]:
     )
 
 
-def load(domain: str, problem: str) -> None:
-    lifted = parse_domain(Source("domain", domain))
-    build(lifted, [parse_problem(Source("problem", problem), lifted)])
-
-
 def test_without_an_example_nothing_is_refused() -> None:
-    load(*texts())
+    model_of(*texts())
     assert len(REFUSED) >= 19
 
 
 @pytest.mark.parametrize("cells", REFUSED, ids=lambda cells: cells[0])
 def test_what_is_not_supported(cells: list[str]) -> None:
     with pytest.raises(Unsupported) as error:
-        load(*texts(cells[1], code(cells[0])[0]))
+        model_of(*texts(cells[1], code(cells[0])[0]))
     assert error.value.what in (f"{cells[2]} {verb} not supported" for verb in ("is", "are"))
     assert error.value.exit_code == 34
     place = error.value.position
     assert place is not None
-    assert place.file == ("problem" if cells[1] == "init" else "domain")
+    assert place.file == ("problem.pddl" if cells[1] == "init" else "domain.pddl")
     assert place.line > 0
 
 
-def test_an_unknown_section_is_bad_input(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    domain, problem = texts("section", "(:observe (p))")
-    (tmp_path / "d.pddl").write_text(domain)
-    (tmp_path / "p.pddl").write_text(problem)
-    assert run(["inspect", str(tmp_path / "d.pddl"), str(tmp_path / "p.pddl")]) == 31
-    assert "unknown section ':observe'" in capsys.readouterr().err
+def test_an_unknown_section_is_bad_input() -> None:
+    with pytest.raises(BadInput, match="unknown section ':observe'"):
+        model_of(*texts("section", "(:observe (p))"))
 
 
 def test_every_answer_is_compared() -> None:

@@ -72,18 +72,10 @@ def test_every_file_names_its_licence() -> None:
     assert [path for path in PYTHON_FILES if not path.read_text("utf-8").startswith(line)] == []
 
 
-def test_no_test_file_imports_another() -> None:
-    """What several need is in tests/support."""
+def test_no_test_file_imports_another_and_no_script_hides_a_module_of_python() -> None:
+    """What several need is in tests/support; folders of scripts are in the path of what they start."""
     importing = re.compile(r"^(?:from|import) tests\.(?:\w+\.)*test_\w+", re.MULTILINE)
-    files = sorted((ROOT / "tests").rglob("*.py"))
-    assert len(files) > 100
-    assert [str(path) for path in files if importing.search(path.read_text("utf-8"))] == []
-
-
-def test_no_script_hides_a_module_of_python() -> None:
-    """Folders of scripts are in the path of what they start."""
-    scripts = [
-        path.stem for name in ("benchmarks", "domains") for path in (ROOT / name).glob("*.py")
-    ]
+    assert [str(path) for path in PYTHON_FILES if importing.search(path.read_text("utf-8"))] == []
+    scripts = [p for p in PYTHON_FILES if p.parent in (ROOT / "benchmarks", ROOT / "domains")]
     assert len(scripts) > 10
-    assert not {*scripts} & sys.stdlib_module_names
+    assert not {path.stem for path in scripts} & sys.stdlib_module_names

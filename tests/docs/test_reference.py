@@ -20,10 +20,7 @@ from tests.support.pages import DOCS, PAGES, anchor, blocks, code, links, prose,
 
 CLI = DOCS / "cli.md"
 #: Sections of options that a command's section links, by the text of the link.
-SHARED = {
-    "cores and machines": "Cores and machines",
-    "limits": "Limits",
-}
+SHARED = {"cores and machines": "Cores and machines", "limits": "Limits"}
 #: Sections of options that all commands have, but some.
 BUT = {
     "Model options": ("domains", "schema"),
@@ -66,7 +63,7 @@ def told(option: click.Option) -> str:
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_options(name: str) -> None:
+def test_usage_and_options(name: str) -> None:
     """The tables say what the options records say; a cell may go on with more."""
     section = sections(CLI)[name]
     shared = [text for link, text in SHARED.items() if f"[{link}]" in section]
@@ -79,12 +76,8 @@ def test_options(name: str) -> None:
         if isinstance(option, click.Option)
     }
     assert {cell: listed[cell][: len(expected.get(cell, ""))] for cell in listed} == expected
-
-
-@pytest.mark.parametrize("name", COMMANDS)
-def test_usage(name: str) -> None:
     usage = " ".join(command(name).collect_usage_pieces(click.Context(command(name))))
-    assert f"    coordlang {name} {usage}\n" in sections(CLI)[name]
+    assert f"    coordlang {name} {usage}\n" in section
 
 
 def test_every_command_has_its_row() -> None:
@@ -142,23 +135,14 @@ def test_links(page: Path) -> None:
             assert fragment in {anchor(heading) for heading in sections(file)}, target
 
 
-def test_links_are_found() -> None:
+def test_pages_name_files_that_exist_and_blocks_of_known_kinds() -> None:
+    """A misspelt kind would not be run."""
     assert sum(len(links(page)) for page in LINKING) > 50
-
-
-def test_files_that_extending_names_exist() -> None:
     named = re.findall(r"`((?:planners|coordlang|tests)/[\w/]+\.py)`", prose(DOCS / "extending.md"))
     assert named
     assert [path for path in named if "NAME" not in path and not (ROOT / path).exists()] == []
-
-
-def test_no_path_of_a_machine() -> None:
     path = re.compile(r"(?<![\w.~])/(?:work|home|root|tmp|Users)/")
     assert [page for page in PAGES if page.parent == DOCS and path.search(page.read_text())] == []
-
-
-def test_blocks_are_of_known_kinds() -> None:
-    """A misspelt kind would not be run."""
     for page in PAGES:
         for block in blocks(page):
             assert block.kind in {"python", "output", "console", "json", "sh", "lisp", ""}, (

@@ -43,11 +43,12 @@ def steps_of(space: PlanSpace) -> Steps:
     return steps
 
 
-def first_break(steps: Steps, robots: int, start: int, *, together: bool) -> int | None:
-    """The least step after which a mixture of plans from a node begins no optimal plan; with
-    ``together`` of plans in the same states only.
+def first_break(steps: Steps, robots: int, starts: list[int], *, together: bool) -> int | None:
+    """The least step after which a mixture of plans from one of the nodes begins no optimal plan;
+    with ``together`` of plans in the same states only.
     """
-    layer, step = {((start,) * robots, start)}, 0
+    layer, step = {((start,) * robots, start) for start in starts}, 0
+    seen = {*layer}
     while layer:
         after = set()
         for plans, mixture in layer:
@@ -59,7 +60,8 @@ def first_break(steps: Steps, robots: int, start: int, *, together: bool) -> int
                 if mixed not in steps[mixture]:
                     return step
                 after.add((ends, steps[mixture][mixed]))
-        layer, step = after, step + 1
+        layer, step = after - seen, step + 1
+        seen |= after
     return None
 
 

@@ -69,13 +69,10 @@ def goes(space: PlanSpace, node: int, found: Miscoordination) -> bool:
 def test_breaks_equal_the_walk(robots: int | None, seeds: range) -> None:
     answers: Counter[tuple[str, bool]] = Counter()
     for candidates, space in random_spaces(seeds, robots):
-        steps = steps_of(space)
-        together = all(
-            first_break(steps, space.robots, start, together=True) is None
-            for start in np.unique(space.starts).tolist()
-        )
+        steps, starts = steps_of(space), space.starts.tolist()
+        together = first_break(steps, space.robots, starts, together=True)
         shown = inseparable(space)
-        assert (shown is None) == together == (witness_in_same_states(space) is None)
+        assert (shown is None) == (together is None) == (witness_in_same_states(space) is None)
         answers["inseparable", shown is not None] += 1
         if shown is not None:
             breaks(candidates, space, shown)
@@ -83,7 +80,7 @@ def test_breaks_equal_the_walk(robots: int | None, seeds: range) -> None:
         requires = Choices(space).requires[space.starts]
         some = [*np.flatnonzero(requires)[:4].tolist(), *np.flatnonzero(~requires)[:2].tolist()]
         for task in some:
-            twin = first_break(steps, space.robots, int(space.starts[task]), together=False)
+            twin = first_break(steps, space.robots, [starts[task]], together=False)
             found = miscoordination(space, task)
             assert (found is None) == (twin is None)
             answers["break", found is not None] += 1
