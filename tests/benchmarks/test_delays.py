@@ -19,10 +19,8 @@ from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
 from coordlang.required.failure import failure_probability
 from planners.joint.model import JointModel, PlanningTask
 from planners.joint.tables import Rows
-from planners.loading import load
-from planners.search.optimal_plans import search
 from planners.search.plans import Plan, Plans
-from tests.support.domains import DOMAINS
+from tests.support.domains import world_of
 
 
 def languages(said: str) -> list[TaskLanguage]:
@@ -65,24 +63,20 @@ def test_without_delays_plans_and_coordination_languages_never_fail() -> None:
     for said in ("minimal", "slack"):
         used = languages(said)
         for together in (False, True):
+            trials = DelayTrials(used, together=together)
             for yields in (False, True):
-                trials = DelayTrials(used, together=together)
                 runs, well, late = trials.sample(0.0, yields, 20, Random(1))
                 assert well == runs
                 assert late <= runs * used[0].model.slack
 
 
-def swap() -> tuple[Execution, PlanningTask, list[list[tuple[int, ...]]]]:
-    """The three cells: the four plans of the task in which the robots change places."""
-    loaded = load(
-        DOMAINS / "three-cells" / "domain.pddl", [DOMAINS / "three-cells" / "problem.pddl"]
-    )
+def swap() -> tuple[Execution, PlanningTask, tuple[int, ...], tuple[int, ...]]:
+    """The three cells, where the robots change places: r1 goes a c b, r2 goes b a."""
+    loaded = world_of("three-cells", "problem").loaded
     execution = Execution(loaded.model)
-    text = ["(move r1 a c)", "(move r1 c b)"], ["(move r2 b a)"]
-    parts = [
-        [loaded.model.labels[robot].index(label) for label in own] for robot, own in enumerate(text)
-    ]
-    return execution, loaded.tasks[0], [[tuple(own) for own in parts]]
+    one, other = loaded.model.labels
+    first = one.index("(move r1 a c)"), one.index("(move r1 c b)")
+    return execution, loaded.tasks[0], first, (other.index("(move r2 b a)"),)
 
 
 class Script(Random):
@@ -100,19 +94,18 @@ def test_a_delay_by_hand() -> None:
     """r1 goes a c b and r2 goes b a.  If r2 is late by a step, all is well; if r1 is, r2 runs into
     it, unless it yields.
     """
-    execution, task, [parts] = swap()
-    rest = (0, parts[1][0])  # r2 waits first, as in plan 1
-    in_step = execution.run(task.init, [parts[0], rest], 0.5, False, Script())
-    assert in_step is not None
-    assert in_step[1] == 2
-    late = execution.run(task.init, [parts[0], rest], 0.5, False, Script(1.0, 1.0, 1.0, 0.0))
-    assert late is None  # r1 moves to b, where r2 still is
-    yields = execution.run(task.init, [parts[0], rest], 0.5, True, Script(1.0, 1.0, 1.0, 0.0))
-    assert yields is not None
-    assert yields[1] == 3
-    # r1 is late: r2 has not gone yet when it rests; then both go on in step, one step later.
-    first = execution.run(task.init, [parts[0], parts[1]], 0.5, False, Script(0.0, 1.0))
-    assert first is None  # r2 moves to a, where r1 still is
+    execution, task, r1, r2 = swap()
+
+    def steps(part: tuple[int, ...], yields: bool, *draws: float) -> int | None:
+        ended = execution.run(task.init, [r1, part], 0.5, yields, Script(*draws))
+        return ended and ended[1]
+
+    rest = (0, *r2)  # r2 waits first, as in plan 1
+    assert steps(rest, False) == 2
+    late = (1.0, 1.0, 1.0, 0.0)
+    assert steps(rest, False, *late) is None  # r1 moves to b, where r2 still is
+    assert steps(rest, True, *late) == 3
+    assert steps(r2, False, 0.0, 1.0) is None  # r1 is late: r2 moves to a, where it still is
 
 
 def fails_late(model: JointModel, task: PlanningTask, plan: Plan, most: int) -> bool:
@@ -148,13 +141,11 @@ def _with_delays(
 
 def test_no_plan_of_a_swap_on_the_three_cells_survives_one_delay() -> None:
     """So by Proposition 27 no language is 1-delay-robust there."""
-    loaded = load(
-        DOMAINS / "three-cells" / "domain.pddl", [DOMAINS / "three-cells" / "problem.pddl"]
-    )
-    plans = list(Plans.of(search(loaded.model, loaded.tasks[0])))
+    here = world_of("three-cells", "problem")
+    model, task, plans = here.loaded.model, here.loaded.tasks[0], [*Plans.of(here.plans)]
     assert len(plans) == 4
-    assert all(fails_late(loaded.model, loaded.tasks[0], plan, 1) for plan in plans)
-    assert not any(fails_late(loaded.model, loaded.tasks[0], plan, 0) for plan in plans)
+    assert all(fails_late(model, task, plan, 1) for plan in plans)
+    assert not any(fails_late(model, task, plan, 0) for plan in plans)
 
 
 def test_units_are_reproducible_and_the_section_shows_them() -> None:
@@ -162,12 +153,9 @@ def test_units_are_reproducible_and_the_section_shows_them() -> None:
     units = [unit for unit in delays.units(settings) if unit.parameters["world"] == "GW1"][:2]
     results = [delays.run(unit, settings) for unit in units]
     assert results[0] == delays.run(units[0], settings)
-    records = [
-        Record(unit.key, unit.parameters, "done", result)
-        for unit, result in zip(units, results, strict=True)
-    ]
-    section = delays.section(records)
-    text = "".join(block for block in section.blocks if isinstance(block, str))
+    done = zip(units, results, strict=True)
+    section = delays.section([Record(u.key, u.parameters, "done", found) for u, found in done])
+    text = "".join(map(str, section.blocks))
     runs, well, _ = results[0]["as they come"][delays.DELAYS.index(0.1)]
     assert "| said | GW1 |" in text
     assert f"| plan | {100 * well / runs:.1f}, " in text

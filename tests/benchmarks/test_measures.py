@@ -40,20 +40,11 @@ def test_three_cells_by_hand() -> None:
     assert task.saving(2) == pytest.approx(1 / 3)
     # The first plan in the order of labels: r1 waits (label 0) and r2 steps to c.
     assert task.first == (IN_B, IN_C, IN_A)
-    measures = flexibility.measures([task])
-    assert (
-        measures["open"],
-        measures["several"],
-        measures["open_several"],
-        measures["expected"],
-    ) == (2, 1, 2, 2)
-    savings = communication.measures([task])
-    assert (savings["differing"], savings["saving"], savings["saving_most"]) == (
-        0,
-        0,
-        round(1 / 3, 6),
-    )
-    assert savings["saving_expected"] == round(1 / 6, 6)
+    wanted: dict[str, float] = {"open": 2, "several": 1, "open_several": 2, "expected": 2}
+    assert wanted.items() <= flexibility.measures([task]).items()
+    most, expected = round(1 / 3, 6), round(1 / 6, 6)
+    wanted = {"differing": 0, "saving": 0, "saving_most": most, "saving_expected": expected}
+    assert wanted.items() <= communication.measures([task]).items()
 
 
 def test_means_are_over_the_right_tasks() -> None:
@@ -64,12 +55,11 @@ def test_means_are_over_the_right_tasks() -> None:
         SentenceStatistics(2, {(0, 1, 2): 1}, (0, 1, 2), (0, 1, 2)),
         SentenceStatistics(2, {(0,): 5}, (0,), (0,)),
     ]
-    savings = communication.measures(tasks)
-    assert (savings["differing"], savings["tasks"]) == (1, 2)
-    assert savings["saving_differing"] == round(2 / 3, 6)
-    assert savings["saving"] == round(1 / 3, 6)
-    plans = flexibility.measures(tasks)
-    assert (plans["open"], plans["several"], plans["open_several"], plans["plans"]) == (3, 1, 5, 3)
+    two, one = round(2 / 3, 6), round(1 / 3, 6)
+    wanted: dict[str, float] = {"differing": 1, "tasks": 2, "saving_differing": two, "saving": one}
+    assert wanted.items() <= communication.measures(tasks).items()
+    wanted = {"open": 3, "several": 1, "open_several": 5, "plans": 3}
+    assert wanted.items() <= flexibility.measures(tasks).items()
 
 
 def test_the_same_as_the_library_measures() -> None:
@@ -95,9 +85,8 @@ def test_all_orders_make_languages_of_different_sizes() -> None:
     states = states_on_plans(candidates.spaces).tolist()
     for order in systematic_orders(candidates, states).values():
         assert sorted(order) == states
-    assert len({tuple(order) for order in systematic_orders(candidates, states).values()}) == len(
-        SYSTEMATIC
-    )
+    orders = {(*order,) for order in systematic_orders(candidates, states).values()}
+    assert len(orders) == len(SYSTEMATIC)
     sizes = {}
     for name, words in greedy_partitions(candidates, 15, Random(0)):
         sizes[name] = int(words.max()) + 1
@@ -122,18 +111,10 @@ def test_brute_force_says_why_it_has_nothing() -> None:
 
 @pytest.mark.parametrize(
     ("successes", "runs", "low", "high"),
-    [
-        (0, 10, 0.0, 0.2775),
-        (10, 10, 0.7225, 1.0),
-        (5, 10, 0.2366, 0.7634),
-        (50, 100, 0.4038, 0.5962),
-    ],
+    [(0, 10, 0.0, 0.2775), (10, 10, 0.7225, 1.0), (5, 10, 0.2366, 0.7634)],
 )
 def test_wilson(successes: int, runs: int, low: float, high: float) -> None:
     """Newcombe (1998) and tables of the score interval."""
     assert wilson(successes, runs) == pytest.approx((low, high), abs=5e-5)
-
-
-def test_intervals_of_nothing() -> None:
     with pytest.raises(ValueError, match="0 runs"):
         wilson(0, 0)

@@ -8,7 +8,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from benchmarks.paper.__main__ import main
 from benchmarks.paper.recipe import Recipe, Settings, Unit
 from benchmarks.paper.runner import attempt, is_known, kept, run
 from tests.support.domains import ROOT
+from tests.support.jobs import until
 
 GAME, COMMUNICATION = game.RECIPE, communication.RECIPE
 QUICK = Settings(samples=2, quick=True)
@@ -103,34 +103,29 @@ def test_an_error_ends_the_run_and_keeps_what_is_done(tmp_path: Path) -> None:
     assert set(lines(tmp_path)) >= {"GWB5/greedy", "GWB5/separating"}
 
 
+def group_lives(group: int) -> bool:
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
 @pytest.mark.thorough
 def test_an_interrupt_leaves_no_process(tmp_path: Path) -> None:
     command = [
         sys.executable,
         "-m",
-        "benchmarks.paper",
-        "game",
-        "--quick",
-        "--results",
-        str(tmp_path),
+        *["benchmarks.paper", "game", "--quick", "--results"],
+        tmp_path,
     ]
     process = subprocess.Popen(command, cwd=ROOT, start_new_session=True, stderr=subprocess.PIPE)
-    deadline = time.monotonic() + 120
-    while not (tmp_path / "game.jsonl").exists():
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    until(lambda: (tmp_path / "game.jsonl").exists() or process.poll() is not None, 120)
+    assert process.poll() is None, process.communicate()
     os.killpg(process.pid, signal.SIGINT)
     process.communicate(timeout=60)
     assert process.returncode != 0
-    while time.monotonic() < deadline:
-        try:
-            os.killpg(process.pid, 0)
-        except ProcessLookupError:
-            break
-        time.sleep(0.05)
-    else:
-        pytest.fail("a process is left")
+    until(lambda: not group_lives(process.pid), 120)
     assert len(lines(tmp_path)) < len(GAME.units(QUICK))
 
 
@@ -138,11 +133,8 @@ def test_command(finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[s
     (tmp_path / "game.jsonl").write_bytes((finished / "game.jsonl").read_bytes())
     common = ["--quick", "--samples", "2", "--results", str(tmp_path)]
     main(["game", *common])
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "evaluation.md",
-        "game.jsonl",
-        "game.svg",
-    ]
+    written = sorted(path.name for path in tmp_path.iterdir())
+    assert written == ["evaluation.md", "game.jsonl", "game.svg"]
     page = (tmp_path / "evaluation.md").read_text()
     assert "| plan |" in page
     assert "![Proposals until accepted" in page
