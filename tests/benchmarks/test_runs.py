@@ -113,12 +113,8 @@ def group_lives(group: int) -> bool:
 
 @pytest.mark.thorough
 def test_an_interrupt_leaves_no_process(tmp_path: Path) -> None:
-    command = [
-        sys.executable,
-        "-m",
-        *["benchmarks.paper", "game", "--quick", "--results"],
-        tmp_path,
-    ]
+    module = ["benchmarks.paper", "game", "--quick", "--results"]
+    command = [sys.executable, "-m", *module, str(tmp_path)]
     process = subprocess.Popen(command, cwd=ROOT, start_new_session=True, stderr=subprocess.PIPE)
     until(lambda: (tmp_path / "game.jsonl").exists() or process.poll() is not None, 120)
     assert process.poll() is None, process.communicate()
