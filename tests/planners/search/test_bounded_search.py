@@ -212,6 +212,6 @@ def test_least_makespan_then_least_cost(
     task = PlanningTask("by hand", model.state(state(init)), goals)
     found = search(model, task, heuristic="projections")
     assert found.cost_of(0) == cost
-    twin = blind_search.search(model, task)
+    twin = blind_search(model, task)
     equal(found, twin)
     equal(search(model, task, heuristic="manhattan"), twin)
