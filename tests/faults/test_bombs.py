@@ -14,14 +14,11 @@ import msgspec
 import pytest
 
 from coordlang.commands.building import build_language
-from coordlang.language.file import read_language
-from coordlang.language.task_file import read_task_file
 from coordlang.verification.certificate_clauses import encode
 from coordlang.verification.certificate_file import read_certificate
 from coordlang.verification.check_certificate import check
 from planners.pddl import parse_domain
 from planners.pddl.sexpr import Source
-from planners.search.plan_file import read_plans
 from planners.system.errors import BadInput, OutOfMemory, Refuted
 from planners.system.files import read_bytes
 from planners.system.limits import time_limit
@@ -93,45 +90,26 @@ def test_other_gzip_is_read_as_python_reads_it(
 
 # Nesting, and keys that occur twice
 
-#: How a file is read, and one in whose ``x`` anything may stand.
-SHELLS: dict[str, tuple[Callable[[Path], object], str]] = {
-    "language": (
-        read_language,
-        '{"format": "coordlang/language", "version": 1, "words": ["a"], "default": "a", '
-        '"states": {}, "producer": {"x": %s}}',
-    ),
-    "certificate": (
-        read_certificate,
-        '{"format": "coordlang/certificate", "version": 1, "domain": "grid", '
-        '"robots": ["r1", "r2"], "refuted": 0, "reasons": [], "producer": {"x": %s}}',
-    ),
-    "tasks": (
-        read_task_file,
-        '{"format": "coordlang/tasks", "version": 1, "x": %s, '
-        '"tasks": [{"init": ["(p)"], "goal": ["(q)"]}]}',
-    ),
-    "plans": (
-        lambda path: read_plans(path, all_tasks("grid", "gw1-2x2").model),
-        '{"x": %s, "plans": [{"actions": [[null, null]]}]}',
-    ),
-}
+#: A certificate; all files of JSON are read by one function.
+CERTIFICATE = (
+    '{"format": "coordlang/certificate", "version": 1, "domain": "grid", '
+    '"robots": ["r1", "r2"], "refuted": 0, "reasons": [], "producer": {"x": %s}}'
+)
 
 
-@pytest.mark.parametrize("kind", SHELLS)
-def test_deep_nesting_is_refused(kind: str, tmp_path: Path) -> None:
-    read, shell = SHELLS[kind]
+def test_deep_nesting_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "deep.json"
     for opening, inside, closing in (("[", "", "]"), ('{"k":', "0", "}")):
-        path.write_text(shell % (opening * 100_000 + inside + closing * 100_000))
+        path.write_text(CERTIFICATE % (opening * 100_000 + inside + closing * 100_000))
         with pytest.raises(BadInput, match=r"deep\.json: this is no JSON, or it is cut off: "):
-            read(path)
-    path.write_text(shell % ("[" * 150 + "]" * 150))
-    assert read(path)
+            read_certificate(path)
+    path.write_text(CERTIFICATE % ("[" * 150 + "]" * 150))
+    assert read_certificate(path)
 
 
 @pytest.mark.parametrize(("key", "value"), [("refuted", "1"), ("robots", "[]"), ("x", "1")])
 def test_a_certificate_has_no_key_twice(key: str, value: str, tmp_path: Path) -> None:
-    path, text = tmp_path / "twice.json", SHELLS["certificate"][1] % "1"
+    path, text = tmp_path / "twice.json", CERTIFICATE % "1"
     path.write_text(text.replace(f'"{key}": ', f'"{key}": {value}, "{key}": ', 1))
     with pytest.raises(BadInput, match=rf"twice\.json: the key '{key}' occurs twice"):
         read_certificate(path)

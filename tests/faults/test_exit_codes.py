@@ -29,6 +29,7 @@ BUILD = ("build", *CELLS, "--method", "minimal", "-o", "-")
         ("2>&-", ("plans", "missing", "x"), 31, ""),
         ("2>/dev/full", ("plans", "--missing"), 2, ""),
         (">/dev/full 2>/dev/full", COUNT, 2, ""),
+        ("2>/dev/full >/dev/null", BUILD, 0, ""),  # an answer needs no stderr
         (">/dev/full", COUNT, 2, "coordlang: the output cannot be written"),
         (">&-", COUNT, 2, "coordlang: stdout is closed"),
         (">&-", BUILD, 2, "coordlang: stdout is closed"),
@@ -45,14 +46,6 @@ def test_streams_that_are_closed_or_full(
     assert bool(done.stderr) == bool(said)
 
 
-def test_an_answer_needs_no_stderr(tmp_path: Path) -> None:
-    output = str(tmp_path / "l.json")
-    build = ("build", *CELLS, "--unsolvable", "skip", "-o", output)
-    done = in_shell("exec COORDLANG 2>/dev/full", *build)
-    assert done.returncode == 0
-    assert done.stdout.endswith(f"written to {output}\n")
-
-
 def test_the_working_directory_is_removed(tmp_path: Path) -> None:
     gone = f"mkdir {tmp_path}/gone; cd {tmp_path}/gone; rmdir {tmp_path}/gone;"
     assert in_shell("exec COORDLANG", *COUNT, before=gone).stdout == "4\n"
@@ -62,15 +55,11 @@ def test_the_working_directory_is_removed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("robots", [["r1", "r3"], ["r1"], ["a", "b"]])
-@pytest.mark.parametrize("place", ["t-map", "three-cells"])
 def test_robots_of_a_language_file_that_contradict_the_domain(
-    place: str, robots: list[str], coordlang: Command, tmp_path: Path
+    robots: list[str], coordlang: Command, language: Path, t_map: tuple[Path, Path]
 ) -> None:
-    files = [DOMAINS / place / name for name in ("domain.pddl", "problem.pddl")]
-    path = tmp_path / "l.json"
-    assert coordlang("build", *files, "--method", "greedy", "-o", path).code == 0
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"robots": robots}))
-    outcome = coordlang("verify", path, *files)
+    language.write_text(json.dumps(json.loads(language.read_text()) | {"robots": robots}))
+    outcome = coordlang("verify", language, *t_map)
     assert outcome.code == 31, outcome.err
     assert "--robots" not in outcome.err
 
@@ -79,24 +68,21 @@ UNICODE = "ünïcödé"
 
 
 @pytest.mark.parametrize(
-    ("name", "changes", "fresh"),
+    ("name", "changes"),
     [
-        *((name, {}, False) for name in ("two words", "two\nlines", "-o", "--help", "'\"$(x)`*")),
-        (UNICODE, {"HOME": None}, False),
-        (UNICODE, {"HOME": "/no/such/home"}, False),
-        (UNICODE, {"TMPDIR": "/no/such/folder"}, False),
-        pytest.param(UNICODE, {"HOME": None}, True, marks=pytest.mark.slow),
-        pytest.param(UNICODE, {"TMPDIR": "/no/such/folder"}, True, marks=pytest.mark.slow),
+        *((name, {}) for name in ("two words", "two\nlines", "-o", "--help", "'\"$(x)`*")),
+        (UNICODE, {"HOME": None}),
+        (UNICODE, {"HOME": "/no/such/home"}),
+        (UNICODE, {"TMPDIR": "/no/such/folder"}),
         pytest.param(
             UNICODE,
             {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
-            True,
             marks=pytest.mark.thorough,
         ),
     ],
 )
 def test_names_of_files_and_the_environment(
-    name: str, changes: dict[str, str | None], fresh: bool, tmp_path: Path
+    name: str, changes: dict[str, str | None], tmp_path: Path
 ) -> None:
     """All files have names that begin with ``name``."""
     domain, problem, language, page = (f"{name}{end}" for end in (".d", ".p", ".json", ".html"))
@@ -115,16 +101,14 @@ def test_names_of_files_and_the_environment(
         ("verify", "--", language, domain, problem),
         ("report", f"--output={page}", "--", language, domain, problem),
     ):
-        ended = (fresh_command if fresh else fork_command)(*arguments, before=before).join()
-        assert ended.code == 0, ended
+        ended = (fresh_command if "LC_ALL" in changes else fork_command)(*arguments, before=before)
+        assert ended.join().code == 0
     found = {path.name for path in tmp_path.iterdir()}
     assert found == {domain, problem, language, page}
 
 
 @pytest.mark.parametrize(
-    "system",
-    ["sys.platform = 'win32'", "sys.modules['resource'] = None; sys.modules['fcntl'] = None"],
-    ids=["win32", "no resource"],
+    "system", ["sys.platform = 'win32'", "sys.modules['resource'] = sys.modules['fcntl'] = None"]
 )
 @pytest.mark.parametrize(
     ("program", "code", "before"),
@@ -132,7 +116,6 @@ def test_names_of_files_and_the_environment(
         ("from coordlang.__main__ import main; main()", 32, "coordlang: "),
         ("import coordlang; coordlang.plans('d.pddl', 'p.pddl')", 1, "OSError: "),
     ],
-    ids=["command line", "library"],
 )
 def test_a_system_without_posix_limits_is_refused(
     system: str, program: str, code: int, before: str
@@ -144,5 +127,4 @@ def test_a_system_without_posix_limits_is_refused(
     assert (done.returncode, done.stdout) == (code, "")
     assert f"{before}coordlang runs on Linux and macOS, not on this system" in done.stderr
     assert "\n  On Windows use WSL" in done.stderr
-    assert "ImportError" not in done.stderr
-    assert "ModuleNotFoundError" not in done.stderr
+    assert not {"ImportError", "ModuleNotFoundError"} & {*done.stderr.replace(":", " ").split()}

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -28,69 +30,58 @@ LONG = "x" * (NAME_MAX + 1)
 
 
 @pytest.fixture
-def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("coordlang.commands.inputs.read_domain", lambda *_: pytest.fail("no work"))
-
-
-@pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
+FILES = [(*BUILD, "-o"), (*BUILD, "-o", "l.json", "--certificate"), ("tasks", *CELLS, "-o"), None]
+FOLDERS = [("export", "l", *CELLS, "w0", "-o"), ("inspect", *CELLS, "--write")]
+UNWRITABLE = {
+    "": "its name is empty",
+    "newdir/": "this names a folder, and there is none",
+    "newdir/.": "this names a folder, and there is none",
+    "plan/": "this names a folder, and there is none",
+    LONG: "File name too long",
+    "loop": "Too many levels of symbolic links",
+    "readonly": "the file is read-only",
+    "link-to-readonly": "the file is read-only",
+}
+
+
 @pytest.mark.parametrize(
-    ("output", "reason"),
+    ("command", "output"),
     [
-        ("", "its name is empty"),
-        ("newdir/", "this names a folder, and there is none"),
-        ("newdir/.", "this names a folder, and there is none"),
-        ("plan/", "this names a folder, and there is none"),
-        (LONG, "File name too long"),
-        ("loop", "Too many levels of symbolic links"),
-        ("readonly", "the file is read-only"),
-        ("link-to-readonly", "the file is read-only"),
+        *((command, output) for command in FILES for output in UNWRITABLE),
+        *((cmd, out) for cmd in (*FOLDERS, ("domains", "--copy", "grid")) for out in ("", LONG)),
     ],
 )
-@pytest.mark.parametrize(
-    "command",
-    [(*BUILD, "-o"), (*BUILD, "-o", "l.json", "--certificate"), ("tasks", *CELLS, "-o"), None],
-    ids=["build", "certificate", "tasks", "Python"],
-)
-@pytest.mark.usefixtures("no_work")
 def test_what_cannot_be_written_is_refused_before_the_work(
-    command: tuple[object, ...] | None, output: str, reason: str, coordlang: Command, here: Path
+    command: tuple[object, ...] | None,
+    output: str,
+    coordlang: Command,
+    here: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    """None: by the library."""
+    monkeypatch.setattr("coordlang.commands.inputs.read_domain", lambda *_: pytest.fail("no work"))
     Path("plan").write_text("")
     Path("loop").symlink_to("loop")
     Path("readonly").write_text("precious")
     Path("readonly").chmod(0o444)
     Path("link-to-readonly").symlink_to("readonly")
     before = sorted(here.rglob("*"))
+    said = f"cannot be written: {UNWRITABLE[output]}"
     if command is None:
-        with pytest.raises(UsageError, match=f"cannot be written: {reason}"):
+        with pytest.raises(UsageError, match=said):
             write_atomically(output, b"new")
     else:
         outcome = coordlang(*command, output)
         assert (outcome.code, outcome.out) == (2, "")
-        said = f"{command[-1]} {output} cannot be written: {reason}\n  Name a file"
-        assert said in outcome.err
+        named = f"{command[-1]} {output} {said}\n  Name a file" if command in FILES else "written"
+        assert named in outcome.err
     assert sorted(here.rglob("*")) == before
     assert Path("readonly").read_text() == "precious"
-
-
-@pytest.mark.parametrize("output", ["", LONG])
-def test_a_folder_that_cannot_be_made_is_refused_before_the_work(
-    output: str, coordlang: Command, language: Path, here: Path, no_work: None
-) -> None:
-    for command in (
-        ("export", language, *CELLS, "w0", "-o"),
-        ("inspect", *CELLS, "--write"),
-        ("domains", "--copy", "grid"),
-    ):
-        outcome = coordlang(*command, output)
-        assert (outcome.code, outcome.out) == (2, "")
-        assert "cannot be written" in outcome.err
-    assert list(here.iterdir()) == [language]
 
 
 @pytest.mark.parametrize("letter", ["x", "\N{LATIN SMALL LETTER E WITH ACUTE}", "\N{ROBOT FACE}"])
@@ -119,36 +110,15 @@ def test_data_is_on_the_disk_before_the_name_is(
     here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     done: list[str] = []
-    sync, replace = os.fsync, os.replace
 
-    def synced(file: int) -> None:
-        done.append("fsync")
-        sync(file)
+    def noted(name: str, real: Callable[..., None], *given: object) -> None:
+        done.append(name)
+        real(*given)
 
-    def replaced(source: str, target: str) -> None:
-        done.append("replace")
-        replace(source, target)
-
-    monkeypatch.setattr(os, "fsync", synced)
-    monkeypatch.setattr(os, "replace", replaced)
+    for name in ("fsync", "replace"):
+        monkeypatch.setattr(os, name, partial(noted, name, getattr(os, name)))
     write_atomically("x", b"new")
     assert done == ["fsync", "replace"]
-
-
-@pytest.mark.parametrize("step", ["fsync", "replace", "fchmod"])
-def test_a_file_that_cannot_be_written_stays_as_it_was(
-    step: str, here: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def failing(*_: object) -> None:
-        raise OSError(28, os.strerror(28))
-
-    Path("x").write_text("old")
-    Path("c").write_text("its certificate")
-    with monkeypatch.context() as patched:
-        patched.setattr(os, step, failing)
-        with pytest.raises(UsageError, match="x cannot be written: No space left on device"):
-            write_atomically("x", b"new", outdated="c")
-    assert {p.name: p.read_text() for p in here.iterdir()} == {"x": "old", "c": "its certificate"}
 
 
 def test_a_file_that_goes_while_it_is_asked_for_denies_nothing(
@@ -204,7 +174,7 @@ def old_pair(here: Path) -> Path:
 
 
 def _pair(folder: Path) -> str:
-    """Which pair stands there: old, new, or a new language alone."""
+    """Which pair stands there: old, new, or a language alone."""
     texts = {p.name: p.read_text() for p in folder.iterdir() if not p.name.startswith(".")}
     if texts == OLD:
         return "old"
@@ -216,12 +186,6 @@ def _pair(folder: Path) -> str:
     assert texts.keys() == OLD.keys()
     assert read_certificate(folder / "c.json").refuted >= 1
     return "new"
-
-
-def test_a_new_pair_replaces_the_old_one(coordlang: Command, old_pair: Path) -> None:
-    assert coordlang(*BUILD, *PAIR).code == 0
-    assert _pair(old_pair) == "new"
-    assert sorted(os.listdir()) == ["c.json", "l.json"]
 
 
 def test_a_pair_is_written_together(
@@ -240,79 +204,73 @@ def test_a_pair_is_written_together(
     assert verified.code == 0, verified.err
 
 
-@pytest.mark.parametrize(("limit", "code"), [(KeyboardInterrupt, 130), (MemoryError, 3)])
-def test_a_certificate_that_is_not_made_leaves_no_old_one(
-    limit: type[BaseException],
-    code: int,
-    coordlang: Command,
-    old_pair: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def stop(_: object) -> None:
-        raise limit
-
-    monkeypatch.setattr(Built, "certificate", stop)
-    outcome = coordlang(*BUILD, *PAIR)
-    assert (_pair(old_pair), outcome.code) == ("new, alone", code)
-    assert code == 3 or outcome.err == (
-        "coordlang: interrupted; the language is written to l.json: it is verified and proved "
-        "minimal; no certificate is written\n"
-    )
-
-
-@pytest.mark.parametrize(("error", "code"), [(OutOfTime("late"), 3), (KeyboardInterrupt(), 130)])
-def test_a_search_that_is_stopped_leaves_no_old_certificate(
+@pytest.mark.parametrize(
+    ("error", "code"), [(KeyboardInterrupt(), 130), (MemoryError(), 3), (OutOfTime("late"), 3)]
+)
+def test_work_that_is_stopped_leaves_no_old_certificate(
     error: BaseException,
     code: int,
     coordlang: Command,
     old_pair: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """In place of the old certificate is that of the bound that was proved."""
-
+    """First the work on the certificate, then the search: its place takes that of the bound."""
     decide = MinimalSearch.decide
+
+    def stop(_: object) -> None:
+        raise error
 
     def late(search: MinimalSearch, size: int, budget: Budget) -> bool:
         if size > 1:  # that one word is not enough is known
             raise error
         return decide(search, size, budget)
 
+    with monkeypatch.context() as patched:
+        patched.setattr(Built, "certificate", stop)
+        outcome = coordlang(*BUILD, *PAIR)
+    assert (_pair(old_pair), outcome.code) == ("new, alone", code)
+    end = "it is verified{}; no certificate is written\n"
+    assert code == 3 or outcome.err == (
+        "coordlang: interrupted; the language is written to l.json: "
+        + end.format(" and proved minimal")
+    )
+    if isinstance(error, MemoryError):
+        return
+    Path("c.json").write_text("old certificate")
     monkeypatch.setattr(MinimalSearch, "decide", late)
     tasks = [DOMAINS / "grid" / name for name in ("domain.pddl", "gw2-2x3.pddl")]
     outcome = coordlang("build", *tasks, "--tasks", "all", "--method", "minimal", *PAIR)
     assert outcome.code == code
     guarantee = read_language(old_pair / "l.json").guarantee
     assert (guarantee.lower_bound, guarantee.proved_minimal) == (2, False)
-    if code == 130:
-        assert "it is verified; no certificate is written\n" in outcome.err
-        assert os.listdir() == ["l.json"]
-    else:
-        assert sorted(os.listdir()) == ["c.json", "l.json"]
-        assert read_certificate("c.json").refuted == 1
+    assert sorted(os.listdir()) == (["c.json", "l.json"] if code == 3 else ["l.json"])
+    assert end.format("") in outcome.err if code == 130 else read_certificate("c.json").refuted == 1
 
 
 #: The last rename (the old certificate goes aside, the language, the certificate) comes, or ends
-#: the command before it: what stands there then, if the command is killed, interrupted (then the
-#: language is saved all the same), or told that the disk is full.
+#: the command before it: what stands there then, if the command is killed, or interrupted (then
+#: the language is saved all the same).  `test_broken_writing` fills the disk there.
 LAST = {
-    (1, False): ("old", "new, alone", "old"),
-    (1, True): ("old, alone", "new, alone", "old"),
-    (2, False): ("old, alone", "new, alone", "old"),
-    (2, True): ("new, alone", "new, alone", "new, alone"),
-    (3, False): ("new, alone", "new, alone", "new, alone"),
-    (3, True): ("new", "new", "new"),
+    (1, False): ("old", "new, alone"),
+    (1, True): ("old, alone", "new, alone"),
+    (2, False): ("old, alone", "new, alone"),
+    (2, True): ("new, alone", "new, alone"),
+    (3, False): ("new, alone", "new, alone"),
+    (3, True): ("new", "new"),
 }
 
 
-@pytest.mark.parametrize("how", ["killed", "interrupted", "full"])
+@pytest.mark.parametrize("is_killed", [True, False])
 @pytest.mark.parametrize(("at", "comes"), LAST)
-def test_every_rename_may_be_the_last_one(how: str, at: int, comes: bool, old_pair: Path) -> None:
+def test_every_rename_may_be_the_last_one(
+    is_killed: bool, at: int, comes: bool, old_pair: Path
+) -> None:
     replace, calls = os.replace, 0
 
     def end() -> None:
-        if how == "killed":
+        if is_killed:
             os.kill(os.getpid(), signal.SIGKILL)
-        raise KeyboardInterrupt if how == "interrupted" else OSError(28, os.strerror(28))
+        raise KeyboardInterrupt
 
     def ending(source: str, target: str) -> None:
         nonlocal calls
@@ -328,18 +286,11 @@ def test_every_rename_may_be_the_last_one(how: str, at: int, comes: bool, old_pa
 
     ended = fork_command(*BUILD, *PAIR, before=before).join()
     pair = _pair(old_pair)
-    killed, interrupted, full = LAST[at, comes]
-    saved = "the language is written to l.json: it is verified and proved min"
-    if how == "killed":
-        assert (ended.code, pair) == (-signal.SIGKILL, killed)
+    if is_killed:
+        assert (ended.code, pair) == (-signal.SIGKILL, LAST[at, comes][0])
         return
-    assert sorted(os.listdir()) == sorted({"old": OLD, "new": OLD}.get(pair, ["l.json"]))
-    if how == "interrupted":
-        assert (ended.code, pair) == (130, interrupted)
-        assert saved in ended.err
-        said = "and so is its certificate" if pair == "new" else "no certificate is written"
-        assert said in ended.err
-    else:
-        assert (ended.code, pair) == (2, full)
-        assert "cannot be written: No space left" in ended.err
-        assert at < 3 or saved in ended.err
+    assert (ended.code, pair) == (130, LAST[at, comes][1])
+    assert sorted(os.listdir()) == (sorted(OLD) if pair == "new" else ["l.json"])
+    assert "the language is written to l.json: it is verified and proved min" in ended.err
+    said = "and so is its certificate" if pair == "new" else "no certificate is written"
+    assert said in ended.err

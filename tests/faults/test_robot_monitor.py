@@ -251,17 +251,6 @@ def places(data: Any) -> Iterator[tuple[Any, Any]]:
             yield from places(data[key])
 
 
-def test_deep_data_in_every_place() -> None:
-    """Refused with a short message, or ignored where the key is."""
-    deep, ignored = nested(DEEP), 0
-    for number in range(sum(1 for _ in places(choices_file()))):
-        data = choices_file()
-        place, key = list(places(data))[number]
-        place[key] = deep
-        ignored += message(partial(Monitor, data, "r1")) is None
-    assert ignored == 3  # "robots" and its members
-
-
 TEXT = json.dumps(choices_file()).encode()
 BRACKETS = b"[" * DEEP + b"]" * DEEP
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Signals that end the process: at every moment the exit code is that of the signal, and nothing is
-left behind.
+"""Signals that end the process: at every moment the exit code is that of the signal, nothing is
+left behind, and no SAT solver crashes.
 """
 
 from __future__ import annotations
@@ -9,22 +9,31 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
+from contextlib import suppress
+from itertools import combinations
 from pathlib import Path
+from random import Random
 from types import FrameType
-from typing import Any
+from typing import Any, get_args
 
+import pysolvers
 import pytest
 
-from planners.system.signals import ENDING, Interrupted, postponed_signals
+from coordlang.commands.building import build_language
+from coordlang.vocabulary.sat import PartitionProblem
+from planners.search.sat import SolverName, propagates, sat_solver, solve_slice
+from planners.system.errors import OutOfTime
+from planners.system.limits import time_left, time_limit
+from planners.system.signals import ENDING, Interrupted, Interruptions, postponed_signals
 from planners.system.writing import write_atomically
-from tests.support.command import own_process
-from tests.support.domains import DOMAINS
-from tests.support.jobs import until
+from tests.support.domains import DOMAINS, all_tasks
+from tests.support.forks import fork
 
 FILES = [str(DOMAINS / "grid" / name) for name in ("domain.pddl", "gw1-2x2.pddl")]
 #: Runs the command line, and sends itself a signal when a module of this name is imported, or the
-#: module of this number.
+#: first module of all.
 _AT_IMPORT = """
 import os, signal, sys
 
@@ -32,68 +41,28 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 signal.signal(signal.SIGINT, signal.default_int_handler)
 number, at = int(sys.argv[1]), sys.argv[2]
 sys.argv[1:] = sys.argv[3:]
-seen = 0
 
 class Finder:
     @staticmethod
     def find_spec(name, path=None, target=None):
-        global seen
-        seen += 1
-        if at in (name, str(seen)):
+        if at in (name, "first"):
             os.kill(os.getpid(), number)
 
 from coordlang.__main__ import main
 sys.meta_path.insert(0, Finder)
 main()
 """
-#: Before the first line of `coordlang.__main__` it is Python that hears the signal.  1: the first
-#: module of all that is looked for after it.
-_MODULES = ("1", "click", "coordlang.commands.main", "msgspec", "numpy", "clingo")
-
-
-def ended_at(number: int, at: object) -> int:
-    """Count plans, and send the signal at an import; the exit code."""
-    program = [sys.executable, "-c", _AT_IMPORT, str(number), str(at), "plans", *FILES, "--count"]
-    ended = subprocess.run(program, capture_output=True, text=True)
-    assert "Traceback" not in ended.stderr
-    return ended.returncode
+#: Before the first line of `coordlang.__main__` it is Python that hears the signal.
+_MODULES = ("first", "click", "coordlang.commands.main", "msgspec", "numpy", "clingo")
 
 
 @pytest.mark.parametrize("module", _MODULES)
 def test_signals_while_modules_are_imported(module: str) -> None:
     number = ENDING[_MODULES.index(module) % len(ENDING)]
-    assert ended_at(number, module) == 128 + number
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("number", ENDING)
-def test_signals_at_every_import(number: int) -> None:
-    """A signal at the last import of all may come when the work is done."""
-    codes = []
-    for at in range(1, 2000, 7):
-        code = ended_at(number, at)
-        if code == 0:
-            break
-        codes.append(code)
-    assert set(codes) == {128 + number}
-    assert len(codes) > 40
-
-
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
-def test_fast_downward_leaves_nothing(number: signal.Signals, tmp_path: Path) -> None:
-    process = subprocess.Popen(
-        own_process("check", *FILES),
-        env={**os.environ, "TMPDIR": str(tmp_path)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    until(lambda: list(tmp_path.glob("coordlang-*/problem.pddl")))
-    process.send_signal(number)
-    out, err = process.communicate(timeout=60)
-    assert (process.returncode, out) == (128 + number, "")
-    assert err.strip() == f"coordlang: interrupted by {number.name}"
-    assert [*tmp_path.iterdir()] == []
+    program = [sys.executable, "-c", _AT_IMPORT, str(number), module, "plans", *FILES, "--count"]
+    ended = subprocess.run(program, capture_output=True, text=True)
+    assert "Traceback" not in ended.stderr
+    assert ended.returncode == 128 + number
 
 
 @pytest.mark.parametrize(
@@ -172,3 +141,136 @@ def test_signals_wait() -> None:
     assert raised.value.number == signal.SIGINT
     with pytest.raises(Interrupted):
         signal.raise_signal(signal.SIGTERM)
+
+
+# ---- SAT solvers
+
+OURS = ("cadical153", "glucose42", "maplesat")
+
+
+def colouring(size: int, solver: SolverName) -> PartitionProblem:
+    """Nearly half of all pairs of 60 states lie in different words: seconds with 12 words."""
+    choice = Random(5)
+    problem = PartitionProblem(range(60), size, solver)
+    for b in range(60):
+        for a in range(b):
+            if choice.random() < 0.45:
+                problem.separate_one([(a, b)])
+    return problem
+
+
+def solve_until_interrupted(solver: SolverName) -> None:
+    """Solve again and again; after an interrupt the memory is used as before."""
+    Interruptions()
+    with suppress(KeyboardInterrupt):
+        while True:
+            problem = colouring(12, solver)
+            try:
+                problem.solve()
+            finally:
+                problem.close()
+    left = [bytearray(size) for size in range(1, 5000, 2)]
+    problem = colouring(20, solver)
+    problem.solve(2_000)
+    problem.close()
+    del left
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _all_is_loaded() -> None:
+    """An interrupted import is another matter ."""
+    colouring(1, "cadical153").close()
+    build_language(all_tasks("grid", "gw1-2x2"), "minimal")
+
+
+@pytest.mark.parametrize("solver", OURS[:2])
+def test_interrupts_while_solvers_work(solver: SolverName) -> None:
+    """One, or two soon after each other; 70: the second one came after the first was caught."""
+    choice = Random(solver)
+    for turn in range(5):
+        process = fork(lambda: solve_until_interrupted(solver))
+        time.sleep(choice.uniform(0.03, 0.25))
+        process.send(signal.SIGINT)
+        if turn % 2:
+            time.sleep(choice.uniform(0.0, 0.05))
+            with suppress(ProcessLookupError):
+                process.send(signal.SIGINT)
+        ended = process.join(30)
+        assert ended.code in (0, 70)
+        assert ended.code == 0 or "planners.system.signals.Interrupted: SIGINT" in ended.err, ended
+
+
+@pytest.mark.parametrize("solver", get_args(SolverName))
+def test_a_time_limit_is_heard_after_a_solver(solver: SolverName) -> None:
+    """MapleChrono, which is not in use, sets an alarm and a handler below Python's."""
+
+    php = [[6 * p + h + 1 for h in range(6)] for p in range(7)]
+    php += [[-a, -b] for h in zip(*php, strict=True) for a, b in combinations(h, 2)]
+
+    def work() -> None:
+        with time_limit(100), sat_solver(solver, php) as sat:
+            assert solve_slice(sat, 10_000_000) is False
+            assert 50 < time_left() <= 100
+            with pytest.raises(OutOfTime):
+                signal.raise_signal(signal.SIGALRM)
+        assert time_left() == float("inf")
+
+    ended = fork(work).join()
+    assert ended.code == 0, ended
+
+
+def called(solver: SolverName, what: str) -> str:
+    """The function of python-sat's extension that does something with a solver."""
+    return f"{'glucose421' if solver == 'glucose42' else solver}_{what}"
+
+
+@pytest.mark.parametrize(
+    ("number", "said"),
+    [(signal.SIGINT, "Interrupted: SIGINT"), (signal.SIGALRM, "OutOfTime: the time limit of")],
+)
+@pytest.mark.parametrize("solver", OURS)
+def test_a_solver_is_freed_once(
+    solver: SolverName, number: signal.Signals, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The signal comes when the solver has been freed, and python-sat has not noted it yet."""
+    free = getattr(pysolvers, called(solver, "del"))
+
+    def freed(*arguments: object) -> None:
+        free(*arguments)
+        signal.raise_signal(number)
+
+    def work() -> None:
+        Interruptions()
+        with time_limit(100):
+            sat = sat_solver(solver, [[1, 2], [-1]])
+            assert solve_slice(sat, 10) is True
+            monkeypatch.setattr(pysolvers, called(solver, "del"), freed)
+            sat.delete()
+
+    ended = fork(work).join()
+    assert (ended.code, said in ended.err) == (70, True), ended
+
+
+@pytest.mark.parametrize(
+    ("solver", "what", "place"),
+    [*((solver, "solve_lim", 2) for solver in OURS), ("glucose42", "propagate", 3)],
+)
+def test_no_solver_is_left_by_longjmp(
+    solver: SolverName, what: str, place: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One of its arguments says whether it takes SIGINT."""
+    real, given = getattr(pysolvers, called(solver, what)), []
+
+    def noted(*arguments: object) -> object:
+        given.append(arguments[place])
+        return real(*arguments)
+
+    monkeypatch.setattr(pysolvers, called(solver, what), noted)
+    with sat_solver(solver, [[1, 2], [-1, 3], [-1, -3, 4]]) as sat:
+        if what == "propagate":
+            assert propagates(sat, [1])
+            assert not propagates(sat, [1, -4])
+        else:
+            assert solve_slice(sat, 10) is True
+            assert solve_slice(sat, 10, [1, -4]) is False
+    assert given == [0, 0]

@@ -3,21 +3,21 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import re
 import shutil
 import signal
+import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from random import Random
 
-from tests.fuzz.mutations import MUTATIONS, OF_NAMES, as_bytes, many_objects
+from tests.fuzz.mutations import MUTATIONS, as_bytes, odd_name
 from tests.support.domains import DOMAINS, SHARED
 from tests.support.forks import fork_command, fresh_command
 
@@ -33,11 +33,15 @@ _FRESH = 25
 _PLACE = re.compile(r":\d+:\d+: ")
 #: Errors of a PDDL file that have no place inside it.
 _PLACELESS = ("no such file", "found an empty file", "binary file")
-#: Pairs of files that are read without an error, with the options they need.
-_SHIPPED = (
-    *("three-cells/problem", "t-map/problem", "corridor/problem", "grid/gw1-2x2"),
-    *("grid/three-robots-3x3", "grid-joint/three-cells"),
-)
+#: Pairs of files that are read without an error, with the options they need: ours, and others'.
+_SHIPPED = """
+three-cells domain problem
+t-map domain problem
+corridor domain problem
+grid domain gw1-2x2
+grid domain three-robots-3x3
+grid-joint domain three-cells
+"""
 _FOREIGN = """
 blocks-arms original_domain original_problem_3
 boxpushing domain p2_3_2_1_1_0
@@ -66,19 +70,15 @@ class Pair:
 def pairs(*, foreign: bool = True) -> list[Pair]:
     """The files to break; without ``foreign`` only those that come with the project."""
 
-    def read(path: Path) -> str:
-        return path.read_bytes().decode("utf-8", "surrogateescape")
-
-    lines = [f"{name.split('/')[0]} domain {name.split('/')[1]}" for name in _SHIPPED]
-    places = [DOMAINS] * len(lines)
-    if foreign and (SHARED / "foreign").is_dir():
-        lines += _FOREIGN.strip().splitlines()
-        places += [SHARED / "foreign"] * (len(lines) - len(places))
     found = []
-    for place, line in zip(places, lines, strict=True):
-        folder, domain, problem, *options = line.split()
-        one, other = (read(place / folder / f"{name}.pddl") for name in (domain, problem))
-        found.append(Pair(folder, one, other, tuple(options)))
+    for place, lines in ((DOMAINS, _SHIPPED), (SHARED / "foreign", _FOREIGN if foreign else "")):
+        for line in lines.strip().splitlines() if place.is_dir() else ():
+            folder, *names, options = (
+                line.split(maxsplit=3) if "--" in line else [*line.split(), ""]
+            )
+            paths = (place / folder / f"{name}.pddl" for name in names)
+            one, other = (p.read_bytes().decode("utf-8", "surrogateescape") for p in paths)
+            found.append(Pair(folder, one, other, tuple(options.split())))
     return found
 
 
@@ -92,11 +92,6 @@ class Mutant:
     domain: bytes
     problem: bytes
     command: str
-
-    @property
-    def light(self) -> bool:
-        """Whether it stays small: what the quick run in the tests keeps to."""
-        return len(self.domain) + len(self.problem) < 100_000
 
     @property
     def arguments(self) -> list[str]:
@@ -115,9 +110,7 @@ def mutant(number: int, seed: int, sources: Sequence[Pair]) -> Mutant:
     for _ in range(random.choice((1, 1, 1, 2))):
         change = random.choices([*MUTATIONS], [*MUTATIONS.values()])[0]
         which = random.choice(("domain", "domain", "problem", "both"))
-        if change is many_objects:
-            which = "problem"
-        if change in OF_NAMES and which == "both":  # the same change, so that they still fit
+        if change is odd_name and which == "both":  # the same change, so that they still fit
             domain, _, problem = change(f"{domain}\x01{problem}", random).partition("\x01")
         else:
             domain = domain if which == "problem" else change(domain, random)
@@ -220,7 +213,7 @@ class Report:
     def text(self) -> str:
         slow = [f"  {seconds:6.2f} s  {what}" for seconds, what in reversed(self.slowest)]
         codes = [f"  {name:14}{code:>7}{n:9}" for (name, code), n in sorted(self.codes.items())]
-        head = f"{len(self.failures)} failures"
+        head = f"{len(self.failures)} failures of {self.codes.total()} mutants"
         return "\n".join(["exit codes", *codes, "", "slowest", *slow, "", head, *self.failures])
 
 
@@ -230,24 +223,15 @@ def fuzz(
     sources: Sequence[Pair],
     *,
     keep: Path,
-    only_light: bool = False,
-    progress: Callable[[str], None] = lambda _: None,
+    show: bool = False,
 ) -> Report:
-    """Run mutants and judge them; files of failures go to ``keep``.
-
-    An interrupt (Ctrl-C) ends it early, with the report so far.
-    """
+    """Run mutants and judge them; files of failures go to ``keep``."""
     report = Report()
-    with (
-        tempfile.TemporaryDirectory(prefix="fuzz-") as name,
-        contextlib.suppress(KeyboardInterrupt),
-    ):
+    with tempfile.TemporaryDirectory(prefix="fuzz-") as name:
         for done, number in enumerate(numbers):
-            m = mutant(number, seed, sources)
-            if m.light or not only_light:
-                _judge(m, Path(name), report, keep)
-            if done % 20 == 0:
-                progress(f"{done} of {len(numbers)}")
+            _judge(mutant(number, seed, sources), Path(name), report, keep)
+            if show and done % 20 == 0:
+                print(f"\r\033[K{done} of {len(numbers)} ..", end="", file=sys.stderr, flush=True)
     return report
 
 
@@ -262,8 +246,7 @@ def _judge(m: Mutant, folder: Path, report: Report, keep: Path) -> None:
     what = f"#{m.number} {m.pair.name}, {m.what}, {m.command}"
     report.codes[m.command, "killed" if outcome.code is None else str(outcome.code)] += 1
     report.slowest = sorted([*report.slowest, (outcome.seconds, what)])[-5:]
-    why = complaint(m, outcome, language.exists())
-    if why is not None:
+    if why := complaint(m, outcome, language.exists()):
         report.failures.append(f"  {what}: {why}\n{outcome.err.strip()[-600:]}")
         shutil.copytree(work, keep / f"{m.number:06}", dirs_exist_ok=True)
         text = f"{why}\n{m.what}\n\ncoordlang {' '.join(m.arguments)}\n\n{outcome.err}"
