@@ -212,30 +212,6 @@ def test_kills(name: str, tmp_path: Path, said: dict[str, str]) -> None:
             assert held in (OLD, new[output]), (output, held[:300])
 
 
-def test_copies_of_domains_are_whole_or_not_there(tmp_path: Path) -> None:
-    choice, copies = random.Random(2), 0
-    whole = {p.name: p.read_bytes() for p in (DOMAINS / "grid").iterdir()}
-    for turn in range(8):
-        target, number = tmp_path / str(turn), SIGNALS[turn % len(SIGNALS)]
-        process = fork_command("domains", "--copy", "grid", target)
-        end = time.monotonic() + (60 if choice.random() < 0.6 else choice.uniform(0.0, 0.4))
-        seen = choice.randrange(len(whole))  # files that are there
-        while time.monotonic() < end and not process.ended():
-            if len([name for _, _, names in os.walk(target) for name in names]) > seen:
-                break
-        process.send(number)
-        ended = process.join()
-        assert ended.code in (0, 128 + number, -number), ended
-        found = {p.name for p in target.iterdir()} if target.exists() else set()
-        if "grid" in found:
-            copies += 1
-            assert {p.name: p.read_bytes() for p in (target / "grid").iterdir()} == whole
-        found -= {"grid"}
-        assert not found or number == signal.SIGKILL
-        assert all(re.fullmatch(r"\.coordlang\.[a-z0-9_]{8}", name) for name in found)
-    assert copies > 0
-
-
 def test_two_processes_write_one_output(tmp_path: Path, said: dict[str, str]) -> None:
     stage = Stage("tasks", tmp_path, said)
     both = [stage.start(), stage.start()]

@@ -90,22 +90,18 @@ class World:
         return coordlang("say", *self.spoken, self.plan).out.split("\n")[0]
 
 
-@pytest.fixture(scope="module")
-def written() -> dict[str, dict[str, bytes]]:
-    """The files of worlds that a test of this module wrote already, by the kind of names."""
-    return {}
+#: The files of worlds that are written already, by the kind of names.
+_WRITTEN: dict[str, dict[str, bytes]] = {}
 
 
 @pytest.fixture
-def world_of(
-    coordlang: Command, tmp_path: Path, written: dict[str, dict[str, bytes]]
-) -> Callable[[str], World]:
+def world_of(coordlang: Command, tmp_path: Path) -> Callable[[str], World]:
     def make(kind: str) -> World:
         world = World(tmp_path, NAMES[kind])
-        if kind not in written:
+        if kind not in _WRITTEN:
             world.write(coordlang)
-            written[kind] = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-        for name, data in written[kind].items():
+            _WRITTEN[kind] = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+        for name, data in _WRITTEN[kind].items():
             (tmp_path / name).write_bytes(data)
         return world
 
@@ -193,6 +189,10 @@ def test_names_are_quoted_wherever_they_are_written(
             assert not re.search(r"&(?!amp;)", done.out)
         elif command[0] == "report":
             check_page(done.out)
+    out = world.folder / "out"  # PDDL that is written again has the same names
+    assert coordlang("inspect", *world.pddl, "--write", out).code == 0
+    again = coordlang("plans", out / "domain.pddl", out / "problem.pddl")
+    assert (again.code, again.out) == (0, coordlang("plans", *world.pddl).out)
 
 
 def check_page(text: str) -> None:
@@ -240,16 +240,6 @@ def test_exported_names_are_read_by_fast_downward(
     assert (back.code, back.err) == (0, "")
     world.plan.write_text(back.out)
     assert world.sentence(coordlang) == words
-
-
-@pytest.mark.parametrize("kind", ["markup", "words"])
-def test_pddl_that_is_written_again_has_the_same_names(
-    coordlang: Command, tmp_path: Path, kind: str
-) -> None:
-    world, out = World(tmp_path, NAMES[kind]), tmp_path / "out"
-    assert coordlang("inspect", *world.pddl, "--write", out).code == 0
-    again = coordlang("plans", out / "domain.pddl", out / "problem.pddl")
-    assert (again.code, again.out) == (0, coordlang("plans", *world.pddl).out)
 
 
 #: A world whose facts are atoms without arguments: their names are the exported ones.

@@ -59,7 +59,7 @@ def edit_tokens(text: str, random: Random) -> str:
     """
     tokens = tokens_of(text)
     for _ in range(random.choice((1, 1, 1, 2, 3))):
-        seen = [n for n, t in enumerate(tokens) if not t.isspace() and t[0] != ";"]
+        seen = [n for n, t in enumerate(tokens) if t.strip() and t[0] != ";"]
         words = [n for n in seen if tokens[n] not in "()"]
         if not words:
             break
