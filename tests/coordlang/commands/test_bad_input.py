@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bad input is normal input: the documented exit code, the place, and what to do about it.
 
-With --json it is one JSON object on stdout, too.
+With --json it is one JSON object on stdout, too. More of PDDL stands in
+tests/planners/pddl/test_odd_pddl.py, and what is not supported in tests/docs/test_pddl.py.
 """
 
 from __future__ import annotations
@@ -13,14 +14,12 @@ from typing import Any
 import jsonschema
 import pytest
 
-import coordlang as door
 from coordlang.commands.main import wants_json
 from coordlang.commands.schema import json_schema
-from planners.pddl.model_options import ModelOptions
 from planners.system.errors import OutOfTime
 from tests.coordlang.commands.conftest import FILES, Shell
 from tests.support.command import Outcome
-from tests.support.hall import DOMAIN, PROBLEM, factored
+from tests.support.hall import DOMAIN, PROBLEM
 
 
 def write(domain: str = DOMAIN, problem: str = PROBLEM) -> None:
@@ -41,175 +40,107 @@ def hall(shell: Shell) -> None:
     write()
 
 
-def test_good_files_are_read(shell: Shell) -> None:
-    assert shell("plans d.pddl p.pddl --count").out == "1\n"
-    shell("plans d.pddl none.pddl", 31, "none.pddl: there is no such file")
+def d(old: str, new: str) -> tuple[str, str]:
+    """Both files, with something else in the domain."""
+    assert old in DOMAIN
+    return DOMAIN.replace(old, new), PROBLEM
 
 
-WRONG_DOMAINS = {
-    "unbalanced": (
-        DOMAIN.rstrip()[:-1],
-        "d.pddl:1:1: the '(define' that opens here is never closed",
-    ),
-    "one too many": (DOMAIN + ")", "d.pddl:8:1: unexpected ')' after the end of the definition"),
-    "a ')' is missing in an action": (
-        DOMAIN.replace("(door ?x ?y))\n", "(door ?x ?y)\n").rstrip()[:-1]
-        + "(:action wait :agent ?r - robot :parameters () :effect (and)))",
-        "d.pddl:7:47: ':action' begins inside of another list: a ')' is missing before it\n"
+def p(old: str, new: str) -> tuple[str, str]:
+    """Both files, with something else in the problem."""
+    assert old in PROBLEM
+    return DOMAIN, PROBLEM.replace(old, new)
+
+
+PLACES, GOAL = "?x ?y - room)\n    :pre", "(:goal (and (at r1 b) (at r2 a))))"
+WRONG = [
+    # parentheses
+    ((DOMAIN.rstrip()[:-1], PROBLEM), "d.pddl:1:1: the '(define' that opens here is never closed"),
+    ((DOMAIN + ")", PROBLEM), "d.pddl:8:1: unexpected ')' after the end of the definition"),
+    (
+        d("(door ?x ?y))\n", "(door ?x ?y)\n(:action wait :parameters () :effect (and))"),
+        "d.pddl:7:1: ':action' begins inside of another list: a ')' is missing before it\n"
         "  '(:action' opens at ",
     ),
-    "swapped arguments": (
-        DOMAIN.replace("(at ?r ?y) (not", "(at ?y ?r) (not"),
+    (("(" * 10_000, PROBLEM), "nested more than 200 deep"),
+    (("", PROBLEM), "expected '(define ...', found an empty file\n  Give a PDDL file"),
+    ((PROBLEM, PROBLEM), "This is a problem file: the order is DOMAIN PROBLEM."),
+    # domains
+    (
+        d("(at ?r ?y) (not", "(at ?y ?r) (not"),
         "d.pddl:7:22: argument 1 of 'at', '?y', is of type room, not robot\n"
         "  It is declared as (at robot room): are arguments swapped",
     ),
-    "unknown predicate": (
-        DOMAIN.replace("(door ?x ?y))\n", "(dor ?x ?y))\n"),
-        "d.pddl:6:35: unknown predicate 'dor'",
-    ),
-    "wrong arity": (
-        DOMAIN.replace(":precondition (and (at ?r ?x)", ":precondition (and (at ?r)"),
+    (
+        d(":precondition (and (at ?r ?x)", ":precondition (and (at ?r)"),
         "d.pddl:6:24: predicate 'at' takes 2 arguments, found 1\n"
         "  Write (at a b), or declare it with 1.",
     ),
-    "type cycle": (
-        DOMAIN.replace("robot room)", "robot - room room - robot)"),
-        "the types form a cycle: robot - room - robot",
-    ),
-    "unknown type": (
-        DOMAIN.replace("?x ?y - room)\n    :pre", "?x ?y - rom)\n    :pre"),
-        "type 'rom' of '?x' is not declared",
-    ),
-    "unknown variable": (
-        DOMAIN.replace("(at ?r ?y)", "(at ?r ?z)"),
-        "variable ?z is not declared here",
-    ),
-    "double variable": (
-        DOMAIN.replace("?x ?y - room)\n    :pre", "?x ?x - room)\n    :pre"),
+    (d(PLACES, PLACES.replace("room", "rom")), "type 'rom' of '?x' is not declared"),
+    (d("(at ?r ?y)", "(at ?r ?z)"), "variable ?z is not declared here"),
+    (
+        d(PLACES, PLACES.replace("?y", "?x")),
         "variable ?x is declared twice\n  Give one of the two another name.",
     ),
-    "unknown keyword": (
-        DOMAIN.replace(":effect", ":effects"),
-        "unknown keyword ':effects' in an action",
-    ),
-    "no action": ("(define (domain hall))", "this domain has no action"),
-    "double action": (
-        DOMAIN.rstrip()[:-1] + "(:action go :parameters () :effect ()))",
+    (d(":effect", ":effects"), "unknown keyword ':effects' in an action"),
+    (("(define (domain hall))", PROBLEM), "this domain has no action"),
+    (
+        (DOMAIN.rstrip()[:-1] + "(:action go :parameters () :effect ()))", PROBLEM),
         "action 'go' is declared twice",
     ),
-    "empty": ("", "expected '(define ...', found an empty file\n  Give a PDDL file"),
-    "object of the problem": (
-        DOMAIN.replace("(at ?r ?x) (door", "(at r1 ?x) (door"),
-        "d.pddl:6:28: object 'r1' is not declared\n  No object is declared. An object that a domain names belongs in its "
-        "(:constants ..).",
+    (
+        d("(at ?r ?x) (door", "(at r1 ?x) (door"),
+        "d.pddl:6:28: object 'r1' is not declared\n  No object is declared. An object that a domain "
+        "names belongs in its (:constants ..).",
     ),
-    "deep": ("(" * 10_000, "nested more than 200 deep"),
-    "a problem instead": (PROBLEM, "This is a problem file: the order is DOMAIN PROBLEM."),
-}
-
-
-@pytest.mark.parametrize("case", WRONG_DOMAINS)
-def test_wrong_domain(case: str, shell: Shell) -> None:
-    text, message = WRONG_DOMAINS[case]
-    write(text)
-    shell("plans d.pddl p.pddl", 31, message)
-
-
-WRONG_PROBLEMS = {
-    "unknown object in the goal": (
-        PROBLEM.replace("(at r2 a))))", "(at r2 c))))"),
+    # problems
+    (
+        p("(at r2 a))))", "(at r2 c))))"),
         "p.pddl:4:32: object 'c' is not declared\n  Declared objects: a, b, r1, r2.\n",
     ),
-    "object of no type": (
-        PROBLEM.replace("a b - room", "a b -"),
+    (
+        p("a b - room", "a b -"),
         "p.pddl:2:31: expected a type after '-'\n"
         "  Write the type's name after it, or leave the '-' out.",
     ),
-    "object of an unknown type": (
-        PROBLEM.replace("- robot a", "- rbot a"),
-        "type 'rbot' of 'r1' is not declared",
-    ),
-    "an object that is a variable": (
-        PROBLEM.replace("a b - room", "a ?b - room"),
+    (p("- robot a", "- rbot a"), "type 'rbot' of 'r1' is not declared"),
+    (
+        p("a b - room", "a ?b - room"),
         "a variable cannot be an object\n  Names of objects have no '?': b.",
     ),
-    "an atom of atoms": (
-        PROBLEM.replace("(at r1 b) (at r2 a)", "(at r1 (at r2 a))"),
+    (
+        p("(at r1 b) (at r2 a)", "(at r1 (at r2 a))"),
         "expected a variable or an object, found a list\n  Arguments are names:",
     ),
-    "an object in parentheses": (
-        PROBLEM.replace("r1 r2 - robot", "(r1) r2 - robot"),
+    (
+        p("r1 r2 - robot", "(r1) r2 - robot"),
         "expected an object, found a list\n  Write an object here, without parentheses.",
     ),
-    "an atom without parentheses": (
-        PROBLEM.replace("(:init (at r1 a)", "(:init at"),
+    (
+        p("(:init (at r1 a)", "(:init at"),
         "expected an atom in parentheses, found 'at'\n  Put it in parentheses",
     ),
-    "either of nothing": (
-        PROBLEM.replace("a b - room", "a b - (either)"),
+    (
+        p("a b - room", "a b - (either)"),
         "expected a type or '(either type ..)'\n"
         "  One type is a name, several are (either name name).",
     ),
-    "another domain": (
-        PROBLEM.replace("hall", "house"),
-        "p.pddl:1:23: this is a problem for domain 'house', not for 'hall'",
-    ),
-    "no robot": (
-        PROBLEM.replace("r1 r2 - robot", "")
-        .replace("(at r1 a) (at r2 b)", "")
-        .replace("(at r1 b) (at r2 a)", ""),
+    (p("hall", "house"), "p.pddl:1:23: this is a problem for domain 'house', not for 'hall'"),
+    (
+        (DOMAIN, "(define (problem p) (:domain hall) (:goal (and)))"),
         "there is no robot in this problem",
     ),
-    "no goal": (
-        PROBLEM.replace("(:goal (and (at r1 b) (at r2 a))))", ")"),
-        "expected one '(:goal FORMULA)', found none\n  Write",
-    ),
-    "two goals": (
-        PROBLEM.rstrip()[:-1] + "(:goal (at r1 a)))",
-        "p.pddl:4:36: expected one '(:goal FORMULA)', found 2\n  Write",
-    ),
-    "half a goal": (
-        PROBLEM.replace("(and (at r1 b) (at r2 a))", ""),
-        "'(:goal FORMULA)', this one has no formula",
-    ),
-}
+    (p(GOAL, ")"), "expected one '(:goal FORMULA)', found none\n  Write"),
+    (p(GOAL, "(:goal))"), "'(:goal FORMULA)', this one has no formula"),
+]
 
 
-@pytest.mark.parametrize("case", WRONG_PROBLEMS)
-def test_wrong_problem(case: str, shell: Shell) -> None:
-    text, message = WRONG_PROBLEMS[case]
-    write(problem=text)
+@pytest.mark.parametrize(("files", "message"), WRONG)
+def test_wrong_files(files: tuple[str, str], message: str, shell: Shell) -> None:
+    write(*files)
     shell("plans d.pddl p.pddl", 31, message)
 
 
-@pytest.mark.parametrize(
-    ("insert", "message"),
-    [
-        ("(:durative-action x)", "durative actions (:durative-action) are not supported"),
-        (
-            "(:derived (at ?r ?x) (at ?r ?x))",
-            "derived predicates (axioms) (:derived) are not supported",
-        ),
-        (
-            "(:action x :parameters () :effect (increase (fuel) 1))",
-            "numeric effect '(increase ..)' is not supported",
-        ),
-        (
-            "(:action x :parameters () :precondition (< 1 2))",
-            "numeric condition '(< ..)' is not supported",
-        ),
-        (
-            "(:action x :parameters () :precondition (preference q (and)))",
-            "a preference is not supported",
-        ),
-    ],
-)
-def test_unsupported(insert: str, message: str, shell: Shell) -> None:
-    write(DOMAIN.rstrip()[:-1] + insert + ")")
-    shell("plans d.pddl p.pddl", 34, message, "d.pddl:7:")
-
-
-COSTLY = DOMAIN.replace(":effect (and", ":effect (and (increase (total-cost) COST)")
 TOO_MUCH = (
     "d.pddl:5:3: an action cost above 2147483648 (of go) is not supported\n"
     "  Write costs in a larger unit, or leave out --cost"
@@ -221,15 +152,13 @@ TOO_MUCH = (
     [
         ("2147483648", 0, ""),
         ("4e", 31, "expected a number"),
-        *((much, 34, TOO_MUCH) for much in ("2147483649", "4000000000.0", "9" * 5000)),
+        ("2147483649", 34, TOO_MUCH),
+        ("4000000000.0", 34, TOO_MUCH),
     ],
 )
 def test_large_costs(cost: str, code: int, message: str, shell: Shell) -> None:
-    """The limit is one of sums: it is no matter where costs are ignored."""
-    write(COSTLY.replace("COST", cost))
+    write(*d(":effect (and", f":effect (and (increase (total-cost) {cost})"))
     shell("plans d.pddl p.pddl --count --cost makespan+cost", code, message)
-    if code != 31:
-        assert shell("plans d.pddl p.pddl --count").out == "1\n"
 
 
 CANDIDATES = """(define (domain en) (:types robot hall) (:predicates (q ?r - robot) (open) (busy ?r))
@@ -239,12 +168,7 @@ CANDIDATES = """(define (domain en) (:types robot hall) (:predicates (q ?r - rob
 
 @pytest.mark.parametrize(
     ("old", "new", "listed"),
-    [
-        ("", "", "robot"),
-        ("robot", "man", "man"),
-        (" - robot", "", "busy"),
-        ("hall", "hall", "robot"),
-    ],
+    [("robot", "man", "man"), (" - robot", "", "busy"), ("hall", "hall", "robot")],
 )
 def test_what_may_be_the_robots(old: str, new: str, listed: str, shell: Shell) -> None:
     problem = (
@@ -257,34 +181,6 @@ def test_what_may_be_the_robots(old: str, new: str, listed: str, shell: Shell) -
     shell(f"{line} {listed}")
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("no", "no: there is no such folder\n  "),
-        ("d.pddl", "d.pddl: this is a file, not a folder\n  "),
-        (".", "without a partner: no such files\n  "),
-    ],
-)
-def test_a_folder_without_factored_files(name: str, message: str, shell: Shell) -> None:
-    shell(f"plans --factored {name}", 31, message)
-
-
-@pytest.mark.parametrize("command", ["coordination", "build -o -", "verify l.json"])
-@pytest.mark.parametrize("files", ["", "d", "d p --factored x"])
-def test_files_or_a_folder(command: str, files: str, shell: Shell) -> None:
-    shell(f"{command} {files}", 2, "DOMAIN PROBLEMS..., or --factored DIR without")
-
-
-def test_factored_files_all_the_way(shell: Shell) -> None:
-    factored(Path("hall"))
-    out = shell("coordination --factored hall").out
-    assert out == "hall: 1 optimal plan of 1 step; coordination is not required\n"
-    shell("build --factored hall --tasks all --method greedy -o l.json")
-    shell("verify l.json --factored hall", 0, "12 tasks")
-    file = "hall/domain-r1.pddl"
-    shell(f"build --factored hall -o {file}", 2, f"-o {file} would overwrite an input file")
-
-
 def test_one_robot_is_noted(shell: Shell) -> None:
     text = PROBLEM.replace("r1 r2 - robot", "r1 - robot").replace("(at r2 b)", "")
     write(problem=text.replace("(at r2 a)", ""))
@@ -292,9 +188,7 @@ def test_one_robot_is_noted(shell: Shell) -> None:
     assert shell("plans d.pddl p.pddl --count", 0, said).out == "1\n"
 
 
-def test_no_plan_and_no_step(shell: Shell) -> None:
-    write(problem=PROBLEM.replace("(door a b)", ""))
-    shell("plans d.pddl p.pddl", 11, "task two: the goal cannot be reached")
+def test_no_step(shell: Shell) -> None:
     write(problem=PROBLEM.replace("(at r1 b) (at r2 a))))", "(at r1 a))))"))
     assert json.loads(shell("plans d.pddl p.pddl --json").out) == {
         "plans": [{"cost": 0, "actions": []}],
@@ -316,10 +210,6 @@ def test_problems_of_different_worlds(shell: Shell) -> None:
     [
         ([], "the list of tasks is empty"),
         ([{"init": ["(at r1 a)"], "goal": []}], "task 1: the state (at r1 a) cannot be reached"),
-        (
-            [{"init": ["(at r1 a)", "(at r1 b)", "(at r2 b)"], "goal": []}],
-            "cannot be reached from the initial state",
-        ),
         ([{"init": ["(at r9 a)"], "goal": []}], "(at r9 a): object 'r9' is not declared"),
         ([{"init": ["(door a a)"], "goal": []}], "(door a a) is static and false"),
         ([{"init": ["(at r1 a)", "(at r2 b)"], "goal": ["(at r1"]}], "cannot read the atoms"),
@@ -327,7 +217,6 @@ def test_problems_of_different_worlds(shell: Shell) -> None:
             [{"init": "at r1"}],
             "this is no task file: Expected `array`, got `str` - at `$.tasks[0].init`",
         ),
-        ({}, "this is no task file: Expected `array`, got `object` - at `$.tasks`"),
     ],
 )
 def test_wrong_task_file(tasks: object, message: str, shell: Shell) -> None:
@@ -390,28 +279,23 @@ def test_a_good_language_survives_a_failing_build(shell: Shell, language: Path) 
     assert [p.name for p in Path().iterdir() if p.name.startswith(".")] == []
 
 
-def test_language_cut_off(shell: Shell, language: Path) -> None:
-    data = language.read_bytes()
-    for share in (0.1, 0.5, 0.99):
-        language.write_bytes(data[: int(len(data) * share)])
-        shell("verify language.json T-MAP", 31, "this is no JSON, or it is cut off")
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
+        (None, "this is no JSON, or it is cut off"),
         ({"version": 2}, "language file version 2; this program reads version 1"),
         ({"format": "x"}, "format 'x', expected 'coordlang/language'"),
-        ({"words": []}, "language.json"),
         ({"default": "w99"}, "'w99' (of 'default') is not among the words"),
         ({"states": {"(at r1 moon)": "w0"}}, "(at r1 moon) can never be true"),
     ],
     ids=str,
 )
 def test_language_that_says_what_it_must_not(
-    changes: dict[str, object], message: str, shell: Shell, language: Path
+    changes: dict[str, object] | None, message: str, shell: Shell, language: Path
 ) -> None:
-    language.write_text(json.dumps(json.loads(language.read_text()) | changes))
+    text = language.read_text()
+    changed = text[:-20] if changes is None else json.dumps(json.loads(text) | changes)
+    language.write_text(changed)
     shell("verify language.json T-MAP", 31, message)
 
 
@@ -430,7 +314,12 @@ def test_language_of_another_domain_or_world(shell: Shell, language: Path) -> No
         shell(f"verify language.json T-MAP {option}", 2, said)
 
 
-PLANS, UNDERSTAND, CHOICES = "plans d p", "understand l d p w0", "choices l d p w0"
+PLANS, UNDERSTAND, CHOICES, BUILD = (
+    "plans d p",
+    "understand l d p w0",
+    "choices l d p w0",
+    "build d p",
+)
 SAMPLE = "--sample N draws N plans: leave out --max"
 
 
@@ -439,8 +328,9 @@ SAMPLE = "--sample N draws N plans: leave out --max"
     [
         ("nonsense", "No such command"),
         ("plans", "expected DOMAIN PROBLEM"),
-        (f"{PLANS} --max x", "not a valid integer"),
-        ("build a b", "Missing option '-o'"),
+        ("verify l.json d", "DOMAIN PROBLEMS..., or --factored DIR without"),
+        ("coordination d p --factored x", "DOMAIN PROBLEMS..., or --factored DIR without"),
+        (BUILD, "Missing option '-o'"),
         ("build d.pddl p.pddl --seed -1 -o l.json", "--seed -1: expected 0 or more"),
         (f"{PLANS} --max 1 --sample 2", SAMPLE),
         (f"{UNDERSTAND} --max 1 --sample 2", SAMPLE),
@@ -453,12 +343,9 @@ SAMPLE = "--sample N draws N plans: leave out --max"
         (f"{UNDERSTAND} --nodes 3 --json --count", "--nodes cuts the DAG"),
         ("export l d p w0 --to ltlf --max-actions 2000", "--max-actions belongs to --to pddl"),
         (f"{PLANS} --robots r1 --robot-type robot", "give one of them"),
-        (
-            "build d p -o l --prefer flexible --method greedy",
-            "--prefer flexible belongs to --metho",
-        ),
-        ("build d p -o l --alpha-only", "--alpha-only belongs to --method separating"),
-        ("build d p -o l --effort 2 --method minimal", "--effort belongs to --method best"),
+        (f"{BUILD} -o l --prefer flexible --method greedy", "--prefer flexible belongs to --metho"),
+        (f"{BUILD} -o l --alpha-only", "--alpha-only belongs to --method separating"),
+        (f"{BUILD} -o l --effort 2 --method minimal", "--effort belongs to --method best"),
     ],
 )
 def test_usage(line: str, message: str, shell: Shell) -> None:
@@ -467,12 +354,16 @@ def test_usage(line: str, message: str, shell: Shell) -> None:
     assert (outcome.out == "") == ("--json" not in line)
 
 
-def test_model_options_that_there_are_not() -> None:
-    bogus: Any = "bogus"
-    with pytest.raises(door.UsageError, match=r"(?s)'bogus'.*makespan\+actions"):
-        ModelOptions(cost=bogus)
-    with pytest.raises(door.UsageError, match=r"(?s)'bogus'.*environment"):
-        ModelOptions(unowned=bogus)
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("no", "no: there is no such folder\n  "),
+        ("d.pddl", "d.pddl: this is a file, not a folder\n  "),
+        (".", "without a partner: no such files\n  "),
+    ],
+)
+def test_a_folder_without_factored_files(name: str, message: str, shell: Shell) -> None:
+    shell(f"plans --factored {name}", 31, message)
 
 
 def test_time_limit(shell: Shell) -> None:
@@ -530,8 +421,6 @@ def test_an_error_as_json(shell: Shell) -> None:
         f"coordlang: {place['file']}:{place['line']}:{place['column']}: {found['message']}\n"
         f"  {found['remedy']}\n"
     )
-    without = shell("plans d.pddl p.pddl", 31)
-    assert (without.out, without.err) == ("", outcome.err)
     for command in ("inspect", "plans --count", "check", "coordination"):
         found = error(shell(f"{command} d.pddl none.pddl --json", 31))
         assert found["message"] == "there is no such file"
