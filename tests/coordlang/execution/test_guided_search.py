@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-import json
 from contextlib import suppress
 from itertools import chain, pairwise, product
-from pathlib import Path
 
 import pytest
 
@@ -16,10 +14,8 @@ from coordlang.language.candidates import Candidates
 from coordlang.language.listed import ground_task
 from planners.check.validate import validate
 from planners.search.heuristics import heuristic
-from planners.search.plan_file import read_plans, texts
+from planners.search.plan_file import texts
 from planners.system.errors import UsageError
-from tests.support.command import Command
-from tests.support.domains import DOMAINS
 from tests.support.naive import plans_by_sentence
 from tests.support.task_languages import RANDOM, SHIPPED, random_task_languages, shipped
 
@@ -117,56 +113,3 @@ def test_a_sentence_of_longer_plans_only_is_no_sentence() -> None:
         assert result.words == words
         with pytest.raises(NoPlanFits):
             plan_under_sentence(task_language, words)
-
-
-@pytest.fixture
-def files(language: Path, t_map: tuple[Path, Path]) -> tuple[Path, Path, Path]:
-    return language, *t_map
-
-
-def test_prints_a_plan_with_its_sentence(
-    coordlang: Command, files: tuple[Path, ...], tmp_path: Path
-) -> None:
-    path = tmp_path / "plan.txt"
-    for sentence in ("w0 w1 w3 w2 w0", "w0 w2 w3 w1 w0"):
-        for heuristic_name in ("relaxed", "manhattan", "blind"):
-            outcome = coordlang("plan", *files, sentence, "--heuristic", heuristic_name)
-            assert outcome.code == 0
-            assert outcome.out.endswith(f"; makespan = 4\n; sentence = {sentence}\n")
-            assert f"A* ({heuristic_name}) expanded" in outcome.err
-            path.write_text(outcome.out)
-            assert coordlang("say", *files, path).out == sentence + "\n"
-
-
-def test_json(coordlang: Command, files: tuple[Path, ...], tmp_path: Path) -> None:
-    outcome = coordlang("plan", *files, "w0 w1 w3 w2 w0", "--json")
-    data = json.loads(outcome.out)
-    assert outcome.err == ""
-    assert (data["sentence"], data["count"], data["optimal_cost"], len(data["plans"])) == (
-        "w0 w1 w3 w2 w0",
-        1,
-        4,
-        1,
-    )
-    search = data["search"]
-    assert search["expanded"] == 4 < search["without_sentence"]["expanded"]
-    path = tmp_path / "plan.json"
-    path.write_text(outcome.out)
-    task_language = shipped("t-map/problem")[1]
-    assert len(read_plans(path, task_language.model)) == 1
-
-
-def test_usage(coordlang: Command, files: tuple[Path, ...]) -> None:
-    assert coordlang("plan", *files).code == 2
-    assert coordlang("plan", *files, "w0", "--prefer", "shortest").code == 2
-    assert coordlang("plan", *files, "w0", "--heuristic", "best").code == 2
-
-
-def test_manhattan_needs_coordinates(coordlang: Command, tmp_path: Path) -> None:
-    files = DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "problem.pddl"
-    language = tmp_path / "language.json"
-    assert coordlang("build", *files, "--method", "greedy", "-o", language).code == 0
-    outcome = coordlang(
-        "plan", language, *files, "--prefer", "shortest", "--heuristic", "manhattan"
-    )
-    assert (outcome.code, "needs a goal with places such as c2-3" in outcome.err) == (2, True)

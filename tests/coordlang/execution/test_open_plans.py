@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections import Counter
-from pathlib import Path
 from random import Random
 from xml.etree import ElementTree
 
@@ -17,8 +15,6 @@ from coordlang.execution.open_plans import OpenPlans, PlanDag, open_plans_data, 
 from coordlang.execution.task_language import NoPlanFits, TaskLanguage
 from planners.search.plan_file import texts
 from planners.search.plans import Plan
-from tests.support.command import Command
-from tests.support.domains import DOMAINS
 from tests.support.naive import plans_by_sentence
 from tests.support.task_languages import RANDOM, SHIPPED, random_task_languages, shipped
 
@@ -162,94 +158,6 @@ def luminance(colour: str) -> float:
     parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
     red, green, blue = (p / 12.92 if p <= 0.03928 else ((p + 0.055) / 1.055) ** 2.4 for p in parts)
     return 0.2126 * red + 0.7152 * green + 0.0722 * blue
-
-
-def test_a_task_without_steps_is_drawn(
-    coordlang: Command, tmp_path: Path, t_map: tuple[Path, Path]
-) -> None:
-    domain, problem = t_map
-    done, language = tmp_path / "done.pddl", tmp_path / "language.json"
-    done.write_text(re.sub(r"\(:goal.*", "(:goal (and)))", problem.read_text(), flags=re.S))
-    assert coordlang("build", domain, done, "--method", "greedy", "-o", language).code == 0
-    for form in ("dot", "json", "ipc"):
-        outcome = coordlang("understand", language, domain, done, "w0", "--format", form)
-        assert outcome.code == 0, outcome.err
-        assert outcome.out
-
-
-@pytest.fixture
-def files(language: Path, t_map: tuple[Path, Path]) -> tuple[Path, Path, Path]:
-    return language, *t_map
-
-
-def test_lists_what_say_says(
-    coordlang: Command, files: tuple[Path, ...], t_map: tuple[Path, Path], tmp_path: Path
-) -> None:
-    path = tmp_path / "plans.json"
-    path.write_text(coordlang("plans", *t_map, "--json").out)
-    for sentence in coordlang("say", *files, path).out.splitlines():
-        path.write_text(coordlang("understand", *files, sentence).out)
-        assert coordlang("say", *files, path).out.strip() == sentence
-        assert coordlang("understand", *files, sentence, "--count").out == "1\n"
-        data = json.loads(coordlang("understand", *files, sentence, "--json").out)
-        keys = ("count", "complete", "covered", "sentence")
-        assert [data[key] for key in keys] == [1, True, True, sentence]
-        assert len(data["plans"]) == 1
-        assert [edge["from"] for edge in data["edges"]] == list(range(len(data["nodes"]) - 1))
-        only = json.loads(coordlang("understand", *files, sentence, "--json", "--count").out)
-        assert (only["count"], only["plans"], "nodes" in only) == (1, [], False)
-
-
-def test_samples_are_seeded(coordlang: Command, tmp_path: Path) -> None:
-    files = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "corners-4x4.pddl"
-    language = tmp_path / "language.json"
-    assert coordlang("build", *files, "--method", "greedy", "-o", language).code == 0
-    sentence = (
-        coordlang("plan", language, *files, "--prefer", "most-plans")
-        .out.splitlines()[-1]
-        .partition("= ")[2]
-    )
-    first, again, other = (
-        coordlang("understand", language, *files, sentence, "--sample", 6, "--seed", seed).out
-        for seed in (1, 1, 2)
-    )
-    assert first == again != other
-    assert first.count("; makespan = 6") == 6
-    some = coordlang("understand", language, *files, sentence, "--max", 3)
-    assert some.out.count("; makespan") == 3
-    assert "3 of 16 plans listed" in some.err
-    drawing = ("--format", "dot", "--nodes", 10, "-o", tmp_path / "x.dot")
-    cut = coordlang("understand", language, *files, sentence, *drawing)
-    assert (cut.code, cut.out) == (0, "")
-    assert "are drawn as" in cut.err
-    assert (tmp_path / "x.dot").read_text().startswith("digraph plans {")
-
-
-@pytest.mark.parametrize(
-    ("sentence", "code", "message"),
-    [
-        ("", 31, "the sentence is empty"),
-        ("w0 w9", 31, "word 2 of the sentence, 'w9', is no word of this language"),
-        ("w0 w0", 31, "twice in a row"),
-        ("w1 w0", 1, "at the beginning no plan says 'w1'"),
-        ("w0 w1 w0", 1, "after \"w0 w1\" no plan says 'w0'\n  There plans say 'w3'."),
-        ("w0 w1 w3", 1, "after \"w0 w1 w3\" no plan ends\n  There plans say 'w2'."),
-        ("w0 w1 w3 w2 w0 w1", 1, "after \"w0 w1 w3 w2 w0\" no plan says 'w1'\n  There plans end."),
-    ],
-)
-def test_sentences_that_cannot_be_understood(
-    sentence: str, code: int, message: str, coordlang: Command, files: tuple[Path, ...]
-) -> None:
-    for command in ("understand", "plan"):
-        outcome = coordlang(command, *files, sentence)
-        assert (outcome.code, outcome.out) == (code, "")
-        assert message in outcome.err
-
-
-def test_options_that_do_not_go_together(coordlang: Command, files: tuple[Path, ...]) -> None:
-    dot = ["--format", "dot"]
-    for options in (["--count", "--max", 3], [*dot, "--sample", 2], [*dot, "--count"]):
-        assert coordlang("understand", *files, "w0", *options).code == 2
 
 
 # -- in a notebook

@@ -3,11 +3,9 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Callable
 from itertools import accumulate
-from pathlib import Path
 from random import Random
 
 import numpy as np
@@ -16,12 +14,8 @@ import pytest
 from coordlang.execution.best_sentence import best_sentence
 from coordlang.execution.preferences import PlanPreference, read_preference
 from coordlang.execution.task_language import TaskLanguage
-from planners.joint.model import show
-from planners.loading import load
 from planners.search.plans import Plan, Plans
 from planners.system.errors import OutOfMemory, UsageError
-from tests.support.command import Command, Outcome
-from tests.support.domains import DOMAINS
 from tests.support.layered_spaces import layered_space
 from tests.support.naive import plans_by_sentence, sentence
 from tests.support.task_languages import SHIPPED, random_task_languages, shipped
@@ -216,48 +210,8 @@ def test_wishes_that_are_none() -> None:
             read_preference(shipped("t-map/problem")[1], text)
 
 
-def test_what_can_never_hold_is_avoided(coordlang: Command, tmp_path: Path) -> None:
-    """Robots are never in cells that they cannot reach, and never closed in; adjacent cells are."""
-    domain = tmp_path / "d.pddl"
-    text = (DOMAINS / "t-map" / "domain.pddl").read_text()
-    domain.write_text(text.replace("(:predicates", "(:predicates (closed ?x)"))
-    files, language = (domain, DOMAINS / "t-map" / "problem.pddl"), tmp_path / "l.json"
-    assert coordlang("build", *files, "--method", "greedy", "-o", language).code == 0
-
-    def preferring(wish: str) -> Outcome:
-        return coordlang("plan", language, *files, "--prefer", wish)
-
-    always = min(show(atom) for atom in load(domain, [files[1]]).model.statics)
-    for atom in ("(closed r1)", "(at r1 r2)", f"(closed r1) {always}", "(at r1 r2) (at r1 c1-1)"):
-        outcome = preferring(f"avoid:{atom}")
-        assert (outcome.code, outcome.out) == (0, preferring("shortest").out)
-        assert f"avoid:{atom}: in every plan it keeps away from {atom}: " in outcome.err
-        assert " can never be true\n" in outcome.err
-    assert f"in every plan it passes through {always}\n" in preferring(f"avoid:{always}").err
-    for atom in ("(at r1 c9-9)", "(ta r1 c1-1)", "(at r1)", "(last r1 none)"):
-        outcome = preferring(f"avoid:{atom}")
-        assert (outcome.code, "this is no atom of the problem" in outcome.err) == (2, True)
-        assert "Write a predicate of the domain with objects of the problem" in outcome.err
-
-
 def test_spelling_of_wishes() -> None:
     task_language = shipped("t-map/problem")[1]
     assert read_preference(task_language, " shortest ") == "shortest"
     assert read_preference(task_language, "first: R2 ").text == "first:r2"  # type: ignore[union-attr]
     assert read_preference(task_language, "avoid: ( AT r1  c1-1 )").text == "avoid:(at r1 c1-1)"  # type: ignore[union-attr]
-
-
-def test_the_command_says_what_became_of_the_wishes(coordlang: Command, tmp_path: Path) -> None:
-    files = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "corners-3x3.pddl"
-    asked = "plan", tmp_path / "language.json", *files
-    assert coordlang("build", *files, "--method", "greedy", "-o", asked[1]).code == 0
-    outcome = coordlang(*asked, "--prefer", "avoid:(at r1 c1-1)", "--prefer", "most-plans")
-    assert outcome.code == 0
-    assert "avoid:(at r1 c1-1): in every plan it keeps away from (at r1 c1-1)\n" in outcome.err
-    assert "most-plans: leaves" in outcome.err
-    assert "c1-1" not in " ".join(line for line in outcome.out.splitlines() if "r1" in line)
-    wishes = ("--prefer", "avoid:(at r1 c2-2)", "--prefer", "shortest", "--json")
-    data = json.loads(coordlang(*asked, *wishes).out)
-    avoided, shortest = data["wishes"]
-    assert (avoided["granted"], avoided["worst_plan"]) == (False, "it passes through (at r1 c2-2)")
-    assert shortest == {"wish": "shortest", "value": len(data["sentence"].split())}
