@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
-from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -20,8 +18,6 @@ from planners.joint.model import IDLE, JointModel
 from planners.joint.tables import Rows
 from tests.support import naive
 from tests.support.behaviour_trees import Leaf, read_tree
-from tests.support.command import Command
-from tests.support.domains import DOMAINS
 from tests.support.task_languages import random_task_languages, shipped
 
 #: Shipped problems: two and three robots, shared actions, conditional choices, joint-action PDDL.
@@ -178,30 +174,3 @@ def test_the_tree_is_as_large_as_the_automaton() -> None:
     edges = sum(int(own.automaton.out_degrees.sum()) for own in found.robots)
     scripts = [node for node in xml.iter("Script") if node.get("code", "").startswith("move")]
     assert len(scripts) == edges
-
-
-def test_command(coordlang: Command, tmp_path: Path) -> None:
-    files = DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "problem.pddl"
-    language, output = tmp_path / "l.json", tmp_path / "trees.xml"
-    coordlang("build", *files, "--method", "greedy", "-o", language)
-    shown = coordlang("export", language, *files, "w1 w0", "--to", "bt")
-    assert shown.code == 0
-    assert coordlang("export", language, *files, "w1 w0", "--to", "bt", "-o", output).out == ""
-    assert output.read_text() == shown.out
-    trees = ("export", language, *files, "w1 w0", "--to", "bt")
-    data = json.loads(coordlang(*trees, "--json").out)
-    assert data == {"xml": shown.out, "subplans": {"r1": 1, "r2": 2}, "guaranteed": True}
-    assert coordlang(*trees, "--max-actions", "3").code == 2
-    assert "or --to bt" in coordlang(*trees, "--translate-plan", "p").err
-
-
-def test_names_that_xml_would_misread(coordlang: Command, tmp_path: Path) -> None:
-    """Two hyphens end an XML comment; a word may have any name."""
-    files = DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "problem.pddl"
-    language = tmp_path / "l.json"
-    coordlang("build", *files, "--method", "greedy", "-o", language)
-    text = language.read_text().replace('"w1"', '"a--b<&"')
-    language.write_text(text)
-    shown = coordlang("export", language, *files, "a--b<& w0", "--to", "bt")
-    assert shown.code == 0, shown.err
-    assert ET.fromstring(shown.out).get("BTCPP_format") == "4"

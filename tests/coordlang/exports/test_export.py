@@ -5,16 +5,12 @@ plans.
 
 from __future__ import annotations
 
-import json
-import os
 import re
-import subprocess
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import islice, product
-from pathlib import Path
 from random import Random
 from typing import Any
 
@@ -37,7 +33,6 @@ from planners.joint.model import show
 from planners.search.plans import Plan, Plans
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, ProvedImpossible, UsageError
-from tests.support.command import Command, own_process
 from tests.support.domains import DOMAINS
 from tests.support.naive_classical import optimal_plans
 from tests.support.other_planners import rows as answers
@@ -322,139 +317,6 @@ def test_a_plan_that_is_cut_off_or_none() -> None:
         exported.joint_plan(plan[:last])
     with pytest.raises(BadInput, match="none of the exported problem"):
         exported.joint_plan([*plan, "fly"])
-
-
-# The command.
-
-SENTENCE = "w0 w2 w1 w0"
-
-
-@pytest.fixture
-def minimal(coordlang: Command, t_map: tuple[Path, Path], tmp_path: Path) -> Path:
-    path = tmp_path / "minimal.json"
-    assert coordlang("build", *t_map, "--tasks", "all", "--method", "minimal", "-o", path).code == 0
-    return path
-
-
-def test_the_export_does_not_depend_on_hashes(
-    minimal: Path, t_map: tuple[Path, Path], tmp_path: Path
-) -> None:
-    texts = []
-    for seed in "02":
-        folder = tmp_path / seed
-        arguments = ["export", minimal, *t_map, SENTENCE, "--max-actions", "0", "-o", folder]
-        subprocess.run(
-            own_process(*arguments), env={**os.environ, "PYTHONHASHSEED": seed}, check=True
-        )
-        texts.append([(folder / name).read_text() for name in ("domain.pddl", "problem.pddl")])
-    assert texts[0] == texts[1]
-
-
-def solve(folder: Path) -> list[str]:
-    """The actions of an optimal plan by Fast Downward, through unified-planning."""
-    import unified_planning as up
-    from unified_planning.engines import PlanGenerationResultStatus as Status
-    from unified_planning.io import PDDLReader
-
-    up.environment.get_environment().credits_stream = None
-    problem = PDDLReader().parse_problem(str(folder / "domain.pddl"), str(folder / "problem.pddl"))
-    with up.environment.get_environment().factory.OneshotPlanner(
-        name="fast-downward-opt"
-    ) as planner:
-        planner._fd_translate_options = ["--invariant-generation-max-time", "0"]
-        answer = planner.solve(problem)
-    assert answer.status == Status.SOLVED_OPTIMALLY
-    return [step.action.name for step in answer.plan.actions]
-
-
-@pytest.mark.thorough
-def test_out_to_fast_downward_and_back(
-    coordlang: Command, t_map: tuple[Path, Path], minimal: Path, tmp_path: Path
-) -> None:
-    for limit in (2000, 0):
-        folder = tmp_path / f"limit-{limit}"
-        done = coordlang("export", minimal, *t_map, SENTENCE, "-o", folder, "--max-actions", limit)
-        assert (done.code, done.err) == (0, "")
-        assert ("explicit" if limit else "select-then-apply") in done.out
-        names = solve(folder)
-        (tmp_path / "sas_plan").write_text(
-            "".join(f"({name} )\n" for name in names) + "; cost = 4 (general cost)\n"
-        )
-        how = ("--max-actions", limit, "--translate-plan", tmp_path / "sas_plan")
-        back = coordlang("export", minimal, *t_map, SENTENCE, *how)
-        assert back.code == 0
-        assert back.out.splitlines()[0] == "0: (move r2 c1-0 c1-1)"
-        assert back.out.endswith("; makespan = 4\n")
-        first = coordlang("plans", *t_map, "--max", 1).out.split("\n", 1)[1]
-        assert back.out == first.rstrip("\n") + "\n"
-
-
-def test_the_command_as_json(
-    coordlang: Command, t_map: tuple[Path, Path], minimal: Path, tmp_path: Path
-) -> None:
-    data = json.loads(coordlang("export", minimal, *t_map, SENTENCE, "--json").out)
-    plain = coordlang("export", minimal, *t_map, SENTENCE)
-    assert plain.out == data["domain"] + data["problem"]
-    assert (data["optimal_cost"], data["step_cost"], data["form"]) == (4, 1, "explicit")
-    assert data["robots"] == ["r1", "r2"]
-    assert {"r1": "(move r1 c0-1 c1-1)", "r2": None} in data["actions"].values()
-    assert {} in data["actions"].values()
-    ltlf = ("export", minimal, *t_map, SENTENCE, "--to", "ltlf")
-    formula = json.loads(coordlang(*ltlf, "--json").out)
-    assert formula["over_words"] == "(w0 & (w0 U (w2 & (w2 U (w1 & (w1 U G(w0)))))))"
-    assert coordlang(*ltlf).out == formula["formula"] + "\n"
-    assert coordlang(*ltlf, "-o", tmp_path / "sentence.ltlf").out == ""
-    assert (tmp_path / "sentence.ltlf").read_text() == formula["formula"] + "\n"
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "message"),
-    [
-        ((SENTENCE, "--translate-plan", "missing"), 31, "there is no such file"),
-        ((SENTENCE, "--translate-plan", "other"), 31, "none of the exported problem"),
-        ((SENTENCE, "--translate-plan", "empty"), 1, "no optimal plan"),
-        ((SENTENCE, "--translate-plan", "two"), 31, "two:3:1: this file holds several plans"),
-        (
-            (SENTENCE, "--to", "ltlf", "--translate-plan", "empty"),
-            2,
-            "--translate-plan belongs to --to pddl",
-        ),
-        ((SENTENCE, "-o", "other"), 2, "the folder other cannot be made"),
-        ((SENTENCE, "-o", "missing/x", "--to", "ltlf"), 2, "cannot be written"),
-        (("w0 w1 w0",), 1, "no optimal plan has the sentence"),
-        (("w7",), 31, "no word of this language"),
-        ((SENTENCE, "--max-actions", "-1"), 2, "--max-actions"),
-    ],
-)
-def test_wrong_arguments(
-    arguments: tuple[str, ...],
-    code: int,
-    message: str,
-    coordlang: Command,
-    t_map: tuple[Path, Path],
-    minimal: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("two").write_text("(fly)\n; cost = 1 (unit cost)\n(fly)\n; cost = 1 (unit cost)\n")
-    Path("other").write_text("(fly)\n")
-    Path("empty").write_text("; nothing\n")
-    done = coordlang("export", minimal, *t_map, *arguments)
-    assert (done.code, message in done.err) == (code, True), done.err
-    assert done.out == ""
-
-
-def test_a_task_that_the_language_does_not_cover(coordlang: Command, tmp_path: Path) -> None:
-    domain, problem = (DOMAINS / "three-cells" / f"{name}.pddl" for name in ("domain", "problem"))
-    language, other = tmp_path / "language.json", tmp_path / "other.pddl"
-    assert coordlang("build", domain, problem, "--method", "greedy", "-o", language).code == 0
-    other.write_text(
-        re.sub(r"\(:goal.*", "(:goal (at r1 c)))", problem.read_text(), flags=re.DOTALL)
-    )
-    done = coordlang("export", language, domain, other, "w1 w0", "-o", tmp_path / "out")
-    assert (done.code, "guarantees nothing" in done.err) == (1, True), done.err
-    assert (tmp_path / "out" / "domain.pddl").exists()
 
 
 # Other planners.
