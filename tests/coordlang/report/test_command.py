@@ -69,9 +69,7 @@ def test_coordinates(coordlang: Command, language: Path, tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("arguments", "code"),
     [
-        (("-o", "{language}"), 2),
         (("-o", "{folder}"), 2),
-        (("-o", "{folder}/missing/page.html"), 2),
         (("--tasks-shown", "0", "-o", "-"), 2),
         ((), 2),
         (("--coordinates", "{folder}/none.json", "-o", "-"), 31),
@@ -87,10 +85,3 @@ def test_what_is_refused(
     assert outcome.code == code
     assert outcome.err
     assert language.read_bytes() == before
-
-
-def test_another_domain_is_refused(coordlang: Command, language: Path, tmp_path: Path) -> None:
-    other = DOMAINS / "three-cells" / "domain.pddl", DOMAINS / "three-cells" / "problem.pddl"
-    page = tmp_path / "report.html"
-    assert coordlang("report", language, *other, "-o", page).code == 31
-    assert not page.exists()
