@@ -70,7 +70,7 @@ def error_json(error: CoordlangError) -> str:
         error.exit_code,
         None if reached is None else sentence(reached),
     )
-    return msgspec.json.encode(ErrorObject(entry)).decode()
+    return msgspec.json.format(msgspec.json.encode(ErrorObject(entry)), indent=0).decode()
 
 
 def json_schema() -> dict[str, Any]:
