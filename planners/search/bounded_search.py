@@ -18,6 +18,7 @@ from planners.search.exact_bound import ExactBound, exact_bound
 from planners.search.goals import FAR
 from planners.search.heuristics import Heuristic
 from planners.search.layers import Edges, StateTable, grown, joined_edges
+from planners.search.optimal_states import OptimalStates
 from planners.search.reachable import PieceSizes
 from planners.search.sampled_ways import mostly_lead
 from planners.search.state_variables import StateVariable
@@ -26,6 +27,8 @@ from planners.system.errors import ProvedImpossible
 
 #: The layer of a state that was not met in this round.
 _NEVER = np.iinfo(np.int32).max
+#: In place of the layer of a state: no optimal plan passes through it.
+_LEFT_OUT = -1
 #: States expanded first; from the joint steps that they have the next numbers of states follow.
 _FIRST, _FIRST_PROBED = 500, 8
 #: Labels in all steps for which the solver's formula takes as long as the steps that are tried
@@ -90,6 +93,7 @@ class BoundedSearch:
         self._depth: Ints = np.zeros(0, np.int64)
         #: What a solver says of optimal plans, once it was asked.
         self.exact: ExactBound | None = None
+        self._optimal: OptimalStates | None = None
         #: Whether no more joint steps may be composed than the probe says.
         self._limited = heuristic.exact
 
@@ -134,7 +138,15 @@ class BoundedSearch:
             if mostly_lead(self._model, self._task.goal, self._heuristic, last, left, most):
                 return at_least
         self.exact = exact_bound(self._model, self._task, self._variables, at_least, self._pieces)
-        return self.bound if self.exact is None else self.exact.makespan
+        if self.exact is None:
+            return self.bound
+        self._optimal = OptimalStates(self.exact.plans, self._pieces.question)
+        return self.exact.makespan
+
+    def close(self) -> None:
+        """Give the solver back."""
+        if self.exact is not None:
+            self.exact.plans.close()
 
     def _round(self, start: Ints) -> int:
         """Search within the bound; the least bound that was too large, `_MET` or `_GROWN`."""
@@ -151,6 +163,9 @@ class BoundedSearch:
             except _GrownError:
                 return _GROWN
             beyond = min(beyond, low)
+            if self._optimal is not None:
+                self._depth[self._optimal.left_out(edges, depth, len(self.table))] = _LEFT_OUT
+                edges = edges.only(self._depth[edges.target] == depth)
             new = np.flatnonzero(self._depth[: len(self.table)] == depth)
             if not len(new):
                 return beyond

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exact bounds from a SAT solver: what no optimal plan has is not searched.
+"""Exact bounds from a SAT solver: what is left after them is on optimal plans, and nothing else.
 
 First the least makespan, then the least second component, then the labels that some optimal plan
-has in each step.  The solver's models are only hints (states and costs come from the joint model);
-its refutations are trusted.  A question that is not decided with some effort is answered with yes:
-more is searched then.
+has in each step; then, state by state, whether an optimal plan passes through it
+(`planners.search.optimal_states`).  The solver's models are only hints (states and costs come from
+the joint model); its refutations are trusted.  A question that is not decided with some effort is
+answered with yes: more is searched then.
 """
 
 from __future__ import annotations
@@ -38,9 +39,11 @@ SMALLER = "a task with a shorter plan, fewer objects or fewer robots"
 class ExactBound:
     """The least makespan of one task, and what its optimal plans consist of.
 
-    ``used[k][robot]`` (labels) says which labels occur in step k of some optimal plan.
+    ``used[k][robot]`` (labels) says which labels occur in step k of some optimal plan; ``plans``
+    are what they satisfy, to be closed by whoever asked for the bound.
     """
 
+    plans: FixedPlans
     makespan: int
     used: list[list[Bools]]
 
@@ -77,12 +80,18 @@ def exact_bound(
             plans = formula.fixed(task.init, len(plan))
     except OutOfEffort:
         return None
-    with closing(plans), reaching(plans.so_far, SMALLER):
-        if model.cost != "makespan":
-            plan, cheap = cheapest(plans, model, task, plan)
-            plans.require(cheap)
-        plans.without_limit()
-        return ExactBound(len(plan), _used(plans, model, plan, pieces.question))
+    try:
+        with reaching(plans.so_far, SMALLER):
+            if model.cost != "makespan":
+                plan, cheap = cheapest(plans, model, task, plan)
+                plans.require(cheap)
+            plans.without_limit()
+            used = _used(plans, model, plan, pieces.question)
+            plans.simplify()
+            return ExactBound(plans, len(plan), used)
+    except BaseException:
+        plans.close()
+        raise
 
 
 def _shortest(formula: PlanFormula, task: PlanningTask, at_least: int) -> Plan:

@@ -8,6 +8,7 @@ Where the model has slack, those within it (`planners.search.slack`).
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -95,7 +96,10 @@ def search_with_effort(
         variables = state_variables(model, task.init)
         chosen = search_heuristic(heuristic, model, task, variables)
     forward = BoundedSearch(model, task, chosen, variables, pieces)
-    with reaching(forward.so_far, SMALLER, lambda: forward.composed, "joint steps"):
+    with (
+        closing(forward),
+        reaching(forward.so_far, SMALLER, lambda: forward.composed, "joint steps"),
+    ):
         forward.run()
         found = _backward(model, task, forward)
     name = f"{chosen.name} + SAT" if forward.exact else chosen.name

@@ -205,7 +205,17 @@ class FixedPlans(Questions):
         super().__init__(effort, int(runs.sum()))
         labels = ranges(first.reshape(-1), runs)
         self.first: Ints = 1 + (np.cumsum(runs) - runs).reshape(first.shape)
-        # Variables of labels come first, others that are left after them.
+        self._take(clauses, labels)
+
+    def simplify(self) -> None:
+        """Eliminate what can be, now that more is required; other variables are forgotten."""
+        self.close()
+        known, self.clauses = self.clauses, array("i")
+        self._solver = sat_solver(SOLVER)
+        self._take(known, np.arange(1, int(self.first[-1, -1]) + self._sizes[-1]))
+
+    def _take(self, clauses: array[int], labels: Ints) -> None:
+        """Clauses, simplified: variables of labels come first, others that occur after them."""
         found = simplified(clauses, labels.tolist())
         lengths = np.fromiter(map(len, found), np.int64, len(found))
         literals = np.fromiter(chain.from_iterable(found), np.int64, int(lengths.sum()))
