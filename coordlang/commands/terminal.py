@@ -187,10 +187,10 @@ class _Spinner(threading.Thread):
                 status.update(Text(f"{visible(self._text())} .. {seconds:.0f} s"))
 
     def _text(self) -> str:
-        part = underway()
+        how_far = underway()
         # The work goes on while it is asked: what cannot be read just now is left out.
         with suppress(ValueError, IndexError, KeyError, RuntimeError, StopIteration):
-            if part is not None and (so_far := part.so_far()) not in self.message:
+            if how_far is not None and (so_far := how_far()) not in self.message:
                 return f"{self.message}: {so_far}"
         return self.message
 

@@ -161,8 +161,7 @@ class Partitions:
         problem = PartitionProblem(self._states, size, "glucose42", named=False)
         states_of = Counter(self._language.values())
         largest = {word: n for n, (word, _) in enumerate(states_of.most_common(size))}
-        kept = {state: largest.get(word) for state, word in self._language.items()}
-        problem.prefer({state: word for state, word in kept.items() if word is not None})
+        problem.prefer({s: largest[w] for s, w in self._language.items() if w in largest})
         for clause in known:
             problem.separate_one(clause)
         return problem

@@ -74,8 +74,6 @@ def ground_actions(
     with reaching(
         lambda: f"{len(actions):,} of at most {total:,} ground actions, of {world}",
         FEWER,
-        lambda: len(actions),
-        "ground actions",
     ):
         for schema in domain.schemas:
             for args in reachable[schema.name]:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -164,13 +164,6 @@ class StateCodec:
         """Make facts false in some states of a table (by number or mask), in place."""
         for fact in facts:
             rows[which, fact // _BLOCK_BITS] &= ~np.uint64(1 << fact % _BLOCK_BITS)
-
-    def rows_of(self, states: Sequence[Iterable[int]]) -> Rows:
-        """A table of states given by the numbers of their true facts, nothing remembered."""
-        rows = np.zeros((len(states), self.width), np.uint64)
-        for number, facts in enumerate(states):
-            rows[number, : self.fact_blocks] = self.mask(facts)
-        return rows
 
     def facts_part(self, rows: Rows) -> Rows:
         """One state or a table of states without remembered actions."""

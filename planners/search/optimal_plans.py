@@ -98,7 +98,7 @@ def search_with_effort(
     forward = BoundedSearch(model, task, chosen, variables, pieces)
     with (
         closing(forward),
-        reaching(forward.so_far, SMALLER, lambda: forward.composed, "joint steps"),
+        reaching(forward.so_far, SMALLER),
     ):
         forward.run()
         found = _backward(model, task, forward)

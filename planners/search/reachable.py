@@ -187,7 +187,7 @@ def explore(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> Spac
     Time and memory are linear in the number of joint steps.
     """
     found = Exploration(model, inits, pieces)
-    with reaching(found.so_far, FEWER, lambda: found.composed, "joint steps"):
+    with reaching(found.so_far, FEWER):
         while len(found.layer):
             found.enter(found.expand())
         return found.space()
@@ -199,7 +199,7 @@ def count(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> tuple[
     Needs only the memory that the states take.
     """
     found = Exploration(model, inits, pieces)
-    with reaching(found.so_far, FEWER, lambda: found.composed, "joint steps"):
+    with reaching(found.so_far, FEWER):
         while len(found.layer):
             found.enter(found.expand(keep=False))
     return len(found.seen), found.composed

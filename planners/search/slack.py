@@ -48,7 +48,7 @@ def explore_within(
             return options
         return heuristic.in_time(rows, options, steps - found.depth - 1)[0]
 
-    with reaching(so_far, "less slack", lambda: found.composed, "joint steps"):
+    with reaching(so_far, "less slack"):
         while len(found.layer) and found.depth < steps:
             new = found.expand(only)
             if heuristic.value is not None:

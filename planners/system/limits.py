@@ -19,7 +19,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
@@ -149,29 +148,12 @@ def time_left() -> float:
     return left if left > 0 else math.inf
 
 
-@dataclass(frozen=True, slots=True)
-class Underway:
-    """What a block does just now.
-
-    Attributes
-    ----------
-    so_far
-        How far it got, in numbers.
-    work
-        A count that grows with the work, None if there is none; ``unit`` is what it counts.
-    """
-
-    so_far: Callable[[], str]
-    work: Callable[[], int] | None = None
-    unit: str = ""
+#: How far the blocks of `reaching` got that the program is in, the innermost last.
+_UNDERWAY: list[Callable[[], str]] = []
 
 
-#: The blocks of `reaching` that the program is in, the innermost last.
-_UNDERWAY: list[Underway] = []
-
-
-def underway() -> Underway | None:
-    """What the innermost block of `reaching` does; None outside of all.
+def underway() -> Callable[[], str] | None:
+    """Says how far the innermost block of `reaching` got; None outside of all.
 
     Another thread may ask.  What it is told is then read while the work changes it.
     """
@@ -180,21 +162,16 @@ def underway() -> Underway | None:
 
 
 @contextmanager
-def reaching(
-    so_far: Callable[[], str],
-    instead: str,
-    work: Callable[[], int] | None = None,
-    unit: str = "",
-) -> Iterator[None]:
+def reaching(so_far: Callable[[], str], instead: str) -> Iterator[None]:
     """Should a limit end the block, let the error say how far it got; meanwhile `underway` does.
 
     ``so_far`` says it, in numbers; ``instead`` is what to try besides a larger limit ("fewer
-    objects").  ``work`` counts the work, in the ``unit`` ("joint steps").  Of nested blocks the
-    innermost speaks.  Memory that is used up (`MemoryError`) leaves the block as `OutOfMemory`.
+    objects").  Of nested blocks the innermost speaks.  Memory that is used up (`MemoryError`)
+    leaves the block as `OutOfMemory`.
     """
     depth = len(_UNDERWAY)
     try:
-        _UNDERWAY.append(Underway(so_far, work, unit))
+        _UNDERWAY.append(so_far)
         yield
         return
     except (OutOfTime, OutOfMemory) as error:
