@@ -5,16 +5,13 @@ from __future__ import annotations
 
 import re
 
-import pytest
-
 from planners.inspection import inspect
 from planners.joint.composition import ComposingStepper
-from planners.loading import PlanningInstance, build, load
+from planners.loading import PlanningInstance, build
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.model_options import ModelOptions
 from planners.pddl.sexpr import Source
 from planners.search.reachable import explore
-from tests.support.domains import DOMAINS
 from tests.support.random_pddl import random_model
 
 PUSHING = """(define (domain pushing) (:types robot place heavy light)
@@ -97,27 +94,6 @@ def named(loaded: PlanningInstance, example: str) -> tuple[str, str]:
     return first, second
 
 
-@pytest.mark.parametrize(
-    ("folder", "problem"),
-    [
-        ("two-arms", "exchange"),
-        ("push-box", "next-door"),
-        ("tray", "serve"),
-        ("vans", "two-each"),
-        ("lock", "both-in"),
-        ("charger", "three-robots"),
-        ("elevator", "two-calls"),
-        ("handover", "exchange"),
-        ("grid", "three-robots-3x3"),
-    ],
-)
-def test_the_example_can_happen_in_the_shipped_domains(folder: str, problem: str) -> None:
-    loaded = load(DOMAINS / folder / "domain.pddl", [DOMAINS / folder / f"{problem}.pddl"])
-    example = inspect(loaded).example
-    assert example is not None
-    assert both_possible(loaded, *named(loaded, example))
-
-
 def test_the_example_can_happen_in_random_models() -> None:
     shown = hidden = 0
     for seed in range(60):
@@ -131,15 +107,3 @@ def test_the_example_can_happen_in_random_models() -> None:
         assert both_possible(loaded, *named(loaded, found.example)), (seed, found.example)
     assert shown >= 15
     assert hidden >= 2, "some clash only between what is never possible together"
-
-
-def test_a_clash_that_never_meets_has_no_example() -> None:
-    shifts = """(define (domain shifts) (:types robot) (:predicates (turn ?r - robot) (next ?r ?o - robot) (lit))
-      (:action light :agent ?r - robot :parameters () :precondition (and (turn ?r) (not (lit))) :effect (lit))
-      (:action hand-over :agent ?r - robot :parameters (?o - robot) :precondition (and (turn ?r) (next ?r ?o) (lit))
-        :effect (and (not (turn ?r)) (turn ?o) (not (lit)))))"""
-    task = """(define (problem p) (:domain shifts) (:objects r1 r2 - robot)
-      (:init (turn r1) (next r1 r2) (next r2 r1)) (:goal (turn r2)))"""
-    found = inspect(made(shifts, task))
-    assert found.interfering > 0
-    assert found.example is None

@@ -7,23 +7,16 @@ import gc
 import math
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
 import pytest
 
-from coordlang.language.partition import Partition
-from coordlang.required.choices import Choices
-from coordlang.required.miscoordination import miscoordination
-from coordlang.verification.by_definition import verify
-from planners import grounding
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import Options, Stepper, Steps
 from planners.joint.tables import Rows
 from planners.loading import PlanningInstance, load
-from planners.search.optimal_plans import plan_spaces, search
-from planners.search.plan_space import PlanSpace
+from planners.search.optimal_plans import search
 from planners.search.reachable import PieceSizes, count, explore
 from planners.system.errors import OutOfMemory, OutOfTime
 from planners.system.limits import (
@@ -199,11 +192,6 @@ def corners(problem: str = "corners-3x3") -> PlanningInstance:
     return load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / f"{problem}.pddl"])
 
 
-def plans(problem: str) -> PlanSpace:
-    loaded = corners(problem)
-    return search(loaded.model, loaded.tasks[0])
-
-
 def stopped(after: int, error: BaseException) -> PlanningInstance:
     loaded = corners()
     stepper = Stopping(loaded.model.stepper, error, [after])
@@ -230,77 +218,6 @@ def test_exploring_says_how_far_it_got() -> None:
     assert caught.value.reached == (
         "Reached: 9 states within 1 steps of the initial states, 9 joint steps; 8 states are new in the last step."
     )
-
-
-def test_the_goals_done_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    loaded = corners()
-    space = explore(loaded.model, loaded.tasks[0].init[None, :])
-    groups = [(loaded.tasks[0].goal, None)] * 3
-    batches = plan_spaces(space, groups, PieceSizes(pairs=len(space)))
-    next(batches)
-    monkeypatch.setattr("planners.search.optimal_plans.distances", failing)
-    with pytest.raises(OutOfTime, match="the optimal plans to 1 of 3 goals, over 72 states"):
-        next(batches)
-
-
-def failing(*_: object, **__: object) -> None:
-    raise late()
-
-
-def unspoken(space: PlanSpace) -> Partition:
-    """One word for all states."""
-    width = space.rows.shape[1]
-    return Partition(("w0",), np.zeros((0, width), np.uint64), np.zeros(0, np.int64), 0)
-
-
-@pytest.mark.parametrize(
-    ("fails", "problem", "work", "said"),
-    [
-        (
-            "planners.grounding.instantiate.reachable_arguments",
-            None,
-            lambda _: corners(),
-            "looking for the applicable instances of 1 action schemas over 11 objects",
-        ),
-        (
-            "planners.grounding.instantiate._Grounder.action",
-            None,
-            lambda _: corners(),
-            "0 of at most 48 ground actions",
-        ),
-        (
-            "coordlang.required.choices.LabelSets.unions",
-            "three-robots-3x3",
-            Choices,
-            "choices in 1 sets, over {nodes:,} states on optimal plans",
-        ),
-        (
-            "coordlang.verification.walk.Walk._children",
-            "corners-3x3",
-            lambda space: verify(unspoken(space), [space]),
-            "layer 1 of 5 of the verification, 1 nodes of its walk",
-        ),
-        (
-            "coordlang.required.choices.Choices.edges_of",
-            "corners-3x3",
-            lambda space: miscoordination(space, 0),
-            "0 of 4 steps to the first break of a mixture, 1 nodes",
-        ),
-    ],
-)
-def test_other_work_says_how_far_it_got(
-    fails: str,
-    problem: str | None,
-    work: Callable[[PlanSpace | None], object],
-    said: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    space = None if problem is None else plans(problem)
-    monkeypatch.setattr(fails, failing)
-    with pytest.raises(OutOfTime) as caught:
-        work(space)
-    assert said.format(nodes=space and len(space)) in str(caught.value)
-    assert space is not None or grounding.FEWER in str(caught.value)
 
 
 def test_exploring_in_pieces_is_the_same_work() -> None:

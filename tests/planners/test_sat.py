@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import threading
 from array import array
 from contextlib import closing
 from itertools import product
@@ -12,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planners.search.questions import Questions
-from planners.search.sat import propagates, sat_solver, simplified
+from planners.search.sat import sat_solver, simplified
 
 VARIABLES = 6
 literal = st.integers(1, VARIABLES).flatmap(lambda v: st.sampled_from((v, -v)))
@@ -63,34 +62,3 @@ def test_clauses_that_are_added_at_once_say_the_same_as_one_by_one(
         many.add_all(flat(clauses))
         assert many.clauses == one.clauses
         assert many.holds([]) == one.holds([]) == bool(kept_values(clauses, []))
-
-
-def test_only_the_thread_that_solves_is_deaf() -> None:
-    """Two threads enter one after the other, and leave in the same order."""
-    from pysat.solvers import MainThread
-
-    heard: list[bool] = []
-    entered, leave = threading.Event(), threading.Event()
-
-    class Solver:
-        def propagate(self, assumptions: list[int]) -> tuple[bool, list[int]]:
-            heard.append(MainThread.check())
-            entered.set()
-            leave.wait(10)
-            return True, []
-
-    first = threading.Thread(target=propagates, args=(Solver(), []))
-    first.start()
-    entered.wait(10)
-
-    class Second(Solver):
-        def propagate(self, assumptions: list[int]) -> tuple[bool, list[int]]:
-            heard.append(MainThread.check())
-            leave.set()
-            first.join()
-            return True, []
-
-    assert MainThread.check()
-    propagates(Second(), [])
-    assert heard == [False, False]
-    assert MainThread.check()

@@ -11,7 +11,6 @@ import pytest
 from coordlang.commands.building import build_language
 from coordlang.language.partition import Partition
 from coordlang.verification.by_definition import verify
-from planners.system.writing import write_atomically
 from tests.support import naive
 from tests.support.command import Command
 from tests.support.domains import DOMAINS, all_tasks
@@ -98,17 +97,6 @@ def test_contradictions(
     outcome = coordlang("verify", language, *t_map)
     assert outcome.code == 31
     assert message in outcome.err
-
-
-def test_writing_goes_through_links_and_devices(tmp_path: Path) -> None:
-    real, link = tmp_path / "real.json", tmp_path / "link.json"
-    real.write_text("old")
-    link.symlink_to(real)
-    write_atomically(link, b"new")
-    assert link.is_symlink()
-    assert real.read_text() == "new"
-    write_atomically("/dev/null", b"nothing")
-    assert not Path("/dev/null").is_file()
 
 
 @pytest.mark.parametrize(

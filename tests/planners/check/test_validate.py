@@ -158,6 +158,14 @@ CARRIERS = "(:objects r1 r2 r3 - robot) (:init (at r1) (at r2)) (:goal (up))"
 SHARED = world(CARRY.format(more=""), CARRIERS)
 BELL = CARRY.format(more="(:action ring :parameters () :effect (rung))")
 ENVIRONMENT, ALL = world(BELL, CARRIERS, "environment"), world(BELL, CARRIERS, "shared")
+#: It spills if one lifts alone; with three, each pair has one that leans.
+TABLE = world(
+    """(:types robot) (:predicates (level) (up ?r - robot) (spilled))
+    (:action lift :agent ?r - robot :parameters () :precondition (level) :effect (and (up ?r)
+      (when (forall (?o - robot) (or (= ?o ?r) (not (lift ?o)))) (and (not (level)) (spilled)))))
+    (:action lean :agent ?r - robot :parameters () :precondition (level) :effect (up ?r))""",
+    "(:objects r1 r2 r3 - robot) (:init (level)) (:goal (spilled))",
+)
 BOXES = world(
     """(:types robot thing - object box - thing) (:predicates (on ?t - object) (p))
     (:action take :agent ?r - robot :parameters (?t - object) :effect (not (on ?t)))
@@ -211,6 +219,10 @@ BOXES = world(
         (ENVIRONMENT, ("(ring)", None, None, None), "belongs to environment"),
         (ALL, ("(ring)", "(ring)", "(ring)"), None),
         (ALL, ("(ring)", "(ring)", None), "needs r3"),
+        # Effects that two actions themselves rule out do not count between them.
+        (TABLE, ("(lift r1)", "(lift r2)", None), None),
+        (TABLE, ("(lift r1)", "(lean r2)", None), "deletes (level)"),
+        (TABLE, ("(lift r1)", "(lift r2)", "(lean r3)"), "deletes (level)"),
         # Quantified literals count for every object of the type.
         (BOXES, ("(take r1 b)", "(look r2)"), "deletes (on b)"),
         (BOXES, ("(take r1 c)", "(look r2)"), "deletes (on c)"),

@@ -24,8 +24,6 @@ from tests.support.classical_models import (
     CORRIDOR_TASK,
     COSTS,
     FORMS,
-    JOINT,
-    JOINT_TASK,
     MODELS,
     WAYS,
     random_state,
@@ -163,18 +161,6 @@ def test_every_plan_once_where_a_third_robot_decides(seed: int, cost: Cost) -> N
     every_plan_once(loaded.model, loaded.tasks[0])
 
 
-def test_what_is_applied_at_once_takes_fewer_states() -> None:
-    """In the corridor all is, in the relay what is handed over is not."""
-    for name in ("corridor", "relay"):
-        loaded = read(*MODELS[name])
-        states = []
-        for way in ("usual", "tidied", "nothing at once"):
-            with written(way):
-                plain = compile_classical(loaded.model, loaded.tasks[0], 0)
-            states.append(len(optimal_plans(plain).edges))
-        assert states == sorted(set(states)), name
-
-
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("name", MODELS)
 def test_what_the_form_says_of_a_step_ends_only_where_it_is_known_true(name: str, way: str) -> None:
@@ -199,16 +185,6 @@ def test_few_joint_actions_are_written_explicitly_and_many_are_not() -> None:
         "idle idle",
     ]
     assert compile_classical(loaded.model, loaded.tasks[0], 4).form == "select-then-apply"
-
-
-def test_joint_actions_with_one_label_tuple_and_one_meaning_are_written_once() -> None:
-    twice = JOINT.replace("(:action first", "(:action again", 1)
-    again = twice[twice.index("(:action again") :]
-    loaded = read(JOINT.rstrip().removesuffix(")") + again, JOINT_TASK)
-    once = read(JOINT, JOINT_TASK)
-    assert len(loaded.model.actions) > len(once.model.actions)
-    written_once = compile_classical(once.model, once.tasks[0]).actions
-    assert len(compile_classical(loaded.model, loaded.tasks[0]).actions) == len(written_once)
 
 
 def test_a_second_cost_that_outgrows_the_step_cost_is_noticed() -> None:

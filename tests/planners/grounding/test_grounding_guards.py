@@ -8,14 +8,10 @@ from __future__ import annotations
 import pytest
 
 import planners.grounding.bindings
-from planners.grounding import ground_actions
-from planners.pddl.formula_tree import literals
-from planners.pddl.model_options import ModelOptions
-from planners.pddl.robots import find_team
 from planners.system.limits import time_limit
 from tests.support.joint_twin import check_model
 from tests.support.random_pddl import RandomModel
-from tests.support.texts import model_of, parsed
+from tests.support.texts import model_of
 
 DOMAIN = """(define (domain halls) (:types robot place - thing hall - place)
   (:constants home - hall)
@@ -109,11 +105,3 @@ def test_few_instances_are_tried() -> None:
     with time_limit(30):
         for domain in (forbidding, DOMAIN.format(condition=nested)):
             assert {a.label for a in model_of(domain, problem).model.actions} >= {"(act r1 p1)"}
-
-
-def test_actions_share_their_atoms() -> None:
-    text = DOMAIN.format(condition="(not (lit ?p)) (or (lit home) (exists (?x) (lit ?x)))")
-    lifted, read = parsed(text, PROBLEM)
-    actions = ground_actions(lifted, read, find_team(lifted, read, ModelOptions()))
-    leaves = [leaf for action in actions for leaf, _ in literals(action.precondition)]
-    assert len({*map(id, leaves)}) == len({*leaves}) < len(leaves)

@@ -72,6 +72,20 @@ def test_what_is_said(forgotten: str, goal: str, said: list[str]) -> None:
         assert (part in text) == any(part in one for one in said), text
 
 
+def test_an_unreachable_goal_comes_with_the_interference_met_most_often() -> None:
+    loaded = model_of(
+        """(define (domain tables) (:types robot) (:predicates (level) (up ?r - robot))
+         (:action lift :agent ?r :parameters () :precondition (level)
+          :effect (and (up ?r) (not (level)))))""",
+        "(define (problem t) (:domain tables) (:objects r1 r2 - robot) (:init (level))"
+        " (:goal (and (up r1) (up r2))))",
+    )
+    with pytest.raises(ProvedImpossible) as caught:
+        search(loaded.model, loaded.tasks[0])
+    said = "(1 of 1 states looked at): (lift r1) deletes (level), which (lift r2) needs."
+    assert said in str(caught.value.remedy)
+
+
 @pytest.mark.parametrize("kind", ["agent", "plain"])
 def test_in_random_models_what_is_said_is_true_of_every_reachable_state(kind: Kind) -> None:
     told = 0

@@ -10,11 +10,11 @@ import time
 
 import pytest
 
-from planners.grounding.reachability import _least_model, reachable_arguments
+from planners.grounding.reachability import reachable_arguments
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.sexpr import Source
-from planners.system.errors import CoordlangError, OutOfTime
+from planners.system.errors import OutOfTime
 from planners.system.limits import time_limit
 
 DOMAIN = """(define (domain views) (:requirements :typing :multi-agent) (:types robot place)
@@ -95,11 +95,3 @@ except MemoryError:
 def test_the_memory_limit_ends_clingo(left: int) -> None:
     run = subprocess.run([sys.executable, "-c", SMALL, str(left)], capture_output=True, text=True)
     assert (run.returncode, run.stdout, run.stderr) == (0, "no memory\n", "")
-
-
-def test_what_clingo_says_is_in_the_error(capfd: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(CoordlangError, match="syntax error"):
-        _least_model(["goal("])
-    with pytest.raises(CoordlangError, match="not complete"):
-        _least_model(["other()."])
-    assert capfd.readouterr() == ("", "")

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from planners.grounding import idling_schemas, instantiate
 from planners.grounding.reachability import reachable_arguments
-from planners.joint.model import own_text
 from planners.pddl.lifted import Atom, Domain
 from tests.support.joint_twin import built, check_model, twin_of
 from tests.support.random_models import random_threes
@@ -156,20 +155,3 @@ def test_an_effect_on_every_object() -> None:
         ),
         note=lambda _: None,
     )
-
-
-@pytest.mark.parametrize(
-    ("text", "robot", "own"),
-    [
-        ("(move r1 a b)", "r1", "move a b"),
-        ("(pass r1 r2 ball)", "r1", "pass r2 ball"),
-        ("(pass r1 r2 ball)", "r2", "pass r1 ball"),
-        ("(move a b)", "r1", "move a b"),
-        ("(point r1 r1)", "r1", "point r1"),
-        ("(r1 r1 a)", "r1", "r1 a"),
-        ("(wait)", "r1", "wait"),
-        ("none", "r1", "none"),
-    ],
-)
-def test_a_label_without_the_robots_name(text: str, robot: str, own: str) -> None:
-    assert own_text(text, robot) == own

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -70,26 +69,6 @@ def test_a_damaged_table_is_worked_out_again_and_said(
     why = "cannot be read (Too many levels of symbolic links)" if damage == "none" else "is damaged"
     assert note == f"{path} {why}: it is ignored, and its result is worked out again"
     assert path.read_bytes() == whole
-
-
-def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
-    squares, notes = batch(support.squares, 3, PARTS), list[str]()
-    store = Store(tmp_path, say=notes.append)
-    first, _ = results(store, squares)
-    pipe, folder, device, *_ = sorted(tmp_path.iterdir())
-    for path in (pipe, folder, device):
-        path.unlink()
-    os.mkfifo(pipe)
-    device.symlink_to("/dev/zero")
-    folder.mkdir()
-    with pytest.raises((OSError, UsageError)):  # a folder is said, and cannot be replaced
-        results(store, squares)
-    folder.rmdir()
-    assert results(store, squares)[0] == first
-    said = {note.partition(":")[0] for note in notes}
-    assert said == {f"{path} is no file" for path in (pipe, folder, device)}
-    assert pipe.is_file()
-    assert device.is_file()
 
 
 @given(st.binary(max_size=300))

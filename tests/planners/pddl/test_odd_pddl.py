@@ -316,7 +316,7 @@ CASES: dict[str, Case] = {
     ),
     "no spaces that are not needed": case(2, d(" (", "("), p(" (", "(")),
     # costs
-    "costs do not count by themselves": case(2, COSTLY, PRICED),
+    "costs do not count by themselves": case(2, COSTLY),
     "costs that count": case(2, COSTLY, PRICED, COST),
     "a cost with a point": case(2, COSTLY, change(PRICED, " 3)", " 3.0)"), COST),
     "a cost that is missing": case(

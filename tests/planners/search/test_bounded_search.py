@@ -9,15 +9,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import fields, replace
-from itertools import product
 from random import Random
 
 import numpy as np
 import pytest
 
-from planners.joint.model import FullState, PlanningTask
 from planners.loading import PlanningInstance, load
-from planners.pddl.lifted import Atom
 from planners.pddl.model_options import Cost, ModelOptions
 from planners.search.heuristics import CHOICES
 from planners.search.optimal_plans import search, search_with_effort
@@ -172,7 +169,7 @@ def test_steps_are_composed_again_however_many_there_were() -> None:
     """Those on the way back count for no limit of the way there."""
     files = DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "corners-6x6.pddl"]
     again = 0
-    for cost, probe in product(COSTS, (100, 200, 300)):
+    for cost, probe in zip(COSTS, (100, 200, 300), strict=True):
         loaded = load(*files, ModelOptions(cost=cost))
         pieces = replace(PIECES, probe=probe, kept=0)
         found, effort = search_with_effort(loaded.model, loaded.tasks[0], pieces)
@@ -186,32 +183,3 @@ def test_on_open_grids_no_solver_is_asked() -> None:
     plans, effort = search_with_effort(task.model, task.tasks[0], replace(PIECES, probe=400))
     assert (counts(plans)[int(plans.starts[0])], effort.rounds) == (8_383_608, 2)
     assert "SAT" not in effort.heuristic
-
-
-@pytest.mark.parametrize(
-    ("init", "goal", "cost"),
-    [
-        # Each goes its own way, and nobody pays for more.
-        (("c0-0", "c2-0"), ("c0-2", "c2-2"), (2, 4)),
-        # r2 is at its goal, and makes way: two actions more.
-        (("c0-0", "c0-1"), ("c0-2", "c0-1"), (2, 4)),
-        # They trade places, and one goes round: the least makespan is not what bounds say.
-        (("c0-0", "c0-2"), ("c0-2", "c0-0"), (4, 6)),
-    ],
-)
-def test_least_makespan_then_least_cost(
-    init: tuple[str, str], goal: tuple[str, str], cost: tuple[int, int]
-) -> None:
-    files = DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "gw4-3x3.pddl"]
-    model = load(*files, ModelOptions(cost="makespan+actions")).model
-
-    def state(cells: tuple[str, str]) -> frozenset[Atom]:
-        return frozenset(Atom("at", (f"r{k}", cell)) for k, cell in enumerate(cells, 1))
-
-    goals = FullState(tuple(model.codec.true_facts(model.state(state(goal)))))
-    task = PlanningTask("by hand", model.state(state(init)), goals)
-    found = search(model, task, heuristic="projections")
-    assert found.cost_of(0) == cost
-    twin = blind_search(model, task)
-    equal(found, twin)
-    equal(search(model, task, heuristic="manhattan"), twin)

@@ -16,7 +16,6 @@ import pytest
 
 from planners.check.validate import validate
 from planners.classical import compile_classical
-from planners.joint.model import show
 from planners.loading import PlanningInstance, build, task_of
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And, Formula, Not
@@ -25,7 +24,6 @@ from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plans import Plans
 from planners.search.reachable import explore
-from planners.system.errors import BadInput
 from tests.support.naive_classical import optimal_plans
 from tests.support.naive_joint_steps import Labels, TooLarge, Twin
 from tests.support.random_pddl import Kind, random_model
@@ -192,25 +190,3 @@ def test_what_belonged_to_an_environment_that_is_not_there_costs_nobody() -> Non
     assert search(loaded.model, loaded.tasks[0]).cost_of(0) == (1, 3)
     verdict = validate(read, loaded.problems[0], loaded.team, [["(go r1 a b)", "(tick)"]])
     assert "it belongs to no robot" in verdict.reason
-
-
-def test_a_price_that_is_missing() -> None:
-    """Only for actions that can happen at all, and only where prices count."""
-    domain = """(define (domain d) (:types robot place) (:predicates (at ?r - robot ?p - place) (way ?a ?b - place))
-      (:functions (far ?a ?b - place))
-      (:action go :agent ?r - robot :parameters (?a ?b - place) :precondition (and (at ?r ?a) (way ?a ?b))
-        :effect (and (not (at ?r ?a)) (at ?r ?b) (increase (total-cost) (far ?a ?b)))))"""
-    problem = """(define (problem p) (:domain d) (:objects r1 r2 - robot a b c - place)
-      (:init (at r1 a) (at r2 a) (way a b) (= (far a b) 2)) (:goal (at r1 b)))"""
-
-    def loaded(more: str = "", cost: str = "makespan+cost") -> PlanningInstance:
-        read = parse_domain(Source("d", domain))
-        task = parse_problem(Source("p", problem.replace("(way a b)", f"(way a b) {more}")), read)
-        return build(read, [task], ModelOptions(cost=cost))  # type: ignore[arg-type]
-
-    model = loaded().model
-    assert search(model, loaded().tasks[0]).cost_of(0) == (1, 2)
-    assert {show(a) for a in model.statics} == {"(way a b)"}
-    with pytest.raises(BadInput, match=r"the cost \(far b c\) has no whole value"):
-        loaded("(way b c)")
-    assert loaded("(way b c)", "makespan").model.cost == "makespan"
