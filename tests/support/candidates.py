@@ -18,7 +18,7 @@ from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan
 from planners.system.errors import ProvedImpossible
 from tests.support import naive
-from tests.support.composition_walk import walk
+from tests.support.composition_walk import first_break, steps_of
 from tests.support.domains import all_tasks
 from tests.support.random_models import graph_text, random_model
 from tests.support.texts import parsed
@@ -55,7 +55,11 @@ def some_tasks(candidates: Candidates, random: Random, number: int) -> Candidate
 
 
 def requiring(candidates: Candidates) -> bool:
-    return any(walk(space).requires[space.starts].any() for space in candidates.spaces)
+    return any(
+        first_break(steps_of(space), space.robots, space.starts.tolist(), together=False)
+        is not None
+        for space in candidates.spaces
+    )
 
 
 def states_of(spaces: Sequence[PlanSpace]) -> int:

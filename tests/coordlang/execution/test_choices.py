@@ -9,7 +9,6 @@ from collections import Counter
 from dataclasses import replace
 from itertools import product
 
-import numpy as np
 import pytest
 
 from coordlang.commands.building import build_language
@@ -17,17 +16,12 @@ from coordlang.execution.automaton import Automaton, determinise
 from coordlang.execution.choices import RobotChoices, SentenceChoices, choices, monitor, own_facts
 from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
 from coordlang.language.candidates import from_problems
-from coordlang.language.partition import Partition
-from coordlang.verification.by_definition import verify
-from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import TRUE
-from planners.pddl.sexpr import Source
 from planners.search.plans import Plans
 from planners.system.errors import OutOfMemory
 from tests.support import naive
 from tests.support.domains import read
 from tests.support.naive_choices import Listed, accepted, listed
-from tests.support.random_models import CHORES
 from tests.support.task_languages import (
     RUNS,
     in_built_languages,
@@ -175,7 +169,6 @@ def test_own_atoms_are_known(robots: int, models: int) -> None:
             assert found.mixtures is None
             check_automata(found, twin)
             for own in found.robots:
-                assert own.atoms == "own"
                 check_own_atoms(task_language, own, twin, seen)
     assert min(seen["true"], seen["false"], seen["unknown"]) >= 100, seen
 
@@ -183,6 +176,7 @@ def test_own_atoms_are_known(robots: int, models: int) -> None:
 def check_own_atoms(
     task_language: TaskLanguage, own: RobotChoices, twin: Listed, seen: Counter[str]
 ) -> None:
+    assert own.atoms == "own"
     known = twin.knows(own.robot)
     mask = own_facts(task_language.model, own.robot)
     facts = task_language.model.codec.facts.texts
@@ -232,59 +226,13 @@ def test_shipped_domains(name: str) -> None:
         assert choices(task_language, words).guaranteed
         return
     for words, twin in twins[:12]:
+        for own in choices(task_language, words, most=0).robots:
+            check_own_atoms(task_language, own, twin, Counter())
         found = choices(task_language, words)
         assert found.guaranteed
         check_automata(found, twin)
         if twin.combinations <= 200:
             check_combinations(found, twin)
-
-
-@pytest.mark.parametrize(
-    "name", ["elevator/two-calls", "tray/serve", "grid-joint/gw2-2x3", "handover/exchange"]
-)
-def test_own_atoms_of_shipped_domains(name: str) -> None:
-    """Conditional effects, whole joint actions and shared subactions: what is said is known."""
-    seen: Counter[str] = Counter()
-    task_language = shipped(name)[1]
-    for words, twin in list(listed(task_language, 2000, 3000))[:6]:
-        for own in choices(task_language, words, most=0).robots:
-            assert own.atoms == "own"
-            check_own_atoms(task_language, own, twin, seen)
-    assert seen["unknown"] >= 4, seen
-
-
-@pytest.mark.parametrize("robots", [2, 3])
-def test_choices_may_leave_the_sentence(robots: int) -> None:
-    """Each robot has two things to do, in any order, and the word says whether an even number of
-    robots began with the second.  The sentence leaves half of the plans open, and yet each robot
-    both orders: every combination is optimal, and half of them have the other sentence.
-    """
-    names = [f"r{n}" for n in range(robots)]
-    items = [(r, f"{r}{x}") for r in names for x in "ab"]
-    text = (
-        f"(define (problem p) (:domain chores) (:objects {' '.join(names)} - robot {' '.join(f'c{i}' for _, i in items)} - chore "
-        f"{' '.join(f't{i}' for _, i in items)} - thing)\n"
-        f"(:init {' '.join(f'(mine {r} c{i}) (gets c{i} t{i})' for r, i in items)})"
-        f"(:goal (and {' '.join(f'(got t{i})' for _, i in items)})))"
-    )
-    domain = parse_domain(Source("d", CHORES))
-    candidates = from_problems(domain, [parse_problem(Source("p", text), domain)])
-    space, codec = candidates.spaces[0], candidates.model.codec
-    begun = [
-        {fact for fact in codec.decode(row) if fact.startswith("(done") and fact.endswith("b)")}
-        for row in space.rows
-    ]
-    layer = dict(zip(space.state.tolist(), space.layer.tolist(), strict=True))
-    word = np.array([1 + len(begun[s]) % 2 if layer[s] == 1 else 0 for s in range(len(space.rows))])
-    table = Partition(("start", "even", "odd"), space.rows, word, 0)
-    assert verify(table, candidates.spaces).holds
-    task_language = TaskLanguage(None, table, space, 0, word[space.state], True)  # type: ignore[arg-type]
-    for words, twin in listed(task_language, 100, 100):
-        found = choices(task_language, words)
-        check_automata(found, twin)
-        check_combinations(found, twin)
-        assert [own.automaton.count for own in found.robots] == [2] * robots
-        assert twin.combinations == 2**robots == 2 * len(twin.plans) == len(twin.optimal)
 
 
 def test_too_many_are_refused_with_an_estimate(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -66,33 +66,6 @@ def test_random_models(robots: int, number: int) -> None:
         check(candidates, task_language, ("blind", "relaxed"))
 
 
-@pytest.mark.parametrize(("robots", "number"), RANDOM)
-def test_a_state_is_looked_at_once(robots: int, number: int) -> None:
-    """By breadth every state is expanded once, whatever the sentence, and none that is as far as the
-    goal, but for goal states that come with another sentence.
-    """
-    for _, _, used in random_task_languages(robots, number):
-        if used.model.cost == "makespan":
-            terrain = ExpandedStates(used.model, used.partition)
-            init = used.space.rows[used.space.state[used.start]]
-            goals = used.space.layers[0]
-            most = _expandable(terrain, init, used.space.cost_of(0)[0]) + goals.stop - goals.start
-            for words in list(plans_by_sentence(used))[:10]:
-                said = used.words_of(words)
-                found = plan_under_sentence(used, said, "blind", terrain, count_words=False)
-                assert found.states == found.expanded <= most
-
-
-def _expandable(terrain: ExpandedStates, init: object, makespan: int) -> int:
-    """How many states are nearer to the start than the goal is."""
-    layer = set(terrain.numbers(init[None, :]))  # type: ignore[index]
-    seen = set(layer)
-    for _ in range(makespan - 1):
-        layer = {target for state in layer for target, _, _ in terrain.steps(state)} - seen
-        seen |= layer
-    return len(seen) if makespan else 0
-
-
 def test_a_sentence_of_longer_plans_only_is_no_sentence() -> None:
     """A* alone may find a longer plan with the sentence; `plan_under_sentence` knows that it is not optimal."""
     task_language = shipped("t-map/problem")[1]

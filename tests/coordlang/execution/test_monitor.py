@@ -231,28 +231,7 @@ def test_a_robot_can_carry_it(three_cells: SentenceChoices, tmp_path: Path) -> N
     ]
 
 
-def test_large_counts_survive_the_file() -> None:
-    """Above 2^53 the numbers are texts; a monitor counts for itself and agrees."""
-    depth, states = 60, list[dict[str, Any]]()
-    for step in range(depth + 1):
-        left = 2 ** (depth - step)
-        states += [
-            {"step": step, "left": left if left <= 2**53 else str(left), "true": [], "unknown": []}
-        ]
-        states[-1]["next"] = {}
-    for before, number in zip(states, range(1, depth + 1), strict=False):
-        before["next"] = {"(go 0)": number, "(go 1)": number}
-    entry = {"robot": "r", "atoms": "own", "facts": [], "others": [], "states": states}
-    data = {"format": "coordlang/choices", "version": 1, "sentence": "w0", "choices": [entry]}
-    at = Monitor(json.loads(json.dumps(data)))
-    assert at.remaining == 2**depth
-    assert at.can(do="(go 1)").subplans == 2**depth - 1
-    states[3]["left"] = 7
-    with pytest.raises(MonitorError, match="state 3 says 7 subplans are left, but there are"):
-        Monitor(data)
-
-
-def crossings(number: int) -> Monitor:
+def crossings(number: int) -> dict[str, Any]:
     """So many steps, in each of which the robot goes left or right; atoms say where it went."""
     facts = [f"(at{step} {side})" for step in range(number) for side in ("left", "right")]
     states: list[dict[str, Any]] = [{"step": 0, "left": 2**number, "true": [], "unknown": []}]
@@ -265,16 +244,27 @@ def crossings(number: int) -> Monitor:
         first = 2 * state["step"] + 1
         sides = enumerate(("(go left)", "(go right)"), first)
         state["next"] = {text: to for to, text in sides if to < len(states)}
+        state["left"] = state["left"] if state["left"] <= 2**53 else str(state["left"])
     entry = {"robot": "r", "atoms": "exact", "facts": facts, "others": [], "states": states}
-    data = {"format": "coordlang/choices", "version": 1, "sentence": "w0", "choices": [entry]}
-    return Monitor(data)
+    return {"format": "coordlang/choices", "version": 1, "sentence": "w0", "choices": [entry]}
+
+
+def test_large_counts_survive_the_file() -> None:
+    """Above 2^53 the numbers are texts; a monitor counts for itself and agrees."""
+    data = crossings(60)
+    at = Monitor(json.loads(json.dumps(data)))
+    assert at.remaining == 2**60
+    assert at.can(do="(go left)").subplans == 2**60 - 1
+    data["choices"][0]["states"][3]["left"] = 7
+    with pytest.raises(MonitorError, match="state 3 says 7 subplans are left, but there are"):
+        Monitor(data)
 
 
 def test_detours_with_too_many_visits_are_refused_and_change_nothing() -> None:
     """Every set of the visits may be made at a time: twice as many with each further visit."""
     few = [f"(at{step} left)" for step in range(12)]
-    assert crossings(12).can(visit=few).subplans == 1
-    robot = crossings(40)
+    assert Monitor(crossings(12)).can(visit=few).subplans == 1
+    robot = Monitor(crossings(40))
     assert robot.can(visit=20 * few).subplans == 2**28
     many = [f"(at{step} left)" for step in range(40)]
     with pytest.raises(MonitorError, match=r"40 visits and dos at once .* more than 262,144"):

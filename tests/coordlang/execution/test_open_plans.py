@@ -6,11 +6,10 @@ from __future__ import annotations
 import re
 from collections import Counter
 from random import Random
-from xml.etree import ElementTree
 
 import pytest
 
-from coordlang.execution.drawing import COLOURS, cut_note, inks, plans_dot
+from coordlang.execution.drawing import cut_note, plans_dot
 from coordlang.execution.open_plans import OpenPlans, PlanDag, open_plans_data, plan_dag
 from coordlang.execution.task_language import NoPlanFits, TaskLanguage
 from planners.search.plan_file import texts
@@ -144,33 +143,4 @@ def test_dot_has_every_node_and_edge(name: str) -> None:
     assert all(line.count('"') % 2 == 0 for line in text.replace('\\"', "").splitlines())
 
 
-def test_words_have_colours_that_differ() -> None:
-    graph = plan_dag(most_open("grid/three-robots-3x3"))
-    found = inks(graph)
-    assert set(found) == set(graph.sentence)
-    assert len({ink.fill for ink in found.values()}) == min(len(found), len(COLOURS))
-    for ink in found.values():  # legible: a contrast of 3 at least (WCAG, large or bold text)
-        light, dark = sorted((luminance(ink.fill), luminance(ink.text)), reverse=True)
-        assert (light + 0.05) / (dark + 0.05) >= 3
-
-
-def luminance(colour: str) -> float:
-    parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
-    red, green, blue = (p / 12.92 if p <= 0.03928 else ((p + 0.055) / 1.055) ** 2.4 for p in parts)
-    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
-
-
 # -- in a notebook
-
-
-def test_a_plan_space_shows_its_layers() -> None:
-    space = shipped("t-map/problem")[1].space
-    rows = ElementTree.fromstring(space._repr_html_()).findall("tr")
-    cells = [[cell.text for cell in row] for row in rows]
-    assert cells[0] == ["steps left", "nodes", "states", "edges"]
-    expected = [
-        [str(layer), str(span.stop - span.start), None, str(len(space.layer_edges(layer).edges))]
-        for layer, span in enumerate(space.layers)
-    ]
-    assert [[*row[:2], None, row[3]] for row in cells[1:]] == expected[::-1]
-    assert f"nodes={len(space)}" in repr(space)

@@ -4,10 +4,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import replace
 from random import Random
 
-import numpy as np
 import pytest
 
 from coordlang.execution.plan_sentence import NotAPlan, NotOptimal, sentence_of_plan
@@ -18,10 +16,10 @@ from planners.check.validate import validate
 from planners.joint.model import PlanningTask
 from planners.joint.tables import Rows
 from planners.search.optimal_plans import search
-from planners.search.plan_file import Texts, only_one_plan, texts
+from planners.search.plan_file import Texts, texts
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
-from planners.system.errors import BadInput, Position, ProvedImpossible
+from planners.system.errors import ProvedImpossible
 from tests.support.naive import plans_by_sentence
 from tests.support.task_languages import RANDOM, SHIPPED, random_task_languages, shipped
 
@@ -164,38 +162,3 @@ def test_wrong_plans_of_shipped_domains(name: str) -> None:
     optimal = {plan for plans in plans_by_sentence(used).values() for plan in plans}
     random = Random(name)
     assert len({judged(candidates, used, changed(used, random), optimal) for _ in range(10)}) > 1
-
-
-def test_two_plans_of_one_step() -> None:
-    text = "; plan {} of 2\n0: (go r{})\n; makespan = 1\n\n"
-    only_one_plan(text.format(1, 1), Position("p"))
-    with pytest.raises(BadInput, match="p:5:1: this file holds several plans"):
-        only_one_plan(text.format(1, 1) + text.format(2, 2), Position("p"))
-
-
-def test_one_plan_is_one() -> None:
-    for text in (
-        "1: (a)\n0: (b)\n",
-        "0.0: (a) [1]\n0.1: (b) [1]\n",
-        "(a)\n(b)\n; cost = 2\n; x\n",
-        "",
-    ):
-        only_one_plan(text, Position("p"))
-
-
-def test_the_plan_with_an_initial_goal_state() -> None:
-    """The empty plan has one word."""
-    candidates, task_language = shipped("three-cells/problem")
-    space = task_language.space
-    goal_node = int(np.flatnonzero(space.layer == 0)[0])
-    there = TaskLanguage(
-        task_language.language,
-        task_language.partition,
-        replace(space, starts=np.array([goal_node])),
-        0,
-        task_language.word,
-        True,
-    )
-    assert sentence_of_plan(there, ()) == (int(task_language.word[goal_node]),)
-    with pytest.raises(NotOptimal):
-        sentence_of_plan(there, [(None,) * len(candidates.model.robots)])

@@ -8,11 +8,10 @@ from dataclasses import replace
 from functools import cache
 from itertools import product
 
-import numpy as np
 import pytest
 
 from coordlang.commands.building import build_language
-from coordlang.explanation.simple import FormulaProblem, _Search, simple
+from coordlang.explanation.simple import _Search, simple
 from coordlang.explanation.variables import valuation
 from coordlang.explanation.words import mapped_states
 from coordlang.vocabulary.job import Assignment, Outcome
@@ -105,27 +104,6 @@ def test_shortest_by_trying_all(number: int) -> None:
     assert length({s: word[s] for s in states}, states, shortest) == best
     assert built.verdict.holds
     assert built.language.guarantee.proved_minimal
-
-
-def test_formulas_of_a_partition() -> None:
-    """Four states of two variables: two words in a chessboard need two terms, with two limits each;
-    one term is not enough.
-    """
-    value = {n: np.array(divmod(n, 2)) for n in range(4)}
-    for terms, solvable in ((1, False), (2, True)):
-        problem = FormulaProblem(range(4), 2, value, (2, 2), terms)
-        for pair in ((0, 1), (0, 2), (1, 3), (2, 3)):
-            problem.separate_one([pair])
-        found = problem.solve()
-        assert (found is not None) == solvable
-        if found is not None:
-            assert found[0] == found[3] != found[1] == found[2]
-            assert problem.lengths() == (2, 4)
-        problem.close()
-    problem = FormulaProblem(range(4), 2, value, (2, 2), 1, limits=1)
-    problem.separate_one([(0, 1)])
-    assert problem.solve() in ({0: 0, 1: 1, 2: 0, 3: 1}, {0: 0, 1: 1, 2: 0, 3: 1})
-    problem.close()
 
 
 @pytest.mark.parametrize("phase", ["_decide", "_limit_fewer"])

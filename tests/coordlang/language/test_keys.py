@@ -93,11 +93,3 @@ def test_both_ways() -> None:
         seen[case] > 5
         for case in ("wrong", "right", "changed, but right", "remembering", "nothing true")
     ), seen
-
-
-def test_no_keys() -> None:
-    codec = StateCodec(FactTable.of([Atom("p", ())]))
-    assert keys_of(codec, np.zeros((0, 1), np.uint64)) == []
-    rows, wrong = read_keys(codec, [])
-    assert rows.shape == (0, 1)
-    assert len(wrong) == 0

@@ -15,49 +15,6 @@ from tests.support import naive
 from tests.support.command import Command
 from tests.support.domains import DOMAINS, all_tasks
 
-PARKING = """(define (domain parking) (:types robot place)
-  (:predicates (at ?r - robot ?p - place) (parked ?r - robot) (next ?a ?b - place))
-  (:action stay :agent ?r - robot :parameters (?p - place) :precondition (at ?r ?p))
-  (:action leave :agent ?r - robot :parameters (?p - place)
-    :precondition (and (parked ?r) (forall (?o - robot) (not (at ?o ?p))) (forall (?o - robot) (not (leave ?o ?p))))
-    :effect (and (not (parked ?r)) (at ?r ?p)))
-  (:action go :agent ?r - robot :parameters (?a ?b - place)
-    :precondition (and (at ?r ?a) (next ?a ?b) (forall (?o - robot) (not (at ?o ?b)))
-      (forall (?o - robot ?x - place) (not (go ?o ?x ?b))))
-    :effect (and (at ?r ?b) (not (at ?r ?a)))))"""
-
-
-def parking(name: str, init: str, goal: str) -> str:
-    return f"""(define (problem {name}) (:domain parking) (:objects r1 r2 - robot a b c - place)
-      (:init {init} (next a b) (next b a) (next b c) (next c b)) (:goal (and {goal})))"""
-
-
-ROADS = parking("roads", "(at r1 a) (at r2 c)", "(at r1 b)")
-PARKED = parking("parked", "(at r1 a) (parked r2)", "(at r1 c) (at r2 a)")
-
-
-@pytest.mark.parametrize("given", [[0], [1], [0, 1]])
-def test_the_verdict_does_not_depend_on_which_problems_are_given(
-    given: list[int], coordlang: Command, tmp_path: Path
-) -> None:
-    """In one problem staying replaces idling, in the other it cannot: the model is the one that was
-    built for.
-    """
-    (tmp_path / "d.pddl").write_text(PARKING)
-    files = []
-    for name, text in (("roads", ROADS), ("parked", PARKED)):
-        files.append(tmp_path / f"{name}.pddl")
-        files[-1].write_text(text)
-    path = tmp_path / "l.json"
-    assert (
-        coordlang("build", tmp_path / "d.pddl", *files, "--method", "greedy", "-o", path).code == 0
-    )
-    built = json.loads(coordlang("verify", path, tmp_path / "d.pddl", *files, "--json").out)
-    chosen = [files[k] for k in given]
-    assert (
-        json.loads(coordlang("verify", path, tmp_path / "d.pddl", *chosen, "--json").out) == built
-    )
-
 
 def edit(path: Path, **changes: object) -> None:
     path.write_text(json.dumps(json.loads(path.read_text()) | changes))

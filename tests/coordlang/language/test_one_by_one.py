@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from coordlang.language import candidates as room
-from coordlang.language.candidates import Candidates, describe, explored_if_small, from_listed
+from coordlang.language.candidates import Candidates, describe, from_listed
 from coordlang.language.listed import ListedTask, goal_text
 from planners.joint.model import JointModel, PlanningTask
 from planners.joint.tables import Rows
@@ -150,33 +150,3 @@ def test_a_robot_that_is_nowhere_or_in_two_places_is_a_mistake(
     good = ListedTask(("(at r1 c0-0)", "(at r2 c1-1)"), ())
     with pytest.raises(BadInput, match=r"task 2: the state .* cannot be reached from the initial"):
         from_listed(domain, problems, [good, ListedTask(init, ())])
-
-
-def test_a_small_space_is_explored(monkeypatch: pytest.MonkeyPatch) -> None:
-    world = built(random_model(3, "agent"))
-    inits = world.tasks[0].init[None, :]
-    whole = explore(world.model, inits)
-    for states, steps, small in ((0, 0, False), (-1, None, False), (0, None, True)):
-        monkeypatch.setattr(room, "MOST_STATES", len(whole) + states)
-        monkeypatch.setattr(room, "MOST_STEPS", room.MOST_STEPS if steps is None else 1)
-        found = explored_if_small(world.model, inits)
-        assert (found is not None) == small
-        assert found is None or np.array_equal(found.rows, whole.rows)
-        monkeypatch.undo()
-
-
-def test_an_unsolvable_task_is_named_as_before(large: None) -> None:
-    domain, problems = grid()
-    init = ("(at r1 c0-0)", "(at r2 c1-1)")
-    bad = ListedTask(init, ("(at r1 c0-0)", "(at r2 c0-0)"))
-    good = ListedTask(init, ("(at r1 c0-1)",))
-    with (
-        pytest.raises(ProvedImpossible, match=r"task 2: the goal \(at r1 c0-0\) \(at r2 c0-0\)"),
-        pytest.warns(Note),
-    ):
-        from_listed(domain, problems, [good, bad])
-    with pytest.warns(Note):
-        kept = from_listed(domain, problems, [bad, good], skip_unsolvable=True)
-    assert (kept.count, len(kept.skipped), kept.listed) == (1, 1, (good,))
-    with pytest.raises(ProvedImpossible), pytest.warns(Note):
-        from_listed(domain, problems, [bad], skip_unsolvable=True)

@@ -138,13 +138,3 @@ def test_a_limit_ends_the_search_for_fewer_words(
         assert outcome.code == code
         assert "the best words so far are written: they are verified" in outcome.err
         assert len(json.loads(path.read_text())["words"]) > 1
-
-
-def test_many_states_are_read_in_parts(
-    coordlang: Command, lifted: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    files = [tmp_path / "whole.json", tmp_path / "parts.json"]
-    assert coordlang("ground", lifted, GRID, LARGER, "-o", files[0], "--jobs", "1").code == 0
-    monkeypatch.setattr("coordlang.lifted.language._ENTRIES", 100)
-    assert coordlang("ground", lifted, GRID, LARGER, "-o", files[1], "--jobs", "1").code == 0
-    assert files[0].read_bytes() == files[1].read_bytes()

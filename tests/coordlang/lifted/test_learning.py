@@ -15,7 +15,7 @@ import pytest
 
 from coordlang.language.candidates import all_pairs
 from coordlang.language.partition import Partition
-from coordlang.lifted.choosing import SimplestHitting, undominated
+from coordlang.lifted.choosing import SimplestHitting
 from coordlang.lifted.features import Feature
 from coordlang.lifted.language import LiftedLanguage
 from coordlang.lifted.learning import Instance, Learned, learn
@@ -169,12 +169,6 @@ def test_words_may_come_first() -> None:
 def words_in(own: Instance, learned: Learned) -> Ints:
     vectors = map(tuple, own.vectors(learned.features).tolist())
     return np.array([learned.word[vector] for vector in vectors])
-
-
-def test_what_is_left_of_dominated_members() -> None:
-    """Of what is in the same sets the lightest; nothing that another one replaces."""
-    inside = np.array([[1, 1, 0], [1, 0, 0], [0, 0, 1], [0, 0, 1], [0, 0, 0], [0, 1, 0]], bool)
-    assert undominated(inside, np.array([2, 2, 3, 1, 1, 1])).tolist() == [0, 3, 5]
 
 
 @pytest.mark.thorough

@@ -155,24 +155,10 @@ def test_a_problem_without_tasks(rings: Lifted, tmp_path: Path) -> None:
         coordlang.ground(rings.language, GRID, stuck, jobs=1)
 
 
-def test_features_that_are_too_weak() -> None:
-    with pytest.raises(ProvedImpossible, match=r"tells states apart .* of gw2-2x3"):
-        coordlang.lift(GRID, OPEN, tasks="all", complexity=3, jobs=1)
-
-
 @pytest.mark.parametrize("wrong", [{"prefer": "nothing"}, {"complexity": 0}, {"seed": -1}])
 def test_wrong_options(wrong: dict[str, object]) -> None:
     with pytest.raises(UsageError):
         coordlang.lift(GRID, OPEN, jobs=1, **wrong)
-
-
-def test_a_problem_without_static_relations() -> None:
-    """Features come from what is left: counts and sizes."""
-    files = [DOMAINS / "flags" / f"{stem}.pddl" for stem in ("domain", "parade")]
-    language = coordlang.ground(
-        coordlang.lift(*files, tasks="all", jobs=1).language, *files, jobs=1
-    )
-    assert language.guarantee.method == "lifted; verified here"
 
 
 def test_an_empty_claim_helps_nobody(rings: Lifted) -> None:
@@ -229,15 +215,6 @@ def test_damaged_files(name: str, rings: Lifted) -> None:
     assert str(error.value.position) == "changed.json"
 
 
-def test_a_file_that_is_cut_off_or_says_something_twice(rings: Lifted, tmp_path: Path) -> None:
-    text = to_bytes(rings.language).decode()
-    for broken in (text[: len(text) // 2], text.replace('"0 1"', '"0 0"')):
-        path = tmp_path / "broken.json"
-        path.write_text(broken)
-        with pytest.raises(BadInput):
-            coordlang.ground(path, GRID, LARGER)
-
-
 def test_features_that_give_other_words_are_not_shown(rings: Lifted) -> None:
     """A language file whose table was changed by hand."""
     language = coordlang.ground(rings.language, GRID, LARGER, jobs=1)
@@ -245,45 +222,6 @@ def test_features_that_give_other_words_are_not_shown(rings: Lifted) -> None:
     changed = replace(language, states={**language.states, key: "w3"})
     with pytest.warns(Note, match="do not give its states their words"):
         assert "column(" not in str(coordlang.explain(changed, GRID, LARGER))
-
-
-def test_names_that_are_not_ascii(tmp_path: Path) -> None:
-    """Robots and places with other letters."""
-    domain, problem = tmp_path / "d.pddl", tmp_path / "p.pddl"
-    domain.write_text(GRID.read_text())
-    text = SMALL.read_text().replace("r1", "\u00e9toile")
-    problem.write_text(text.replace("c0-", "\u043c0-").replace("c1-", "\u043c1-"))
-    lifted = coordlang.lift(domain, problem, tasks="all", jobs=1)
-    assert "\u00e9toile" in lifted.language.robots
-    language = coordlang.ground(lifted.language, domain, problem, jobs=1)
-    assert language.guarantee.method == "lifted; verified here"
-
-
-WALKERS = """(define (domain d) (:requirements :typing) (:types walker place)
-  (:predicates (at ?w - walker ?p - place) (way ?p ?q - place) (free ?p - place))
-  (:action walk :parameters (?w - walker ?p ?q - place)
-    :precondition (and (at ?w ?p) (way ?p ?q) (free ?q))
-    :effect (and (at ?w ?q) (not (at ?w ?p)) (free ?p) (not (free ?q)))))
-"""
-
-
-def test_a_loaded_problem(tmp_path: Path) -> None:
-    """Its robots were named when it was loaded, and nothing else says which they are."""
-    domain, problem = tmp_path / "d.pddl", tmp_path / "p.pddl"
-    domain.write_text(WALKERS)
-    problem.write_text(
-        "(define (problem p) (:domain d) (:objects r1 r2 - walker a b c - place)"
-        "(:init (at r1 a) (at r2 b) (free c) (way a b) (way b c) (way c a))"
-        "(:goal (and (at r1 b) (at r2 c))))"
-    )
-    with pytest.raises(BadInput, match="which objects are the robots"):
-        coordlang.load(domain, problem)
-    loaded = coordlang.load(domain, problem, robots=("r1", "r2"), cost="makespan+actions")
-    lifted = coordlang.lift(loaded, tasks="all", jobs=1).language
-    assert lifted.model["cost"] == "makespan+actions"
-    assert [known.problem for known in lifted.verified] == ["p"]
-    language = coordlang.ground(lifted, domain, problem, jobs=1)
-    assert language.guarantee.method == "lifted; verified here"
 
 
 INSEPARABLE = """(define (domain d) (:requirements :typing) (:types robot)

@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from random import Random
 
-import numpy as np
 import pytest
 
 import coordlang
@@ -23,7 +22,6 @@ from coordlang.verification.by_definition import verify, verify_candidates
 from planners.loading import load
 from planners.parallel.batch import Store
 from planners.parallel.workers import Workers
-from planners.search.portions import Explored, Searched, cut
 from planners.system.errors import BadInput, ProvedImpossible
 from tests.support.domains import DOMAINS, all_tasks
 from tests.support.random_models import random_model
@@ -83,42 +81,6 @@ def test_jobs_give_what_the_whole_gives(robots: int, number: int) -> None:
         answers[verdict.holds] += 1
     assert answers[True] >= 3
     assert answers[False] >= 3
-
-
-@pytest.mark.parametrize("robots", [2, 3])
-def test_portions_are_the_plan_spaces_of_their_goals(robots: int) -> None:
-    for candidates in random_candidates(range(16), robots):
-        source = candidates.source
-        assert isinstance(source, Explored | Searched)
-        (whole, *_) = candidates.spaces
-        edges = Counter[tuple[int, ...]]()
-        for goals in cut(source.efforts, ONE):
-            part = source.portion(goals)
-            for edge, node in enumerate(part.sources.tolist()):
-                nodes = part.state[[node, part.target_of(edge)]].tolist()
-                edges[(*nodes, int(part.layer[node]), *part.labels_of(edge))] += 1
-        assert edges == Counter(
-            (
-                *whole.state[[node, whole.target_of(edge)]].tolist(),
-                int(whole.layer[node]),
-                *whole.labels_of(edge),
-            )
-            for edge, node in enumerate(whole.sources.tolist())
-        )
-
-
-def test_goals_are_cut_by_their_efforts_alone() -> None:
-    random = np.random.default_rng(0)
-    for size in (1, 2, 7, 500):
-        efforts = random.integers(0, 50, size)
-        for portion in (0.5, 10.0, 300.0, 1e9):
-            parts = cut(efforts, portion)
-            assert [goal for part in parts for goal in part] == list(range(size))
-            assert all(part for part in parts)
-            if len(parts) > 1:
-                most = max(int(efforts[p.start : p.stop].sum()) for p in parts)
-                assert most <= efforts.sum() / len(parts) + 50 + 1
-    assert len(cut(np.zeros(3, np.int64), 1.0)) == 1
 
 
 def test_processes_and_kept_jobs_change_nothing(tmp_path: Path) -> None:

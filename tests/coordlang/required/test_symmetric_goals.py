@@ -6,13 +6,12 @@ from __future__ import annotations
 from itertools import combinations
 from random import Random
 
-import numpy as np
 import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.required import all_differences
-from coordlang.required.all_differences import SymmetricGoals, differences, symmetric_goals
+from coordlang.required.all_differences import differences, symmetric_goals
 from coordlang.required.divergences import FirstDifferences
 from coordlang.required.miscoordination import Inseparable, separable
 from planners.parallel.workers import Workers
@@ -86,28 +85,6 @@ def test_random_models() -> None:
             agree(candidates)
             found += symmetric_goals(candidates, 0, 0) is not None
     assert found >= 1
-
-
-@pytest.mark.parametrize(
-    ("folder", "stem"),
-    [("grid", "gw2-2x3"), ("grid", "gw4-3x3"), ("three-cells", "problem"), ("t-map", "problem")],
-)
-def test_shipped_maps(folder: str, stem: str) -> None:
-    assert agree(all_tasks(folder, stem))
-
-
-def test_the_orbits_of_goals() -> None:
-    turn, swap = np.array([1, 2, 0, 3, 4, 5]), np.array([0, 1, 2, 4, 3, 5])
-    goals = SymmetricGoals.of([turn, swap], 6)
-    assert goals.representative.tolist() == [0, 0, 0, 3, 3, 5]
-    assert goals.chosen.tolist() == [0, 3, 5]
-    assert goals.spoken_for.tolist() == [3, 0, 0, 2, 0, 1]
-    assert goals.images_of_states(np.array([1, 5])).tolist() == [0, 1, 2, 5]
-    rows = np.array([[0, 1, 3], [5, 3, -1]])
-    assert goals.images_of_rows(rows).tolist() == [
-        *([0, 1, 3], [0, 1, 4], [1, 2, 3], [1, 2, 4], [2, 0, 3], [2, 0, 4]),
-        *([5, 3, -1], [5, 4, -1]),
-    ]
 
 
 def test_where_symmetries_are_not_looked_for() -> None:

@@ -6,18 +6,17 @@ from __future__ import annotations
 from itertools import combinations, permutations
 from random import Random
 
-import numpy as np
 import pytest
 
 from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
 from coordlang.language.listed import ListedTask
-from coordlang.symmetry.group import Symmetry, SymmetryGroup, generated, symmetry_group
+from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from planners.joint.states import split_atoms
-from planners.pddl import parse_domain, parse_problem, read_domain
+from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
 from planners.search.plans import Plans, counts
 from planners.system.errors import ProvedImpossible
-from tests.support.domains import DOMAINS, all_tasks
+from tests.support.domains import all_tasks
 from tests.support.random_models import random_model
 from tests.support.symmetric_worlds import GRID, state_symmetries, world
 
@@ -129,22 +128,6 @@ def test_of_a_large_group_a_subgroup() -> None:
     assert len(elements(symmetry_group(candidates))) >= 23
 
 
-def test_what_is_generated() -> None:
-    turn, back, swap = ([1, 2, 0], [2, 0, 1], [1, 0, 2])
-
-    def group(*permutations: list[int], largest: int = 6) -> list[list[int]]:
-        found = generated([Symmetry({}, np.array(p)) for p in permutations], largest)
-        return sorted(symmetry.states.tolist() for symmetry in found)
-
-    assert group() == []
-    assert group(swap) == [swap]
-    assert group(turn) == group(back) == group(turn, back) == [turn, back]
-    assert len(group(turn, swap)) == 5
-    assert group(turn, swap, largest=5) == [turn, back], "the whole group has six elements"
-    assert group(swap, turn, largest=5) == [swap]
-    assert group(turn, largest=2) == []
-
-
 SIGNS = """(define (domain signs) (:types robot place sign)
   (:predicates (at ?r - robot ?p - place) (way ?a ?b - place) (posted ?s - sign ?p - place))
   (:action go :agent ?r - robot :parameters (?a ?b - place)
@@ -204,20 +187,3 @@ def check_plans(candidates: Candidates, group: SymmetryGroup) -> None:
             frozenset(tuple(permutation[s] for s in states) for states in plans)
             for plans in plans_of_tasks
         }
-
-
-def test_objects_that_nothing_reaches_cost_no_symmetries() -> None:
-    """A hundred cells without a door: the same symmetries, and not a hundred factorial of them to
-    try.
-    """
-    text = (DOMAINS / "grid" / "gw1-2x2.pddl").read_text()
-    extra = " ".join(f"far{n}" for n in range(100))
-    domain = read_domain(DOMAINS / "grid" / "domain.pddl")
-    plain = all_pairs(domain, [parse_problem(Source("p", text), domain)])
-    more = all_pairs(
-        domain, [parse_problem(Source("p", text.replace(" - cell", f" {extra} - cell")), domain)]
-    )
-    assert more.count == plain.count
-    found = symmetry_group(plain).permutations
-    assert len(found) == 15
-    assert symmetry_group(more).permutations == found

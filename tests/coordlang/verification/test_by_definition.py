@@ -14,7 +14,8 @@ import pytest
 
 from coordlang.language.candidates import Candidates, from_problems
 from coordlang.language.partition import Partition
-from coordlang.required.divergences import first_differences, states_on_plans
+from coordlang.required.choices import Choices
+from coordlang.required.divergences import DivergenceSearch, first_differences, states_on_plans
 from coordlang.required.miscoordination import Miscoordination, inseparable, miscoordination
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary import Job, greedy
@@ -74,6 +75,11 @@ def test_where_plans_that_require_coordination_part(robots: int, most: int, numb
                 (p, frozenset(s for s in q if s >= 0)) for p, q in zip(last, after, strict=True)
             }
             assert table == naive.minimal(alphas)
+            search = DivergenceSearch(robots, chunk=7)
+            for space in candidates.spaces:
+                search.add(Choices(space))
+            rows = [(p, *q) for p, q in zip(last, after, strict=True)]
+            assert [*map(tuple, search.table().tolist())] == rows
     assert min(seen["required"], seen["not required"]) >= number // 10, seen
     assert seen["inseparable"] >= number // 40
 

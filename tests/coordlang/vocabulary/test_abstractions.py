@@ -70,31 +70,6 @@ def test_what_abstractions_of_a_grid_say(says: Callable[[Cell, Cell], Hashable])
     assert partition([says(b, a) for a, b in places(candidates)]) in found
 
 
-def test_abstractions_of_a_ring() -> None:
-    """Its cuts all cross each other: there are no coordinates, but colours and nearness."""
-    candidates = all_tasks("grid", "gwb3-3x4")
-    found = abstractions(candidates, range(len(candidates.rows)))
-    both = places(candidates)
-    labels = {as_labels(classes) for classes in found}
-    assert {partition([a for a, _ in both]), partition([(a, colour(b)) for a, b in both])} < labels
-    assert len(found) == 8, "four, for each robot"
-
-
-@pytest.mark.parametrize(
-    ("folder", "stem"),
-    [("grid", "gw2-2x3"), ("t-map", "problem"), ("flags", "two-up"), ("two-arms", "exchange")],
-)
-def test_every_abstraction_merges_states_and_is_another(folder: str, stem: str) -> None:
-    candidates = all_tasks(folder, stem)
-    states = sorted({s for space in candidates.spaces for s in space.state.tolist()})
-    found = abstractions(candidates, states)
-    sizes = [len(set(classes[states].tolist())) for classes in found]
-    assert sizes == sorted(sizes)
-    assert all(1 < size < len(states) for size in sizes)
-    assert len({as_labels(classes[states]) for classes in found}) == len(found)
-    assert all(len(classes) == len(candidates.rows) for classes in found)
-
-
 def test_of_abstractions_that_look_alike_one_is_left() -> None:
     """Where robot 1 is, or where robot 2 is; and each that is left is no image of another."""
     candidates = all_tasks("grid", "gw2-2x3")

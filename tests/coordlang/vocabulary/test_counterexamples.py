@@ -15,7 +15,6 @@ from coordlang.language.candidates import from_problems
 from coordlang.required.choices import Choices
 from coordlang.vocabulary.counterexample_walk import CounterexampleWalk
 from coordlang.vocabulary.counterexamples import Counterexample, Mixtures, many_counterexamples
-from coordlang.vocabulary.sentence_sets import NOTHING, SILENCE, SentenceSets
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import BadInput, ProvedImpossible, UsageError
 from tests.support import naive
@@ -89,29 +88,3 @@ def test_plans_within_slack_are_refuted_like_optimal_ones() -> None:
     answers = compared(with_slack(range(60)), Random(1))
     print(dict(answers))
     assert min(answers[True], answers[False]) >= 5
-
-
-def test_sets_of_sentences_are_those_of_lists() -> None:
-    """Unions, intersections, what comes before and after; one number for each set."""
-    random = Random(3)
-    sets = SentenceSets()
-    numbers: dict[frozenset[tuple[int, ...]], int] = {}
-    every = [(a, b)[:n] for a in range(2) for b in range(2) for n in range(3)]
-
-    def number_of(listed: frozenset[tuple[int, ...]]) -> int:
-        number = NOTHING
-        for sentence in sorted(listed):
-            number = sets.union(number, sets.before(sentence, SILENCE))
-        assert numbers.setdefault(listed, number) == number
-        return number
-
-    for _ in range(300):
-        one, other = (frozenset(random.sample(every, random.randrange(5))) for _ in range(2))
-        first, second = number_of(one), number_of(other)
-        assert sets.union(first, second) == number_of(one | other)
-        assert sets.common(first, second) == number_of(one & other)
-        assert sets.after((1,), first) == number_of(frozenset(s[1:] for s in one if s[:1] == (1,)))
-        assert [s for s in set(every) if sets.has(first, s)] == [s for s in set(every) if s in one]
-        if one:
-            assert sets.drawn(first, random) in one
-    assert len(set(numbers.values())) == len(numbers)

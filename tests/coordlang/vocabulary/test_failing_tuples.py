@@ -8,15 +8,13 @@ from random import Random
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from coordlang.language.sentences import sentence
 from coordlang.language.warping import separation_clause
 from coordlang.required.choices import Choices
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.vocabulary.counterexamples import Mixtures, many_counterexamples
-from coordlang.vocabulary.failing_tuples import FailingTuples, agreeing_rows
+from coordlang.vocabulary.failing_tuples import FailingTuples
 from planners.search.plan_space import PlanSpace
 from tests.support.domains import all_tasks
 from tests.support.random_spaces import runs, separable_spaces
@@ -65,28 +63,6 @@ def test_tuples_agree_iff_their_plans_have_one_sentence(robots: int | None, seed
         assert answers[False] >= 5
 
 
-@given(st.integers(2, 4), st.integers(2, 7), st.integers(1, 5), st.integers(0, 2**32 - 1))
-def test_rows_that_agree_are_those_of_all_steps(
-    robots: int, length: int, words: int, seed: int
-) -> None:
-    """Looking at the first step and the last one first leaves none out."""
-    random = np.random.default_rng(seed)
-    by_step = random.integers(6, size=(length, robots, 40))
-    by_step[0] = by_step[0, 0]
-    if seed % 2:
-        by_step[-1] = by_step[-1, 0]
-    table = random.integers(words, size=(3, 6))
-    expected = [
-        (number, row)
-        for number, word in enumerate(table.tolist())
-        for row in range(40)
-        if has_one_sentence(by_step[:, :, row].T.tolist(), word)
-    ]
-    partitions, rows = agreeing_rows(table, by_step)
-    found = list(zip(partitions.tolist(), rows.tolist(), strict=True))
-    assert found == expected
-
-
 def test_images_under_symmetries_are_known() -> None:
     """One of all images is kept; whichever image is asked for, it is known."""
     candidates = all_tasks("grid", "gw1-2x2")
@@ -112,18 +88,3 @@ def test_images_under_symmetries_are_known() -> None:
         ]
         answers[expected] += 1
     assert min(answers[True], answers[False]) >= 5, answers
-
-
-def test_shared_beginnings_and_ends_are_left_out() -> None:
-    space = all_tasks("grid", "gw1-2x2").spaces[0]
-    pool, whole = filled(space, SymmetryGroup(()))
-    for agreeing in pool.agreeing(np.zeros(len(space.rows), np.int64)):
-        for one, other in pool.sequences(agreeing, agreeing.rows).tolist():
-            assert one[0] == other[0]
-            assert one[1] != other[1]
-            assert one[-1] != other[-1] or one[-2] != other[-2]
-            assert any(
-                "".join(f",{s}" for s in one) in "".join(f",{s}" for s in plan)
-                for plans in whole
-                for plan in plans
-            )

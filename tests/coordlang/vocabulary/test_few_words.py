@@ -147,14 +147,6 @@ def test_plans_left_open_are_measured_as_they_are_defined() -> None:
     assert 1 < measured.mean() < table.count.mean()
 
 
-@pytest.mark.parametrize(("states", "words", "number"), [(3, 3, 5), (4, 2, 8), (5, 5, 52)])
-def test_numbers_of_partitions(states: int, words: int, number: int) -> None:
-    """Bell and Stirling numbers."""
-    assert partitions(states, words, 1_000) == number
-    assert len(list(module._all(states, words))) == number
-    assert partitions(states, words, number - 1) == number
-
-
 def test_a_limit_leaves_the_best_so_far() -> None:
     def interrupt(text: str) -> None:
         if text.startswith("annealing") and " 0 of" not in text:

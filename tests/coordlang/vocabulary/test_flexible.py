@@ -17,7 +17,6 @@ from coordlang.language.candidates import Candidates, from_listed
 from coordlang.language.flexibility import flexibility
 from coordlang.language.task_file import read_task_file
 from coordlang.required.divergences import required_nodes
-from coordlang.vocabulary.annealing import AnnealingSettings
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Assignment, Outcome
@@ -190,17 +189,6 @@ def test_bounds_without_listing_all_boxes() -> None:
     assert (loose >= exact - 1e-9).all()
     number = flexibility_bounds(candidates.spaces, requires, most_plans=0)
     assert (number >= loose).all()
-
-
-def test_annealing_is_as_long_as_it_is_set() -> None:
-    built = build_language(all_tasks("grid", "gw1-2x2"), "greedy")
-    found = Outcome({state: n % 3 for n, state in enumerate(built.job.states)}, 1)
-    job = replace(built.job, check=lambda _: None)
-    untouched = flexible(job, found, AnnealingSettings(patience=0))
-    assert untouched.partition is found.partition
-    assert untouched.figures["moves"] == 0
-    short = AnnealingSettings(moves=0, least_moves=7, patience=2)
-    assert flexible(job, found, short).figures["moves"] == 14
 
 
 def test_flexible_reaches_its_bound_on_the_ring() -> None:

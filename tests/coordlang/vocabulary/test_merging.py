@@ -6,9 +6,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from itertools import combinations, pairwise
-from random import Random
 
-import numpy as np
 import pytest
 
 from coordlang.language.candidates import Candidates
@@ -16,7 +14,7 @@ from coordlang.language.partition import Partition
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.job import Assignment
-from coordlang.vocabulary.merging import forbidden_merges, merged
+from coordlang.vocabulary.merging import merged
 from coordlang.vocabulary.refuter import Refuter
 from tests.support.domains import all_tasks
 from tests.support.random_spaces import random_spaces
@@ -87,39 +85,3 @@ def test_random_models_merge_until_no_merge_is_left(robots: int | None, seeds: r
 def test_shipped_worlds_merge_until_no_merge_is_left(folder: str, stem: str, most: int) -> None:
     candidates = all_tasks(folder, stem)
     assert 3 <= check(languages(candidates, symmetry_group(candidates)), candidates) <= most
-
-
-def test_what_fails_once_fails_for_ever() -> None:
-    """A partition coarser than one that is no language is none (Proposition 21)."""
-    random, failing = Random(0), 0
-    for robots, seeds in ((2, range(30)), (3, range(10))):
-        for candidates, _ in random_spaces(seeds, robots):
-            states = states_of(candidates)
-            word = {state: random.randrange(max(2, len(states) // 2)) for state in states}
-            if not is_language(word, candidates):
-                coarser = list(merges(word))
-                failing += len(coarser)
-                assert not any(is_language(own, candidates) for own in coarser)
-    assert failing >= 10
-
-
-def test_merges_are_forbidden_after_which_a_known_tuple_agrees() -> None:
-    forbidding = 0
-    for robots in (2, 3):
-        for candidates, _ in random_spaces(range(30), robots):
-            group = symmetry_group(candidates)
-            refuter = Refuter(candidates.spaces, group, len(candidates.rows), 0)
-            states = states_of(candidates)
-            if not is_language({state: state for state in states}, candidates):
-                continue
-            for language in merged({state: state for state in states}, states, refuter):
-                word = np.zeros(len(candidates.rows), np.int64)
-                word[states] = [language[state] for state in states]
-                words = int(word.max()) + 1
-                forbidden = forbidden_merges(refuter.pool, word)
-                for one, other in combinations(range(words), 2):
-                    trial = np.where(word == other, one, word)
-                    agrees = bool(refuter.pool.agreeing(trial))
-                    assert forbidden[one, other] == forbidden[other, one] == agrees
-                    forbidding += agrees
-    assert forbidding >= 50

@@ -4,8 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from itertools import combinations, islice, permutations, product
+from itertools import combinations, islice, permutations
 
 import pytest
 from hypothesis import given, settings
@@ -13,9 +12,7 @@ from hypothesis import strategies as st
 
 from coordlang.commands.building import build_language
 from coordlang.language.sentences import sentence
-from coordlang.language.warping import Clause, pair, separation_clause, warping_clause
-from coordlang.vocabulary.clauses import without_implied
-from coordlang.vocabulary.loop import ProblemsBySize
+from coordlang.language.warping import pair, separation_clause, warping_clause
 from coordlang.vocabulary.sat import PartitionProblem
 from tests.support.candidates import small_candidates
 from tests.support.domains import all_tasks
@@ -80,26 +77,6 @@ def test_separation_clause_of_three_plans() -> None:
     assert separation_clause([[0, 1, 3], [0, 2, 3], [0, 4, 3]], [0, 1, 0, 0, 1]) is None
 
 
-@settings(max_examples=200, deadline=None)
-@given(
-    st.integers(1, 3),
-    st.lists(st.sets(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=1), max_size=6),
-)
-def test_colouring_against_trying_all(size: int, drawn: list[set[tuple[int, int]]]) -> None:
-    clauses = [frozenset(pair(a, b) for a, b in clause if a != b) for clause in drawn]
-    problem = PartitionProblem([2, 0, 1, 4, 3], size)
-    for clause in clauses:
-        problem.separate_one(clause)
-    found = problem.solve()
-    problem.close()
-
-    def holds(word: tuple[int, ...] | dict[int, int]) -> bool:
-        return all(any(word[a] != word[b] for a, b in clause) for clause in clauses)
-
-    assert (found is not None) == any(holds(word) for word in product(range(size), repeat=5))
-    assert found is None or holds(found)
-
-
 GROUPS: tuple[list[list[int]], ...] = (
     [],
     [[0, 1, 2, 4, 3]],
@@ -141,45 +118,6 @@ def test_one_of_symmetric_partitions(
     if found is not None:
         images = [[found[s[a]] != found[s[b]] for a, b in pairs] for s in [range(5), *group]]
         assert images[0] == max(images)
-
-
-def test_problems_are_kept_and_learn_what_is_new() -> None:
-    started: list[int] = []
-
-    def start(size: int, known: Sequence[Clause]) -> PartitionProblem:
-        started.append(len(known))
-        problem = PartitionProblem([0, 1, 2], size)
-        for clause in known:
-            problem.separate_one(clause)
-        return problem
-
-    problems = ProblemsBySize(start, PartitionProblem.separate_one)
-    clauses = [{(0, 1)}, {(0, 1), (1, 2)}, {(1, 2)}, {(0, 2)}, {(0, 2), (1, 2)}]
-    known = [frozenset(clause) for clause in clauses]
-    first = problems.under(2, known[:2])
-    assert first.solve() is not None
-    assert problems.under(2, known[:3]) is first
-    assert (found := first.solve()) is not None
-    assert found[0] == found[2] != found[1]
-    assert problems.under(2, known[:4]) is first
-    assert first.solve() is None
-    assert problems.under(2, known) is not first, "more than twice what it started with: afresh"
-    assert problems.under(3, known).solve() is not None
-    problems.close()
-    assert problems.under(2, known).solve() is None
-    assert started == [2, 5, 5, 5]
-    problems.close()
-
-
-def test_without_what_is_implied() -> None:
-    short, long, other = (
-        frozenset({(0, 1)}),
-        frozenset({(0, 1), (1, 2)}),
-        frozenset({(1, 2), (2, 3)}),
-    )
-    assert without_implied([long, short, other, short]) == [short, other]
-    assert without_implied([long, short, other], 1) == [short, other], "short ones first"
-    assert without_implied([long, short, other], 0) == [short, long, other]
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates
 from coordlang.required.last_differences import DifferenceWalk
 from coordlang.vocabulary.exhaustive import _partitions
-from coordlang.vocabulary.separations import alternatives, constraints
+from coordlang.vocabulary.separations import constraints
 from tests.support import naive
 from tests.support.candidates import listed, requiring, small_candidates
 from tests.support.domains import all_tasks
@@ -129,27 +129,6 @@ def test_known_minima(folder: str, stem: str, both: int, alpha: int) -> None:
         assert built.language.guarantee.size == words == built.figures["separating_lower_bound"]
 
 
-def test_gw1_has_eight_states_that_alpha_alone_keeps_apart() -> None:
-    """So no partition with the paper's 7 words satisfies alpha alone."""
-    candidates = all_tasks("grid", "gw1-2x2")
-    apart = {p for (group,) in demands(candidates, 1000, beta=False) for p in group}
-    states = sorted({s for p in apart for s in p})
-    assert any(
-        all(frozenset(p) in apart for p in combinations(group, 2))
-        for group in combinations(states, 8)
-    )
-    assert not any(
-        all(frozenset(p) in apart for p in combinations(group, 2))
-        for group in combinations(states, 9)
-    )
-
-
-def test_different_ends_need_one_pair_only() -> None:
-    (only,) = alternatives(-1, [4, 7, 4])
-    assert only.pairs == {(4, 7)}
-    assert [sorted(s.pairs) for s in alternatives(2, [5, 3])] == [[(2, 3), (2, 5), (3, 5)]]
-
-
 @pytest.mark.thorough
 @pytest.mark.parametrize(
     ("robots", "most", "number"),
@@ -172,14 +151,3 @@ def test_every_constraint_and_no_other(robots: int, most: int, number: int) -> N
         }
         assert None not in found
         assert every == demands(candidates, most, beta=True)
-
-
-def test_too_many_constraints_are_not_written_down() -> None:
-    (space,) = all_tasks("three-cells").spaces
-    walk_of = DifferenceWalk(space)
-    every = walk_of.every(10**6)
-    assert every is not None
-    assert len(every) == 24
-    assert len(set(constraints(every))) == 12, "each is met in two ways: the domain is symmetric"
-    assert walk_of.every(24) == every
-    assert walk_of.every(23) is None

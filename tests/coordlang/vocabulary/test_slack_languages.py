@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from random import Random
 
-import numpy as np
 import pytest
 
 from coordlang.commands.building import build_language
@@ -161,11 +160,3 @@ def test_lower_bounds_are_certified() -> None:
     # For optimal plans its reasons are none.
     with pytest.raises(Refuted):
         check(built.certificate(), shipped("three-cells", "problem", every=True))
-
-
-def test_states_repeat_on_plans_and_nodes_do_not() -> None:
-    found = shipped("grid", "corners-3x3", slack=2)
-    (space,) = found.spaces
-    assert len(np.unique(space.state)) < len(space)
-    assert found.model.hides_slack
-    assert not shipped("grid", "corners-3x3", slack=2, words_see_slack=True).model.hides_slack

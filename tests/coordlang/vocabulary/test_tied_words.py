@@ -20,7 +20,7 @@ from coordlang.vocabulary.abstractions import abstractions
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.loop import Budget, Languages
 from coordlang.vocabulary.orbit_words import OrbitWords
-from coordlang.vocabulary.tied_words import TiedWords, _Kind, _Kinds, _Orbits
+from coordlang.vocabulary.tied_words import TiedWords, _Orbits
 from planners.parallel.workers import Workers
 from tests.support.domains import all_tasks
 
@@ -52,11 +52,6 @@ def test_what_is_found_is_a_language_of_its_kind(stem: str, least: int) -> None:
         )
     ), "the word says where a state's image is, or an abstraction says the word"
     assert found(candidates, least - 1)[2] is None
-
-
-def test_the_same_seed_finds_the_same() -> None:
-    candidates = all_tasks("grid", "gw2-2x3")
-    assert found(candidates, 6)[2] == found(candidates, 6)[2] is not None
 
 
 @pytest.mark.parametrize("finds", ["nothing", "all words"])
@@ -117,36 +112,3 @@ def test_partitions_of_a_kind_are_found_iff_there_are_some(seed: int) -> None:
             answers[bool(left)] += 1
         problem.close()
     assert min(answers[True], answers[False]) >= 3, answers
-
-
-def test_a_few_kinds_are_looked_at_to_their_end() -> None:
-    """At first all alike; then each has half of what one had that used all of it up."""
-    kinds = [_Kind(group_table([np.arange(3)]).cyclic_action(0, (0, 1))) for _ in range(4)]
-    looked_at = _Kinds([*kinds], deepens=True)
-    rounds: list[list[int]] = []
-    for _ in range(3):
-        rounds.append([])
-        while looked_at.open:
-            kind = looked_at.open.pop(0)
-            rounds[-1].append(looked_at.next_effort().rounds)
-            if kind is not kinds[1]:  # it stops for its conflicts
-                kind.rounds = rounds[-1][-1]
-            looked_at.leave_undecided(kind)
-        looked_at.begin_again()
-    assert rounds == [[50] * 4, [800, 400, 400, 200], [1600, 800, 800, 400]]
-
-
-def test_kinds_rule_out_others() -> None:
-    """An abstraction with all symmetries, an action with all abstractions."""
-    group = group_table([np.arange(3), np.array([1, 0, 2])])
-    nothing, action = group.cyclic_action(0, (0, 1)), group.cyclic_action(1, (1, 0))
-    one, other = np.array([0, 1, 0]), np.array([0, 0, 1])
-    assert _Kind(nothing, one).rules_out(_Kind(action, one))
-    assert not _Kind(nothing, one).rules_out(_Kind(action, other))
-    assert not _Kind(nothing, one).rules_out(_Kind(action))
-    assert _Kind(action).rules_out(_Kind(action, one))
-    assert not _Kind(action, one).rules_out(_Kind(action))
-
-
-def job_of(stem: str) -> Job:
-    return build_language(all_tasks("grid", stem), "greedy").job
