@@ -23,7 +23,6 @@ from coordlang.explanation.words import (
 )
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.language.words import Language
-from planners.joint.model import show
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Atom
 from planners.pddl.model_options import ModelOptions
@@ -173,17 +172,6 @@ def test_conditions_of_sets_of_values() -> None:
     )
     assert literal_text(Literal(both, frozenset(both.values[:1]))) == "free(r)"
     assert literal_text(Literal(both, frozenset(both.values[1:]))) == "not free(r)"
-    for variable in (carried, lying, both):
-        for size in range(1, len(variable.values)):
-            for values in combinations(variable.values, size):
-                literal = Literal(variable, frozenset(values))
-                for true in variable.values:
-                    state = {true} if true else set()
-                    assert literal.holds(frozenset(state)) == (true in values)
-                    cover = Cover(((literal,),), (1,), 1, False)
-                    texts = {show(atom) for atom in state}
-                    assert cover.holds(texts) == (true in values)
-                    assert any(listed(c, texts) for c in cover.conditions()) == (true in values)
 
 
 def test_further_states_have_the_default() -> None:

@@ -181,6 +181,11 @@ def test_by_hand() -> None:
         "(inverse at) (one r2))))) 3)": 2,
         "(mod (gap adjacent (one c0-0) (some (inverse at) (one r2))) 4)": 3,
         "(min (gap adjacent (one r1) (one r2)) 3)": UNDEFINED,
+        # What is not there is not counted.
+        "(same (at r9) (at r1))": UNDEFINED,
+        "(min (distance road (at r1) (at r2)) 2)": UNDEFINED,
+        "(min (count holds _ _) 2)": 0,
+        "(min (size (some holds all)) 2)": 0,
     }
     for text, expected in texts.items():
         assert here.get(feature(text)).tolist() == [expected], text
@@ -227,19 +232,3 @@ def test_coordinates_of_a_file() -> None:
         points = {name: (x, float(k)) for k, (name, x) in enumerate(zip(names, xs, strict=True))}
         assert States(World.loaded(loaded, points), rows).get(column).tolist() == [expected]
     assert States(World.loaded(loaded), rows).get(column).tolist() == [UNDEFINED]
-
-
-def test_features_of_a_problem_without_what_they_name() -> None:
-    """Other robots, other predicates: nothing is named, nothing is counted."""
-    there = states_of("charger", "queue")
-    for text, expected in {
-        "(mod (row (holds r9)) 3)": UNDEFINED,
-        "(same (at r9) (at r1))": UNDEFINED,
-        "(min (count holds _ _) 2)": 0,
-        "(min (count at _) 2)": 0,
-        "(min (count at r9 _) 2)": 0,
-        "(min (size (some holds all)) 2)": 0,
-        "(min (distance road (at r1) (at r2)) 2)": UNDEFINED,
-        "(min (position door (at r1)) 2)": UNDEFINED,
-    }.items():
-        assert set(there.get(feature(text)).tolist()) == {expected}, text

@@ -182,26 +182,21 @@ def lifted_of(data: dict[str, object]) -> LiftedLanguage:
 Change = Callable[[dict[str, Any]], object]
 DAMAGED: dict[str, tuple[Change, str]] = {
     "version": (lambda d: d.update(version=2), "version 2"),
-    "format": (lambda d: d.update(format="coordlang/language"), "format"),
     "feature": (lambda d: d["features"][0].update(definition="(mod (x))"), "defines no feature"),
     "modulus": (
         lambda d: d["features"][0].update(definition=f"(mod (row (at r1)) {10**30})"),
         "defines no feature",
     ),
     "values": (lambda d: d.update(values={"0": "w0"}), "are no values of 2 features"),
-    "no number": (lambda d: d.update(values={"0 x": "w0"}), "are no values of 2 features"),
     "beyond all bounds": (
         lambda d: d.update(values={f"0 {10**25}": "w0"}),
         "are no values of 2 features",
     ),
-    "spaces": (lambda d: d.update(values={"0  1": "w0"}), "are no values of 2 features"),
     "unknown word": (lambda d: d.update(values={"0 1": "w9"}), "which 'words' has not"),
-    "no words": (lambda d: d.update(words=[]), "words must be different"),
     "equal words": (lambda d: d.update(words=["w0", "w0"]), "words must be different"),
     "own word": (lambda d: d.update(words=["w0", "w1", "w2", "w3", "v0.1"]), "unknown values"),
     "unseen": (lambda d: d.update(words=["w0", "w1", "w2", "w3", "w\u200b4"]), "U\\+200B"),
     "no robots": (lambda d: d.update(robots=[]), "robots must be different"),
-    "missing": (lambda d: d.pop("features"), "missing required field `features`"),
 }
 
 

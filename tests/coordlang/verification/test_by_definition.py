@@ -15,14 +15,12 @@ import pytest
 from coordlang.language.candidates import Candidates, from_problems
 from coordlang.language.partition import Partition
 from coordlang.required.choices import Choices
-from coordlang.required.divergences import DivergenceSearch, first_differences, states_on_plans
+from coordlang.required.divergences import DivergenceSearch, first_differences
 from coordlang.required.miscoordination import Miscoordination, inseparable, miscoordination
 from coordlang.verification.by_definition import verify
-from coordlang.vocabulary import Job, greedy
 from planners.pddl.model_options import ModelOptions
 from tests.support import naive
 from tests.support.candidates import listed, small_candidates
-from tests.support.domains import own_task
 from tests.support.texts import parsed
 
 #: (robots, plans of one task that the twin lists at most, models)
@@ -120,19 +118,6 @@ def check_witness(candidates: Candidates, table: Partition, witness: Miscoordina
             if len({naive.sentence([word[s] for s in states]) for states in passed}) == 1:
                 return
     raise AssertionError("no task has these plans with one sentence and a failing mixture")
-
-
-def test_sets_are_fewer_than_plans() -> None:
-    """Under words that separate all divergences, and under one word for all states."""
-    candidates = own_task("grid", "three-robots-3x3")
-    first = first_differences(candidates.spaces)
-    words = greedy(Job(candidates, tuple(states_on_plans(candidates.spaces).tolist()), first))
-    silence = dict.fromkeys(words.partition, 0)
-    for partition, holds in (words.partition, True), (silence, False):
-        table = Partition.of_states(candidates.rows, partition)
-        plans, sets = (verify(table, candidates.spaces, growth) for growth in (inf, -1.0))
-        assert plans.holds == sets.holds == holds
-        assert sets.nodes < plans.nodes
 
 
 def test_sets_of_steps_of_long_plans() -> None:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from fractions import Fraction
 from itertools import product
 from pathlib import Path
@@ -52,17 +51,6 @@ def test_tables_of_plans_measure_what_is_counted(robots: int, number: int) -> No
         some += len(table) > 0
     assert compared >= 10
     assert some >= 5
-
-
-def test_some_of_many_plans_are_drawn() -> None:
-    """A task with more plans than are listed: near the count, in silence."""
-    space = own_task("grid", "corners-5x5").spaces[0]
-    states = int(space.state.max()) + 1
-    word = np.zeros(states, np.int64)
-    table = plan_table([space], states, most_tasks=10, seed=1, listed=100)
-    assert not table.is_complete
-    (measured,) = table.failures(word, np.arange(1))
-    assert measured == pytest.approx(float(failure_probability([space], [None]).mean), abs=0.1)
 
 
 def by_hand(candidates: Candidates, words: int) -> tuple[dict[str, Fraction], int]:
@@ -145,20 +133,6 @@ def test_plans_left_open_are_measured_as_they_are_defined() -> None:
     measured = table.plans_left_open(word, np.arange(len(table)))
     assert measured == pytest.approx(flexibility(candidates.spaces, words).expected)
     assert 1 < measured.mean() < table.count.mean()
-
-
-def test_a_limit_leaves_the_best_so_far() -> None:
-    def interrupt(text: str) -> None:
-        if text.startswith("annealing") and " 0 of" not in text:
-            raise KeyboardInterrupt
-
-    job = replace(
-        job_for_few_words(Making(all_tasks("grid", "gw2-2x3")), seed=1), progress=interrupt
-    )
-    found = few_words(job, 3)
-    assert isinstance(found.stopped, KeyboardInterrupt)
-    assert found.measured > 5
-    assert found.failures.mean < found.silence.mean
 
 
 @pytest.mark.parametrize(

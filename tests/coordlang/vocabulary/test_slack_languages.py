@@ -102,13 +102,6 @@ def test_waiting_here_or_there_is_one_sentence_and_both_plans_are_named() -> Non
     assert "--words-see-slack" in str(error.value)
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize("more", [{"words_see_slack": True}, {"remember_actions": True}])
-def test_what_tells_waits_apart(more: dict[str, bool]) -> None:
-    seen = shipped("three-cells", "problem", slack=1, every=True, **more)
-    assert build_language(seen, "minimal").language.guarantee.proved_minimal
-
-
 def test_methods_that_part_plans_where_states_first_differ_are_refused() -> None:
     """Propositions 3 to 6 speak of nodes: a plan may part from another one by waiting."""
     found = shipped("grid", "corners-3x3", slack=1)
@@ -129,27 +122,6 @@ def test_there_are_languages_where_plans_part_by_waiting() -> None:
     # Proposition 24: it is one for optimal plans as well, for what has ended rests.
     optimal = shipped("grid", "corners-3x3")
     assert verify(built.language.partition(found.model), optimal.spaces).holds
-
-
-@pytest.mark.thorough
-def test_a_language_within_slack_is_one_within_less() -> None:
-    """Under words of states, and where no second cost chooses other plans."""
-    held = 0
-    for found in small_tasks(range(60), 2):
-        if found.model.slack_facts or found.model.cost != "makespan":
-            continue
-        states = states_on_plans(found.spaces).tolist()
-        random = Random(len(states))
-        optimal = from_problems(
-            found.loaded.domain, found.loaded.problems, replace(found.loaded.options, slack=0)
-        )
-        for words in (1, 2, 2, 2, 3):
-            word = {state: random.randrange(words) for state in states}
-            partition = Partition.of_states(found.rows, word)
-            if verify(partition, found.spaces).holds:
-                held += words > 1
-                assert verify(partition, optimal.spaces).holds
-    assert held > 5
 
 
 def test_lower_bounds_are_certified() -> None:
