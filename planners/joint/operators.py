@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,107 +14,48 @@ from planners.joint.states import StateCodec, TrueFacts, test_bits
 from planners.joint.tables import Bools, Ints, Numbers, Rows, ranges
 from planners.pddl.lifted import TRUE, Formula
 
-#: Looking up one true fact takes about as long as testing so many.
-_LOOK_UP = 3
-
-
-@dataclass(frozen=True, slots=True)
-class _Level:
-    """One depth of the tree: each node's children (facts to test), and operators that end in it."""
-
-    first_child: Ints
-    child_fact: Ints
-    first_operator: Ints
-    operators: Ints
-
-    def below(self, rows: Rows, true: TrueFacts, row: Ints, node: Ints) -> tuple[Ints, Ints]:
-        """The children (row, child) whose fact is true, of pairs of a row and a node.
-
-        Either each child's fact is tested, or each true fact is looked up among the children,
-        whichever is less work.
-        """
-        counts = self.first_child[node + 1] - self.first_child[node]
-        facts_of_row = true.first[row + 1] - true.first[row]
-        if int(counts.sum()) <= _LOOK_UP * int(facts_of_row.sum()):
-            child = ranges(self.first_child[node], counts)
-            row = np.repeat(row, counts)
-            holds = test_bits(rows, row, self.child_fact[child])
-            return row[holds], child[holds]
-        fact = true.fact[ranges(true.first[row], facts_of_row)]
-        row, node = np.repeat(row, facts_of_row), np.repeat(node, facts_of_row)
-        parents = np.repeat(np.arange(len(self.first_child) - 1), np.diff(self.first_child))
-        facts = int(max(self.child_fact.max(), true.fact.max(initial=0))) + 1
-        keys, wanted = parents * facts + self.child_fact, node * facts + fact
-        child = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        found = keys[child] == wanted
-        return row[found], child[found]
-
 
 class Matcher:
-    """A tree in which the path to an operator tests each fact that it requires to be true once.
+    """Finds operators by the rarest fact that they require, and tests the others one by one.
 
     Parameters
     ----------
     required
         For each operator the numbers of the facts that it requires to be true.
     forbidden
-        For each operator the mask of facts that it requires to be false (operators x words).
+        For each operator the mask of facts that it requires to be false (operators x blocks).
     """
 
     def __init__(self, required: Sequence[frozenset[int]], forbidden: Rows) -> None:
         self._forbidden = forbidden
         self._has_forbidden = bool(forbidden.any())
         frequency = Counter(fact for facts in required for fact in facts)
-        # Frequent facts first: operators then share long beginnings of their paths.
-        paths = [sorted(facts, key=lambda f: (-frequency[f], f)) for facts in required]
-        self._levels: list[_Level] = []
-        nodes: list[list[int]] = [list(range(len(required)))]
-        depth = 0
-        while nodes:
-            first_child, child_fact, first_operator, operators = [0], [], [0], []
-            following: list[list[int]] = []
-            for members in nodes:
-                children: dict[int, list[int]] = {}
-                for operator in members:
-                    if len(paths[operator]) == depth:
-                        operators.append(operator)
-                    else:
-                        children.setdefault(paths[operator][depth], []).append(operator)
-                for fact in sorted(children):
-                    child_fact.append(fact)
-                    following.append(children[fact])
-                first_child.append(len(child_fact))
-                first_operator.append(len(operators))
-            self._levels.append(
-                _Level(
-                    *(
-                        np.array(a, np.int64)
-                        for a in (first_child, child_fact, first_operator, operators)
-                    )
-                )
-            )
-            nodes, depth = following, depth + 1
+        #: (operators, facts) those that each operator requires, rare ones first; -1 to fill up.
+        self._facts = np.full((len(required), max(map(len, required), default=0) + 1), -1)
+        for number, facts in enumerate(required):
+            self._facts[number, : len(facts)] = sorted(facts, key=lambda f: (frequency[f], f))
+        # By their first fact, CSR; those without any are first.
+        self._operators = np.argsort(self._facts[:, 0], kind="stable")
+        bounds = np.arange(-1, 64 * forbidden.shape[1] + 1)
+        self._first = np.searchsorted(self._facts[self._operators, 0], bounds)
 
     def match(self, rows: Rows) -> tuple[Ints, Ints]:
         """All pairs (row number, operator) with the operator's literals satisfied, sorted."""
-        true = TrueFacts.of(rows)
-        row = np.arange(len(rows))
-        node = np.zeros(len(rows), np.int64)
-        found_rows: list[Ints] = []
-        found_operators: list[Ints] = []
-        for level in self._levels:
-            counts = level.first_operator[node + 1] - level.first_operator[node]
-            found_rows.append(np.repeat(row, counts))
-            found_operators.append(level.operators[ranges(level.first_operator[node], counts)])
-            row, node = level.below(rows, true, row, node)
-        rows_out = np.concatenate(found_rows)
-        operators_out = np.concatenate(found_operators)
+        true, every = TrueFacts.of(rows), np.arange(len(rows))
+        row = np.concatenate((every, true.row))
+        fact = np.concatenate((np.full(len(rows), -1), true.fact))
+        counts = self._first[fact + 2] - self._first[fact + 1]
+        operator = self._operators[ranges(self._first[fact + 1], counts)]
+        row = np.repeat(row, counts)
+        for place in range(1, self._facts.shape[1] - 1):
+            fact = self._facts[operator, place]
+            holds = (fact < 0) | test_bits(rows, row, fact)
+            row, operator = row[holds], operator[holds]
         if self._has_forbidden:
-            fact_blocks = self._forbidden.shape[1]
-            clash = (rows[rows_out, :fact_blocks] & self._forbidden[operators_out]).any(axis=1)
-            rows_out, operators_out = rows_out[~clash], operators_out[~clash]
-        order = np.lexsort((operators_out, rows_out))
-        return rows_out[order], operators_out[order]
+            clash = (rows[row] & self._forbidden[operator]).any(axis=1)
+            row, operator = row[~clash], operator[~clash]
+        order = np.lexsort((operator, row))
+        return row[order], operator[order]
 
 
 class Operators:
