@@ -12,8 +12,7 @@ from benchmarks.paper.recipe import Record
 from benchmarks.paper.reported import TABLE_1
 from coordlang.commands.building import build_few_words, build_language
 from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
-from coordlang.language.listed import ListedTask
-from coordlang.language.task_file import read_task_file
+from coordlang.language.listed import ListedTask, read_task_file
 from coordlang.language.words import Language
 from planners.pddl import read_domain, read_problem
 from planners.pddl.model_options import ModelOptions

@@ -9,7 +9,7 @@ from statistics import fmean
 from benchmarks.frame import markdown
 from benchmarks.paper.recipe import Record
 from benchmarks.paper.suite import METHODS, world_and_method
-from coordlang.required.failures import wilson
+from coordlang.required.failure import wilson
 
 #: Columns of a table: their heads, and what they show of a record.
 Columns = Mapping[str, Callable[[Record], object]]

@@ -17,9 +17,13 @@ from coordlang.language.partition import Partition
 from coordlang.language.provenance import Guarantee, provenance_of
 from coordlang.language.tolerance import Tolerance
 from coordlang.language.words import Language
-from coordlang.required.all_differences import differences
-from coordlang.required.divergences import FirstDifferences, states_on_plans, without_divergences
-from coordlang.required.failures import Failures
+from coordlang.required.divergences import (
+    FirstDifferences,
+    differences,
+    states_on_plans,
+    without_divergences,
+)
+from coordlang.required.failure import Failures
 from coordlang.required.miscoordination import Inseparable
 from coordlang.verification.by_definition import Verdict, verify_candidates
 from coordlang.vocabulary import METHODS, Job, Outcome

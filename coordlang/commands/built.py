@@ -13,7 +13,7 @@ from coordlang.language.provenance import Guarantee
 from coordlang.language.warping import Clause
 from coordlang.language.words import Language
 from coordlang.required.divergences import FirstDifferences
-from coordlang.required.failures import NONE, Failures
+from coordlang.required.failure import NONE, Failures
 from coordlang.verification.by_definition import Verdict
 from coordlang.verification.certificate_file import Certificate
 from coordlang.verification.check_certificate import check as check_certificate

@@ -14,7 +14,6 @@ from coordlang.commands.layout import fitted
 from coordlang.commands.records import ExplainOptions
 from coordlang.commands.terminal import covered_code, echo, line_width, warn_of_failures, working
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.explanation.cover import Cover
 from coordlang.explanation.demands import SentenceDemands, sentence_demands
 from coordlang.explanation.lifted_words import LiftedWords, lifted_words
 from coordlang.explanation.text import (
@@ -26,6 +25,7 @@ from coordlang.explanation.text import (
 )
 from coordlang.explanation.text import shown as formula_text
 from coordlang.explanation.words import (
+    Cover,
     MappedStates,
     WordDescriptions,
     all_covers,

@@ -282,8 +282,7 @@ def load_language(path: given.File) -> Language:
 
 def read_tasks(tasks: TasksSource) -> tuple[tuple[ListedTask, ...], Position]:
     """Read a task list, with what messages call it."""
-    from coordlang.language.listed import ListedTask
-    from coordlang.language.task_file import TASKS, read_task_file, tasks_from_data
+    from coordlang.language.listed import TASKS, ListedTask, read_task_file, tasks_from_data
 
     if isinstance(tasks, str | PathLike):
         return read_task_file(fspath(tasks)), Position(fspath(tasks))

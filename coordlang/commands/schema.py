@@ -18,8 +18,8 @@ from planners.system.messages import sentence
 
 #: The modules whose ``json_schema`` describes a file format.
 SCHEMAS = {
-    "language": "coordlang.language.record",
-    "tasks": "coordlang.language.task_file",
+    "language": "coordlang.language.file",
+    "tasks": "coordlang.language.listed",
     "certificate": "coordlang.verification.certificate_file",
     "lifted": "coordlang.lifted.file",
     "choices": "coordlang.execution.choices",

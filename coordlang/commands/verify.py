@@ -15,8 +15,7 @@ from coordlang.commands.witness import witness_data, witness_text
 from coordlang.language.candidates import require_solvable
 from coordlang.language.recorded import check_source, recorded_candidates
 from coordlang.language.tolerance import Tolerance, tolerance_data
-from coordlang.required.failure import TooManyToCount
-from coordlang.required.failures import NONE, Failures, failures_under
+from coordlang.required.failure import NONE, Failures, TooManyToCount, failures_under
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.verification.by_definition import verify_candidates
 from coordlang.verification.certificate_file import read_certificate

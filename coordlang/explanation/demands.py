@@ -10,7 +10,7 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from coordlang.explanation.cover import Cover
+from coordlang.explanation.words import Cover
 from coordlang.language.partition import Partition
 from coordlang.required.choices import Choices
 from planners.joint.model import JointModel, own_text

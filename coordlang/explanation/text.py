@@ -8,9 +8,8 @@ from itertools import groupby, takewhile
 from math import prod
 from typing import Any
 
-from coordlang.explanation.cover import Cover, Literal, Term
 from coordlang.explanation.demands import RobotPart, SentenceDemands, WordChange
-from coordlang.explanation.words import MappedStates, WordDescriptions
+from coordlang.explanation.words import Cover, Literal, MappedStates, Term, WordDescriptions
 from planners.joint.model import show
 from planners.system.notebook import counted
 

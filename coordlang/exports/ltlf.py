@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.explanation.cover import Conjunction
+from coordlang.explanation.words import Conjunction
 from coordlang.exports.membership import membership, refuse_seen_slack
 from planners.joint.model import show
 from planners.pddl.lifted import Atom

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.explanation.cover import Conjunction
 from coordlang.explanation.variables import truth
-from coordlang.explanation.words import word_formulas
+from coordlang.explanation.words import Conjunction, word_formulas
 from planners.joint.model import JointModel
 from planners.joint.tables import Bools, Ints, Rows, unique_rows
 from planners.system.errors import UsageError

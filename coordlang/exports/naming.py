@@ -13,8 +13,8 @@ from dataclasses import replace
 from itertools import pairwise
 
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.explanation.cover import Conjunction
 from coordlang.explanation.variables import truth
+from coordlang.explanation.words import Conjunction
 from coordlang.exports.membership import Membership
 from planners.classical import ClassicalAction, ClassicalTask, Condition
 from planners.joint.model import show

@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
+import msgspec
 from msgspec import Meta
 
 from planners.grounding import ground_goal
@@ -20,7 +23,8 @@ from planners.pddl.model_options import ModelOptions
 from planners.pddl.names import Names
 from planners.pddl.robots import fluent_predicates
 from planners.pddl.sexpr import Source, parse
-from planners.system.errors import BadInput, Position
+from planners.system.errors import BadInput, Position, note
+from planners.system.files import FileFormat, read_bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,3 +141,59 @@ def _read_text(domain: Domain, problem: Problem, text: str, position: Position |
         return read_formula(names, names.document.root)
     except BadInput as error:
         raise BadInput(f"{text}: {error.what}", position=position, remedy=error.remedy) from None
+
+
+class TaskFile(msgspec.Struct, frozen=True):
+    """A task file, version 1.  Keys that are not listed here are ignored by readers."""
+
+    format: Annotated[str, Meta(description="What kind of file this is.")]
+    version: Annotated[int, Meta(description="Readers refuse a version that they do not know.")]
+    tasks: Annotated[list[ListedTask], Meta(description="The tasks; each goal may be partial.")]
+
+
+TASKS = FileFormat("tasks", "task file", TaskFile, "coordlang/tasks")
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of task files."""
+    return TASKS.json_schema()
+
+
+def read_task_file(path: str | Path) -> tuple[ListedTask, ...]:
+    """Read a task file (docs/formats.md).  Raises `BadInput` for anything else."""
+    position = Position(str(path))
+    return _plain(TASKS.decode(read_bytes(path), position), position)
+
+
+def tasks_from_data(data: Any, position: Position) -> tuple[ListedTask, ...]:
+    """Read the data of a task file.  Raises `BadInput` for anything else."""
+    return _plain(TASKS.convert(data, position), position)
+
+
+def task_data(tasks: Sequence[ListedTask]) -> list[dict[str, list[str]]]:
+    """Tasks as a file lists them."""
+    return [{"init": list(task.init), "goal": list(task.goal)} for task in tasks]
+
+
+def tasks_text(tasks: Sequence[ListedTask]) -> str:
+    """A task file, one task a line."""
+    lines = ",\n".join(f"  {json.dumps(task)}" for task in task_data(tasks))
+    return f'{{"format": "{TASKS.format}", "version": {TASKS.version},\n "tasks": [\n{lines}]}}\n'
+
+
+def _plain(file: TaskFile, position: Position) -> tuple[ListedTask, ...]:
+    """The tasks with their texts in lower case, with single spaces; each one once."""
+
+    def plain(texts: Sequence[str]) -> tuple[str, ...]:
+        return tuple(" ".join(text.lower().split()) for text in texts)
+
+    once: dict[tuple[frozenset[str], frozenset[str]], ListedTask] = {}
+    for task in file.tasks:
+        init, goal = plain(task.init), plain(task.goal)
+        once.setdefault((frozenset(init), frozenset(goal)), ListedTask(init, goal))
+    if again := len(file.tasks) - len(once):
+        note(
+            f"{again:,} of {len(file.tasks):,} tasks repeat another one: every task counts once",
+            position=position,
+        )
+    return tuple(once.values())

@@ -10,7 +10,7 @@ from typing import Any
 
 from coordlang.language.candidates import Candidates
 from coordlang.language.keys import keys_of
-from coordlang.language.task_file import task_data
+from coordlang.language.listed import task_data
 from coordlang.language.tolerance import Tolerance
 from planners.joint.assembly import SLACK_LEFT
 from planners.joint.model import show

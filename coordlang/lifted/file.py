@@ -13,8 +13,15 @@ import msgspec
 from msgspec import Meta
 
 from coordlang.language.candidates import Kind
-from coordlang.language.file import Fault, faults_of_robots, present, refuse_first
-from coordlang.language.record import DomainRecord, ModelRecord, refuse_duplicates
+from coordlang.language.file import (
+    DomainRecord,
+    Fault,
+    ModelRecord,
+    faults_of_robots,
+    present,
+    refuse_duplicates,
+    refuse_first,
+)
 from coordlang.lifted.language import (
     LIFT_AGAIN,
     LiftedLanguage,

@@ -12,14 +12,16 @@ Propositions 2 and 14 of docs/concepts.md say why this decides what it decides.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coordlang.required.choices import Choices
-from planners.joint.tables import Bools, Ints, spans
+from planners.joint.states import bits
+from planners.joint.tables import Bools, Ints, spans, unique_tuples
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import OutOfMemory
@@ -101,3 +103,224 @@ def _check_size(sizes: NDArray[np.float64], space: PlanSpace, most: float) -> No
             f"of {robots} plans' next steps",
             remedy=f"Use {instead}.",
         )
+
+
+#: The shared state (-1: there is none, the plans end in different states), then the different ones,
+#: sorted.
+Difference = tuple[int, ...]
+
+#: Links of a walk up to which all differences may be listed.
+_LINKS = 1_000_000
+
+
+@dataclass(slots=True)
+class _Layer:
+    """Walk nodes ``(x_1 .. x_n, y)`` with as many joint steps to go.
+
+    With what links them to the layer below.
+
+    ``x`` (k, robots) are plan-space nodes, ``meets``, ``parts`` (links) say whether a link leads
+    from different nodes to one, or from one node shared by all plans and their mixture to different
+    ones.  ``tail`` (k): can the plans stay together from here and still fail?
+    """
+
+    x: Ints
+    source: Ints
+    child: Ints
+    parts: Bools
+    meets: Bools
+    tail: Bools
+
+
+class DifferenceWalk:
+    """The composition walk of one plan space, kept whole, from every node of the plan space.
+
+    Each tuple of plans that introduce RC has a *first difference* ``alpha = (p; s_1 .. s_n)``, the
+    last shared state and the next ones, and a *last difference* ``beta = (t_1 .. t_n; q)``, or ends
+    in different goal states.  A partition is a coordination language if for every such tuple some
+    two different ``s_i, s_j`` and ``p`` lie in three different words, or some two different ``t_i,
+    t_j`` and ``q`` do, or two of the different goal states lie in different words (Theorem 3;
+    Propositions 5 and 6 of docs/concepts.md).
+
+    Only nodes from which some mixture fails are walked; memory is that of the links between them.
+    Raises `OutOfMemory` before the memory budget is used up.
+    """
+
+    def __init__(self, space: PlanSpace) -> None:
+        self._space = space
+        self._robots = space.robots
+        self._layers = _walk(space)
+
+    @property
+    def nodes(self) -> int:
+        """How many nodes the walk has."""
+        return sum(len(layer.x) for layer in self._layers)
+
+    @property
+    def edges(self) -> int:
+        """How many edges the walk has."""
+        return sum(len(layer.source) for layer in self._layers)
+
+    def unseparated(
+        self, word: Ints, random: np.random.Generator
+    ) -> Iterator[tuple[Difference, Difference]]:
+        """First and last differences that ``word`` (the word number of each state) leaves together.
+
+        For every unseparated first difference of plans that introduce RC, one of their unseparated
+        last differences, drawn at random.
+
+        None at all: the partition satisfies Theorem 3 for these tasks.  O(links).
+        """
+        state = self._space.state
+        x = state[self._layers[0].x]
+        bad = (x != x[:, :1]).any(axis=1) & (word[x] == word[x[:, :1]]).all(axis=1)
+        # Per node: a link (of any layer, numbered through) or goal node that ends badly.
+        ending = np.where(bad, np.arange(len(x)), -1)
+        # Rows (q, t_1 .. t_n), or (-1, t_1 .. t_n) for different goal states.
+        endings = [np.column_stack((np.full(len(x), -1), x))]
+        offset = len(x)
+        for below, layer in pairwise(self._layers):
+            first = state[layer.x[layer.source]]
+            after = state[below.x[layer.child]]
+            rows = np.flatnonzero(layer.parts & (ending[layer.child] >= 0))
+            rows = rows[~_separated(word, first[rows, 0], after[rows])]
+            yield from self._with_endings(
+                first[rows, 0], after[rows], endings, ending[layer.child[rows]]
+            )
+            last = np.flatnonzero(layer.meets & below.tail[layer.child])
+            last = last[~_separated(word, after[last, 0], first[last])]
+            endings.append(np.column_stack((after[last, 0], first[last])))
+            on = np.flatnonzero(ending[layer.child] >= 0)
+            source = np.concatenate((layer.source[last], layer.source[on]))
+            value = np.concatenate((offset + np.arange(len(last)), ending[layer.child[on]]))
+            offset += len(last)
+            order = random.permutation(len(source))
+            ending = np.full(len(layer.x), -1)
+            ending[source[order]] = value[order]
+
+    def every(self, most: int) -> list[tuple[Difference, Difference]] | None:
+        """Each first difference with each last difference that can follow, of these tasks.
+
+        None if there are more than ``most``.  O(links x last differences / block size).
+        """
+        if self.edges > _LINKS:
+            return None
+        firsts, lasts = self._differences()
+        if sum(ends.bit_count() for ends in firsts.values()) > most:
+            return None
+        return [(first, lasts[number]) for first, ends in firsts.items() for number in bits(ends)]
+
+    def _differences(self) -> tuple[dict[Difference, int], list[Difference]]:
+        """First differences, and the list of last differences.
+
+        With each first one a set of bits: the numbers of the last ones that can follow.
+        """
+        state = self._space.state
+        number: dict[Difference, int] = {}
+        firsts: dict[Difference, int] = {}
+        following = [
+            1 << number.setdefault((-1, *sorted(row)), len(number)) if len(set(row)) > 1 else 0
+            for row in state[self._layers[0].x].tolist()
+        ]
+        for below, layer in pairwise(self._layers):
+            here, after = state[layer.x[layer.source]], state[below.x[layer.child]]
+            meets = layer.meets & below.tail[layer.child]
+            ends = [0] * len(layer.x)
+            columns = (layer.source, layer.child, layer.parts, meets)
+            links = zip(*(column.tolist() for column in columns), strict=True)
+            for link, (source, child, parts, meet) in enumerate(links):
+                more = following[child]
+                if parts and more:
+                    first = (int(here[link, 0]), *sorted(after[link].tolist()))
+                    firsts[first] = firsts.get(first, 0) | more
+                if meet:
+                    last = (int(after[link, 0]), *sorted(here[link].tolist()))
+                    more |= 1 << number.setdefault(last, len(number))
+                ends[source] |= more
+            following = ends
+        return firsts, list(number)
+
+    def _with_endings(
+        self, shared: Ints, following: Ints, endings: Sequence[Ints], ending: Ints
+    ) -> Iterator[tuple[Difference, Difference]]:
+        if not len(shared):
+            return
+        ends = np.concatenate(endings)[ending]
+        columns = (shared, np.sort(following, axis=1), ends[:, :1], np.sort(ends[:, 1:], axis=1))
+        table = np.unique(np.column_stack(columns), axis=0)
+        # One ending for each first difference will do in one round.
+        _, fresh = np.unique(table[:, : self._robots + 1], axis=0, return_index=True)
+        for row in table[fresh].tolist():
+            yield tuple(row[: self._robots + 1]), tuple(row[self._robots + 1 :])
+
+
+def _separated(word: Ints, shared: Ints, others: Ints) -> Bools:
+    """For each difference whether some two of ``others`` and ``shared`` lie in three words.
+
+    Shapes: ``others`` (k, robots), ``shared`` (k).
+    """
+    good = np.zeros(len(shared), np.bool_)
+    common = word[shared]
+    for i, j in combinations(range(others.shape[1]), 2):
+        a, b = word[others[:, i]], word[others[:, j]]
+        good |= (a != b) & (a != common) & (b != common)
+    return good
+
+
+def _walk(space: PlanSpace) -> list[_Layer]:
+    """All layers, goals first, of nodes from which some mixture fails."""
+    width, bound = space.robots + 1, len(space) + 1  # the last number: the mixture has failed
+    choices, index = Choices(space), EdgeIndex.of(space)
+    requiring = np.flatnonzero(choices.requires)
+    tables: list[Ints] = []
+    links: list[tuple[Ints, Ints]] = []
+    source, arriving = np.zeros(0, np.int64), np.zeros((0, width), np.int64)
+    for number in range(len(space.layers) - 1, -1, -1):
+        here = requiring[space.layer[requiring] == number]
+        starting = np.repeat(here[:, None], width, axis=1)
+        table, place = unique_tuples(np.concatenate((starting, arriving)), [bound] * width)
+        tables.append(table)
+        links.append((source, place[len(starting) :]))
+        if number:
+            source, arriving = _links(choices, index, table)
+        if 4 * sum(a.nbytes + b.nbytes for a, b in links) > memory_left():
+            raise OutOfMemory(
+                f"the composition walk has more than {sum(len(t) for t in tables):,} nodes: too "
+                "large to keep",
+                remedy=f"Use --method greedy or minimal, fewer tasks, or {more_memory()}.",
+            )
+    return _layers(tables[::-1], links[:0:-1])
+
+
+def _links(choices: Choices, index: EdgeIndex, table: Ints) -> tuple[Ints, Ints]:
+    """The different links out of a table of nodes: (source, where each leads)."""
+    space = choices.space
+    failed = len(space)
+    bounds = [len(table), *[failed + 1] * table.shape[1]]
+    links = [np.zeros((0, len(bounds)), np.int64)]
+    for move in moves(space, index, np.where(table == failed, FAILED, table)):
+        target = space.targets(move.edges)
+        fails = can_fail(choices, target, move.mixed)
+        mixed = np.where(move.mixed == FAILED, failed, move.mixed)
+        links.append(unique_tuples(np.column_stack((move.source, target, mixed))[fails], bounds)[0])
+    together = np.concatenate(links)
+    return together[:, 0], together[:, 1:]
+
+
+def _layers(tables: Sequence[Ints], links: Sequence[tuple[Ints, Ints]]) -> list[_Layer]:
+    """The layers with what their links are, goals first."""
+    none = np.zeros(0, np.int64)
+    nothing = np.zeros(0, np.bool_)
+    x = tables[0][:, :-1]
+    layers = [_Layer(x, none, none, nothing, nothing, (x == x[:, :1]).all(axis=1))]
+    for table, (source, child) in zip(tables[1:], links, strict=True):
+        x, below = table[:, :-1], layers[-1]
+        together = (x == x[:, :1]).all(axis=1)
+        joined = (below.x == below.x[:, :1]).all(axis=1)
+        tail = np.zeros(len(x), np.bool_)
+        tail[source[together[source] & joined[child] & below.tail[child]]] = True
+        diagonal = together & (table[:, -1] == x[:, 0])
+        parts = diagonal[source] & ~joined[child]
+        meets = ~together[source] & joined[child]
+        layers.append(_Layer(x, source, child, parts, meets, tail))
+    return layers

@@ -13,7 +13,7 @@ import numpy as np
 
 from coordlang.language.tolerance import percent
 from coordlang.required.choices import Choices, LabelSets
-from coordlang.required.failures import NONE, Failures, failures
+from coordlang.required.failure import NONE, Failures, failures
 from coordlang.required.miscoordination import Miscoordination, miscoordination
 from planners.joint.composition import cost_of
 from planners.joint.model import JointModel, PlanningTask

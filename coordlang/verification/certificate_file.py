@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import msgspec
 from msgspec import Meta
 
-from coordlang.language.record import refuse_duplicates
+from coordlang.language.file import refuse_duplicates
 from planners.system.errors import Position
 from planners.system.files import FileFormat, read_bytes
 from planners.system.writing import write_compressed

@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from coordlang.language.warping import Pair, pair
-from coordlang.required.last_differences import DifferenceWalk
+from coordlang.required.composition_walk import DifferenceWalk
 from coordlang.symmetry.group import symmetry_group
 from coordlang.vocabulary.clauses import clique, most_constrained_first
 from coordlang.vocabulary.greedy import greedy_partition

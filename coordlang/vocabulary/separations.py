@@ -11,8 +11,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from coordlang.language.warping import Pair, pair
+from coordlang.required.composition_walk import Difference
 from coordlang.required.divergences import Divergences
-from coordlang.required.last_differences import Difference
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,10 +11,9 @@ from itertools import combinations, product
 import numpy as np
 
 from planners.grounding import GroundAction
-from planners.joint.conditions import Evaluator, Labels, speaks_of_step
+from planners.joint.conditions import Evaluator, Labels, Operators, speaks_of_step
 from planners.joint.interference import Choices, compatible, conflict
 from planners.joint.model import Options, Stepper, Steps
-from planners.joint.operators import Operators
 from planners.joint.states import StateCodec
 from planners.joint.step_clauses import Clause, StepClauses, Waiting, clauses
 from planners.joint.tables import Bools, Ints, Rows, ranges, spans

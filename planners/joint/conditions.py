@@ -1,19 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ground formulas evaluated on many (state, joint step) pairs at once."""
+"""Ground formulas and actions on many states at once: what holds, and what can be done."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.joint.states import FactTable, test_bits
-from planners.joint.tables import Bools, Ints, Rows
+from planners.grounding import GroundAction, GroundEffect
+from planners.joint.states import FactTable, StateCodec, TrueFacts, test_bits
+from planners.joint.tables import Bools, Ints, Numbers, Rows, ranges
 from planners.pddl.formula_tree import Compound, Leaf, conjuncts, fold, literals, signed
-from planners.pddl.lifted import And, Atom, Formula, Not, Or, StepAtom, Truth
+from planners.pddl.lifted import TRUE, And, Atom, Formula, Not, Or, StepAtom, Truth
 
 Labels = NDArray[np.int32]
 
@@ -86,3 +88,113 @@ def split_condition(
         else:
             rest.append(part)
     return known, rest
+
+
+class Matcher:
+    """Finds operators by the rarest fact that they require, and tests the others one by one.
+
+    Parameters
+    ----------
+    required
+        For each operator the numbers of the facts that it requires to be true.
+    forbidden
+        For each operator the mask of facts that it requires to be false (operators x blocks).
+    """
+
+    def __init__(self, required: Sequence[frozenset[int]], forbidden: Rows) -> None:
+        self._forbidden = forbidden
+        self._has_forbidden = bool(forbidden.any())
+        frequency = Counter(fact for facts in required for fact in facts)
+        #: (operators, facts) those that each operator requires, rare ones first; -1 to fill up.
+        self._facts = np.full((len(required), max(map(len, required), default=0) + 1), -1)
+        for number, facts in enumerate(required):
+            self._facts[number, : len(facts)] = sorted(facts, key=lambda f: (frequency[f], f))
+        # By their first fact, CSR; those without any are first.
+        self._operators = np.argsort(self._facts[:, 0], kind="stable")
+        bounds = np.arange(-1, 64 * forbidden.shape[1] + 1)
+        self._first = np.searchsorted(self._facts[self._operators, 0], bounds)
+
+    def match(self, rows: Rows) -> tuple[Ints, Ints]:
+        """All pairs (row number, operator) with the operator's literals satisfied, sorted."""
+        true, every = TrueFacts.of(rows), np.arange(len(rows))
+        row = np.concatenate((every, true.row))
+        fact = np.concatenate((np.full(len(rows), -1), true.fact))
+        counts = self._first[fact + 2] - self._first[fact + 1]
+        operator = self._operators[ranges(self._first[fact + 1], counts)]
+        row = np.repeat(row, counts)
+        for place in range(1, self._facts.shape[1] - 1):
+            fact = self._facts[operator, place]
+            holds = (fact < 0) | test_bits(rows, row, fact)
+            row, operator = row[holds], operator[holds]
+        if self._has_forbidden:
+            clash = (rows[row] & self._forbidden[operator]).any(axis=1)
+            row, operator = row[~clash], operator[~clash]
+        order = np.lexsort((operator, row))
+        return row[order], operator[order]
+
+
+class Operators:
+    """Ground actions, numbered as given, for whole tables of states at a time; None is idling.
+
+    ``adds`` and ``deletes`` (actions, fact blocks) are what they do in every state, ``conditional``
+    the effects of those that also depend on it; ``step_formulas`` are the parts of preconditions
+    that speak of the joint step, which `applicable` leaves out.
+    """
+
+    def __init__(
+        self, actions: Sequence[GroundAction | None], codec: StateCodec, evaluator: Evaluator
+    ) -> None:
+        self._codec, self._evaluator = codec, evaluator
+        self._state_formulas: dict[int, list[Formula]] = {}
+        self.step_formulas: dict[int, list[Formula]] = {}
+        self.conditional: dict[int, list[GroundEffect]] = {}
+        self.adds = np.zeros((len(actions), codec.fact_blocks), np.uint64)
+        self.deletes = np.zeros_like(self.adds)
+        required, forbidden = [frozenset[int]()] * len(actions), np.zeros_like(self.adds)
+        for number, action in enumerate(actions):
+            if action is None:
+                continue
+            literals, rest = split_condition(action.precondition, evaluator)
+            required[number] = frozenset(fact for fact, positive in literals if positive)
+            forbidden[number] = codec.mask(fact for fact, positive in literals if not positive)
+            for formula in rest:
+                kind = self.step_formulas if speaks_of_step(formula) else self._state_formulas
+                kind.setdefault(number, []).append(formula)
+            self._enter_effects(number, action)
+        self._matcher = Matcher(required, forbidden)
+
+    def _enter_effects(self, number: int, action: GroundAction) -> None:
+        index = self._codec.facts.index
+        known = [effect for effect in action.effects if effect.atom in index]
+        certain = [effect for effect in known if effect.condition == TRUE]
+        self.adds[number] = self._codec.mask(index[e.atom] for e in certain if e.adds)
+        self.deletes[number] = self._codec.mask(index[e.atom] for e in certain if not e.adds)
+        if conditional := [effect for effect in known if effect.condition != TRUE]:
+            self.conditional[number] = conditional
+
+    def applicable(self, rows: Rows) -> tuple[Ints, Ints]:
+        """Pairs (row, action) whose conditions on the state hold, sorted."""
+        row, operator = self._matcher.match(rows)
+        keep: Bools = np.ones(len(row), np.bool_)
+        for number, formulas in self._state_formulas.items():
+            there = np.flatnonzero(operator == number)
+            for formula in formulas:
+                keep[there] &= self._evaluator.holds(formula, rows, row[there])
+        return row[keep], operator[keep]
+
+    def changes(
+        self, rows: Rows, source: Ints, chosen: Numbers, labels: Labels | None = None
+    ) -> tuple[Rows, Rows]:
+        """What the actions ``chosen[k]`` add to ``rows[source[k]]``, and what they delete.
+
+        ``labels[k]`` are what all robots do beside, where conditions may speak of that.
+        """
+        adds, deletes = self.adds[chosen], self.deletes[chosen]
+        for number, effects in self.conditional.items():
+            there = np.flatnonzero(chosen == number)
+            beside = None if labels is None else labels[there]
+            for effect in effects if len(there) else ():
+                fires = self._evaluator.holds(effect.condition, rows, source[there], beside)
+                into = adds if effect.adds else deletes
+                self._codec.set(into, there[fires], [self._codec.facts.index[effect.atom]])
+        return adds, deletes

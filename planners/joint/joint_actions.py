@@ -9,9 +9,8 @@ import numpy as np
 
 from planners.grounding import GroundAction
 from planners.joint.composition import cost_of
-from planners.joint.conditions import Evaluator
+from planners.joint.conditions import Evaluator, Operators
 from planners.joint.model import Options, Stepper, Steps
-from planners.joint.operators import Operators
 from planners.joint.states import StateCodec
 from planners.joint.tables import Rows
 from planners.pddl.model_options import Cost

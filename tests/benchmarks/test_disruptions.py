@@ -12,7 +12,7 @@ from benchmarks.paper.suite import language_for
 from benchmarks.paper.task_choices import Disruption, TaskChoices
 from benchmarks.paper.warehouse import LAYOUTS, WAREHOUSES, deliveries, human_in, listed_tasks
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.required.failures import wilson
+from coordlang.required.failure import wilson
 from planners.search.plans import Plan
 from tests.support import naive
 from tests.support.domains import all_tasks

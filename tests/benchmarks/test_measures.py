@@ -17,7 +17,7 @@ from coordlang.language.flexibility import flexibility as measured
 from coordlang.language.partition import Partition
 from coordlang.language.sentences import sentence_counts
 from coordlang.required.divergences import states_on_plans
-from coordlang.required.failures import wilson
+from coordlang.required.failure import wilson
 from coordlang.verification.by_definition import verify
 from planners.system.errors import OutOfMemory
 from tests.support import naive

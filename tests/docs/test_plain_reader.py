@@ -14,9 +14,9 @@ import pytest
 from coordlang.commands.main import run
 from coordlang.language.candidates import all_pairs
 from coordlang.language.file import read_language
+from coordlang.language.listed import read_task_file
 from coordlang.language.recorded import options_of
 from coordlang.language.sentences import sentence
-from coordlang.language.task_file import read_task_file
 from planners.search.plans import Plans, counts
 from tests.support.domains import ROOT, read
 from tests.support.pages import DOCS, blocks

@@ -18,7 +18,7 @@ import pytest
 
 from coordlang.commands.main import run
 from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
-from coordlang.language.task_file import read_task_file
+from coordlang.language.listed import read_task_file
 from planners.pddl.model_options import ModelOptions
 from tests.support.domains import DOMAINS, ROOT, read
 

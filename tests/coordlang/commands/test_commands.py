@@ -226,7 +226,7 @@ def test_a_bug_is_said_plainly(shell: Shell, monkeypatch: pytest.MonkeyPatch) ->
     def broken() -> None:
         raise OSError(1, "odd")
 
-    monkeypatch.setattr("coordlang.language.record.json_schema", broken)
+    monkeypatch.setattr("coordlang.language.file.json_schema", broken)
     shell("schema", 32, "internal error", "--debug shows where")
 
 

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from coordlang.commands.building import build_language
-from coordlang.explanation.cover import Cover, Literal
 from coordlang.explanation.minimise import Points, expand, minimise
 from coordlang.explanation.text import literal_text, pddl_condition, shown
 from coordlang.explanation.variables import Variable, truth, valuation
 from coordlang.explanation.words import (
+    Cover,
+    Literal,
     all_covers,
     describe_words,
     mapped_states,

@@ -20,7 +20,7 @@ import pytest
 from coordlang.commands.build import build
 from coordlang.commands.explain import explain
 from coordlang.execution.task_language import NoPlanFits, TaskLanguage, languages_in_tasks
-from coordlang.explanation.cover import Conjunction
+from coordlang.explanation.words import Conjunction
 from coordlang.exports import membership as membership_module
 from coordlang.exports.ltlf import export_ltlf, symbols_of
 from coordlang.exports.membership import membership

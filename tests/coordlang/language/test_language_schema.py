@@ -16,8 +16,13 @@ import jsonschema
 import pytest
 
 from coordlang.commands.building import build_language
-from coordlang.language.file import language_from_bytes, read_language, to_bytes, write_language
-from coordlang.language.record import json_schema
+from coordlang.language.file import (
+    json_schema,
+    language_from_bytes,
+    read_language,
+    to_bytes,
+    write_language,
+)
 from coordlang.language.tolerance import Tolerance
 from planners.system.errors import BadInput, Position
 from tests.support.command import Command

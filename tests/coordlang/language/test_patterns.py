@@ -11,9 +11,8 @@ from pathlib import Path
 import pytest
 
 from coordlang.language.candidates import from_listed
-from coordlang.language.listed import ListedTask
+from coordlang.language.listed import ListedTask, read_task_file
 from coordlang.language.patterns import varied_tasks
-from coordlang.language.task_file import read_task_file
 from planners.loading import PlanningInstance, load
 from planners.system.errors import UsageError
 from tests.support.command import Command

@@ -21,9 +21,8 @@ from coordlang.execution.monitor import Monitor, MonitorError
 from coordlang.execution.task_language import languages_in_tasks
 from coordlang.language.file import read_language
 from coordlang.language.file import to_bytes as language_bytes
-from coordlang.language.listed import ListedTask
+from coordlang.language.listed import ListedTask, read_task_file, tasks_text
 from coordlang.language.sentences import task_sentences
-from coordlang.language.task_file import read_task_file, tasks_text
 from coordlang.lifted.file import read_lifted
 from coordlang.lifted.file import to_bytes as lifted_bytes
 from coordlang.simulation.record import read_simulation

@@ -15,10 +15,9 @@ import pytest
 
 from coordlang.language.candidates import all_pairs
 from coordlang.language.partition import Partition
-from coordlang.lifted.choosing import SimplestHitting
 from coordlang.lifted.features import Feature
 from coordlang.lifted.language import LiftedLanguage
-from coordlang.lifted.learning import Instance, Learned, learn
+from coordlang.lifted.learning import Instance, Learned, SimplestHitting, learn
 from coordlang.lifted.pool import pool_of
 from coordlang.verification.by_definition import verify
 from planners.joint.tables import Ints

@@ -15,7 +15,7 @@ import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import all_pairs, from_listed, from_problems
-from coordlang.language.task_file import read_task_file
+from coordlang.language.listed import read_task_file
 from coordlang.language.words import Language
 from coordlang.report.page import Report, make_report
 from planners.pddl import read_domain, read_problem

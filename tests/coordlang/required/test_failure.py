@@ -13,8 +13,12 @@ import pytest
 
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.sentences import sentence_counts
-from coordlang.required.failure import TooManyToCount, failure_of_sentence, failure_probability
-from coordlang.required.failures import estimated_failure
+from coordlang.required.failure import (
+    TooManyToCount,
+    estimated_failure,
+    failure_of_sentence,
+    failure_probability,
+)
 from tests.support import naive
 from tests.support.domains import all_tasks, own_task
 from tests.support.naive import TooLarge

@@ -14,8 +14,7 @@ import pytest
 import coordlang
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.language.partition import Partition
-from coordlang.required.all_differences import differences
-from coordlang.required.divergences import FirstDifferences
+from coordlang.required.divergences import FirstDifferences, differences
 from coordlang.required.miscoordination import Inseparable
 from coordlang.required.task_answers import answers
 from coordlang.verification.by_definition import verify, verify_candidates

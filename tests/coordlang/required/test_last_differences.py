@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from coordlang.language.partition import Partition
-from coordlang.required.last_differences import Difference, DifferenceWalk
+from coordlang.required.composition_walk import Difference, DifferenceWalk
 from coordlang.verification.by_definition import verify
 from planners.joint.tables import Ints
 from tests.support.random_spaces import runs, separable_spaces

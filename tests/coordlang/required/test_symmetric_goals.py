@@ -10,9 +10,12 @@ import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
-from coordlang.required import all_differences
-from coordlang.required.all_differences import differences, symmetric_goals
-from coordlang.required.divergences import FirstDifferences
+from coordlang.required import divergences
+from coordlang.required.divergences import (
+    FirstDifferences,
+    differences,
+    symmetric_goals,
+)
 from coordlang.required.miscoordination import Inseparable, separable
 from planners.parallel.workers import Workers
 from planners.pddl import parse_problem, read_domain, read_problem
@@ -45,9 +48,7 @@ def answer(candidates: Candidates, portion: float, by_symmetry: bool) -> FirstDi
     """First differences with or without symmetries; None if some plans are inseparable."""
     with pytest.MonkeyPatch.context() as patch:
         for_action = 0 if by_symmetry else 10**9
-        patch.setattr(
-            all_differences, "symmetric_goals", lambda c: symmetric_goals(c, 0, for_action)
-        )
+        patch.setattr(divergences, "symmetric_goals", lambda c: symmetric_goals(c, 0, for_action))
         try:
             return differences(candidates, Workers(), portion=portion)
         except Inseparable:
@@ -105,7 +106,7 @@ def test_a_language_is_the_same_and_inseparable_plans_are_shown(
     grid = all_tasks("grid", "gw4-3x3")
     without = build_language(grid, "greedy")
     monkeypatch.setattr(
-        "coordlang.required.all_differences.symmetric_goals", lambda c: symmetric_goals(c, 0, 0)
+        "coordlang.required.divergences.symmetric_goals", lambda c: symmetric_goals(c, 0, 0)
     )
     assert build_language(grid, "greedy").language.states == without.language.states
     shown = 0

@@ -13,7 +13,7 @@ import pytest
 
 import coordlang as library
 from coordlang.language.tolerance import percent
-from coordlang.required.failures import failures_under
+from coordlang.required.failure import failures_under
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
 
@@ -89,7 +89,7 @@ def test_a_refuted_language_is_refuted_when_time_is_over(
     def over(*_: object) -> None:
         raise library.OutOfTime("the time limit of 1 s is over")
 
-    monkeypatch.setattr("coordlang.required.failures.failure_probability", over)
+    monkeypatch.setattr("coordlang.required.failure.failure_probability", over)
     found = coordlang("verify", silent(tmp_path / "l.json", None), *SQUARE)
     assert found.code == 1
     assert "fail in an unknown share of all runs (the time limit of 1 s is over)" in found.out

@@ -11,8 +11,13 @@ import pytest
 
 from coordlang.language.candidates import Candidates
 from coordlang.required.choices import Choices
-from coordlang.required.miscoordination import Miscoordination, Step, inseparable, miscoordination
-from coordlang.required.witnesses import witness_in_same_states
+from coordlang.required.miscoordination import (
+    Miscoordination,
+    Step,
+    inseparable,
+    miscoordination,
+    witness_in_same_states,
+)
 from planners.check.validate import Verdict, validate
 from planners.joint.model import JointModel
 from planners.search.plan_space import PlanSpace

@@ -15,8 +15,7 @@ import pytest
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates, all_pairs
 from coordlang.language.warping import pair
-from coordlang.symmetry.group import Symmetry, symmetry_group
-from coordlang.symmetry.of_part import symmetries_of_part
+from coordlang.symmetry.group import Symmetry, symmetries_of_part, symmetry_group
 from coordlang.verification.certificate_file import Certificate, Reason
 from coordlang.verification.check_certificate import Checked, check
 from coordlang.verification.make_certificate import _reason

@@ -15,7 +15,7 @@ import pytest
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates, from_listed
 from coordlang.language.flexibility import flexibility
-from coordlang.language.task_file import read_task_file
+from coordlang.language.listed import read_task_file
 from coordlang.required.divergences import required_nodes
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from coordlang.vocabulary.flexible import flexible

@@ -13,7 +13,7 @@ import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates
-from coordlang.required.last_differences import DifferenceWalk
+from coordlang.required.composition_walk import DifferenceWalk
 from coordlang.vocabulary.exhaustive import _partitions
 from coordlang.vocabulary.separations import constraints
 from tests.support import naive

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pytest
 
-import planners.grounding.bindings
+import planners.grounding.instantiate
 from planners.system.limits import time_limit
 from tests.support.joint_twin import check_model
 from tests.support.random_pddl import RandomModel
@@ -75,7 +75,7 @@ def test_the_same_joint_steps_as_by_definition(
     met: list[str] = []
     check_model(RandomModel(DOMAIN.format(condition=condition), PROBLEM), met.append)
     check_model(RandomModel(anywhere(condition), PROBLEM), met.append)
-    monkeypatch.setattr(planners.grounding.bindings, "_MANY", 0)
+    monkeypatch.setattr(planners.grounding.instantiate, "_MANY", 0)
     check_model(RandomModel(anywhere(condition), PROBLEM), met.append)
     assert "too large" not in met
 
