@@ -11,7 +11,7 @@ docs/concepts.md).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -93,6 +93,44 @@ class CounterexampleWalk:
         layers = _Walk(self._choices, self._index, word).layers()
         _backward(space, layers)
         return _retrace(space, layers, most, ways * _RANDOM_WAYS)
+
+
+class TwoPlans:
+    """Finds failing tuples of plans of which all but one are the same: two plans walked in step.
+
+    One robot does its part of one plan, all others theirs of the other.  That few such plans have
+    one sentence is seen at once where words tell states apart; where none has, other tuples may.
+
+    Parameters
+    ----------
+    space
+        A plan space of any number of robots.
+    """
+
+    def __init__(self, space: PlanSpace) -> None:
+        self._robots = space.robots
+        self._walks = [_one_and_others(space, robot) for robot in range(space.robots)]
+
+    def failing(self, word: Ints, most: int, ways: int = 1) -> list[Counterexamples]:
+        """Some of them, about ``most`` for each robot; see `CounterexampleWalk.failing`."""
+        found = []
+        for robot, (edges, walk) in enumerate(self._walks):
+            plan = np.full(self._robots, 1)
+            plan[robot] = 0
+            for two in walk.failing(word, most, ways):
+                all_edges = edges[two.edges[:, :, plan]]
+                found.append(Counterexamples(two.start, all_edges, two.states[:, plan]))
+        return found
+
+
+def _one_and_others(space: PlanSpace, robot: int) -> tuple[Ints, CounterexampleWalk]:
+    """A walk with all robots but one taken for one, and the edge that each of its edges is."""
+    rest = np.delete(space.labels, robot, axis=1).astype(np.int64)
+    _, others = unique_tuples(rest, [int(column.max(initial=0)) + 1 for column in rest.T])
+    labels = np.column_stack((space.labels[:, robot], others)).astype(space.labels.dtype)
+    order = np.lexsort((labels[:, 1], labels[:, 0], space.sources))
+    two = replace(space, labels=labels[order], target=space.target[order], cost=space.cost[order])
+    return order, CounterexampleWalk(Choices(two))
 
 
 class _Walk:

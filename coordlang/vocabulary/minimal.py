@@ -11,7 +11,7 @@ symmetries.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
 from functools import cached_property
@@ -23,6 +23,7 @@ from coordlang.vocabulary.loop import Budget, Languages, between, close_bounds, 
 from coordlang.vocabulary.merging import merged
 from coordlang.vocabulary.partitions import Partitions, Refutation
 from coordlang.vocabulary.sat import Undecided
+from coordlang.vocabulary.stutter_free import StutterFree
 from planners.system.limits import run_until_stopped
 
 if TYPE_CHECKING:  # they load networkx
@@ -40,8 +41,10 @@ _PAIRS, _FIRST_PAIRS = 1_000, 30
 _BEGINNING = 10
 #: What may be spent on each number at first.
 _SOON = Budget(rounds=10, conflicts=2_000)
-#: Words fewer than those of a language near which one is looked for, as a share of them.
-_SHARE = 4
+#: Stutter-free partitions of one number that are looked at in one go before others are.
+_LONG = 40
+#: They have fewer words than the best language by this part at least.
+_FEWER_WORDS = 5
 #: Merges in a row that fail before something else is tried.
 _VAIN = 15
 #: Merged words are verified once they are so many times the last ones that were.
@@ -97,6 +100,7 @@ class MinimalSearch:
         self._most = sys.maxsize if effort is None else effort * _UNIT
         self._merges = 0
         self._merging: tuple[Assignment, Iterator[Assignment]] | None = None
+        self._least_stutter_free = 2
         self.lower = job.lower_bound
         self.best: Assignment | None = job.incumbent
         self.refuting = Refutation(1, {}, 0)
@@ -110,8 +114,9 @@ class MinimalSearch:
 
     @cached_property
     def _partitions(self) -> Partitions:
-        known = self.languages.known
-        return Partitions(self._job.states, known.clauses, known.group.permutations)
+        known, spaces = self.languages.known, self._job.candidates.spaces
+        stutter_free = StutterFree(spaces[0]) if self._is_one_task else None
+        return Partitions(self._job.states, known.clauses, known.group.permutations, stutter_free)
 
     @cached_property
     def _tied(self) -> TiedWords:
@@ -142,29 +147,27 @@ class MinimalSearch:
             return
         if self._pairs // _FIRST_PAIRS > _BEGINNING * self._most:
             return
+        if self._is_one_task:
+            budget = _SOON
+            while self._least_stutter_free < self.upper and budget.rounds <= _LONG:
+                self._find_stutter_free(budget)
+                budget = budget.doubled()
         while self.lower < self.upper and not self._is_spent and self.decide(self.lower, _SOON):
             pass
         self._try_abstractions()
         if self._is_one_task:
             self.merge(_VAIN)
-            self._descend(_SOON)
         else:
             self._decide_between(_SOON)
             self.merge(_VAIN)
         known = self.best
-        close_bounds(
-            lambda: (self.lower, self.upper), self._decide_or_descend, lambda: self._is_spent
-        )
+        close_bounds(lambda: (self.lower, self.upper), self._narrow, lambda: self._is_spent)
         if self.best is known and not self._is_spent:
             # Merged words tell more states apart than a language must: fewer leave more plans open.
             self.decide(self.lower, Budget())
 
     @property
     def _is_one_task(self) -> bool:
-        """Near languages pay for one task; with many, tied words are found sooner.
-
-        With near languages the open 2x6 grid took 70 s in place of 49.
-        """
         return self._job.candidates.count == 1
 
     def _decide_between(self, budget: Budget) -> None:
@@ -173,19 +176,25 @@ class MinimalSearch:
             if not self._find_or_refute(between(self.lower, self.upper), budget):
                 return
 
-    def _descend(self, budget: Budget) -> None:
-        """Look for languages with fewer words near the best one, as long as some are found.
+    def _find_stutter_free(self, budget: Budget) -> None:
+        """Look for stutter-free languages with fewer words than the best one.
 
-        A quarter fewer, and where there are none within the budget half as many fewer each time.
+        From below, where partitions are refuted soonest and most is learnt of the others, too; then
+        nearer and nearer to the number that suffices.
         """
-        share = _SHARE
-        while self.lower < self.upper and self.best is not None and not self._is_spent:
-            fewer = max(1, self.upper // share)
-            if self._find_or_refute(max(self.lower, self.upper - fewer), budget, self.best):
+        size = max(self.lower, self._least_stutter_free)
+        while size <= self.upper - max(1, self.upper // _FEWER_WORDS) and not self._is_spent:
+            try:
+                found = self._find_within(self._partitions.find_stutter_free, size, budget)
+            except Undecided:
+                size = max(size + 1, between(size, self.upper))
                 continue
-            if fewer == 1:
-                return
-            share *= 2
+            self._partitions.drop_stutter_free(size)
+            if found is None:
+                size = self._least_stutter_free = size + 1
+            else:
+                self._offer(found)
+                size = between(self._least_stutter_free, self.upper)
 
     def _try_abstractions(self) -> None:
         """Take the first abstraction whose abstract states, each with a word, are a language."""
@@ -242,13 +251,13 @@ class MinimalSearch:
             self._offer(coarsest)
         self._merging = self.best, self._merging[1]
 
-    def _decide_or_descend(self, size: int, budget: Budget) -> bool:
-        """`decide`; between the bounds, look for languages near the best one first."""
+    def _narrow(self, size: int, budget: Budget) -> bool:
+        """`decide`; between the bounds, look for languages that are sooner found first."""
         if size == self.lower:
             return self.decide(size, budget)
         bounds = self.lower, self.upper
         if self._is_one_task:
-            self._descend(budget)
+            self._find_stutter_free(budget)
         if bounds == (self.lower, self.upper):
             self.merge(_VAIN)
         return bounds != (self.lower, self.upper) or self.decide(size, budget)
@@ -264,11 +273,10 @@ class MinimalSearch:
             return True
         return size == self.lower == self.upper - 1 and self._finds_tied(size, budget.rounds)
 
-    def _find_or_refute(self, size: int, budget: Budget, near: Assignment | None = None) -> bool:
-        """`decide` among all partitions, those ``near`` a language first."""
+    def _find_or_refute(self, size: int, budget: Budget) -> bool:
+        """`decide` among all partitions."""
         try:
-            refuted = self._refuted_within(size, budget) if near is None else None
-            refuted = refuted or self._refuted(size, budget, near)
+            refuted = self._refuted_within(size, budget) or self._refuted(size, budget)
         except Undecided:
             return False
         if refuted is not None:
@@ -277,26 +285,31 @@ class MinimalSearch:
             self.lower = size + 1
         return True
 
-    def _refuted(self, size: int, budget: Budget, near: Assignment | None) -> Refutation | None:
+    def _refuted(self, size: int, budget: Budget) -> Refutation | None:
         """That there is no language with so few words; None, and one is offered, if there is."""
-
-        def partition(conflicts: int) -> dict[int, int] | None:
-            if self._is_spent:
-                raise Undecided
-            return self._partitions.find(size, min(conflicts, self._most - self.work), near)
-
-        found = find(partition, self._holds, budget)
+        found = self._find_within(self._partitions.find, size, budget)
         self._partitions.drop(size)
         if found is None:
             return Refutation.of(size, self.languages.known)
         self._offer(found)
-        if near is None:
-            self.merge(_VAIN)
+        self.merge(_VAIN)
         return None
+
+    def _find_within(
+        self, partition: Callable[[int, int], dict[int, int] | None], size: int, budget: Budget
+    ) -> dict[int, int] | None:
+        """The first language among ``partition (size, conflicts)``, None if there is none."""
+
+        def following(conflicts: int) -> dict[int, int] | None:
+            if self._is_spent:
+                raise Undecided
+            return partition(size, min(conflicts, self._most - self.work))
+
+        return find(following, self._holds, budget)
 
     def _finds_tied(self, size: int, rounds: int) -> bool:
         """Whether a language with so many words is soon found among those of some kinds."""
-        if self._is_spent:
+        if self._is_spent or self._is_one_task:
             return False
         self._report(f"trying {size} words that some states decide")
         found = self._tied.find(size, rounds)

@@ -6,12 +6,13 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from coordlang.language.warping import Clause
 from coordlang.required.choices import Choices
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.clauses import without_implied
-from coordlang.vocabulary.counterexample_walk import CounterexampleWalk
+from coordlang.vocabulary.counterexample_walk import CounterexampleWalk, TwoPlans
 from coordlang.vocabulary.counterexamples import Counterexamples, Mixtures, many_counterexamples
 from coordlang.vocabulary.job import Evidence
 from planners.joint.tables import Bools, Ints
@@ -19,9 +20,11 @@ from planners.search.plan_space import PlanSpace
 
 #: So many failing tuples are always wanted of a walk, which finds many in one go.
 _OF_WALK = 20_000
+#: So many of each robot's walk beside all others.
+_OF_TWO_PLANS = 1_000
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TaskPart:
     """Some of the tasks of a plan space, searched for counterexamples together.
 
@@ -30,7 +33,8 @@ class TaskPart:
     choices
         The robots' choices in the plan space of just these tasks.
     finder
-        Finds those of its plans that fail: for two robots a walk, else sets.
+        Finds those of its plans that fail: for two robots a walk, else sets; for more robots and
+        stutter-free words two plans walked in step come before sets.
     """
 
     choices: Choices
@@ -47,6 +51,10 @@ class TaskPart:
     def space(self) -> PlanSpace:
         """The plan space of the tasks."""
         return self.choices.space
+
+    @cached_property
+    def _two_plans(self) -> TwoPlans:
+        return TwoPlans(self.space)
 
     def failing(
         self, word: Ints, most: int, ways: int = 1, steps: int = sys.maxsize
@@ -74,6 +82,10 @@ class TaskPart:
         nodes = word[self.space.state]
         if isinstance(self.finder, CounterexampleWalk):
             return self.finder.failing(nodes, max(most, _OF_WALK), ways)
+        if (nodes[self.space.sources] != nodes[self.space.targets()]).all():
+            found = self._two_plans.failing(nodes, _OF_TWO_PLANS, ways)
+            if found:
+                return found
         return many_counterexamples(self.finder, nodes, most, ways, steps)
 
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -16,10 +15,11 @@ from coordlang.vocabulary.clauses import (
     most_frequent_pairs,
     without_implied,
 )
-from coordlang.vocabulary.job import Assignment, Evidence
+from coordlang.vocabulary.job import Evidence
 from coordlang.vocabulary.loop import ProblemsBySize
 from coordlang.vocabulary.necessary_clauses import NecessaryClauses
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
+from coordlang.vocabulary.stutter_free import StutterFree
 from planners.search.sat import SolverName
 
 #: Conflicts within which most partitions are found; after so many the solver is likely on the way
@@ -58,7 +58,7 @@ class Partitions:
     """Partitions that satisfy all known clauses, by three solvers.
 
     The second one is allowed only one of symmetric partitions: proofs are ten times shorter, but
-    partitions harder to find.  The third one keeps near a language with more words.
+    partitions harder to find.  The third one is allowed only stutter-free partitions.
 
     Parameters
     ----------
@@ -68,6 +68,8 @@ class Partitions:
         The known clauses about these states, a list that only grows.
     permutations
         Where symmetries take each state; the images of every clause must be clauses.
+    stutter_free
+        What stutter-free partitions have in common, where they are asked for.
 
     Attributes
     ----------
@@ -80,20 +82,19 @@ class Partitions:
         states: Sequence[int],
         clauses: Sequence[Clause],
         permutations: Sequence[Sequence[int]],
+        stutter_free: StutterFree | None = None,
     ) -> None:
         self._states, self._clauses, self._permutations = states, clauses, permutations
+        self._stutter_free = stutter_free
         self.conflicts = 0
         require = PartitionProblem.separate_one
         #: Numbers of words with which partitions are so few that the first solver finds none.
         self._hard: set[int] = set()
         self._all = ProblemsBySize(self._start, require)
         self._up_to_symmetry = ProblemsBySize(self._start_up_to_symmetry, require)
-        self._near = ProblemsBySize(self._start_near, require)
-        self._language: Assignment = {}
+        self._without_stutter = ProblemsBySize(self._start_stutter_free, require)
 
-    def find(
-        self, size: int, conflicts: int, near: Assignment | None = None
-    ) -> dict[int, int] | None:
+    def find(self, size: int, conflicts: int) -> dict[int, int] | None:
         """A partition into ``size`` words, or None if there is none.
 
         Parameters
@@ -102,25 +103,22 @@ class Partitions:
             The number of words.
         conflicts
             Conflicts of the solver that are allowed.
-        near
-            A language: partitions are looked for that keep its words where clauses allow it.
 
         Raises
         ------
         Undecided
             After so many conflicts.
         """
-        if near is not None:
-            if near is not self._language:
-                self._near.close()
-                self._language = near
-            return self._solved(self._near.under(size, self._clauses), conflicts)
         if size not in self._hard:
             with suppress(Undecided):
                 return self._solved(self._all.under(size, self._clauses), _EASY)
             self._hard.add(size)
             self._all.drop(size)
         return self._solved(self._up_to_symmetry.under(size, self._clauses), conflicts)
+
+    def find_stutter_free(self, size: int, conflicts: int) -> dict[int, int] | None:
+        """`find` among stutter-free partitions."""
+        return self._solved(self._without_stutter.under(size, self._clauses), conflicts)
 
     def _solved(self, problem: PartitionProblem, conflicts: int) -> dict[int, int] | None:
         before = problem.conflicts
@@ -129,14 +127,18 @@ class Partitions:
         finally:
             self.conflicts += problem.conflicts - before
 
+    def drop_stutter_free(self, size: int) -> None:
+        """`drop` among stutter-free partitions."""
+        self._without_stutter.drop(size)
+
     def drop(self, size: int) -> None:
         """Forget a number of words that is decided."""
-        for problems in (self._all, self._up_to_symmetry, self._near):
+        for problems in (self._all, self._up_to_symmetry, self._without_stutter):
             problems.drop(size)
 
     def close(self) -> None:
         """Give back what the solvers hold."""
-        for problems in (self._all, self._up_to_symmetry, self._near):
+        for problems in (self._all, self._up_to_symmetry, self._without_stutter):
             problems.close()
 
     def _start(
@@ -157,11 +159,12 @@ class Partitions:
         problem.add_lex_leaders(self._permutations, pairs)
         return problem
 
-    def _start_near(self, size: int, known: Sequence[Clause]) -> PartitionProblem:
+    def _start_stutter_free(self, size: int, known: Sequence[Clause]) -> PartitionProblem:
+        assert self._stutter_free is not None, "only asked for one task"
         problem = PartitionProblem(self._states, size, "glucose42", named=False)
-        states_of = Counter(self._language.values())
-        largest = {word: n for n, (word, _) in enumerate(states_of.most_common(size))}
-        problem.prefer({s: largest[w] for s, w in self._language.items() if w in largest})
+        for states in self._stutter_free.pairs:
+            problem.separate_one([states])
+        problem.prefer(self._stutter_free.preferred(size))
         for clause in known:
             problem.separate_one(clause)
         return problem
