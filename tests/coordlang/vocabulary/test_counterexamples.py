@@ -13,7 +13,7 @@ import pytest
 
 from coordlang.language.candidates import from_problems
 from coordlang.required.choices import Choices
-from coordlang.vocabulary.counterexample_walk import CounterexampleWalk
+from coordlang.vocabulary.counterexample_walk import CounterexampleWalk, TwoPlans
 from coordlang.vocabulary.counterexamples import Counterexample, Mixtures, many_counterexamples
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import BadInput, ProvedImpossible, UsageError
@@ -55,6 +55,10 @@ def compared(spaces: Iterator[PlanSpace], random: Random) -> Counter[bool]:
                 assert bool(walk.failing(nodes, 20)) != holds
                 found += walk.failing(nodes, 20)
             assert bool(found) != holds
+            two_plans = TwoPlans(space).failing(nodes, 20)
+            assert not (two_plans and holds)
+            assert space.robots > 2 or bool(two_plans) != holds
+            found += two_plans
             for table in found:
                 for row in range(len(table)):
                     check(space, table.one(row), word)
