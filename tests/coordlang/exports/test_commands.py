@@ -19,12 +19,14 @@ import pytest
 import coordlang as door
 from coordlang.commands.export import ExportedTask
 from planners.classical import action_names
+from planners.classical.fast_downward import total_cost
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
 from planners.system.errors import UsageError
 from tests.support.command import Command, Outcome, own_process
 from tests.support.domains import DOMAINS
 from tests.support.naive_classical import optimal_plans
+from tests.support.task_languages import SHIPPED
 
 #: A sentence of the least language of the T-map, and one of the task of three cells.
 SENTENCE, OF_CELLS = "w0 w2 w1 w0", "w1 w0"
@@ -180,7 +182,8 @@ LIFT = """(define (domain table) (:requirements :typing :multi-agent)
                                (and (not (level)) (spilled))))))"""
 BOTH = """(define (problem both) (:domain table) (:objects r1 r2 - robot) (:init (level))
   (:goal (and (up r1) (up r2) (not (spilled)))))"""
-EACH = pytest.mark.parametrize("name", ["lift", "grid/corners-3x3", "charger/in-turn"])
+WORLDS = ["lift", "grid/corners-3x3", "charger/in-turn"]
+EACH = pytest.mark.parametrize("name", WORLDS)
 
 
 @cache
@@ -250,13 +253,19 @@ def test_pyperplan(name: str, tmp_path: Path) -> None:
     assert door.say(language, *files, plan).sentence == sentence
 
 
-@EACH
-def test_kstar(name: str, tmp_path: Path) -> None:
-    """It lists as many plans of least cost as there are plans with the sentence."""
+@pytest.mark.parametrize(
+    "name", [*WORLDS, *(pytest.param(name, marks=pytest.mark.slow) for name in SHIPPED)]
+)
+def test_kstar_and_fast_downward(name: str, tmp_path: Path) -> None:
+    """K* lists as many plans of least cost as there are with the sentence; the cost is the least."""
     planners = pytest.importorskip(
         "kstar_planner.planners", reason="K* is not installed (extra oracles)"
     )
-    export(name, for_planner="kstar").save(tmp_path)
+    try:
+        exported = export(name, for_planner="kstar")
+    except door.Inseparable:
+        return
+    exported.save(tmp_path)
     found = planners.plan_unordered_topq(
         domain_file=tmp_path / "domain.pddl",
         problem_file=tmp_path / "problem.pddl",
@@ -264,3 +273,4 @@ def test_kstar(name: str, tmp_path: Path) -> None:
         timeout=100,
     )
     assert len(found["plans"]) == built(name)[3]
+    assert total_cost(exported.exported.classical) == exported.exported.cost

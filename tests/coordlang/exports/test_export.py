@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 from functools import cache
 from itertools import islice, product
 from random import Random
@@ -21,70 +20,38 @@ from coordlang.commands.build import build
 from coordlang.commands.explain import explain
 from coordlang.execution.task_language import NoPlanFits, TaskLanguage, languages_in_tasks
 from coordlang.explanation.words import Conjunction
-from coordlang.exports import membership as membership_module
 from coordlang.exports.ltlf import export_ltlf, symbols_of
 from coordlang.exports.membership import membership
 from coordlang.exports.pddl import PddlExport, export_pddl, plan_names
-from coordlang.language.candidates import from_problems
 from coordlang.language.sentences import sentence
-from coordlang.language.words import Language
 from planners.classical import ClassicalTask, action_names
 from planners.joint.model import show
+from planners.pddl.model_options import ModelOptions
 from planners.search.plans import Plan, Plans
-from planners.search.reachable import explore
-from planners.system.errors import BadInput, ProvedImpossible, UsageError
-from tests.support.domains import DOMAINS
+from planners.system.errors import BadInput, UsageError
+from tests.support.domains import DOMAINS, own_task
 from tests.support.naive_classical import optimal_plans
-from tests.support.other_planners import rows as answers
-from tests.support.random_models import random_chores, random_model
-from tests.support.task_languages import task_languages
+from tests.support.task_languages import random_language, random_task_languages, task_languages
 
 FORMS = {"explicit": 100_000, "select-then-apply": 0}
-#: Seeds of the random tasks; a second lot, much longer, runs on demand.
-SEEDS = {"few": range(80), "many": range(80, 600)}
+#: How many random models of each number of robots; a second lot, much longer, runs on demand.
+NUMBER = {"few": 10, "many": 150}
 BOTH = pytest.mark.parametrize("lot", ["few", pytest.param("many", marks=pytest.mark.slow)])
-
-
-def random_task_language(seed: int) -> TaskLanguage | None:
-    """A random task with a random partition of its reachable states, some of them left to the
-    default.
-
-    None where there is nothing to say, or too much to list.
-    """
-    random = Random(seed)
-    make = random_model if seed % 2 else random_chores
-    domain, problem, options = make(seed, random.choice([2, 2, 3]))
-    if seed % 4 == 0:
-        options = replace(options, remember_actions=True)
-    try:
-        candidates = from_problems(domain, [problem], options)
-    except ProvedImpossible:
-        return None
-    model, space = candidates.model, candidates.spaces[0]
-    if not space.layer[space.starts[0]] or Plans.of(space).count > 60:
-        return None
-    rows = explore(model, space.rows[space.state[space.starts]]).rows
-    if len(rows) > 70:
-        return None
-    words = tuple(f"w{n}" for n in range(random.randint(1, 4)))
-    keys = [model.codec.key(row) for row in rows]
-    on_plans = [set(model.codec.decode(space.rows[state])) for state in set(space.state.tolist())]
-    changing = sorted(set().union(*on_plans) - set(on_plans[0]).intersection(*on_plans))
-    if random.random() < 0.8 and changing:  # words that are about what changes on the way
-        atoms = random.sample(changing, min(2, len(changing)))
-        meaning = {value: random.choice(words) for value in range(4)}
-        word = [meaning[sum(2**n * (atom in key) for n, atom in enumerate(atoms))] for key in keys]
-    else:
-        word = [random.choice(words) for _ in keys]
-    states = {key: w for key, w in zip(keys, word, strict=True) if random.random() < 0.9}
-    language = Language(words, states, words[-1])
-    return next(languages_in_tasks(language, candidates))
 
 
 @cache
 def tasks(lot: str) -> tuple[TaskLanguage, ...]:
-    found = map(random_task_language, SEEDS[lot])
-    return tuple(task_language for task_language in found if task_language is not None)
+    """Tasks with random words: of random models, of joint actions, of remembered actions; and one
+    with a language in which "w0" and "w0 w2 w1 w0" are both said.
+    """
+    found = [*task_languages("t-map", "problem", everything=False)]
+    found += [u for robots in (2, 3) for _, _, u in random_task_languages(robots, NUMBER[lot])]
+    for name, remember in product(("grid-joint/three-cells", "handover/one-door"), (True, False)):
+        candidates = own_task(*name.split("/"), ModelOptions(remember_actions=remember))
+        for seed in range(4):
+            language = random_language(Random(seed), candidates)
+            found.append(next(languages_in_tasks(language, candidates)))
+    return tuple(used for used in found if 1 < Plans.of(used.space, used.task).count <= 60)
 
 
 def rich() -> TaskLanguage:
@@ -130,16 +97,13 @@ def test_the_optimal_plans_are_the_plans_that_fit(lot: str) -> None:
                 )
 
 
-def test_the_random_tasks_are_worth_it() -> None:
-    """Some have several sentences, some sentences leave several plans open; some remember actions,
-    some have three robots.
-    """
-    listed = [(task_language, by_sentence(task_language)) for task_language in tasks("few")]
-    both = [any(len(p) > 1 for p in found.values()) for _, found in listed if len(found) > 1]
-    assert (len(listed) >= 20, len(both) >= 4, sum(both) >= 3) == (True, True, True)
-    assert {task_language.model.remembers for task_language, _ in listed} == {True, False}
-    assert {len(task_language.model.robots) for task_language, _ in listed} == {2, 3}
-    assert {task_language.model.is_joint_action for task_language, _ in listed} == {True, False}
+def test_the_tasks_are_worth_it() -> None:
+    """Several say several sentences, some of which leave several plans open."""
+    listed = [[len(plans) for plans in by_sentence(used).values()] for used in tasks("few")]
+    assert sum(len(found) > 1 for found in listed) >= 15
+    assert sum(len(found) > 1 and max(found) > 1 for found in listed) >= 12
+    for asked in ("remembers", "is_joint_action"):
+        assert {getattr(used.model, asked) for used in tasks("few")} == {True, False}
 
 
 @BOTH
@@ -161,19 +125,12 @@ def satisfied(term: Conjunction, state: frozenset[str]) -> bool:
     return all((show(atom) in state) == value for atom, value in term.items())
 
 
-def test_a_word_named_in_two_ways_would_be_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A break of the code: with terms that overlap one plan has several counterparts."""
-    words, plans = max(by_sentence(rich()).items(), key=lambda s: len(s[1]))
-    assert len(planned(export_pddl(rich(), words))) == len(plans)
-    monkeypatch.setattr(membership_module, "disjoint", lambda facts, terms: [*terms, *terms])
-    assert len(planned(export_pddl(rich(), words))) > len(plans)
-
-
 # LTLf by definition (De Giacomo and Vardi 2013): a formula is true at a place of a finite sequence
 # of states.
 
 
-def parse(text: str) -> tuple[object, ...]:
+@cache
+def parsed(text: str) -> tuple[object, ...]:
     """The text of a formula, with all operations in brackets, as nested tuples."""
     tokens = re.findall(r"[()!&|UG]|[a-z][a-z0-9_]*", text)
     assert "".join(tokens) == text.replace(" ", "")
@@ -215,66 +172,39 @@ def true_at(formula: Any, states: Sequence[frozenset[str]], place: int) -> bool:
     raise AssertionError(formula)
 
 
-def symbols_in(
-    task_language: TaskLanguage, plan: Plan, symbols: dict[str, str]
-) -> list[frozenset[str]]:
-    """The states of a plan as the sets of symbols that hold."""
-    space, codec = task_language.space, task_language.model.codec
-    states = [codec.decode(space.rows[n]) for n in Plans.of(space, task_language.task).states(plan)]
-    return [frozenset(symbol for symbol, atom in symbols.items() if atom in s) for s in states]
+def asked(
+    tasks: Iterable[TaskLanguage], sentences: int, plans: int
+) -> Iterator[tuple[str, list[dict[str, bool]], bool]]:
+    """The formulas of some sentences, some plans as the symbols that hold in their states, and
+    whether a plan has the sentence.
+    """
+    for used in tasks:
+        codec, every, listed = used.model.codec, Plans.of(used.space, used.task), by_sentence(used)
+        for words in islice(listed, sentences):
+            exported = export_ltlf(used, words)
+            for other, found in listed.items():
+                for plan in islice(sorted(found), plans):
+                    states = [codec.decode(used.space.rows[n]) for n in every.states(plan)]
+                    symbols = exported.symbols.items()
+                    trace = [{s: atom in true for s, atom in symbols} for true in states]
+                    yield exported.formula, trace, other == words
 
 
 @BOTH
 def test_the_formula_is_true_of_the_plans_that_fit_and_of_no_other(lot: str) -> None:
     answers = Counter[bool]()
-    for task_language in tasks(lot):
-        sentences = by_sentence(task_language)
-        for words in islice(sentences, 3):
-            exported = export_ltlf(task_language, words)
-            formula = parse(exported.formula)
-            for other, plans in sentences.items():
-                for plan in islice(sorted(plans), 10):
-                    held = true_at(formula, symbols_in(task_language, plan, exported.symbols), 0)
-                    assert held == (other == words)
-                    answers[held] += 1
+    for formula, trace, expected in asked(tasks(lot), 3, 10):
+        states = [frozenset(s for s, holds in true.items() if holds) for true in trace]
+        assert true_at(parsed(formula), states, 0) == expected
+        answers[expected] += 1
     assert min(answers[True], answers[False]) > 10
 
 
-def test_no_word_may_be_skipped() -> None:
-    """A plan that stays in w0 does not say "w0 w2 w1 w0", though nothing else is wrong with it."""
-    (task_language,) = task_languages("t-map", "problem", everything=False)
-    sentences = by_sentence(task_language)
-    assert any(len(set(words)) == 1 for words in sentences)
-    assert any(words[0] == words[-1] and len(words) > 2 for words in sentences)
-    for words in sentences:
-        exported = export_ltlf(task_language, words)
-        held = {
-            other: true_at(
-                parse(exported.formula), symbols_in(task_language, min(plans), exported.symbols), 0
-            )
-            for other, plans in sentences.items()
-        }
-        assert held == {other: other == words for other in sentences}
-
-
 def test_an_independent_library_says_the_same() -> None:
-    parser = pytest.importorskip(
-        "flloat.parser.ltlf", reason="flloat is not installed"
-    ).LTLfParser()
-    answers = Counter[bool]()
-    for task_language in tasks("few"):
-        sentences = by_sentence(task_language)
-        for words in islice(sentences, 2):
-            exported = export_ltlf(task_language, words)
-            formula = parser(exported.formula)
-            for other, plans in islice(sentences.items(), 4):
-                states = symbols_in(task_language, min(plans), exported.symbols)
-                trace = [
-                    {symbol: symbol in state for symbol in exported.symbols} for state in states
-                ]
-                answers[held := bool(formula.truth(trace, 0))] += 1
-                assert held == (other == words)
-    assert min(answers[True], answers[False]) > 5
+    flloat = pytest.importorskip("flloat.parser.ltlf", reason="flloat is not installed")
+    read = cache(flloat.LTLfParser())
+    for formula, trace, expected in asked(tasks("few")[::2], 2, 1):
+        assert read(formula).truth(trace, 0) == expected
 
 
 def test_the_formula_over_words_is_the_same_with_their_formulas() -> None:
@@ -319,35 +249,6 @@ def test_a_plan_that_is_cut_off_or_none() -> None:
         exported.joint_plan([*plan, "fly"])
 
 
-# Other planners.
-
-
-def test_the_table_without_other_planners() -> None:
-    rows = [row for name in ("three-cells", "t-map") for row in answers(name, 60.0, other=False)]
-    assert {row.form for row in rows} == {"explicit", "select-then-apply"}
-    assert all(row.agrees and row.graph == row.listing for row in rows)
-    assert not replace(rows[0], listing=rows[0].graph + 1).agrees
-    assert not replace(rows[0], fast_downward=rows[0].cost + 1).agrees
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "folder",
-    sorted(
-        {path.parent.name for path in DOMAINS.glob("*/domain.pddl")}
-        - {"flags", "grid", "grid-joint"}
-    ),
-)
-def test_other_planners_find_exactly_the_plans_that_fit(folder: str) -> None:
-    pytest.importorskip("kstar_planner", reason="K* is not installed (extra oracles)")
-    rows = [*answers(folder, 300.0)]
-    assert rows
-    for row in rows:
-        assert row.agrees, row
-        assert row.kstar == row.graph == row.listing, row
-        assert row.fast_downward == row.cost, row
-
-
 # Within slack.
 
 WITHIN_SLACK = [
@@ -357,10 +258,10 @@ WITHIN_SLACK = [
 ]
 
 
-def within_slack(folder: str, slack: int, **given: Any) -> TaskLanguage:
-    """Three words for the plans within slack of a shipped problem; they may be inseparable."""
+def within_slack(folder: str, slack: int, words: int = 3, **given: Any) -> TaskLanguage:
+    """Some words for the plans within slack of a shipped problem; they may be inseparable."""
     domain, problem = (DOMAINS / folder / f"{name}.pddl" for name in ("domain", "problem"))
-    built = build(domain, problem, slack=slack, words=3, seed=1, **given)
+    built = build(domain, problem, slack=slack, words=words, seed=1, **given)
     used: TaskLanguage = explain(built.language, domain, problem).used
     return used
 
@@ -394,20 +295,16 @@ def test_every_plan_within_slack_has_the_sentence(folder: str, slack: int) -> No
 
 
 def test_the_formula_within_slack() -> None:
-    task_language = within_slack("three-cells", 1)
-    sentences = by_sentence(task_language)
-    for words, (other, plans) in product(sentences, sentences.items()):
-        exported = export_ltlf(task_language, words)
-        for plan in plans:
-            states = symbols_in(task_language, plan, exported.symbols)
-            assert true_at(parse(exported.formula), states, 0) == (other == words)
+    for formula, trace, expected in asked([within_slack("three-cells", 1)], 99, 99):
+        states = [frozenset(s for s, holds in true.items() if holds) for true in trace]
+        assert true_at(parsed(formula), states, 0) == expected
 
 
 def test_slack_that_pddl_cannot_say_is_refused() -> None:
-    seen = within_slack("three-cells", 1, words_see_slack=True)
+    seen = within_slack("three-cells", 1, 1, words_see_slack=True)
     for export in (export_pddl, export_ltlf):
         with pytest.raises(UsageError, match="see how much is left of the slack"):
             export(seen, [0])
-    dear = within_slack("three-cells", 1, cost="makespan+actions")
+    dear = within_slack("three-cells", 1, 1, cost="makespan+actions")
     with pytest.raises(UsageError, match="counts the joint steps"):
         export_pddl(dear, [0])
