@@ -28,9 +28,7 @@ from unified_planning.exceptions import (
 )
 from unified_planning.io import PDDLReader
 from unified_planning.model import ContingentProblem
-from unified_planning.model.htn import HierarchicalProblem
 from unified_planning.model.multi_agent import Agent, MultiAgentProblem
-from unified_planning.model.scheduling import SchedulingProblem
 from unified_planning.plans import (
     ActionInstance,
     PartialOrderPlan,
@@ -84,38 +82,25 @@ def verdict(problem: Any, plan: Any, **params: Any) -> Any:
         return validator.validate(problem, plan)
 
 
-def crossing(cells: int = 4, kind: str = "Robot") -> Any:
+CROSSING = """(define (domain crossing) (:requirements :typing) (:types cell KIND)
+  (:predicates (at ?r - KIND ?c - cell) (near ?a ?b - cell) (free ?c - cell) (seen))
+  (:action move :parameters (?r - KIND ?a ?b - cell)
+    :precondition (and (at ?r ?a) (near ?a ?b) (free ?b))
+    :effect (and (not (at ?r ?a)) (at ?r ?b) (not (free ?b)) (free ?a))) MORE)"""
+
+
+def crossing(cells: int = 4, kind: str = "robot", more: str = "") -> Any:
     """Two robots on a star of cells (the T-map with four) trade places, one cell each; entering
     asks for a free cell.
     """
-    cell, robot = up.UserType("Cell"), up.UserType(kind)
-    at = up.Fluent("At", up.BoolType(), r=robot, c=cell)
-    near, free = (
-        up.Fluent("near", up.BoolType(), a=cell, b=cell),
-        up.Fluent("free", up.BoolType(), c=cell),
+    names, others = [f"c{n}" for n in range(cells)], [n for n in range(cells) if n != 1]
+    ways = " ".join(f"(near c{n} c1) (near c1 c{n})" for n in others)
+    free = " ".join(f"(free c{n})" for n in (1, *range(3, cells)))
+    return PDDLReader().parse_problem_string(
+        CROSSING.replace("KIND", kind).replace("MORE", more),
+        f"""(define (problem p) (:domain crossing) (:objects r1 r2 - {kind} {" ".join(names)} - cell)
+        (:init (at r1 c0) (at r2 c2) {ways} {free}) (:goal (and (at r1 c2) (at r2 c0))))""",
     )
-    move = up.InstantaneousAction("Move", r=robot, a=cell, b=cell)
-    for condition in (at(move.r, move.a), near(move.a, move.b), free(move.b)):
-        move.add_precondition(condition)
-    for fluent, value in ((at(move.r, move.a), False), (at(move.r, move.b), True)):
-        move.add_effect(fluent, value)
-    move.add_effect(free(move.b), False)
-    move.add_effect(free(move.a), True)
-    problem = up.Problem("crossing")
-    for fluent in (at, near, free):
-        problem.add_fluent(fluent, default_initial_value=False)
-    problem.add_action(move)
-    places = [problem.add_object(f"c{n}", cell) for n in range(cells)]
-    robots = [problem.add_object(f"R{n}", robot) for n in (1, 2)]
-    for place in (p for n, p in enumerate(places) if n != 1):
-        problem.set_initial_value(near(place, places[1]), True)
-        problem.set_initial_value(near(places[1], place), True)
-    for r, start, goal in ((robots[0], 0, 2), (robots[1], 2, 0)):
-        problem.set_initial_value(at(r, places[start]), True)
-        problem.add_goal(at(r, places[goal]))
-    for n in (1, *range(3, cells)):
-        problem.set_initial_value(free(places[n]), True)
-    return problem
 
 
 def read(folder: str, problem: str) -> Any:
@@ -192,24 +177,6 @@ def test_an_optimal_plan() -> None:
     kinds = {kind: solve(problem, plan_kind=kind).plan for kind in PLAN_KINDS}
     assert {kind: plan.kind for kind, plan in kinds.items()} == {kind: kind for kind in kinds}
     assert all(verdict(problem, plan).status == Validity.VALID for plan in kinds.values())
-
-
-def test_a_sequential_plan_forgets_the_steps() -> None:
-    """Why partial-order plans are the default: other joint plans, the same sequence."""
-    problem, robot = up.Problem("relay"), up.UserType("robot")
-    robots = [problem.add_object(f"r{n}", robot) for n in (1, 2, 3)]
-    done = problem.add_fluent("done", up.BoolType(), r=robot, default_initial_value=False)
-    work = up.InstantaneousAction("work", r=robot)
-    work.add_precondition(up.Not(done(work.r)))
-    work.add_precondition(up.Or(up.Not(up.Equals(work.r, robots[2])), done(robots[0])))
-    work.add_effect(done(work.r), True)
-    problem.add_action(work)
-    for r in robots:
-        problem.add_goal(done(r))
-    first, second = all_plans(problem)  # r3 comes after r1, r2 shares a step with either
-    assert first != second
-    sequences = all_plans(problem, plan_kind=PlanKind.SEQUENTIAL_PLAN)
-    assert sequences[0] == sequences[1]
 
 
 # Multi-agent problems.
@@ -631,103 +598,31 @@ def test_limits(monkeypatch: pytest.MonkeyPatch) -> None:
     assert solve(crossing()).status == Status.MEMOUT
 
 
-def _process(problem: Any) -> None:
-    fuel = problem.add_fluent("fuel", up.RealType(), default_initial_value=3)
-    problem.add_process(up.Process("leak"))
-    problem.process("leak").add_decrease_continuous_effect(fuel, 1)
-
-
-def _event(problem: Any) -> None:
-    problem.add_event(up.Event("gust"))
-    problem.event("gust").add_effect(_free(problem), False)
-
-
-def _numeric(problem: Any) -> None:
-    fuel = problem.add_fluent("fuel", up.IntType(), default_initial_value=3)
-    problem.action("Move").add_decrease_effect(fuel, 1)
-
-
-def _free(problem: Any) -> Any:
-    return problem.fluent("free")(problem.object("c3"))
-
-
-#: What a problem may have, and the engine does not read -> what the refusal names.
-UNREAD: dict[str, Any] = {
-    "STATE_INVARIANTS": lambda p: p.add_trajectory_constraint(up.Always(_free(p))),
-    "TRAJECTORY_CONSTRAINTS": lambda p: p.add_trajectory_constraint(up.Sometime(_free(p))),
-    "TIMED_GOALS": lambda p: p.add_timed_goal(up.GlobalStartTiming(5), _free(p)),
-    "TIMED_EFFECTS": lambda p: p.add_timed_effect(up.GlobalStartTiming(5), _free(p), False),
-    "PROCESSES": _process,
-    "EVENTS": _event,
-    "INT_FLUENTS": _numeric,
-    "UNDEFINED_INITIAL_SYMBOLIC": lambda p: p.add_fluent("unknown", up.BoolType()),
-}
-
-
-@pytest.mark.filterwarnings("ignore:We cannot establish")
-@pytest.mark.parametrize("skip", [False, True])
-@pytest.mark.parametrize("feature", UNREAD)
-def test_a_feature_that_is_not_read_is_refused(feature: str, skip: bool) -> None:
-    """By the planners with a status, by the validator with an exception; also without checks."""
-    problem = crossing()
-    plan = solve(problem).plan
-    UNREAD[feature](problem)
-    assert not CoordlangEngine.supports(problem.kind)
-    refused(problem, plan, feature, skip)
-
-
-def refused(problem: Any, plan: Any, why: str, skip: bool) -> None:
-    engine = CoordlangEngine()
-    engine.error_on_failed_checks, engine.skip_checks = False, skip
-    for result in (engine.solve(problem), *engine.get_solutions(problem)):
-        assert (result.status, result.plan) == (Status.UNSUPPORTED_PROBLEM, None)
-        assert why in str(result.log_messages)
-    with pytest.raises(UPUnsupportedProblemTypeError, match=why):
-        engine.validate(problem, plan)
-
-
 class _Derived(up.Problem):  # type: ignore[misc]
     """What a class of somebody else adds to a problem is not known."""
 
 
 @pytest.mark.filterwarnings("ignore:We cannot establish")
-@pytest.mark.parametrize(
-    "kind", [HierarchicalProblem, ContingentProblem, SchedulingProblem, _Derived]
-)
-def test_a_class_of_problems_that_is_not_read_is_refused(kind: Any) -> None:
-    problem = kind("empty")
-    for skip in (False, True):
-        refused(problem, SequentialPlan([]), f"a {kind.__name__} is not supported", skip)
+@pytest.mark.parametrize("skip", [False, True])
+@pytest.mark.parametrize("kind", [ContingentProblem, _Derived])
+def test_a_class_of_problems_that_is_not_read_is_refused(kind: Any, skip: bool) -> None:
+    """Features and the classes of examples: `test_examples`."""
+    problem, engine = kind("empty"), CoordlangEngine()
+    engine.error_on_failed_checks, engine.skip_checks = False, skip
+    for result in (engine.solve(problem), *engine.get_solutions(problem)):
+        assert (result.status, result.plan) == (Status.UNSUPPORTED_PROBLEM, None)
+        assert f"a {kind.__name__} is not supported" in str(result.log_messages)
+    with pytest.raises(UPUnsupportedProblemTypeError, match="is not supported"):
+        engine.validate(problem, SequentialPlan([]))
 
 
 def test_a_check_that_fails_is_an_error_where_the_user_wants_it() -> None:
     problem = crossing()
-    UNREAD["TIMED_GOALS"](problem)
+    problem.add_timed_goal(up.GlobalStartTiming(5), problem.fluent("free")(problem.object("c3")))
     with pytest.raises(UPNoSuitableEngineAvailableException):
         up.OneshotPlanner(problem_kind=problem.kind, optimality_guarantee="SOLVED_OPTIMALLY")
     with pytest.raises(UPUsageError, match="cannot establish"):
         CoordlangEngine().solve(problem)
-
-
-@pytest.mark.filterwarnings("ignore:We cannot establish")
-def test_another_metric_is_refused_or_without_checks_ignored_and_nothing_promised() -> None:
-    for metrics in (1, 2):
-        problem = crossing()
-        plan = solve(problem).plan
-        for _ in range(metrics - 1):
-            problem.add_quality_metric(up.MinimizeMakespan())
-        problem.add_quality_metric(up.MinimizeActionCosts({problem.action("Move"): up.Int(1)}))
-        result = solve(problem)
-        assert (result.status, result.plan) == (Status.UNSUPPORTED_PROBLEM, None)
-        assert "MinimizeActionCosts" in str(result.log_messages)
-        engine = CoordlangEngine()
-        engine.skip_checks = True
-        *_, last = engine.get_solutions(problem)
-        assert last.status == Status.SOLVED_SATISFICING
-        assert "MinimizeActionCosts is ignored" in str(last.log_messages)
-        assert verdict(problem, plan).status == Validity.VALID, (
-            "which plans are good is another question"
-        )
 
 
 def test_what_nothing_uses_is_no_reason_to_refuse() -> None:
@@ -738,13 +633,10 @@ def test_what_nothing_uses_is_no_reason_to_refuse() -> None:
 
 
 def test_the_factory_finds_the_engine_for_several_agents() -> None:
-    with up.OneshotPlanner(problem_kind=agents().kind) as planner:
-        assert planner.name == "coordlang"
-    problem = agents()
-    with up.AnytimePlanner(
-        problem_kind=problem.kind, anytime_guarantee=up.AnytimeGuarantee.OPTIMAL_PLANS
-    ) as planner:
-        assert planner.name == "coordlang"
+    optimal = {"anytime_guarantee": up.AnytimeGuarantee.OPTIMAL_PLANS}
+    for mode, asked in ((up.OneshotPlanner, {}), (up.AnytimePlanner, optimal)):
+        with mode(problem_kind=agents().kind, **asked) as planner:
+            assert planner.name == "coordlang"
 
 
 @pytest.mark.parametrize(
@@ -760,12 +652,12 @@ def test_the_factory_finds_the_engine_for_several_agents() -> None:
         ({"unowned": "bogus"}, "bogus"),
         ({"unowned": ""}, "unowned"),
         ({"remember_actions": "no"}, "remember_actions"),
-        ({"robots": "R1"}, "sequence"),
+        ({"robots": "r1"}, "sequence"),
         ({"robots": (1,)}, "no object or type"),
-        ({"robots": ("R1",), "robot_type": "cheese"}, "not both"),
-        ({"subactions": {"swapp": {"R1": "(move ?a)"}}}, "no action 'swapp'"),
-        ({"subactions": {"Move": "(move ?a)"}}, "subactions: '.move .a.' for 'Move'"),
-        ({"robot": "R1"}, "no parameter 'robot'"),
+        ({"robots": ("r1",), "robot_type": "cheese"}, "not both"),
+        ({"subactions": {"swapp": {"r1": "(move ?a)"}}}, "no action 'swapp'"),
+        ({"subactions": {"move": "(move ?a)"}}, "subactions: '.move .a.' for 'move'"),
+        ({"robot": "r1"}, "no parameter 'robot'"),
         ({"robots": 3}, "sequence"),
     ],
 )
@@ -782,19 +674,17 @@ def test_wrong_parameters(params: dict[str, Any], message: str) -> None:
 
 def test_who_the_robots_are() -> None:
     problem = crossing()
-    kind = problem.user_type("Robot")
+    kind = problem.user_type("robot")
     for params in (
         {"robots": problem.objects(kind)},
-        {"robots": ("R1", "R2")},
+        {"robots": ("r1", "r2")},
         {"robot_type": kind},
     ):
         assert solve(problem, **params).metrics["plans"] == "2"
-    nobody = up.Problem("nobody")
-    on = nobody.add_fluent("on", up.BoolType(), default_initial_value=False)
-    press = up.InstantaneousAction("press")
-    press.add_effect(on, True)
-    nobody.add_action(press)
-    nobody.add_goal(on)
+    nobody = PDDLReader().parse_problem_string(
+        "(define (domain d) (:predicates (on)) (:action press :parameters () :effect (on)))",
+        "(define (problem p) (:domain d) (:init) (:goal (on)))",
+    )
     with pytest.raises(UPUsageError, match="Say robot_type TYPE or robots NAME,NAME"):
         solve(nobody)
     with pytest.raises(UPUsageError, match="no agent"):
@@ -802,10 +692,8 @@ def test_who_the_robots_are() -> None:
 
 
 def test_a_note_is_a_message_in_words_of_the_engine() -> None:
-    problem = crossing(kind="Vehicle")  # and one action takes nothing but a vehicle
-    look = up.InstantaneousAction("look", r=problem.user_type("Vehicle"))
-    look.add_effect(problem.add_fluent("seen", default_initial_value=False), True)
-    problem.add_action(look)
+    # One action takes nothing but a vehicle.
+    problem = crossing(4, "vehicle", "(:action look :parameters (?r - vehicle) :effect (seen))")
     (message,) = solve(problem).log_messages
     assert "robots are taken to be r1, r2" in str(message)
     assert "Say robot_type vehicle if that is so" in str(message)
@@ -834,10 +722,10 @@ def test_invalid_plans() -> None:
     at_once: dict[Any, list[Any]] = {one: [], two: []}
     for order in (at_once, {one: [two], two: [one]}):  # the second has a cycle
         refused(PartialOrderPlan(order), FailedValidationReason.MUTEX_CONFLICT)
-    wait = up.InstantaneousAction("Wait", r=up.UserType("Robot"))
+    wait = up.InstantaneousAction("wait", r=problem.user_type("robot"))
     elsewhere = (*one.actual_parameters[:2], up.ObjectExp(crossing(5).object("c4")))
     for action in (
-        ActionInstance(wait, (up.ObjectExp(problem.object("R1")),)),
+        ActionInstance(wait, (up.ObjectExp(problem.object("r1")),)),
         ActionInstance(good[0].action, good[0].actual_parameters, agents().agents[0]),
         solve(agents(), plan_kind=PlanKind.SEQUENTIAL_PLAN).plan.actions[0],
         ActionInstance(one.action, elsewhere),
@@ -910,42 +798,23 @@ def test_unified_planning_is_imported_by_register_only() -> None:
     assert (done.stdout, done.stderr) == ("False True\n", "")
 
 
-@pytest.mark.thorough
-def test_the_example_script() -> None:
-    script = ROOT / "docs" / "examples" / "unified_planning_example.py"
-    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
-    lines = done.stdout.splitlines()
-    assert [line.split()[0] for line in lines[:2]] == ["INTERMEDIATE", "SOLVED_OPTIMALLY"]
-    assert [line.split("leaves")[1] for line in lines[3:]] == [
-        " 1 open; SOLVED_OPTIMALLY VALID"
-    ] * 2
-
-
 @pytest.mark.parametrize(("robot", "valid"), [("r2", True), ("r1", False)])
 def test_a_valid_plan_may_have_an_action_that_is_idling(robot: str, valid: bool) -> None:
     """Only r2 is awake, so only r2 may rest, which does nothing."""
-    kind, place = up.UserType("robot"), up.UserType("place")
-    problem = up.Problem("rooms")
-    at = problem.add_fluent("at", up.BoolType(), default_initial_value=False, r=kind, p=place)
-    awake = problem.add_fluent("awake", up.BoolType(), default_initial_value=False, r=kind)
-    go = up.InstantaneousAction("go", r=kind, a=place, b=place)
-    go.add_precondition(at(go.r, go.a))
-    go.add_effect(at(go.r, go.a), False)
-    go.add_effect(at(go.r, go.b), True)
-    rest = up.InstantaneousAction("rest", r=kind)
-    rest.add_precondition(awake(rest.r))
-    wake = up.InstantaneousAction("wake", r=kind)
-    wake.add_effect(awake(wake.r), True)
-    problem.add_actions([go, rest, wake])
-    names = {"r1": kind, "r2": kind, "a": place, "b": place}
-    objects = {name: up.Object(name, own) for name, own in names.items()}
-    problem.add_objects(objects.values())
-    for fact in (at(objects["r1"], objects["a"]), awake(objects["r2"])):
-        problem.set_initial_value(fact, True)
-    problem.add_goal(at(objects["r1"], objects["b"]))
-    move = ActionInstance(go, tuple(up.ObjectExp(objects[name]) for name in ("r1", "a", "b")))
-    idle = ActionInstance(rest, (up.ObjectExp(objects[robot]),))
+    problem = PDDLReader().parse_problem_string(
+        """(define (domain rooms) (:types robot place)
+        (:predicates (at ?r - robot ?p - place) (awake ?r - robot))
+        (:action go :parameters (?r - robot ?a ?b - place) :precondition (at ?r ?a)
+          :effect (and (not (at ?r ?a)) (at ?r ?b)))
+        (:action rest :parameters (?r - robot) :precondition (awake ?r))
+        (:action wake :parameters (?r - robot) :effect (awake ?r)))""",
+        """(define (problem p) (:domain rooms) (:objects r1 r2 - robot a b - place)
+        (:init (at r1 a) (awake r2)) (:goal (at r1 b)))""",
+    )
+    move, idle = (
+        ActionInstance(problem.action(name), tuple(map(up.ObjectExp, map(problem.object, given))))
+        for name, given in (("go", ("r1", "a", "b")), ("rest", (robot,)))
+    )
     found = verdict(problem, SequentialPlan([move, idle]), robot_type="robot")
     with up.PlanValidator(name="sequential_plan_validator") as validator:
         assert validator.validate(problem, SequentialPlan([move, idle])).status == found.status
