@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -50,27 +51,60 @@ def test_plans(coordlang: Command) -> None:
         plans[plans.count]
 
 
-def test_inspect_and_check(coordlang: Command) -> None:
-    found = door.inspect(*T_MAP, states=True)
-    assert str(found) + "\n" == coordlang("inspect", *T_MAP, "--states").out
-    answer = json.loads(coordlang("inspect", *T_MAP, "--states", "--json").out)
-    assert json.loads(json.dumps(found.data())) == answer
-    assert found.reachable is not None
-    assert found.reachable.states == 12
-    assert door.inspect(*T_MAP).reachable is None
-    checked = door.check(*T_MAP)
-    assert checked
-    assert checked.cost == checked.fast_downward == (4, 0)
+SENTENCE = "w0 w2 w1 w0"
+#: Functions, their arguments behind the files, and the same on the command line.
+SAME: list[tuple[str, dict[str, Any], str]] = [
+    ("inspect", {"states": True}, "--states"),
+    ("check", {}, ""),
+    ("coordination", {}, ""),
+    ("verify", {}, ""),
+    ("say", {"plan": "plan"}, "plan"),
+    ("plan", {"sentence": SENTENCE}, f"'{SENTENCE}'"),
+    ("plan", {"prefer": ["first:r2", "shortest"]}, "--prefer first:r2 --prefer shortest"),
+    ("choices", {"sentence": SENTENCE.split()}, f"'{SENTENCE}'"),
+    ("choices", {"sentence": SENTENCE, "robot": "r2"}, f"'{SENTENCE}' --robot r2"),
+    ("explain", {}, ""),
+    ("explain", {"task": True, "sentence": "w0"}, "--task --sentence w0"),
+    ("explain", {"formula_per_word": True}, "--formula-per-word"),
+    *(("export", {"sentence": SENTENCE, "to": to}, f"'{SENTENCE}' --to {to}")
+      for to in ("pddl", "ltlf", "bt")),
+]  # fmt: skip
+NO_LANGUAGE = {"inspect", "check", "coordination", "plans", "build"}
+
+
+@pytest.mark.parametrize(("name", "given", "line"), SAME, ids=str)
+def test_a_function_answers_as_its_command(
+    name: str,
+    given: dict[str, Any],
+    line: str,
+    coordlang: Command,
+    language: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    plans = door.plans(*T_MAP)
+    Path("plan").write_text(plans.ipc(plans[0]))
+    files = [*([] if name in NO_LANGUAGE else [language]), *T_MAP]
+    found = getattr(door, name)(*files, **given)
+    outcome = coordlang(name, *files, *shlex.split(line), "--json")
+    assert json.loads(json.dumps(found.data())) == json.loads(outcome.out)
+    shows_itself(found)
+
+
+def shows_itself(found: Any) -> None:
+    """In a line, and as a table in a notebook."""
+    assert repr(found).startswith(f"{type(found).__name__}(")
+    assert len(repr(found)) < 400
+    assert found._repr_html_().startswith("<table>")
 
 
 def test_coordination(tmp_path: Path) -> None:
     found = door.coordination(*T_MAP)
     assert found
-    assert found.required
-    assert len(found) == 1
     assert found[0].witness is found.witness is not None
-    assert found.witness.step == 0
-    assert "breaks here" in str(found)
+    assert (len(found), found.witness.step) == (1, 0)
+    shows_itself(found[0])
     found = door.coordination(factored=factored(tmp_path / "hall"))
     assert not found
     assert (found[0].plans, found.witness) == (1, None)
@@ -78,29 +112,25 @@ def test_coordination(tmp_path: Path) -> None:
 
 def test_build_and_verify(language: Path, tmp_path: Path) -> None:
     built = door.build(*T_MAP, tasks="all", method="minimal")
+    shows_itself(built)
     assert built.language.words == ("w0", "w1", "w2")
     assert (built.guarantee.proved_minimal, built.tasks, built.stopped) == (True, 132, None)
     assert built.language.provenance.producer["version"] == door.__version__
     assert built.language.provenance.producer["arguments"] == ["method=minimal", "tasks=all"]
-    assert door.load_language(language).states == built.language.states
-    for source in (language, str(language), built.language):
-        found = door.verify(source, *T_MAP)
-        assert found
-        assert (found.words, found.tasks, found.witness) == (3, 132, None)
+    loaded = door.load_language(language)
+    assert loaded.states == built.language.states
+    assert len(repr(loaded)) < 200
+    for word, states in loaded.sizes().items():
+        assert f"<td>{word}</td><td>{states}" in loaded._repr_html_()
     path = tmp_path / "certificate.json"
     write_certificate(built.certificate(), path)
-    for certificate in (path, built.certificate()):
-        found = door.verify(language, *T_MAP, certificate=certificate)
+    for source, proof in ((language, path), (built.language, built.certificate())):
+        found = door.verify(source, *T_MAP, certificate=proof)
         assert found
-        assert found.lower_bound == 3
-
-
-def test_a_language_that_is_none(language: Path) -> None:
-    whole = door.load_language(language)
-    silent = replace(whole, states=dict.fromkeys(whole.states, "w0"))
+        assert (found.words, found.tasks, found.witness, found.lower_bound) == (3, 132, None, 3)
+    silent = replace(loaded, states=dict.fromkeys(loaded.states, "w0"))
     found = door.verify(silent, *T_MAP)
     assert not found
-    assert not found.holds
     assert found.witness is not None
     assert found.witness.sentence == ("w0",)
 
@@ -120,10 +150,8 @@ def test_tasks_as_objects(tmp_path: Path) -> None:
     data = {"format": "coordlang/tasks", "version": 1, "tasks": tasks}
     path = tmp_path / "tasks.json"
     path.write_text(json.dumps(data))
-    counts = {
-        door.build(*CELLS, tasks=source, method="greedy").tasks for source in (tasks, data, path)
-    }
-    assert counts == {1}
+    for source in (tasks, data, path):
+        assert door.build(*CELLS, tasks=source, method="greedy").tasks == 1
     with pytest.raises(door.BadInput, match="missing required field `goal`"):
         door.build(*CELLS, tasks=[{"init": []}], method="greedy")
 
@@ -131,49 +159,40 @@ def test_tasks_as_objects(tmp_path: Path) -> None:
 def test_say_and_understand(language: Path, tmp_path: Path) -> None:
     plans = door.plans(*T_MAP)
     said = {door.say(language, *T_MAP, plan).sentence for plan in plans}
-    assert said == {"w0 w2 w1 w0", "w0"}
+    assert said == {SENTENCE, "w0"}
     path = tmp_path / "plans.json"
     path.write_text(json.dumps(plans.data(list(plans))))
     several = door.say(language, *T_MAP, path)
     assert set(several.sentences) == said
-    assert several.covered
     with pytest.raises(ValueError, match="2 plans"):
         several.sentence  # noqa: B018
-    for sentence in ("w0 w2 w1 w0", ("w0", "w2", "w1", "w0")):
-        left = door.understand(language, *T_MAP, sentence)
-        assert (left.count, left.sentence, left.covered) == (1, "w0 w2 w1 w0", True)
-        assert plans.rank(left[0]) is not None
-        assert len(left.dag().nodes) == 5
-        assert left.dot().startswith("digraph")
-    with pytest.raises(door.NoPlanFits):
-        door.understand(language, *T_MAP, "w0 w1")
+    left = door.understand(language, *T_MAP, SENTENCE)
+    shows_itself(left)
+    assert (left.count, left.sentence, left.covered) == (1, SENTENCE, True)
+    assert plans.rank(left[0]) is not None
+    assert len(left.dag().nodes) == 5
+    assert left.dot().startswith("digraph")
+    assert door.plan(language, *T_MAP, SENTENCE).steps == left[0]
+    for wrong in (
+        lambda: door.understand(language, *T_MAP, "w0 w1"),
+        lambda: door.explain(language, *T_MAP, task=True, sentence="w0 w1"),
+    ):
+        with pytest.raises(door.NoPlanFits):
+            wrong()
     with pytest.raises(door.NotAPlan):
         door.say(language, *T_MAP, [("(move r1 c0-1 c1-1)", "(move r2 c1-0 c1-1)")])
     with pytest.raises(door.NotOptimal):
         door.say(language, *T_MAP, [(None, None), *plans[0]])
 
 
-def test_plan(language: Path) -> None:
-    found = door.plan(language, *T_MAP, "w0 w2 w1 w0")
-    assert (len(found), found.cost, found.covered) == (4, (4, 0), True)
-    assert door.say(language, *T_MAP, found.steps).sentence == found.sentence
-    best = door.plan(language, *T_MAP, prefer=["first:r2", "shortest"])
-    first, shortest = best.fulfilled
-    assert (first.preference, first.is_granted, shortest.value) == ("first:r2", True, 4)
-    assert door.plan(language, *T_MAP, prefer="shortest").sentence == "w0"
-
-
 def test_choices(tmp_path: Path) -> None:
     built = door.build(*CELLS, method="greedy")
     found = door.choices(built.language, *CELLS, "w1 w0")
-    assert found.guaranteed
-    assert found.subplans == {"r1": 1, "r2": 2}
+    assert (found.guaranteed, found.subplans) == (True, {"r1": 1, "r2": 2})
     robot = found.monitor("R2")
     assert robot.allowed() == (None, "(move r2 b a)")
     path = tmp_path / "r2.json"
-    only = door.choices(built.language, *CELLS, "w1 w0", robot="r2", check=True)
-    assert only.robots == ("r2",)
-    only.save(path)
+    door.choices(built.language, *CELLS, "w1 w0", robot="r2", check=True).save(path)
     assert door.Monitor.read(str(path)).remaining == 2
     with pytest.raises(door.NotAllowed):
         robot.did("(move r2 b c)")
@@ -181,33 +200,18 @@ def test_choices(tmp_path: Path) -> None:
         found.monitor("r9")
 
 
-def test_explain(language: Path) -> None:
+def test_explain_and_export(language: Path, tmp_path: Path) -> None:
     found = door.explain(language, *T_MAP, task=True)
     assert found.formulas["w1"] == "at(r1) = c1-0 and at(r2) = c1-1"
     assert found.words.pddl["w1"] == "(and (at r1 c1-0) (at r2 c1-1))"
-    assert [s.words for s in found.sentences] == [("w0",), ("w0", "w2", "w1", "w0")]
+    assert [s.words for s in found.sentences] == [("w0",), tuple(SENTENCE.split())]
     assert [d.plans for d in found.demands()] == [1, 1]
-    one = door.explain(language, *T_MAP, task=True, sentence="w0")
-    assert [s.words for s in one.sentences] == [("w0",)]
-    assert len(one.all_sentences) == 2
-    every = door.explain(language, *T_MAP, formula_per_word=True)
-    assert "every other state" in str(found)
-    assert "every other state" not in str(every)
-    with pytest.raises(door.UsageError, match="--sentence"):
-        door.explain(language, *T_MAP, sentence="w0")
-    with pytest.raises(door.NoPlanFits):
-        door.explain(language, *T_MAP, task=True, sentence="w0 w1")
-
-
-def test_export(language: Path, tmp_path: Path) -> None:
-    exported = door.export(language, *T_MAP, "w0 w2 w1 w0")
-    assert (exported.form, exported.cost, exported.covered) == ("explicit", 4, True)
+    exported = door.export(language, *T_MAP, SENTENCE)
     exported.save(tmp_path / "new")
     assert (tmp_path / "new" / "domain.pddl").read_text() == exported.domain
     with pytest.raises(door.BadInput, match="none of the exported problem"):
         exported.translate_plan(["fly"])
-    formula = door.export(language, *T_MAP, "w0 w2 w1 w0", to="ltlf")
-    assert formula.over_words.startswith("(w0 & (w0 U (w2")
+    formula = door.export(language, *T_MAP, SENTENCE, to="ltlf")
     assert str(formula) == formula.formula
 
 
@@ -235,33 +239,6 @@ def test_of_two_contradictions_the_same_is_told(language: Path, given: tuple[str
         options_of(door.load_language(language), model, given)
 
 
-def test_results_show_themselves(language: Path) -> None:
-    results = [
-        door.plans(*T_MAP),
-        door.inspect(*T_MAP),
-        door.coordination(*T_MAP),
-        door.coordination(*T_MAP)[0],
-        door.build(*CELLS, method="greedy"),
-        door.verify(language, *T_MAP),
-        door.say(language, *T_MAP, door.plans(*T_MAP)[0]),
-        door.understand(language, *T_MAP, "w0"),
-        door.plan(language, *T_MAP, "w0"),
-        door.choices(language, *T_MAP, "w0"),
-        door.explain(language, *T_MAP),
-        door.export(language, *T_MAP, "w0"),
-        door.export(language, *T_MAP, "w0", to="ltlf"),
-    ]
-    for result in results:
-        assert len(repr(result)) < 400
-        assert repr(result).startswith(f"{type(result).__name__}(")
-        html = result._repr_html_()
-        assert html.startswith("<table>")
-    loaded = door.load_language(language)
-    assert len(repr(loaded)) < 200
-    for word, states in loaded.sizes().items():
-        assert f"<td>{word}</td><td>{states}" in loaded._repr_html_()
-
-
 BUILD = [
     ({"cost": "steps"}, "--cost steps: there is no such value"),
     ({"unowned": "nobody"}, "--unowned nobody: there is no such value"),
@@ -277,6 +254,7 @@ USES = [
     ("plan", {"sentence": "w0", "prefer": "shortest"}, ""),
     ("plan", {"sentence": "w0", "heuristic": "best"}, "--heuristic"),
     ("plan", {"prefer": "best"}, ""),
+    ("explain", {"sentence": "w0"}, "--sentence"),
     ("export", {"sentence": "w0", "to": "sas"}, "--to sas"),
     ("verify", {"robot_type": "robot"}, "Leave out --robot-type"),
     *(("choices", {"sentence": "w0", "robot": r}, "") for r in (3, [3], "r9", ["r1", "r9"])),
@@ -303,7 +281,7 @@ VALUES: list[dict[str, Any]] = [
 def test_a_wrong_value_is_an_error_and_never_another_answer(
     name: str, wrong: dict[str, Any], message: str, language: Path
 ) -> None:
-    files = T_MAP if name in ("build", "plans") else [language, *T_MAP]
+    files = T_MAP if name in NO_LANGUAGE else [language, *T_MAP]
     with pytest.raises(door.UsageError, match=message or None) as caught:
         getattr(door, name)(*files, **wrong)
     assert caught.value.remedy
