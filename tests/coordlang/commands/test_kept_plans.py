@@ -3,9 +3,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -89,41 +86,3 @@ def test_no_cache_reads_and_keeps_nothing(
     request.getfixturevalue("no_search")
     assert coordlang(*arguments).out == "18\n"
     assert "is searched again" in coordlang(*arguments, "--no-cache").err
-
-
-def test_damage_is_said(coordlang: Command, folder: Path) -> None:
-    arguments = ("plans", *GRID, "--count")
-    coordlang(*arguments)
-    (entry,) = folder.glob("plans-*/*")
-    whole = entry.read_bytes()
-    entry.write_bytes(whole[:-1])
-    outcome = coordlang(*arguments)
-    assert (outcome.code, outcome.out) == (0, "18\n")
-    assert f"{entry} is damaged: it is ignored, and its result is worked out again" in outcome.err
-    assert entry.read_bytes() == whole
-    assert coordlang(*arguments).err == ""
-
-
-def test_a_folder_that_cannot_be_made(
-    coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "file").write_text("")
-    monkeypatch.setenv("COORDLANG_CACHE", str(tmp_path / "file"))
-    outcome = coordlang("plans", *GRID, "--count")
-    assert (outcome.code, outcome.out) == (0, "18\n")
-    assert "not kept" in outcome.err
-    assert "--no-cache" in outcome.err
-
-
-def test_two_commands_at_once(folder: Path) -> None:
-    command = [sys.executable, "-m", "coordlang", "plans", *map(str, GRID), "--count"]
-    both = [
-        subprocess.Popen(
-            command, env=dict(os.environ), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
-        for _ in range(2)
-    ]
-    assert [(*process.communicate(), process.returncode) for process in both] == [
-        ("18\n", "", 0)
-    ] * 2
-    assert len([*folder.glob("plans-*/*")]) == 1

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from coordlang.commands import terminal
-from coordlang.commands.layout import WIDTH, alike, columns, fitted, named, wrapped
-from coordlang.commands.witness import witness_data, witness_text
+from coordlang.commands.layout import WIDTH, columns, fitted, wrapped
+from coordlang.commands.witness import witness_text
 from coordlang.required.miscoordination import Miscoordination, Step
 from planners.joint.states import split_atoms
 from tests.support.command import Command
@@ -62,12 +62,6 @@ def test_lines_fit(width: int) -> None:
         assert atom in text.replace("\n", "")
 
 
-def test_json_has_all_of_it() -> None:
-    data = witness_data(seven())
-    assert data is not None
-    assert len(data["plans"]) == len(data["states"]) == 7
-
-
 def test_atoms_are_not_broken() -> None:
     text = "state (at r1 c0-0) (last r2 (go r2 b)) (not (free r1)) end"
     assert wrapped(text, 80, "  ", "    ") == ["  " + text]
@@ -84,12 +78,6 @@ def test_atoms_are_not_broken() -> None:
         "  10  a     (at r1 c0-0) (at r2 c0-1)",
         "      | b   (at r3 c2-2)",
     ]
-
-
-def test_names_and_groups() -> None:
-    assert named(["a"]) == "a"
-    assert named(["a", "b", "c"]) == "a, b and c"
-    assert list(alike(["x", "y", "x"])) == [[0, 2], [1]]
 
 
 class Screen:

@@ -6,7 +6,6 @@ each other.
 from __future__ import annotations
 
 import json
-import os
 import shutil
 from pathlib import Path
 
@@ -104,28 +103,16 @@ TO_FILE = [
         *((line, "no/x", "there is no folder no") for line in TO_FILE),
         (TO_FILE[0], "plan/x", "there is no folder plan"),
         (TO_FILE[0], "in", "Is a directory"),
-        (TO_FILE[0], "shut/x", "Permission denied"),
     ],
 )
 def test_the_place_is_looked_at_before_the_work(
     line: str, place: str, reason: str, here: Shell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    Path("shut").mkdir()
-    access = os.access  # the superuser may write everywhere
-    monkeypatch.setattr(
-        os, "access", lambda path, mode: Path(path).name != "shut" and access(path, mode)
-    )
     monkeypatch.setattr(
         "coordlang.commands.inputs.read_domain", lambda *_: pytest.fail("no work before")
     )
     said = f"{line.split()[-1]} {place} cannot be written: {reason}\n  Name a file"
     here(f"{line} {place}", 2, said)
-
-
-def test_a_shut_folder_for_exported_files(here: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(os, "access", lambda path, mode: not os.path.isdir(path))
-    here(f"{EXPORT} -o made/here", 2, "Permission denied")
-    assert not Path("made").exists()
 
 
 @pytest.mark.parametrize("line", [f"{BUILD} -o x.json --certificate", VERIFY])

@@ -9,14 +9,11 @@ import pty
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
-from generate import problem_text, scenario
-from gridmap import open_grid
 
 from coordlang.commands import terminal
-from tests.support.domains import DOMAINS, ROOT
+from tests.support.domains import ROOT
 
 CODE = """
 import sys, time
@@ -79,23 +76,6 @@ def test_how_far_the_work_got() -> None:
     done = re.findall(r"searching: (\d+) states .. \d s", shown)
     assert any(int(number) > 10 for number in done)
     assert "searching .. 1 s" in shown or "searching .. 2 s" in shown
-
-
-def test_how_far_a_search_got(tmp_path: Path) -> None:
-    problem = tmp_path / "corners.pddl"  # a second of search, for there to be something to show
-    problem.write_text(problem_text(scenario("corners", open_grid(6, 6), robots=3), "grid"))
-    files = [str(DOMAINS / "grid" / "domain.pddl"), str(problem)]
-    arguments = ["plans", *files, "--count", "--no-cache", "--heuristic", "blind"]
-    code = CODE.split("with terminal.working")[0] + (
-        "from coordlang.__main__ import main\n"
-        "import planners.search.optimal_plans\n"
-        "terminal._INTERVAL = 0.01\n"
-        f"sys.argv[1:] = {arguments}\n"
-        "main()\n"
-    )
-    out, shown = on_a_terminal(code)
-    assert out.strip().isdigit()
-    assert re.search(r"finding all optimal plans: [\d,]+ states within \d+ steps", shown)
 
 
 @pytest.mark.thorough
