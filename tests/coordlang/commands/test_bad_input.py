@@ -59,8 +59,7 @@ WRONG = [
     ((DOMAIN + ")", PROBLEM), "d.pddl:8:1: unexpected ')' after the end of the definition"),
     (
         d("(door ?x ?y))\n", "(door ?x ?y)\n(:action wait :parameters () :effect (and))"),
-        "d.pddl:7:1: ':action' begins inside of another list: a ')' is missing before it\n"
-        "  '(:action' opens at ",
+        "d.pddl:7:1: ':action' begins inside of another list: a ')' is missing before it\n  '(:act",
     ),
     (("(" * 10_000, PROBLEM), "nested more than 200 deep"),
     (("", PROBLEM), "expected '(define ...', found an empty file\n  Give a PDDL file"),
@@ -68,67 +67,44 @@ WRONG = [
     # domains
     (
         d("(at ?r ?y) (not", "(at ?y ?r) (not"),
-        "d.pddl:7:22: argument 1 of 'at', '?y', is of type room, not robot\n"
-        "  It is declared as (at robot room): are arguments swapped",
+        "d.pddl:7:22: argument 1 of 'at', '?y', is of type room, not robot\n  It is declared as (at ",
     ),
     (
-        d(":precondition (and (at ?r ?x)", ":precondition (and (at ?r)"),
-        "d.pddl:6:24: predicate 'at' takes 2 arguments, found 1\n"
-        "  Write (at a b), or declare it with 1.",
+        d("(and (at ?r ?x)", "(and (at ?r)"),
+        "d.pddl:6:24: predicate 'at' takes 2 arguments, found 1",
     ),
     (d(PLACES, PLACES.replace("room", "rom")), "type 'rom' of '?x' is not declared"),
     (d("(at ?r ?y)", "(at ?r ?z)"), "variable ?z is not declared here"),
-    (
-        d(PLACES, PLACES.replace("?y", "?x")),
-        "variable ?x is declared twice\n  Give one of the two another name.",
-    ),
+    (d(PLACES, PLACES.replace("?y", "?x")), "variable ?x is declared twice\n  Give one of the two"),
     (d(":effect", ":effects"), "unknown keyword ':effects' in an action"),
     (("(define (domain hall))", PROBLEM), "this domain has no action"),
-    (
-        (DOMAIN.rstrip()[:-1] + "(:action go :parameters () :effect ()))", PROBLEM),
-        "action 'go' is declared twice",
-    ),
+    ((f"{DOMAIN.rstrip()[:-1]}(:action go))", PROBLEM), "action 'go' is declared twice"),
     (
         d("(at ?r ?x) (door", "(at r1 ?x) (door"),
-        "d.pddl:6:28: object 'r1' is not declared\n  No object is declared. An object that a domain "
-        "names belongs in its (:constants ..).",
+        "d.pddl:6:28: object 'r1' is not declared\n  No object is declared. An object that a domain ",
     ),
     # problems
     (
         p("(at r2 a))))", "(at r2 c))))"),
         "p.pddl:4:32: object 'c' is not declared\n  Declared objects: a, b, r1, r2.\n",
     ),
-    (
-        p("a b - room", "a b -"),
-        "p.pddl:2:31: expected a type after '-'\n"
-        "  Write the type's name after it, or leave the '-' out.",
-    ),
+    (p("a b - room", "a b -"), "p.pddl:2:31: expected a type after '-'\n  Write the type's name "),
     (p("- robot a", "- rbot a"), "type 'rbot' of 'r1' is not declared"),
-    (
-        p("a b - room", "a ?b - room"),
-        "a variable cannot be an object\n  Names of objects have no '?': b.",
-    ),
+    (p("a b - room", "a ?b - room"), "a variable cannot be an object\n  Names of objects have no"),
     (
         p("(at r1 b) (at r2 a)", "(at r1 (at r2 a))"),
-        "expected a variable or an object, found a list\n  Arguments are names:",
+        "expected a variable or an object, found a list",
     ),
-    (
-        p("r1 r2 - robot", "(r1) r2 - robot"),
-        "expected an object, found a list\n  Write an object here, without parentheses.",
-    ),
+    (p("r1 r2 - robot", "(r1) r2 - robot"), "expected an object, found a list\n  Write an object"),
     (
         p("(:init (at r1 a)", "(:init at"),
-        "expected an atom in parentheses, found 'at'\n  Put it in parentheses",
+        "expected an atom in parentheses, found 'at'\n  Put it in",
     ),
-    (
-        p("a b - room", "a b - (either)"),
-        "expected a type or '(either type ..)'\n"
-        "  One type is a name, several are (either name name).",
-    ),
+    (p("a b - room", "a b - (either)"), "expected a type or '(either type ..)'\n  One type is a "),
     (p("hall", "house"), "p.pddl:1:23: this is a problem for domain 'house', not for 'hall'"),
     (
         (DOMAIN, "(define (problem p) (:domain hall) (:goal (and)))"),
-        "there is no robot in this problem",
+        "there is no robot in this pro",
     ),
     (p(GOAL, ")"), "expected one '(:goal FORMULA)', found none\n  Write"),
     (p(GOAL, "(:goal))"), "'(:goal FORMULA)', this one has no formula"),
@@ -141,44 +117,15 @@ def test_wrong_files(files: tuple[str, str], message: str, shell: Shell) -> None
     shell("plans d.pddl p.pddl", 31, message)
 
 
-TOO_MUCH = (
-    "d.pddl:5:3: an action cost above 2147483648 (of go) is not supported\n"
-    "  Write costs in a larger unit, or leave out --cost"
-)
-
-
-@pytest.mark.parametrize(
-    ("cost", "code", "message"),
-    [
-        ("2147483648", 0, ""),
-        ("4e", 31, "expected a number"),
-        ("2147483649", 34, TOO_MUCH),
-        ("4000000000.0", 34, TOO_MUCH),
-    ],
-)
-def test_large_costs(cost: str, code: int, message: str, shell: Shell) -> None:
+@pytest.mark.parametrize(("cost", "code"), [("2147483648", 0), ("4e", 31), ("2147483649", 34)])
+def test_large_costs(cost: str, code: int, shell: Shell) -> None:
     write(*d(":effect (and", f":effect (and (increase (total-cost) {cost})"))
-    shell("plans d.pddl p.pddl --count --cost makespan+cost", code, message)
-
-
-CANDIDATES = """(define (domain en) (:types robot hall) (:predicates (q ?r - robot) (open) (busy ?r))
- (:action go :parameters (?r - robot) :precondition (open) :effect (q ?r))
- (:action door :parameters () :effect (open)))"""
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "listed"),
-    [("robot", "man", "man"), (" - robot", "", "busy"), ("hall", "hall", "robot")],
-)
-def test_what_may_be_the_robots(old: str, new: str, listed: str, shell: Shell) -> None:
-    problem = (
-        "(define (problem p) (:domain en) (:objects a b - robot) (:init (busy a) (busy b)) "
-        "(:goal (and (q a) (q b))))"
-    )
-    write(CANDIDATES.replace(old, new), problem.replace(old, new))
-    line = "plans d.pddl p.pddl --unowned shared --robot-type"
-    shell(f"{line} nix", 2, f"Candidates: {listed}.\n")
-    shell(f"{line} {listed}")
+    said = {
+        0: "",
+        31: "expected a number",
+        34: "d.pddl:5:3: an action cost above 2147483648 (of go",
+    }
+    shell("plans d.pddl p.pddl --count --cost makespan+cost", code, said[code])
 
 
 def test_one_robot_is_noted(shell: Shell) -> None:
@@ -186,17 +133,6 @@ def test_one_robot_is_noted(shell: Shell) -> None:
     write(problem=text.replace("(at r2 a)", ""))
     said = "r1 is the only robot: there is nothing to coordinate"
     assert shell("plans d.pddl p.pddl --count", 0, said).out == "1\n"
-
-
-def test_no_step(shell: Shell) -> None:
-    write(problem=PROBLEM.replace("(at r1 b) (at r2 a))))", "(at r1 a))))"))
-    assert json.loads(shell("plans d.pddl p.pddl --json").out) == {
-        "plans": [{"cost": 0, "actions": []}],
-        "count": 1,
-        "complete": True,
-        "optimal_cost": 0,
-        "robots": ["r1", "r2"],
-    }
 
 
 def test_problems_of_different_worlds(shell: Shell) -> None:
@@ -271,34 +207,6 @@ def test_a_state_in_which_nothing_is_true(shell: Shell) -> None:
     shell("say l.json d.pddl p.pddl plan", 1, "The state before it is (no fact holds).")
 
 
-def test_a_good_language_survives_a_failing_build(shell: Shell, language: Path) -> None:
-    before = language.read_bytes()
-    task_file([])
-    shell("build T-MAP --tasks tasks.json --method greedy -o language.json", 31)
-    assert language.read_bytes() == before
-    assert [p.name for p in Path().iterdir() if p.name.startswith(".")] == []
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        (None, "this is no JSON, or it is cut off"),
-        ({"version": 2}, "language file version 2; this program reads version 1"),
-        ({"format": "x"}, "format 'x', expected 'coordlang/language'"),
-        ({"default": "w99"}, "'w99' (of 'default') is not among the words"),
-        ({"states": {"(at r1 moon)": "w0"}}, "(at r1 moon) can never be true"),
-    ],
-    ids=str,
-)
-def test_language_that_says_what_it_must_not(
-    changes: dict[str, object] | None, message: str, shell: Shell, language: Path
-) -> None:
-    text = language.read_text()
-    changed = text[:-20] if changes is None else json.dumps(json.loads(text) | changes)
-    language.write_text(changed)
-    shell("verify language.json T-MAP", 31, message)
-
-
 def test_language_of_another_domain_or_world(shell: Shell, language: Path) -> None:
     said = "this language belongs to another domain ('t-map')"
     shell("verify language.json d.pddl p.pddl", 31, said)
@@ -307,11 +215,6 @@ def test_language_of_another_domain_or_world(shell: Shell, language: Path) -> No
     Path("other.pddl").write_text(text)
     said = "has other objects or static facts than the language's problem"
     shell(f"verify language.json {domain} other.pddl", 31, said)
-    said = "contradicts the language file, which was built with --cost makespan\n  Leave out"
-    shell("verify language.json T-MAP --cost makespan+actions", 2, said)
-    for option in ("--unowned environment", "--robots r1", "--remember-actions"):
-        said = f"Leave out {option.split()[0]}.\n"
-        shell(f"verify language.json T-MAP {option}", 2, said)
 
 
 PLANS, UNDERSTAND, CHOICES, BUILD = (
@@ -366,36 +269,17 @@ def test_a_folder_without_factored_files(name: str, message: str, shell: Shell) 
     shell(f"plans --factored {name}", 31, message)
 
 
-def test_time_limit(shell: Shell) -> None:
-    said = "the time limit of 0.5 s is over"
-    assert shell("build HUGE --tasks all -o - --time-limit 0.5", 23, said).out == ""
-
-
-NOBODY_MOVES = """(define (domain d) (:requirements :typing) (:types robot cell)
-  (:predicates (at ?r - robot ?c - cell) (way ?a ?b - cell) (key ?r - robot) (pass ?r - robot))
-  (:action alone :agent ?r - robot :parameters (?a ?b - cell)
-    :precondition (and (pass ?r) (at ?r ?a) (way ?a ?b))
-    :effect (and (at ?r ?b) (not (at ?r ?a))))
-  (:action with :agent ?r - robot :parameters (?a ?b - cell)
-    :precondition (and (at ?r ?a) (way ?a ?b)
-      (exists (?o - robot) (and (not (= ?o ?r)) (help ?o))))
-    :effect (and (pass ?r) (at ?r ?b) (not (at ?r ?a))))
-  (:action help :agent ?r - robot :parameters ()
-    :precondition (and (pass ?r) (key ?r)
-      (forall (?o - robot ?a ?b - cell) (not (with ?o ?a ?b))))
-    :effect (not (key ?r))))
-"""
-
-
 def test_verifying_no_task_at_all(shell: Shell) -> None:
     """A start from which nobody can move, though each fact might change: there are no pairs."""
-    text = (
-        "(define (problem p) (:domain d) (:objects r1 r2 - robot a b - cell)"
-        "(:init (at r1 a) (at r2 b) (way a b) (way b a) (key r1) (key r2) PASS)"
-        "(:goal (at r1 a)))"
+    off = "(:action off :agent ?r - robot :precondition (on ?r) :effect (not (on ?r))) (:action go"
+    domain = DOMAIN.replace("(:action go", off).replace(
+        "?y - room))", "?y - room) (on ?r - robot))"
     )
-    write(NOBODY_MOVES, text.replace("PASS", "(pass r1) (pass r2)"))
-    Path("stuck.pddl").write_text(text.replace("PASS", ""))
+    write(
+        domain.replace("(and (at ?r ?x)", "(and (on ?r) (at ?r ?x)"),
+        *p("(:init", "(:init (on r1) (on r2)")[1:],
+    )
+    Path("stuck.pddl").write_text(PROBLEM)
     shell("build d.pddl p.pddl --tasks all --method greedy -o l.json")
     said = "there is no candidate task"
     assert shell("verify l.json d.pddl stuck.pddl --tasks all", 11, said).out == ""

@@ -54,7 +54,7 @@ def test_no_command_searches_again(
     coordlang: Command, folder: Path, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
     language, plan = tmp_path / "l.json", tmp_path / "plan"
-    build = ("build", *GRID, "-o", language, "--jobs", 1)
+    build = ("build", *GRID, "--method", "greedy", "-o", language, "--jobs", 1)
     assert coordlang(*build).code == 0
     (entry,) = folder.glob("plans-*/*")
     outcome = coordlang("plans", *GRID, "--max", 1, "--format", "ipc")

@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 
-import coordlang
 from coordlang.commands.building import build_language
 from coordlang.commands.repairing import repair_language
 from coordlang.language.words import Language
@@ -72,16 +71,6 @@ def test_it_says_which_and_why(shell: Shell) -> None:
     before = Path("new.json").read_bytes()
     shell("build CELLS --start new.json -o new.json", 2)
     assert Path("new.json").read_bytes() == before
-
-
-def test_a_language_that_still_holds_is_as_it_was(shell: Shell) -> None:
-    """States that are on no plan of the tasks stay, too."""
-    build(shell, "SQUARE --tasks all --method minimal -o old.json")
-    figures = build(shell, "SQUARE --tasks all --start old.json -o new.json")
-    assert figures["repair"]["still_holds"]
-    assert (figures["words"], figures["lower_bound"], figures["proved_minimal"]) == (3, 2, False)
-    assert parts("new.json") == parts("old.json")
-    assert json.loads(Path("new.json").read_text())["guarantee"]["method"] == "repair"
 
 
 def test_tasks_are_added_to_those_recorded(shell: Shell) -> None:
@@ -210,17 +199,3 @@ def test_a_false_bound_is_not_carried_over() -> None:
         built = repair_language(candidates, start)
         assert built.language.guarantee.lower_bound == bound
         assert built.verdict.holds
-
-
-def test_from_python() -> None:
-    one = coordlang.build(*CELLS, method="minimal")
-    all_of_it = coordlang.build(*CELLS, tasks="all", start=one.language)
-    assert one.repaired is None
-    repaired = all_of_it.repaired
-    assert repaired is not None
-    assert not repaired.still_holds
-    assert [change.new for change in repaired.changed] == ["w2", "w2"]
-    assert coordlang.verify(all_of_it.language, *CELLS)
-    again = coordlang.build(*CELLS, tasks="all", start=all_of_it.language)
-    assert again.repaired is not None
-    assert again.repaired.still_holds
