@@ -34,20 +34,43 @@ _SLACK = 0.8
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
-    """A differential drive: its greatest speed (m/s) and rate of turning (rad/s)."""
+class Body:
+    """How a robot is built, with lengths in metres and times in seconds.
 
-    speed: float
-    turn: float
+    ``cell`` is the length of one unit of the coordinates of places, ``radius`` the robot's,
+    ``speed`` (m/s) and ``turn`` (rad/s) are the greatest of its wheels; ``tick`` lies between two
+    looks at sensors and commands to wheels.
+    """
+
+    cell: float = 1.0
+    radius: float = 0.2
+    speed: float = 1.0
+    turn: float = 3.0
+    tick: float = 0.1
+
+    @property
+    def clearance(self) -> float:
+        """How near to its middle a robot lets come what is straight ahead."""
+        return self.radius + 0.03 * self.cell
+
+    @property
+    def reaction(self) -> float:
+        """A robot drives so slowly that it would come as near as that only after this time.
+
+        Three ticks: two robots that come head on take at most two thirds of what is between them
+        in a tick, and so never touch.
+        """
+        return 3 * self.tick
 
     @property
     def turning(self) -> float:
-        """Seconds in which every turn on the spot is done: half a turn, and some slack."""
+        """The time in which every turn on the spot is done: half a turn, and some slack."""
         return math.pi / self.turn + _SLACK
 
-    def period(self, metres: float) -> float:
-        """Seconds for a joint step whose longest way has this length: turn, then drive."""
-        return self.turning + (metres / self.speed + _SLACK)
+    def period(self, longest: float) -> float:
+        """The time of a joint step whose longest way has this length, in whole ticks."""
+        needed = self.turning + (longest / self.speed + _SLACK)
+        return round(math.ceil(needed / self.tick) * self.tick, 6)
 
 
 def distance(pose: Pose, target: tuple[float, float]) -> float:
@@ -61,38 +84,20 @@ def _bearing(pose: Pose, target: tuple[float, float]) -> float:
     return math.remainder(angle, 2 * math.pi)
 
 
-def turned(pose: Pose, target: tuple[float, float], drive: Drive) -> Velocity:
+def turned(pose: Pose, target: tuple[float, float], body: Body) -> Velocity:
     """Turn on the spot towards a point."""
-    return 0.0, _bounded(_GAIN * _bearing(pose, target), drive.turn)
+    return 0.0, _bounded(_GAIN * _bearing(pose, target), body.turn)
 
 
-def driven(pose: Pose, target: tuple[float, float], drive: Drive) -> Velocity:
+def driven(pose: Pose, target: tuple[float, float], body: Body) -> Velocity:
     """Drive towards a point, steering; slower where it is near or not straight ahead."""
     angle = _bearing(pose, target)
     ahead = _GAIN * distance(pose, target) * max(0.0, math.cos(angle))
-    return _bounded(ahead, drive.speed), _bounded(_GAIN * angle, drive.turn)
+    return _bounded(ahead, body.speed), _bounded(_GAIN * angle, body.turn)
 
 
 def _bounded(value: float, most: float) -> float:
     return max(-most, min(most, value))
-
-
-@dataclass(frozen=True, slots=True)
-class Body:
-    """What a robot knows of itself and of the floor.
-
-    ``points`` are the places in metres, ``leads`` the place that each own subaction leads to, if it
-    leads anywhere; ``cell`` is the length that counts as one place.  The robot stands still where
-    something is nearer than ``clearance`` straight ahead (metres from its middle), and drives so
-    slowly that it would come as near as that in ``reaction`` seconds.
-    """
-
-    drive: Drive
-    points: Mapping[str, tuple[float, float]]
-    leads: Mapping[str, str]
-    cell: float
-    clearance: float
-    reaction: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,25 +162,29 @@ class Asked:
 class Robot:
     """One robot.
 
-    It follows ``monitor``, its choices, and draws among them with ``random``; a step takes
-    ``period`` seconds at most where nothing comes in between.  ``words`` says how far in the
-    sentence own subactions may lead; None where no sentence is agreed.
+    It follows ``monitor``, its choices, and draws among them with ``random``.  ``points`` are the
+    places in metres, ``leads`` the place that each own subaction leads to, if it leads anywhere; a
+    step takes ``period`` seconds at most where nothing comes in between.  ``words`` says how far in
+    the sentence own subactions may lead; None where no sentence is agreed.
     """
 
     def __init__(
         self,
         name: str,
-        monitor: Monitor,
         body: Body,
+        points: Mapping[str, tuple[float, float]],
+        leads: Mapping[str, str],
+        monitor: Monitor,
+        words: OwnWords | None,
         pace: Pace,
         period: float,
         random: Random,
-        words: OwnWords | None = None,
     ) -> None:
         self.name = name
         self.steps: list[OwnStep] = []
         self.detours: list[Asked] = []
-        self._monitor, self._body, self._pace, self._period = monitor, body, pace, period
+        self._body, self._points, self._leads = body, points, leads
+        self._monitor, self._pace, self._period = monitor, pace, period
         self._random, self._own_words, self._word_state = random, words, 0
         #: Own steps done, and words of the sentence passed at most, by its own account.
         self.done = self.words = 0
@@ -222,7 +231,7 @@ class Robot:
             if self._pace.is_common or sensed.time >= step.begin + self._period:
                 return Act(messages=self._finish(step, sensed.time))
             return Act()
-        target = self._body.points[step.place]
+        target = self._points[step.place]
         if distance(sensed.pose, target) < ARRIVED * self._body.cell:
             return Act(messages=self._finish(step, sensed.time))
         return self._drive(target, step, sensed)
@@ -236,7 +245,7 @@ class Robot:
             self.detours.append(Asked(atom, None, granted))
         met = {self._place_of(stranger, sensed.pose) for stranger in sensed.strangers}
         for place in sorted(met - {detour.avoid for detour in self.detours}):
-            ways = [text for text, led in sorted(self._body.leads.items()) if led == place]
+            ways = [text for text, led in sorted(self._leads.items()) if led == place]
             if not ways:
                 continue
             granted = bool(self._monitor.can(never=ways))
@@ -249,7 +258,7 @@ class Robot:
         length = stranger[0] + self._body.cell / 10
         angle = pose[2] + stranger[1]
         at = pose[0] + length * math.cos(angle), pose[1] + length * math.sin(angle)
-        away = {name: math.dist(at, point) for name, point in self._body.points.items()}
+        away = {name: math.dist(at, point) for name, point in self._points.items()}
         return min(sorted(away), key=away.__getitem__)
 
     @property
@@ -258,7 +267,7 @@ class Robot:
 
     def _begin(self, time: float) -> None:
         subaction = drawn(self._monitor, self._random)
-        place = self._body.leads.get(subaction) if subaction is not None else None
+        place = self._leads.get(subaction) if subaction is not None else None
         self._monitor.did(subaction)
         self.steps.append(OwnStep(self.done, subaction, place, time))
         self._is_turning = place is not None
@@ -275,17 +284,17 @@ class Robot:
 
     def _drive(self, target: tuple[float, float], step: OwnStep, sensed: Sensed) -> Act:
         """Turn on the spot, then drive: where all begin together, all drive off together."""
-        drive, elapsed = self._body.drive, sensed.time - step.begin
+        body = self._body
         if self._is_turning:
             aligned = abs(_bearing(sensed.pose, target)) < _ALIGNED
-            waits = self._pace.is_common and elapsed < drive.turning
+            waits = self._pace.is_common and sensed.time - step.begin < body.turning
             if waits or not aligned:
-                return Act(turned(sensed.pose, target, drive))
+                return Act(turned(sensed.pose, target, body))
             self._is_turning = False
         if sensed.ahead is None:
             return Act()
-        ahead, turn = driven(sensed.pose, target, drive)
-        room = (sensed.ahead - self._body.clearance) / self._body.reaction
+        ahead, turn = driven(sensed.pose, target, body)
+        room = (sensed.ahead - body.clearance) / body.reaction
         if room <= 0:
             return Act((0.0, turn), is_stopped=True)
         return Act((min(ahead, room), turn))

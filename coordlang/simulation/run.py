@@ -22,7 +22,7 @@ from coordlang.simulation.record import (
     StepRecord,
     WishRecord,
 )
-from coordlang.simulation.robot import Act, Body, Pose, Robot, Sensed
+from coordlang.simulation.robot import Act, Pose, Robot, Sensed
 from coordlang.simulation.simulator import POSITION_NOISE, Settings, Simulator, require_simulator
 from coordlang.simulation.team import Mission
 from coordlang.sites.coordinates import Point
@@ -45,41 +45,17 @@ def runs_of(
 ) -> Iterator[RunRecord]:
     """Run a mission so many times, with the seeds ``seed``, ``seed + 1``, ..
 
-    Raises
-    ------
-    UsageError
-        If ir-sim is not installed, or the robots are too large for the floor.
+    ``floor`` has the places of the mission's world; ``wishes`` are what robots come to want on the
+    way.  The same seed gives the same run; O(robots * ticks).  Raises `UsageError` if ir-sim is not
+    installed, or the robots are too large for the floor.
     """
     require_room(floor, settings.radius)
     require_simulator()
     for further in range(number):
-        yield run(mission, floor, settings, seed + further, wishes)
-
-
-def run(
-    mission: Mission, floor: Floor, settings: Settings, seed: int, wishes: Sequence[WishRecord] = ()
-) -> RunRecord:
-    """Let the robots do a task once.
-
-    The same seed gives the same run.  O(robots * ticks).
-
-    Parameters
-    ----------
-    mission
-        What each robot is given.
-    floor
-        The places of the mission's world.
-    settings
-        How robots are built and keep step.
-    seed
-        Of every choice and of all noise.
-    wishes
-        What robots come to want on the way.
-    """
-    going = _Going(mission, floor, settings, seed, wishes)
-    while not going.has_ended:
-        going.tick()
-    return going.record()
+        going = _Going(mission, floor, settings, seed + further, wishes)
+        while not going.has_ended:
+            going.tick()
+        yield going.record()
 
 
 def record_of(
@@ -138,19 +114,13 @@ class _Going:
         self.robots = {
             name: Robot(
                 name,
-                given.monitor,
-                Body(
-                    settings.drive,
-                    floor.points,
-                    mission.leads[name],
-                    settings.cell,
-                    settings.clearance,
-                    settings.reaction,
-                ),
+                settings,
+                floor.points,
+                mission.leads[name],
+                *given,
                 Pace(settings.step, mission.robots, self.period),
                 self.period,
                 Random(f"{seed} choices {name}"),
-                given.words,
             )
             for name, given in mission.team(seed).items()
         }

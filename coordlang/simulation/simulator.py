@@ -20,7 +20,7 @@ from typing import Any
 
 from coordlang.simulation.floor import Floor, outlines
 from coordlang.simulation.pace import PACES
-from coordlang.simulation.robot import Drive, Pose, Velocity
+from coordlang.simulation.robot import Body, Pose, Velocity
 from coordlang.sites.coordinates import Point
 from planners.system.errors import UsageError
 from planners.system.signals import postponed_signals
@@ -38,40 +38,20 @@ POSITION_NOISE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class Settings(Body):
     """How robots are built and keep step.
 
-    Attributes
-    ----------
-    step
-        The way to keep step: ``clock``, ``barrier`` or ``word``.
-    cell
-        Metres for one unit of the coordinates of places.
-    radius
-        The radius of a robot, in metres.
-    speed, turn
-        Its greatest speed (m/s) and rate of turning (rad/s).
-    noise
-        The standard deviation of what wheels do, as a share of what they are told, drawn anew in
-        each tick; a tenth of it, in metres and in radians, is that of where a robot believes to be.
-    lidar
-        Whether robots stop before what a lidar sees straight ahead.
-    human
-        The place of a human that nobody but a lidar knows of, ``random`` for a place drawn for each
-        run, ``walking`` for one who walks about; None for nobody.
-    tick
-        Seconds between two looks at sensors and commands to wheels.
+    ``step`` is one of `PACES`.  ``noise`` is the standard deviation of what wheels do, as a share
+    of what they are told, drawn anew in each tick; a tenth of it, in metres and in radians, is that
+    of where a robot believes to be.  ``lidar``: robots stop before what a lidar sees straight
+    ahead.  ``human`` is the place of a human that nobody but a lidar knows of, ``random`` for a
+    place drawn for each run, ``walking`` for one who walks about; None for nobody.
     """
 
     step: str = "clock"
-    cell: float = 1.0
-    radius: float = 0.2
-    speed: float = 1.0
-    turn: float = 3.0
     noise: float = 0.1
     lidar: bool = True
     human: str | None = None
-    tick: float = 0.1
 
     def __post_init__(self) -> None:
         """Raise `UsageError` for what no robot can be built with."""
@@ -102,29 +82,6 @@ class Settings:
             raise UsageError(
                 "--human: without a lidar no robot sees a human", remedy="Leave out --no-lidar."
             )
-
-    @property
-    def drive(self) -> Drive:
-        """The robots' wheels."""
-        return Drive(self.speed, self.turn)
-
-    @property
-    def clearance(self) -> float:
-        """How near to its middle a robot lets come what is straight ahead, in metres."""
-        return self.radius + 0.03 * self.cell
-
-    @property
-    def reaction(self) -> float:
-        """Seconds in which a robot would come as near as that to what is ahead.
-
-        Three ticks: two robots that come head on take at most two thirds of what is between them
-        in a tick, and so never touch.
-        """
-        return 3 * self.tick
-
-    def period(self, longest: float) -> float:
-        """Seconds that a joint step takes whose longest way has this length: whole ticks."""
-        return round(math.ceil(self.drive.period(longest) / self.tick) * self.tick, 6)
 
 
 def require_simulator() -> Any:
@@ -250,7 +207,7 @@ def _world(
     floor: Floor, poses: Mapping[str, Pose], settings: Settings, human: Point | None
 ) -> dict[str, Any]:
     """The world as ir-sim reads it."""
-    spread, drive = settings.noise**2, settings.drive
+    spread = settings.noise**2
     disc = {"name": "circle", "radius": settings.radius}
     lidar = {
         "type": "lidar2d",
@@ -268,8 +225,8 @@ def _world(
             },
             "shape": disc,
             "state": list(pose),
-            "vel_max": [drive.speed, drive.turn],
-            "vel_min": [-drive.speed, -drive.turn],
+            "vel_max": [settings.speed, settings.turn],
+            "vel_min": [-settings.speed, -settings.turn],
             "sensors": [lidar],
         }
         for name, pose in poses.items()

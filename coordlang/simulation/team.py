@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from random import Random
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -31,8 +31,7 @@ from planners.system.messages import echoed
 Agreement = Literal["sentence", "plan", "nothing"]
 
 
-@dataclass(frozen=True, slots=True)
-class Equipment:
+class Equipment(NamedTuple):
     """What one robot is given for one run: a monitor of its own, and its words."""
 
     monitor: Monitor

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-import coordlang.simulation.run as simulation_run
-from coordlang.simulation.record import RunRecord, read_simulation
+from coordlang.simulation.record import read_simulation
+from coordlang.simulation.simulator import Simulator
 from tests.coordlang.commands.conftest import FILES, Shell
 from tests.support.command import Outcome
 
@@ -116,14 +116,12 @@ def test_a_limit_while_the_world_is_made_is_no_line_on_stdout(
 def test_an_interrupt_keeps_the_runs_that_are_done(
     simulate: Shell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run = simulation_run.run
-
-    def interrupted(*arguments: Any) -> RunRecord:
+    def interrupted(*arguments: Any) -> object:
         if arguments[3] == 2:
             raise KeyboardInterrupt
-        return run(*arguments)
+        return Simulator(*arguments)
 
-    monkeypatch.setattr(simulation_run, "run", interrupted)
+    monkeypatch.setattr("coordlang.simulation.run.Simulator", interrupted)
     simulate("--runs 9 -o runs.json", 130, "interrupted; 2 runs of 9 done")
     assert [one.seed for one in read_simulation("runs.json").runs] == [0, 1]
 

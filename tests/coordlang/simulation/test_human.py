@@ -10,7 +10,7 @@ import pytest
 
 from coordlang.simulation.floor import Human
 from coordlang.simulation.record import EventRecord, RunRecord, WishRecord
-from coordlang.simulation.run import run
+from coordlang.simulation.run import runs_of
 from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Agreement
 from planners.system.errors import UsageError
@@ -27,7 +27,7 @@ def runs(
 ) -> list[RunRecord]:
     mission = mission_of(folder, stem, agreement)
     floor = floor_for(mission)
-    return [run(mission, floor, settings, seed, wishes) for seed in range(number)]
+    return list(runs_of(mission, floor, settings, number, wishes=wishes))
 
 
 def detours(found: RunRecord) -> list[EventRecord]:

@@ -13,7 +13,7 @@ from coordlang.execution.best_sentence import best_sentence
 from coordlang.execution.task_language import language_in_task
 from coordlang.language.candidates import from_problems
 from coordlang.simulation.record import RunRecord
-from coordlang.simulation.run import run
+from coordlang.simulation.run import runs_of
 from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Mission, mission
 from coordlang.sites.movingai import planning_files, read_map
@@ -46,7 +46,7 @@ def on_map(map_file: Path, ways: Ways, folder: Path) -> Mission:
 def broken(of: Mission, settings: Settings, runs: int) -> list[RunRecord]:
     """The runs in which something went wrong."""
     floor = floor_for(of, settings)
-    found = [run(of, floor, settings, seed) for seed in range(runs)]
+    found = runs_of(of, floor, settings, runs)
     return [one for one in found if one.collisions or one.deadlock or one.late or not one.arrived]
 
 
@@ -68,7 +68,7 @@ def test_four_robots_of_the_greatest_radius_rotate(step: str, ring: Mission) -> 
 def test_robots_drive_off_together_however_far_each_has_to_turn(ring: Mission) -> None:
     settings = Settings(noise=0.0)
     for seed in range(3):
-        found = run(ring, floor_for(ring), settings, seed)
+        [found] = runs_of(ring, floor_for(ring), settings, 1, seed)
         turns = {round(abs(poses[0][2] - poses[-1][2]), 1) for poses in found.poses.values()}
         assert len(turns) > 1
         left = {

@@ -11,7 +11,7 @@ import msgspec
 import pytest
 
 from coordlang.simulation.record import RunRecord
-from coordlang.simulation.run import run
+from coordlang.simulation.run import runs_of
 from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Agreement
 from tests.support.simulation import floor_for, mission_of
@@ -22,7 +22,7 @@ def runs(
 ) -> list[RunRecord]:
     mission = mission_of(folder, agreement=agreement)
     floor = floor_for(mission, settings)
-    return [run(mission, floor, settings, seed + further) for further in range(number)]
+    return list(runs_of(mission, floor, settings, number, seed))
 
 
 def nearest(found: RunRecord) -> float:
@@ -108,7 +108,7 @@ def test_within_a_word_robots_get_out_of_step() -> None:
     """Why a barrier for each word is not enough: the same choices, done in step, are a plan."""
     mission = mission_of("t-map", method="minimal")
     assert len(mission.sentence) == 1, "there is no barrier at all"
-    found = [run(mission, floor_for(mission), Settings(step="word"), seed) for seed in range(6)]
+    found = list(runs_of(mission, floor_for(mission), Settings(step="word"), 6))
     idle = [s for run_ in found for s in run_.steps if s.subaction is None and s.end is not None]
     assert min(step.end - step.begin for step in idle if step.end is not None) > 1, "a whole step"
     broken = [run_ for run_ in found if not run_.arrived]
