@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from coordlang.execution.task_language import TaskLanguage
@@ -20,17 +20,8 @@ from planners.system.errors import BadInput, Position, Refuted
 class NotAPlan(Refuted):
     """These joint steps are no plan of the task.
 
-    Parameters
-    ----------
-    step
-        The first step that cannot be taken, from 0; the plan's length if only the goal fails at the
-        end.
-    reason
-        Why, in words.
-    position
-        Where it stands in the plan file.
-    remedy
-        What can be done.
+    ``step`` is the first one that cannot be taken, from 0; the plan's length if only the goal fails
+    at the end.
     """
 
     def __init__(
@@ -43,16 +34,8 @@ class NotAPlan(Refuted):
 class NotOptimal(Refuted):
     """A plan of the task, but not an optimal one: only optimal plans have a sentence.
 
-    Parameters
-    ----------
-    step
-        The first step, from 0, with which the plan is the beginning of no optimal plan any more.
-    excess
-        Its cost above the optimal one: (steps, second component).
-    reason
-        How much too expensive it is and where it leaves all optimal plans, in words.
-    slack
-        The joint steps more that plans may take.
+    ``step`` is the first one, from 0, with which the plan is the beginning of no optimal plan any
+    more, ``excess`` its cost above the optimal one: (steps, second component).
     """
 
     def __init__(self, step: int, excess: tuple[int, int], reason: str, slack: int = 0) -> None:
@@ -67,29 +50,10 @@ class NotOptimal(Refuted):
 
 
 def sentence_of_plan(task_language: TaskLanguage, plan: Sequence[Texts]) -> tuple[int, ...]:
-    """The sentence of an optimal plan (the paper's TSC).
+    """The sentence of an optimal plan (the paper's TSC), as word numbers.
 
-    O(steps) expansions.
-
-    Parameters
-    ----------
-    task_language
-        The language and the task.
-    plan
-        ``plan[k][i]`` is the subaction of robot i in step k as text, None if it idles (as
-        `planners.search.plan_file.read_plans` gives it).
-
-    Returns
-    -------
-    tuple of int
-        Word numbers; `TaskLanguage.text` writes them as text.
-
-    Raises
-    ------
-    NotAPlan
-        With the first step that cannot be taken.
-    NotOptimal
-        With the first step that leaves all optimal plans.
+    ``plan[k][i]`` is the subaction of robot i in step k as text, None if it idles.  O(steps)
+    expansions.  Raises `NotAPlan` and `NotOptimal`, with the first step that breaks.
     """
     numbers, rows, second = _executed(task_language, plan)
     space, node = task_language.space, task_language.start
@@ -104,29 +68,48 @@ def sentence_of_plan(task_language: TaskLanguage, plan: Sequence[Texts]) -> tupl
     return sentence(words)
 
 
-def _executed(task_language: TaskLanguage, plan: Sequence[Texts]) -> tuple[Plan, list[Rows], int]:
-    """Carry out a plan of the task, optimal or not, step by step.
+def carried_out(
+    model: JointModel, row: Rows, plan: Iterable[tuple[int, ...]]
+) -> tuple[list[Rows], int, str | None]:
+    """Carry out joint steps (labels) from a state, as long as they can be taken.
 
-    Returns its label numbers, the states that it passes through (one more than steps), and the
-    second component of its cost.  Raises `NotAPlan` for a step that cannot be taken, or if the goal
-    does not hold at the end.
+    Returns the states passed (one more than steps taken), the second component of the cost, and why
+    the next step cannot be taken, None if all are.
     """
-    model, space = task_language.model, task_language.space
-    init = model.forgetting_slack(space.rows[space.state[task_language.start]])
-    rows, second, numbers = [init], 0, []
-    for number, step in enumerate(plan):
-        labels = _label_numbers(model, step, number)
+    rows, second = [row], 0
+    for labels in plan:
         steps = model.successors(rows[-1][None, :])
         found = (steps.labels == labels).all(axis=1).nonzero()[0]
         if not len(found):
-            raise NotAPlan(
-                number,
-                f"step {number + 1} cannot be taken: {model.why_not(rows[-1], labels)}",
-                remedy=f"The state before it is {model.state_text(rows[-1])}.",
-            )
+            return rows, second, model.why_not(rows[-1], labels)
         rows.append(steps.result[found[0]])
         second += int(steps.cost[found[0]])
-        numbers.append(labels)
+    return rows, second, None
+
+
+def _executed(task_language: TaskLanguage, plan: Sequence[Texts]) -> tuple[Plan, list[Rows], int]:
+    """Carry out a plan of the task, optimal or not.
+
+    Returns its label numbers, the states that it passes through, and the second component of its
+    cost.  Raises `NotAPlan` for a step that cannot be taken, or if the goal does not hold at the
+    end.
+    """
+    model, space = task_language.model, task_language.space
+    init = model.forgetting_slack(space.rows[space.state[task_language.start]])
+    numbers: list[tuple[int, ...]] = []
+
+    def steps() -> Iterator[tuple[int, ...]]:
+        for number, step in enumerate(plan):
+            numbers.append(_label_numbers(model, step, number))
+            yield numbers[-1]
+
+    rows, second, why = carried_out(model, init, steps())
+    if why is not None:
+        raise NotAPlan(
+            len(rows) - 1,
+            f"step {len(rows)} cannot be taken: {why}",
+            remedy=f"The state before it is {model.state_text(rows[-1])}.",
+        )
     goal = space.goals[space.goal[task_language.start]]
     if not model.holds(goal, rows[-1][None, :])[0]:
         raise NotAPlan(

@@ -21,7 +21,7 @@ from coordlang.explanation.words import WordDescriptions, all_covers, describe_w
 from coordlang.language.words import Language
 from coordlang.report.layout import graph_layout, place_layout, spread
 from coordlang.report.shown import Selection
-from coordlang.report.task import Tables, TaskPage, task_data, task_summary
+from coordlang.report.task import Tables, task_data, task_summary
 from coordlang.sites.coordinates import Point
 from coordlang.sites.world import World, find_world
 from planners.joint.model import JointModel, own_text
@@ -46,27 +46,28 @@ MOST_PLACES = 600
 def page_data(
     language: Language,
     selection: Selection,
-    parts: Sequence[TaskPage],
+    seed: int,
     known: Mapping[str, Point] | None = None,
     most_places: int = MOST_PLACES,
     lifted: LiftedWords | None = None,
 ) -> dict[str, Any]:
     """Return the page's data for a language and the tasks to be shown.
 
-    ``known`` are coordinates of places from a file; with more than ``most_places`` no map is drawn.
+    ``seed`` is that of the plans drawn of large tasks.  ``known`` are coordinates of places from a
+    file; with more than ``most_places`` no map is drawn.
     ``lifted`` has the formulas of words that are functions of features.
     """
-    first = parts[0].shown.language
+    first = selection.tasks[0].language
     model = first.model
     tables = Tables(model, first.partition)
     listed = _listed_states(language, tables)
-    tasks = [task_data(part, tables) for part in parts]
+    tasks = [task_data(shown, tables, seed) for shown in selection.tasks]
     states = [model.codec.decode(row) for row in tables.rows]
     world = _drawn_world(model, states, most_places)
     facts = sorted({fact for state in states for fact in state})
     number = {fact: k for k, fact in enumerate(facts)}
-    for task, part in zip(tasks, parts, strict=True):
-        task.update(task_summary(part, world))
+    for task, shown in zip(tasks, selection.tasks, strict=True):
+        task.update(task_summary(shown.language, world))
     return {
         "robots": list(model.robots),
         "kept": {
@@ -93,7 +94,7 @@ def page_data(
             "count": str(language.provenance.tasks.get("count", 0)),
             "looked": selection.looked,
             "requiring": selection.requiring,
-            "complete": selection.complete and len(parts) == len(selection.tasks),
+            "complete": selection.complete,
         },
     }
 

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ from coordlang.language.sentences import Sentence, sentence, sentence_counts
 from coordlang.report.layout import layer_orders
 from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
-from planners.search.plans import Plans, counts
+from planners.search.plans import Plans
 from planners.system.errors import OutOfMemory
 
 #: Plan-space edges of one task beyond which plans are drawn.
@@ -50,17 +51,6 @@ class ShownSentence:
     words: Sentence
     plans: int
     own: tuple[int | None, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class ShownSentences:
-    """Sentences of a task: the ``listed`` ones, those that leave most plans open first.
-
-    ``total`` is the number of all sentences, None if they are too many to count.
-    """
-
-    listed: tuple[ShownSentence, ...]
-    total: int | None
 
 
 def plan_graph(language: TaskLanguage, seed: int, most: int = EDGES) -> Graph:
@@ -108,48 +98,41 @@ def _drawn_edges(language: TaskLanguage, seed: int, most: int) -> Ints:
 
 def shown_sentences(
     language: TaskLanguage, graph: Graph, seed: int, most: int = EDGES
-) -> ShownSentences:
-    """Return the task's sentences that leave most plans open.
+) -> tuple[list[ShownSentence], int | None]:
+    """Return the task's sentences that leave most plans open, and the number of all sentences.
 
-    If there are too many to count them all, or more than ``most`` edges, those of the drawn plans
-    are compared.
+    If there are too many to count them all (then it is None), or more than ``most`` edges, those of
+    the drawn plans are compared.
     """
-    every = _all_sentences(language) if len(language.space.target) <= most else None
-    plans = _drawn_sentences(language, graph, seed, most) if every is None else every
-    ranked = sorted(plans.items(), key=lambda entry: (-entry[1], entry[0]))[:SENTENCES]
+    found: dict[Sentence, int] | None = None
+    if len(language.space.target) <= most:
+        with suppress(OutOfMemory):  # if a node has too many sentences
+            found = sentence_counts(
+                language.space, language.word, start=language.start, most_of_node=_ALL_SENTENCES
+            )[language.start]
+    total = None if found is None else len(found)
+    if found is None:
+        drawn = _drawn_sentences(language, graph, seed, most)
+        found = {words: Plans.of(language.plans_with(words)).count for words in drawn}
     listed = []
-    for words, number in ranked:
+    for words, number in sorted(found.items(), key=lambda entry: (-entry[1], entry[0]))[:SENTENCES]:
         open_plans = language.plans_with(words)
         own = tuple(_own_count(open_plans, robot) for robot in range(len(language.model.robots)))
         listed.append(ShownSentence(words, number, own))
-    return ShownSentences(tuple(listed), None if every is None else len(every))
-
-
-def _all_sentences(language: TaskLanguage) -> Mapping[Sentence, int] | None:
-    """Count the plans of every sentence; None if a node has too many sentences."""
-    try:
-        counted = sentence_counts(
-            language.space, language.word, start=language.start, most_of_node=_ALL_SENTENCES
-        )
-    except OutOfMemory:
-        return None
-    return counted[language.start]
+    return listed, total
 
 
 def _drawn_sentences(
     language: TaskLanguage, graph: Graph, seed: int, most: int
-) -> dict[Sentence, int]:
-    """Count the plans of the sentences of plans within the drawn part."""
+) -> dict[Sentence, None]:
+    """The sentences of plans within the drawn part, in the order in which they were drawn."""
     inside = set(graph.edges.tolist())
-    found: dict[Sentence, int] = {}
+    found: dict[Sentence, None] = {}
     for path in _drawn_paths(language, seed, most):
         if not inside.issuperset(path) or len(found) >= SENTENCES:
             break
         nodes = language.space.nodes_on(language.start, path)
-        words = sentence(language.word[nodes].tolist())
-        if words not in found:
-            open_plans = language.plans_with(words)
-            found[words] = counts(open_plans)[int(open_plans.starts[0])]
+        found[sentence(language.word[nodes].tolist())] = None
     return found
 
 

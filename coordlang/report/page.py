@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
@@ -18,7 +18,6 @@ from coordlang.language.words import Language
 from coordlang.report.data import MOST_PLACES, page_data
 from coordlang.report.shown import select_tasks
 from coordlang.report.simulated import simulated_data, summary
-from coordlang.report.task import task_page
 from coordlang.simulation.record import SimulationRecord
 from coordlang.sites.coordinates import Point
 from planners.pddl.lifted import Domain, Problem
@@ -61,54 +60,36 @@ def make_report(
     """Render the report of a language; the same arguments give the same bytes.
 
     It shows the problems' tasks and candidate tasks drawn with ``seed``, at most ``tasks_shown``,
-    fewer if the page would become larger than ``largest``.
-
-    Parameters
-    ----------
-    options
-        How the model is built (default: as the language file says).
-    coordinates
-        Of the places of the map, if they are known (`read_coordinates`).
-    position
-        What error messages name as the place of the language.
-    largest
-        Bytes that a page has at most.
-    most_places
-        With more places no map is drawn.
-    simulated
-        Runs to be played on the page.
-
-    Raises
-    ------
-    OutOfMemory
-        If the page of a single task would be too large.
-    CoordlangError
-        What `coordlang.report.shown.select_tasks` raises.
+    fewer if the page would have more than ``largest`` bytes.  ``options`` say how the model is
+    built (default: as the language file says), ``coordinates`` where places are; with more than
+    ``most_places`` no map is drawn.  ``position`` is what messages name as the place of the
+    language, ``simulated`` are runs to be played.  Raises `OutOfMemory` if the page of a single
+    task would be too large, and what `coordlang.report.shown.select_tasks` raises.
     """
     selection = select_tasks(language, domain, problems, tasks_shown, seed, options, position)
-    parts = [task_page(shown, seed) for shown in selection.tasks]
     lifted = lifted_words(
         language,
         domain,
         problems[0],
-        parts[0].shown.language.model,
+        selection.tasks[0].language.model,
         coordinates or {},
         position or Position("the language file"),
     )
     while True:
-        data = page_data(language, selection, parts, coordinates, most_places, lifted)
+        data = page_data(language, selection, seed, coordinates, most_places, lifted)
         if simulated is not None:
             data["simulated"] = simulated_data(simulated)
         html = _render(language, domain, problems, data, seed, simulated)
         if len(html) <= largest:
             candidates = int(language.provenance.tasks.get("count", 0))
-            return Report(html, len(parts), candidates, parts[0].shown.language)
-        if len(parts) == 1:
+            return Report(html, len(selection.tasks), candidates, selection.tasks[0].language)
+        if len(selection.tasks) == 1:
             raise OutOfMemory(
                 f"the page of one task would have {len(html):,} bytes, more than {largest:,}",
                 remedy="Give a smaller problem.",
             )
-        parts = parts[: len(parts) // 2]
+        half = selection.tasks[: len(selection.tasks) // 2]
+        selection = replace(selection, tasks=half, complete=False)
 
 
 def _render(

@@ -35,14 +35,10 @@ class PlanVizFiles:
 
 
 def planviz(task_language: TaskLanguage, known: Mapping[str, Point] | None = None) -> PlanVizFiles:
-    """Write the first optimal plan of a task for PlanViz.
+    """Write the first optimal plan of a task for PlanViz; ``known`` are coordinates from a file.
 
-    ``known`` are coordinates of places from a file.
-
-    Raises
-    ------
-    UsageError
-        If the robots are not always in cells of a grid, or move to others than the neighbours.
+    Raises `UsageError` if the robots are not always in cells of a grid, or move to others than the
+    neighbours.
     """
     space = task_language.space
     plans = Plans.of(space, task_language.task)

@@ -69,14 +69,8 @@ def select_tasks(
     """Select at most ``number`` tasks: those of the problems, then different candidate tasks.
 
     Candidate tasks are drawn with ``seed``.  Tasks that require coordination are preferred, up to
-    three quarters of those drawn.
-
-    Raises
-    ------
-    UsageError
-        If there are more than ``number`` problems.
-    ProvedImpossible
-        If a problem cannot be solved.
+    three quarters of those drawn.  Raises `UsageError` if there are more than ``number`` problems,
+    `ProvedImpossible` if a problem cannot be solved.
     """
     if len(problems) > number:
         raise UsageError(

@@ -4,20 +4,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
+from coordlang.execution.plan_sentence import carried_out
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.listed import goal_text
 from coordlang.language.partition import Partition
-from coordlang.report.graph import Graph, ShownSentences, plan_graph, shown_sentences
+from coordlang.report.graph import Graph, plan_graph, shown_sentences
 from coordlang.report.shown import ShownTask
 from coordlang.required.failure import TooManyToCount, failure_probability
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.sites.world import World
-from coordlang.verification.by_definition import verify
+from coordlang.verification.by_definition import Verdict, verify
 from planners.joint.model import JointModel
 from planners.joint.states import split_atoms
 from planners.joint.tables import Ints, Rows
@@ -28,82 +29,6 @@ from planners.system.errors import OutOfMemory
 _ADDITIONS = 300_000
 #: Plan-space edges beyond which a task is not verified again for the page.
 _VERIFIED = 20_000
-
-
-@dataclass(frozen=True, slots=True)
-class Played:
-    """The execution of a mixture of plans.
-
-    ``states`` are the keys of those passed, the start first; ``stops`` is the number of the first
-    step that is not applicable (None: all are), and ``why``; ``reaches``: the goal holds at last.
-    """
-
-    states: tuple[str, ...]
-    stops: int | None
-    why: str | None
-    reaches: bool
-
-
-@dataclass(frozen=True, slots=True)
-class TaskPage:
-    """Everything about one shown task: its plans and its sentences, and what goes wrong.
-
-    ``played`` is what happens without a language, if plans of the task miscoordinate; ``verified``:
-    the language coordinates the task (None: not checked); ``violation``: plans of one sentence that
-    miscoordinate, so that it is none.
-    """
-
-    shown: ShownTask
-    graph: Graph
-    sentences: ShownSentences
-    played: Played | None
-    verified: bool | None
-    violation: Miscoordination | None
-    violation_played: Played | None
-
-
-def task_page(shown: ShownTask, seed: int) -> TaskPage:
-    """Compute what is shown of a task."""
-    language = shown.language
-    graph = plan_graph(language, seed)
-    verified, violation = _verified(language)
-    return TaskPage(
-        shown,
-        graph,
-        shown_sentences(language, graph, seed),
-        play(language, shown.witness) if shown.witness else None,
-        verified,
-        violation,
-        play(language, violation) if violation else None,
-    )
-
-
-def _verified(language: TaskLanguage) -> tuple[bool | None, Miscoordination | None]:
-    if len(language.space.target) > _VERIFIED:
-        return None, None
-    try:
-        verdict = language.verdict or verify(language.partition, [language.space])
-    except OutOfMemory:
-        return None, None
-    return verdict.holds, verdict.witness
-
-
-def play(language: TaskLanguage, witness: Miscoordination) -> Played:
-    """Play a mixture from the start: robot i executes its part of ``witness.plans[i]``."""
-    space, model = language.space, language.model
-    row = space.rows[space.state[language.start]]
-    goal = space.goals[space.goal[language.start]]
-    states = [model.codec.key(row)]
-    for number, step in enumerate(zip(*witness.plans, strict=True)):
-        labels = model.numbers([own[robot] for robot, own in enumerate(step)])
-        assert labels is not None
-        steps = model.successors(row[None, :])
-        same = np.flatnonzero((steps.labels == np.array(labels)).all(axis=1))
-        if not len(same):
-            return Played(tuple(states), number, model.why_not(row, labels), False)
-        row = steps.result[same[0]]
-        states.append(model.codec.key(row))
-    return Played(tuple(states), None, None, bool(model.holds(goal, row[None, :])[0]))
 
 
 class Tables:
@@ -132,38 +57,50 @@ class Tables:
         return own.setdefault(text, len(own))
 
 
-def task_data(part: TaskPage, tables: Tables) -> dict[str, Any]:
+def task_data(shown: ShownTask, tables: Tables, seed: int) -> dict[str, Any]:
     """Return a task as JSON data, with states and labels as numbers into ``tables``."""
-    language = part.shown.language
-    space, model = language.space, language.model
+    language, space = shown.language, shown.language.space
+    graph = plan_graph(language, seed)
+    sentences, total = shown_sentences(language, graph, seed)
+    verdict = _verdict(language)
+    violation = verdict.witness if verdict else None  # plans of one sentence that miscoordinate
     makespan, second = space.cost_of(language.task)
-    requires = None if not part.shown.decided else part.shown.witness is not None
+    requires = None if not shown.decided else shown.witness is not None
     return {
-        "name": part.shown.name,
+        "name": shown.name,
         "covered": language.covered,
         "requires": requires,
         "silence": _failure(language, None) if requires else None,
-        "failure": _failure(language, language.word) if part.violation else None,
-        "verified": part.verified,
+        "failure": _failure(language, language.word) if violation else None,
+        "verified": verdict.holds if verdict else None,
         "steps": makespan,
-        "second": second if model.cost != "makespan" else None,
+        "second": second if language.model.cost != "makespan" else None,
         "plans": str(counts(space)[language.start]),
-        "complete": part.graph.complete,
+        "complete": graph.complete,
         "all_nodes": len(space),
         "all_edges": len(space.target),
-        **_graph_data(language, part.graph, tables),
+        **_graph_data(language, graph, tables),
         "sentences": [
             {
                 "words": list(one.words),
                 "plans": str(one.plans),
                 "own": [None if number is None else str(number) for number in one.own],
             }
-            for one in part.sentences.listed
+            for one in sentences
         ],
-        "all_sentences": part.sentences.total,
-        "witness": _witness_data(part.shown.witness, part.played, tables),
-        "violation": _witness_data(part.violation, part.violation_played, tables),
+        "all_sentences": total,
+        "witness": _witness_data(language, shown.witness, tables),
+        "violation": _witness_data(language, violation, tables),
     }
+
+
+def _verdict(language: TaskLanguage) -> Verdict | None:
+    """Whether the language coordinates the task; None if it is too large to find out."""
+    if len(language.space.target) > _VERIFIED:
+        return None
+    with suppress(OutOfMemory):
+        return language.verdict or verify(language.partition, [language.space])
+    return None
 
 
 def _failure(language: TaskLanguage, word: Ints | None) -> float | None:
@@ -209,10 +146,22 @@ def _graph_data(language: TaskLanguage, graph: Graph, tables: Tables) -> dict[st
 
 
 def _witness_data(
-    witness: Miscoordination | None, played: Played | None, tables: Tables
+    language: TaskLanguage, witness: Miscoordination | None, tables: Tables
 ) -> dict[str, Any] | None:
-    if witness is None or played is None:
+    """Plans that miscoordinate, and what happens: robot i executes its part of plan i.
+
+    ``together`` are the states passed, the start first; ``stops`` is the number of the first step
+    that is not applicable (None: all are), and ``why``; ``reaches``: the goal holds at last.
+    """
+    if witness is None:
         return None
+    space, model = language.space, language.model
+    mixed = (
+        [own[robot] for robot, own in enumerate(step)] for step in zip(*witness.plans, strict=True)
+    )
+    init = space.rows[space.state[language.start]]
+    rows, _, why = carried_out(model, init, filter(None, map(model.numbers, mixed)))
+    goal = space.goals[space.goal[language.start]]
     return {
         "plans": [
             [[tables.label(robot, text) for robot, text in enumerate(step)] for step in plan]
@@ -221,16 +170,15 @@ def _witness_data(
         "states": [[tables.state(key) for key in states] for states in witness.states],
         "breaks": witness.step,
         "reason": witness.reason,
-        "together": [tables.state(key) for key in played.states],
-        "stops": played.stops,
-        "why": played.why,
-        "reaches": played.reaches,
+        "together": [tables.state(model.codec.key(row)) for row in rows],
+        "stops": None if why is None else len(rows) - 1,
+        "why": why,
+        "reaches": why is None and bool(model.holds(goal, rows[-1][None, :])[0]),
     }
 
 
-def task_summary(part: TaskPage, world: World) -> dict[str, Any]:
+def task_summary(language: TaskLanguage, world: World) -> dict[str, Any]:
     """Return the start and goal of a task in words and, as ``goals``, on the map."""
-    language = part.shown.language
     space, model = language.space, language.model
     init = model.codec.decode(space.rows[space.state[language.start]])
     text = goal_text(model, space.goals[space.goal[language.start]])

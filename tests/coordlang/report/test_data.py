@@ -19,7 +19,6 @@ from coordlang.report import graph
 from coordlang.report.data import page_data
 from coordlang.report.page import make_report
 from coordlang.report.shown import select_tasks
-from coordlang.report.task import task_page
 from coordlang.required.miscoordination import Inseparable
 from planners.search.plans import Plans
 from planners.system.errors import ProvedImpossible, UsageError
@@ -121,14 +120,13 @@ def test_random_models() -> None:
             selection = select_tasks(language, domain, [problem], 4, seed)
         except (Inseparable, ProvedImpossible):
             continue
-        parts = [task_page(shown, seed) for shown in selection.tasks]
-        data = page_data(language, selection, parts)
+        data = page_data(language, selection, seed)
         made += 1
         unmapped += not data["places"]
-        for task, part in zip(data["tasks"], parts, strict=True):
+        for task, shown in zip(data["tasks"], selection.tasks, strict=True):
             of_sentences = sum(int(s["plans"]) for s in task["sentences"])
             assert int(task["plans"]) == len(listed_plans(task)) == of_sentences
-            assert not part.shown.language.covered or task["verified"]
+            assert not shown.language.covered or task["verified"]
             if task["witness"]:
                 requiring += 1
                 assert task["witness"]["breaks"] <= task["steps"]
@@ -141,7 +139,7 @@ def test_random_models() -> None:
 def test_large_tasks_are_drawn() -> None:
     spoken = language_in_task(*make_language("grid", "three-robots-3x3", None))
     whole = graph.plan_graph(spoken, 0)
-    exact = {s.words: s.plans for s in graph.shown_sentences(spoken, whole, 0).listed}
+    exact = {s.words: s.plans for s in graph.shown_sentences(spoken, whole, 0)[0]}
     part = graph.plan_graph(spoken, 0, most=60)
     assert whole.complete
     assert not part.complete
@@ -152,10 +150,10 @@ def test_large_tasks_are_drawn() -> None:
     # whole plan.
     assert set(targets) | {spoken.start} == nodes
     assert set(sources) | {n for n in nodes if space.layer[n] == 0} == nodes
-    drawn = graph.shown_sentences(spoken, part, 0, most=60)
-    assert drawn.total is None
-    assert drawn.listed
-    assert all(exact.get(s.words, s.plans) == s.plans for s in drawn.listed)
+    drawn, total = graph.shown_sentences(spoken, part, 0, most=60)
+    assert total is None
+    assert drawn
+    assert all(exact.get(s.words, s.plans) == s.plans for s in drawn)
 
 
 def test_selection() -> None:
