@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.words import Conjunction
-from coordlang.exports.membership import membership, refuse_seen_slack
+from coordlang.exports.membership import refuse_seen_slack, short_terms
 from planners.joint.model import show
 from planners.pddl.lifted import Atom
 
@@ -48,7 +48,7 @@ def export_ltlf(task_language: TaskLanguage, words: Sequence[int]) -> SentenceFo
     """
     refuse_seen_slack(task_language.model, "--to ltlf")
     task_language.plans_with(words)  # raises where no plan has the sentence
-    terms = membership(task_language, apart=False).terms
+    terms = short_terms(task_language)
     used = sorted(set(words))
     atoms = sorted({atom for word in used for term in terms[word] for atom in term}, key=show)
     symbol = dict(zip(atoms, symbols_of(map(show, atoms)), strict=True))

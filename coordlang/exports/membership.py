@@ -3,9 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-
 import numpy as np
 
 from coordlang.execution.task_language import TaskLanguage
@@ -15,108 +12,34 @@ from planners.joint.model import JointModel
 from planners.joint.tables import Bools, Ints, Rows, unique_rows
 from planners.system.errors import UsageError
 
-#: In which states of a table a term holds, (states).
-Where = Callable[[Conjunction], Bools]
+#: For each word its terms.  A state that the language maps, or that is on an optimal plan of the
+#: task, belongs to the word exactly if one of them holds.  Elsewhere terms of several words may
+#: hold, or none.
+Terms = tuple[tuple[Conjunction, ...], ...]
 
 #: For more states than this no short formulas are looked for.
 _STATES = 20_000
 
 
-@dataclass(frozen=True, slots=True)
-class Membership:
-    """For each word its terms: a state belongs to the word exactly if one of them holds.
+def short_terms(task_language: TaskLanguage, states: int = _STATES) -> Terms:
+    """The terms of the words' formulas (`coordlang.explanation`); several may hold in one state.
 
-    This holds for every state that the language maps and every state on an optimal plan of the
-    task.  Elsewhere nothing is promised: terms of several words may hold, or none.
+    For more than ``states`` states they are `exclusive_terms`, which are found faster.
     """
-
-    terms: tuple[tuple[Conjunction, ...], ...]
-
-    @property
-    def size(self) -> int:
-        """The number of terms."""
-        return sum(map(len, self.terms))
-
-
-def membership(
-    task_language: TaskLanguage, *, apart: bool = True, states: int = _STATES
-) -> Membership:
-    """The words of a language as terms: those of their formulas (`coordlang.explanation`).
-
-    Exactly one term holds in each state; at least one, and shorter ones, if they need not be
-    ``apart``.  For more than ``states`` states they are the leaves of a decision tree: found
-    faster, up to twice as many, but never more than states.
-    """
-    rows = task_language.space.rows[np.unique(task_language.space.state)]
-    rows, _ = unique_rows(np.concatenate((task_language.partition.rows, rows)))
+    rows = _rows(task_language)
     if len(rows) > states:
-        return _tree(task_language, rows)
+        return exclusive_terms(task_language)
     formulas = word_formulas(task_language.language, task_language.model, rows)
-    terms = [formulas[word].conjunctions() for word in task_language.partition.words]
-    if apart:
-        where = states_where(task_language.model, rows)
-        terms = [disjoint(where, of_word) for of_word in terms]
-    return Membership(tuple(map(tuple, terms)))
+    words = task_language.partition.words
+    return tuple(tuple(formulas[word].conjunctions()) for word in words)
 
 
-def states_where(model: JointModel, rows: Rows) -> Where:
-    """A function that says in which of some states a term holds."""
-    atoms, holds = truth(model, rows)
-    number = {atom: column for column, atom in enumerate(atoms)}
-
-    def where(term: Conjunction) -> Bools:
-        columns = [number[atom] for atom in term]
-        same: Bools = (holds[:, columns] == list(term.values())).all(axis=1)
-        return same
-
-    return where
-
-
-def disjoint(where: Where, terms: Sequence[Conjunction]) -> list[Conjunction]:
-    """Terms that hold in the same states, no two in the same state.
-
-    Larger ones first, of others only what is left; parts in which there is no state are dropped.
-    """
-    found: list[tuple[Conjunction, Bools]] = []
-    for term in sorted(terms, key=lambda t: -int(where(t).sum())):
-        parts = [(term, where(term))]
-        for earlier, taken in found:
-            left = []
-            for part, states in parts:
-                if (states & taken).any():
-                    left += _without(where, part, earlier)
-                else:
-                    left.append((part, states))
-            parts = left
-        found += parts
-    return [term for term, states in found if states.any()]
-
-
-def _without(
-    where: Where, term: Conjunction, other: Conjunction
-) -> list[tuple[Conjunction, Bools]]:
-    """The part of a term outside another one, as terms that exclude each other, with their states.
-
-    ``t`` without ``a & b`` is ``t & !a`` or ``t & a & !b`` (the disjoint sharp of two-level
-    minimisation).
-    """
-    found = []
-    inside = dict(term)
-    for atom, value in other.items():
-        if atom not in inside:
-            outside = {**inside, atom: not value}
-            states = where(outside)
-            if states.any():
-                found.append((outside, states))
-            inside[atom] = value
-    return found
-
-
-def _tree(task_language: TaskLanguage, rows: Rows) -> Membership:
-    """The leaves of a binary decision tree.
+def exclusive_terms(task_language: TaskLanguage) -> Terms:
+    """Terms of which exactly one holds in each state: the leaves of a binary decision tree.
 
     Each test is the one that gives most information about the word (least entropy, as in ID3).
     """
+    rows = _rows(task_language)
     word = task_language.partition.word_of(rows)
     atoms, values = truth(task_language.model, rows)
     terms: list[list[Conjunction]] = [[] for _ in task_language.partition.words]
@@ -130,7 +53,13 @@ def _tree(task_language: TaskLanguage, rows: Rows) -> Membership:
         true = values[here, best]
         todo.append((here[~true], {**term, atoms[best]: False}))
         todo.append((here[true], {**term, atoms[best]: True}))
-    return Membership(tuple(map(tuple, terms)))
+    return tuple(map(tuple, terms))
+
+
+def _rows(task_language: TaskLanguage) -> Rows:
+    """The states that the language maps, and those on optimal plans of the task."""
+    rows = task_language.space.rows[np.unique(task_language.space.state)]
+    return unique_rows(np.concatenate((task_language.partition.rows, rows)))[0]
 
 
 def _best_test(values: Bools, word: Ints, words: int) -> int:

@@ -14,8 +14,7 @@ from itertools import pairwise
 
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.variables import truth
-from coordlang.explanation.words import Conjunction
-from coordlang.exports.membership import Membership
+from coordlang.exports.membership import Terms
 from planners.classical import ClassicalAction, ClassicalTask, Condition
 from planners.joint.model import show
 from planners.pddl.lifted import Atom
@@ -29,7 +28,7 @@ def named_by_words(
     words: Sequence[int],
     plain: ClassicalTask,
     labels: Sequence[Sequence[RobotLabel]],
-    tests: Membership,
+    tests: Terms,
     steps: int | None = None,
 ) -> ClassicalTask:
     """The plain task in which states are named by their words and the sentence is followed.
@@ -60,7 +59,7 @@ class _NamingFacts:
         task_language: TaskLanguage,
         words: Sequence[int],
         plain: ClassicalTask,
-        tests: Membership,
+        tests: Terms,
         steps: int | None,
     ) -> None:
         self.model, self.words = task_language.model, words
@@ -115,7 +114,7 @@ class _NamingFacts:
             deletes=tuple(sorted(deletes - adds)),
         )
 
-    def naming_actions(self, tests: Membership) -> list[ClassicalAction]:
+    def naming_actions(self, tests: Terms) -> list[ClassicalAction]:
         """Actions that name a state by its word, one for each term of the word."""
         return [
             _free(
@@ -125,7 +124,7 @@ class _NamingFacts:
                 (self.naming,),
             )
             for word, named in self.named.items()
-            for number, term in enumerate(tests.terms[word], 1)
+            for number, term in enumerate(tests[word], 1)
         ]
 
     def following_actions(self) -> list[ClassicalAction]:
@@ -176,10 +175,10 @@ class _NamingFacts:
         return sorted((self.number[atom], value) for atom, value in term.items())
 
 
-def _remembered(task_language: TaskLanguage, tests: Membership) -> dict[Atom, bool]:
+def _remembered(task_language: TaskLanguage, tests: Terms) -> dict[Atom, bool]:
     """The atoms of remembered subactions that terms mention, and whether they are true at first."""
     facts = task_language.model.codec.facts
-    mentioned = {atom for terms in tests.terms for term in terms for atom in term}
+    mentioned = {atom for terms in tests for term in terms for atom in term}
     space = task_language.space
     init = space.rows[space.state[[task_language.start]]]
     atoms, [values] = truth(task_language.model, init)

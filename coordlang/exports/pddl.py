@@ -11,9 +11,9 @@ Why its optimal plans are exactly the plans with the sentence, one to one:
    (`planners.classical`). Naming costs nothing and only forbids.  So no plan is cheaper than an
    optimal plan of the task.
 2. In a state on an optimal plan of the task exactly one naming is possible, that of its word
-   (`membership`), and after it at most one action: which one, the word decides.  So an optimal plan
-   of the task has at most one counterpart, and has it exactly if its words are, one after another,
-   those of the sentence.
+   (`exclusive_terms`), and after it at most one action: which one, the word decides.  So an optimal
+   plan of the task has at most one counterpart, and has it exactly if its words are, one after
+   another, those of the sentence.
 3. Some plan has the sentence (`TaskLanguage.plans_with`), so the optimal cost is that of the task.
    Then each plan of that cost is an optimal plan of the task, passes only through states on optimal
    plans of the task, and by 2 it has the sentence.
@@ -35,7 +35,7 @@ from dataclasses import dataclass
 
 from coordlang.execution.guided_search import plan_under_sentence
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.exports.membership import membership, refuse_seen_slack
+from coordlang.exports.membership import exclusive_terms, refuse_seen_slack
 from coordlang.exports.naming import RobotLabel, named_by_words
 from planners.classical import (
     ClassicalAction,
@@ -114,29 +114,14 @@ def export_pddl(
 ) -> PddlExport:
     """Write the task under a sentence as PDDL; its optimal plans are exactly those of the sentence.
 
-    The cost of a plan is that of the joint plan: ``classical.cost`` of the total cost is (makespan,
-    second component).
+    ``classical.cost`` of a plan's total cost is that of the joint plan, (makespan, second
+    component). Up to ``limit`` plain actions every joint action is written as one; beyond, robots
+    choose one after another (see `planners.classical.compile_classical`).  With ``strips_only``
+    there are neither negative conditions nor costs: then the plans with the fewest actions are
+    those of the sentence.
 
-    Parameters
-    ----------
-    task_language
-        The language and the task.
-    words
-        The word numbers of the sentence.
-    limit
-        Up to this many plain actions every joint action is written as one; beyond, robots choose
-        one after another (see `planners.classical.compile_classical`).
-    strips_only
-        Neither negative conditions nor costs: then the plans with the fewest actions are those of
-        the sentence.
-
-    Raises
-    ------
-    UsageError
-        Under ``strips_only``, where actions without costs do not count joint steps; with slack,
-        for words that see it, and where more than joint steps counts.
-    NoPlanFits
-        If no optimal plan has the sentence.
+    Raises `NoPlanFits`, and `UsageError` under ``strips_only`` where actions without costs do not
+    count joint steps; with slack, for words that see it, and where more than joint steps counts.
     """
     _require_slack_told(task_language.model)
     space, model = task_language.plans_with(words), task_language.model
@@ -148,7 +133,7 @@ def export_pddl(
     task = PlanningTask("task", space.rows[space.state[start]], space.goals[space.goal[start]])
     plain = compile_classical(model, task, limit, longest=max(1, steps or makespan))
     labels = [_labels(model, plain, action) for action in plain.actions]
-    tests = membership(task_language)
+    tests = exclusive_terms(task_language)
     named = named_by_words(task_language, words, plain, labels, tests, steps)
     labels += [()] * (len(named.actions) - len(labels))
     if strips_only:
@@ -164,7 +149,7 @@ def export_pddl(
         problem=problem,
         labels=dict(zip(action_names(named), labels, strict=True)),
         cost=plain.step_cost * makespan + second,
-        terms=tests.size,
+        terms=sum(map(len, tests)),
     )
 
 

@@ -20,8 +20,9 @@ from coordlang.commands.build import build
 from coordlang.commands.explain import explain
 from coordlang.execution.task_language import NoPlanFits, TaskLanguage, languages_in_tasks
 from coordlang.explanation.words import Conjunction
+from coordlang.exports import pddl as pddl_module
 from coordlang.exports.ltlf import export_ltlf, symbols_of
-from coordlang.exports.membership import membership
+from coordlang.exports.membership import Terms, exclusive_terms, short_terms
 from coordlang.exports.pddl import PddlExport, export_pddl, plan_names
 from coordlang.language.sentences import sentence
 from planners.classical import ClassicalTask, action_names
@@ -112,17 +113,30 @@ def test_one_term_in_every_state(lot: str) -> None:
         rows = np.concatenate((used.partition.rows, used.space.rows[used.space.state]))
         words = used.partition.word_of(rows).tolist()
         states = [frozenset(used.model.codec.decode(row)) for row in rows]
-        tree, shorter = membership(used, states=0), membership(used, apart=False)
-        for found, most in ((membership(used), 1), (tree, 1), (shorter, len(rows))):
+        tree = exclusive_terms(used)
+        assert short_terms(used, states=0) == tree
+        for found, most in ((tree, 1), (short_terms(used), len(rows))):
             for state, word in zip(states, words, strict=True):
-                true = [sum(satisfied(term, state) for term in terms) for terms in found.terms]
+                true = [sum(satisfied(term, state) for term in terms) for terms in found]
                 assert [n for n, terms in enumerate(true) if terms] == [word]
                 assert sum(true) <= most
-        assert tree.size <= len(set(states))
+        assert sum(map(len, tree)) <= len(set(states))
 
 
 def satisfied(term: Conjunction, state: frozenset[str]) -> bool:
     return all((show(atom) in state) == value for atom, value in term.items())
+
+
+def test_a_word_named_in_two_ways_would_be_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A break of the code: with terms that overlap one plan has several counterparts."""
+    words, plans = max(by_sentence(rich()).items(), key=lambda s: len(s[1]))
+    assert len(planned(export_pddl(rich(), words))) == len(plans)
+
+    def twice(used: TaskLanguage) -> Terms:
+        return tuple((*terms, *terms) for terms in exclusive_terms(used))
+
+    monkeypatch.setattr(pddl_module, "exclusive_terms", twice)
+    assert len(planned(export_pddl(rich(), words))) > len(plans)
 
 
 # LTLf by definition (De Giacomo and Vardi 2013): a formula is true at a place of a finite sequence
