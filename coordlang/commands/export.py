@@ -16,7 +16,6 @@ from coordlang.commands.records import WRITTEN, ExportOptions
 from coordlang.commands.sentences import SentencePlans
 from coordlang.commands.terminal import covered_code, echo, write
 from coordlang.execution.choices import choices as choices_under
-from coordlang.execution.open_plans import OpenPlans
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.exports.behaviour_tree import behaviour_trees
 from coordlang.exports.ltlf import export_ltlf
@@ -213,7 +212,7 @@ def export(files: Arguments, options: ExportOptions) -> Any:
     if options.to == "pddl":
         strips_only = options.for_planner == "pyperplan"
         exported = export_pddl(used, words, options.max_actions, strips_only=strips_only)
-        return ExportedTask(used, SentencePlans(OpenPlans.of(used, words)), exported)
+        return ExportedTask(used, SentencePlans(used, words), exported)
     if options.to == "bt":
         found = choices_under(used, words)
         counts = {used.model.robots[own.robot]: own.automaton.count for own in found.robots}

@@ -18,13 +18,14 @@ from coordlang.commands.terminal import covered_code, echo, note, write
 from coordlang.execution.best_sentence import BestSentence, best_sentence
 from coordlang.execution.drawing import cut_note, plans_dot
 from coordlang.execution.guided_search import ExpandedStates, GuidedPlan, plan_under_sentence
-from coordlang.execution.open_plans import OpenPlans, PlanDag, open_plans_data, plan_dag
+from coordlang.execution.open_plans import PlanDag, open_plans_data, plan_dag
 from coordlang.execution.plan_sentence import read_plan_file, sentence_of_plan
 from coordlang.execution.preferences import Preference, read_preference
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.tolerance import tolerance_data
 from planners.search.heuristics import HeuristicName
 from planners.search.plan_file import Texts, json_count
+from planners.search.plans import Plans
 from planners.system.errors import CoordlangError, UsageError
 from planners.system.notebook import counted
 
@@ -104,22 +105,21 @@ def show_say(found: Said, options: SayOptions) -> int:
 class SentencePlans(OptimalPlans, InTask):
     """The optimal plans that a sentence leaves open, as `OptimalPlans` with a drawn DAG."""
 
-    __slots__ = ("_open", "used")
+    __slots__ = ("_words", "used")
     shown = ("sentence", *OptimalPlans.shown, "covered")
 
-    def __init__(self, open_plans: OpenPlans) -> None:
-        super().__init__(open_plans.plans)
-        self._open = open_plans
-        self.used = open_plans.task_language
+    def __init__(self, used: TaskLanguage, words: Sequence[int]) -> None:
+        super().__init__(Plans.of(used.plans_with(words)))
+        self.used, self._words = used, words
 
     @property
     def sentence(self) -> str:
         """The sentence."""
-        return self.used.text(self._open.words)
+        return self.used.text(self._words)
 
     def dag(self, nodes: int | None = None) -> PlanDag:
         """Return the plans as the paths of a DAG, cut to about so many nodes (None: all)."""
-        return plan_dag(self._open, nodes)
+        return plan_dag(self.used, self._words, self._plans.space, nodes)
 
     def dot(self, nodes: int = NODES_DRAWN) -> str:
         """Return the DAG in the language of Graphviz."""
@@ -131,7 +131,8 @@ class SentencePlans(OptimalPlans, InTask):
 
     def data_with(self, listed: Sequence[Sequence[Texts]], graph: PlanDag | None) -> dict[str, Any]:
         """Return a JSON plan file with sentence and guarantee, and with the DAG if one is given."""
-        return open_plans_data(self._open, [self._known(plan) for plan in listed], graph)
+        numbers = [self._known(plan) for plan in listed]
+        return open_plans_data(self.used, self._words, self._plans, numbers, graph)
 
 
 @public(UnderstandOptions)
@@ -147,7 +148,7 @@ def understand(files: Arguments, options: UnderstandOptions) -> SentencePlans:
     """
     said = files.needed("SENTENCE")
     used = files.task().used
-    return SentencePlans(OpenPlans.of(used, used.words_of(said)))
+    return SentencePlans(used, used.words_of(said))
 
 
 def show_understand(found: SentencePlans, options: UnderstandOptions) -> int:
@@ -298,7 +299,7 @@ def plan(files: Arguments, options: PlanOptions) -> PlanUnderSentence:
         found,
         plan_under_sentence(used, None, options.heuristic, expanded),
         tuple(_fulfilled(preferences, best)) if best else (),
-        SentencePlans(OpenPlans.of(used, words)),
+        SentencePlans(used, words),
     )
 
 

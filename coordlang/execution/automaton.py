@@ -47,22 +47,13 @@ class Knowledge(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Automaton:
-    """A deterministic automaton over one robot's label numbers (0: idle).
+    """A deterministic automaton over one robot's label numbers (0: idle); state 0 is its start.
 
-    State 0 is where it starts.  Nothing but its own module indexes ``first``, ``label`` and
-    ``target``.
-
-    Parameters
-    ----------
-    layers
-        ``layers[k]`` are the states after k joint steps; those of the last layer are final.
-    first, label, target
-        The edges out of state s are ``first[s]`` to ``first[s + 1]``, sorted by their label; each
-        has a label and a target.
-    left
-        For each state the exact number of subplans from it on, at least 1.
-    known
-        For each state what the robot knows there; all empty where no knowledge was computed.
+    ``layers[k]`` are the states after k joint steps, those of the last one are final.  The edges
+    out of state s are ``first[s]`` to ``first[s + 1]``, sorted by label, each with a ``label`` and
+    a ``target`` (only this module indexes these).  ``left`` has for each state the exact number of
+    subplans from it on, at least 1; ``known`` what the robot knows there, all empty where no
+    knowledge was computed.
     """
 
     layers: tuple[range, ...]
@@ -106,34 +97,18 @@ class Automaton:
 def determinise(
     space: PlanSpace, robot: int, truth: Sequence[int] | None = None, most: int | None = None
 ) -> Automaton:
-    """The least automaton of a robot's subplans over the plans of a plan space.
+    """The least automaton of a robot's subplans over the plans of a plan space of one task.
 
-    Without ``truth`` it is the minimal deterministic automaton that accepts exactly the robot's
-    subplans.  With ``truth`` it also gives for each state what is known there: the facts that have
-    one value in all nodes that plans with the same own beginning can be in.  Then it is the least
-    automaton that accepts the subplans and gives this output (a Moore machine: states are merged
-    that agree on the knowledge, now and after every continuation).
+    Without ``truth`` it is the minimal deterministic automaton that accepts exactly these.  With
+    ``truth``, the true facts of each node as bits, it also gives for each state what is known
+    there: the facts that have one value in all nodes that plans with the same own beginning can be
+    in.  It is then the least automaton with this output (a Moore machine: states are merged that
+    agree on the knowledge, now and after every continuation).
 
     Three passes over the layers: nodes that behave alike are one (upwards), subset construction
     (downwards), equal futures are one (upwards).  Linear but for the subsets, of which there may be
-    exponentially many.
-
-    Parameters
-    ----------
-    space
-        The plans of one task.
-    robot
-        The robot's number.
-    truth
-        For each node its true facts as bits.
-    most
-        The most members that all subsets together may have; None: as many as the memory holds.
-
-    Raises
-    ------
-    OutOfMemory
-        With an estimate, before the subsets fill the memory or when they have more than ``most``
-        members.
+    exponentially many: raises `OutOfMemory`, with an estimate, before they fill the memory or have
+    more than ``most`` members.
     """
     nodes = (_nodes(space, robot, truth, number) for number in range(len(space.layers)))
     layers, top = _merged(nodes)  # merging nodes changes no set of own continuations

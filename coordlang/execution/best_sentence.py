@@ -20,19 +20,10 @@ _END = -1
 
 @dataclass(frozen=True, slots=True)
 class BestSentence:
-    """The best sentence, and what became of each preference.
+    """The best sentence (word numbers), and the exact number of plans that it leaves open.
 
-    Parameters
-    ----------
-    words
-        Its word numbers.
-    plans
-        The exact number of plans that it leaves open.
-    values
-        One value for each preference: the number of words, the number of plans, or (grade of the
-        worst plan left open, grade of the best).
-    prefixes
-        How many prefixes of sentences were looked at.
+    ``values`` has for each preference the number of words, the number of plans, or (grade of the
+    worst plan left open, grade of the best); so many ``prefixes`` of sentences were looked at.
     """
 
     words: tuple[int, ...]
@@ -54,19 +45,13 @@ def best_sentence(
       best plan has.  The robots may end up with any of these plans, so the worst one is what the
       sentence promises.
 
-    Of sentences that are equal in all preferences the one with fewest words is taken, then the
-    first by word numbers.
-
+    Of equal sentences the one with fewest words is taken, then the first by word numbers.
     Best-first search over prefixes of sentences, with a bound on what any continuation can give;
     prefixes that lead to the same nodes with the same counts are one.  ``shortest`` alone takes as
     many prefixes as the sentence has words.  The other preferences ask for the best string of a
-    nondeterministic automaton, which has no polynomial algorithm in general (for ``most-plans`` cf.
-    Lyngsø and Pedersen 2002 on hidden Markov models).
-
-    Raises
-    ------
-    OutOfMemory
-        When the prefixes have more than ``most`` entries, or more than the memory holds.
+    nondeterministic automaton, which has no polynomial algorithm in general (cf. Lyngsø and
+    Pedersen 2002 on hidden Markov models).  Raises `OutOfMemory` when the prefixes have more than
+    ``most`` entries, or more than the memory holds.
     """
     graph = _Graph.of(task_language, preferences)
     start = _Prefix((graph.word[0],), {0: 1})

@@ -48,11 +48,7 @@ Atoms = Literal["exact", "own"]
 
 @dataclass(frozen=True, slots=True)
 class RobotChoices:
-    """One robot's choices.
-
-    ``automaton`` accepts the subplans of the robot with this number, and has for each state what it
-    knows there; ``atoms`` says how this was found.
-    """
+    """One robot's subplans as an automaton with what it knows, and how this was found."""
 
     robot: int
     automaton: Automaton
@@ -63,18 +59,8 @@ class RobotChoices:
 class SentenceChoices:
     """All robots' choices under one sentence of one task.
 
-    Parameters
-    ----------
-    task_language
-        The language and the task.
-    words
-        The word numbers of the sentence.
-    fits
-        The plans with the sentence.
-    robots
-        Each robot's choices.
-    mixtures
-        Every combination of the choices; None where there are too many to walk.
+    ``fits`` are the plans with the sentence, ``mixtures`` every combination of the choices, None
+    where there are too many to walk.
     """
 
     task_language: TaskLanguage
@@ -101,27 +87,13 @@ def choices(
     words: Sequence[int],
     most: int | None = MOST,
 ) -> SentenceChoices:
-    """The choices of every robot under a sentence.
+    """The choices of every robot under a sentence, given by its word numbers.
 
     What is known in a state is exact (`coordlang.execution.automaton.determinise`) where all
-    combinations of choices can be walked with at most ``most`` joint moves and all of them are
-    optimal.  Elsewhere only the atoms are known that the robot's own subactions alone change.
-
-    Parameters
-    ----------
-    task_language
-        The language and the task.
-    words
-        The word numbers of the sentence.
-    most
-        The most joint moves of a walk; None: as many as the memory holds.
-
-    Raises
-    ------
-    NoPlanFits
-        If no optimal plan has the sentence.
-    OutOfMemory
-        If the automata, or with ``most=None`` the combinations, do not fit into the memory.
+    combinations of choices can be walked with at most ``most`` joint moves (None: as many as the
+    memory holds) and all of them are optimal.  Elsewhere only the atoms are known that the robot's
+    own subactions alone change.  Raises `NoPlanFits`, and `OutOfMemory` if the automata, or with
+    ``most=None`` the combinations, do not fit into the memory.
     """
     fits = task_language.plans_with(words)
     subplans = [determinise(fits, robot) for robot in range(len(task_language.model.robots))]

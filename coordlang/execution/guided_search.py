@@ -87,26 +87,11 @@ def plan_under_sentence(
     *,
     count_words: bool = True,
 ) -> GuidedPlan:
-    """Find an optimal plan of the task with a sentence.
+    """Find an optimal plan of the task with a sentence (word numbers); any optimal plan for None.
 
-    Parameters
-    ----------
-    task_language
-        The language and the task.
-    words
-        The word numbers of the sentence; any optimal plan for None.
-    name
-        The heuristic (`planners.search.heuristics.HEURISTICS`).  Of plans within slack the earliest
-        is read off the plan space, without a search.
-    states
-        What earlier searches with the same language and model have expanded.
-    count_words
-        Whether the words that are left also bound the steps that are left; see `a_star`.
-
-    Raises
-    ------
-    NoPlanFits
-        If no optimal plan of the task has the sentence.
+    ``name`` is one of `planners.search.heuristics.HEURISTICS`; ``states`` are what earlier searches
+    with the same language and model have expanded; for ``count_words`` see `a_star`.  Of plans
+    within slack the earliest is read off the plan space, without a search.  Raises `NoPlanFits`.
     """
     space = task_language.space
     if space.model.slack:
@@ -158,9 +143,7 @@ def a_star(
     *,
     count_words: bool = True,
 ) -> GuidedPlan | None:
-    """Find an optimal plan with a sentence, if it is the sentence of an optimal plan.
-
-    For another sentence it may find a longer plan or none.
+    """Find an optimal plan with a sentence; for other sentences a longer plan or none.
 
     With a sentence a node is a state and the *index* of its word in the sentence.  What does not
     fit is pruned: a step stays in its word or goes on to the next one, and a goal state counts at
@@ -169,12 +152,10 @@ def a_star(
     takes at least one step, so with ``count_words`` the number of words that are left is a lower
     bound, too (the paper only prunes).
 
-    Costs are lexicographic: steps, second component.  The next node is one with least (steps +
-    bound, second component), then least bound, then the largest index, then the one whose
-    predecessor was expanded last, then the one with the smallest labels.
-
-    ``bound`` is an admissible, consistent lower bound on the joint steps left; for the rest see
-    `plan_under_sentence`.
+    Costs are lexicographic: steps, second component.  ``bound`` is an admissible, consistent lower
+    bound on the steps left.  The next node is one with least (steps + bound, second component),
+    then least bound, then the largest index, then the one whose predecessor was expanded last, then
+    the one with the smallest labels.
     """
     [start] = states.numbers(init[None, :])
     if words is not None and (not words or states.word[start] != words[0]):

@@ -18,41 +18,6 @@ from planners.search.plans import Plan, Plans, counts
 
 
 @dataclass(frozen=True, slots=True)
-class OpenPlans:
-    """The plans that a sentence leaves open in one task.
-
-    ``words`` are the word numbers of the sentence.  ``fits`` are the plans as a plan space of one
-    task, whose nodes are a joint state and the number of words passed; ``plans`` are the same,
-    counted and ranked.
-    """
-
-    task_language: TaskLanguage
-    words: tuple[int, ...]
-    fits: PlanSpace
-    plans: Plans
-
-    @classmethod
-    def of(cls, task_language: TaskLanguage, words: Sequence[int]) -> OpenPlans:
-        """Find the optimal plans of the task with a sentence, given by its word numbers.
-
-        O(plan-space edges * words), however many plans there are.  Raises `NoPlanFits` if there is
-        none; it says how far plans follow the sentence.
-        """
-        fits = task_language.plans_with(words)
-        return cls(task_language, tuple(words), fits, Plans.of(fits))
-
-    @property
-    def count(self) -> int:
-        """The number of plans that the sentence leaves open."""
-        return self.plans.count
-
-    def __repr__(self) -> str:
-        """The sentence and the number of plans, not the plan space."""
-        sentence = self.task_language.text(self.words)
-        return f"OpenPlans(sentence={sentence!r}, count={self.count})"
-
-
-@dataclass(frozen=True, slots=True)
 class DagNode:
     """A joint state on a plan, or several states of one step that are drawn as one.
 
@@ -111,13 +76,15 @@ class PlanDag:
         return [range(layer[0], layer[-1] + 1) for layer in layers]
 
 
-def plan_dag(open_plans: OpenPlans, most: int | None = None) -> PlanDag:
-    """The plans that a sentence leaves open as a DAG of at most about ``most`` nodes (None: all).
+def plan_dag(
+    task_language: TaskLanguage, words: Sequence[int], space: PlanSpace, most: int | None = None
+) -> PlanDag:
+    """The plans with a sentence as a DAG of at most about ``most`` nodes (None: all).
 
-    A larger one is cut in its breadth: every step keeps the nodes that most plans pass through, at
-    least one, and the others of a step are merged into one.
+    ``space`` is `TaskLanguage.plans_with` of the sentence.  A larger DAG is cut in its breadth:
+    every step keeps the nodes that most plans pass through, at least one, and the others of a step
+    are merged into one.
     """
-    task_language, space = open_plans.task_language, open_plans.fits
     names, codec = task_language.partition.words, task_language.model.codec
     word = task_language.partition.word_of(space.rows)[space.state]
     passed = words_passed(space, word)
@@ -137,7 +104,7 @@ def plan_dag(open_plans: OpenPlans, most: int | None = None) -> PlanDag:
             number.update(dict.fromkeys(others, len(nodes)))
             nodes.append(DagNode(step, "", "", 0, sum(through[n] for n in others), len(others)))
     return PlanDag(
-        sentence=tuple(names[w] for w in open_plans.words),
+        sentence=tuple(names[w] for w in words),
         task=describe(task_language.space, task_language.task),
         robots=task_language.model.robots,
         count=through[int(space.starts[0])],
@@ -185,20 +152,23 @@ def _edges(
 
 
 def open_plans_data(
-    open_plans: OpenPlans, listed: Sequence[Plan], graph: PlanDag | None
+    task_language: TaskLanguage,
+    words: Sequence[int],
+    plans: Plans,
+    listed: Sequence[Plan],
+    graph: PlanDag | None,
 ) -> dict[str, Any]:
     """The JSON form: a plan file (docs/formats.md) with the sentence, its guarantee and the DAG.
 
-    ``listed`` are the plans to write out; ``graph`` is the DAG to write as ``nodes`` and ``edges``,
-    or None.
+    ``listed`` are those of the ``plans`` to write out; ``graph`` is the DAG to write as ``nodes``
+    and ``edges``, or None.
     """
-    task_language = open_plans.task_language
     data = {
-        "sentence": task_language.text(open_plans.words),
+        "sentence": task_language.text(words),
         "covered": task_language.covered,
         "task": describe(task_language.space, task_language.task),
         **tolerance_data(task_language.tolerance),
-        **to_json(open_plans.plans, listed),
+        **to_json(plans, listed),
     }
     if graph is not None:
         data["nodes"] = [_node_data(node) for node in graph.nodes]

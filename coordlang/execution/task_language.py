@@ -30,13 +30,8 @@ from planners.system.messages import echoed
 class NoPlanFits(Refuted):
     """No optimal plan of the task has this sentence.
 
-    Attributes
-    ----------
-    fitting
-        The word numbers of the longest prefix of the sentence that some plan's sentence begins
-        with.
-    next_words
-        The word numbers that can follow it, None where a plan may end.
+    ``fitting`` are the word numbers of the longest prefix of the sentence with which some plan's
+    sentence begins; ``next_words`` those that can follow it, None where a plan may end.
     """
 
     def __init__(
@@ -63,27 +58,12 @@ class NoPlanFits(Refuted):
 class TaskLanguage:
     """A language with the optimal plans of one task.
 
-    Parameters
-    ----------
-    language
-        The language.
-    partition
-        The same as a partition of the model's states.
-    space
-        The optimal plans of the task, and perhaps of further ones.
-    task
-        The number of the task in ``space.starts``.
-    word
-        The word number of every plan-space node.
-    covered
-        Whether it is one of the language's candidate tasks and nothing worse happens in it than
-        the language says.  For any other task nothing is guaranteed.
-    holds
-        Whether the plans of each sentence mix freely in the task: verified here.
-    verdict
-        What the verification said; None where there was none, or it did not fit into the memory.
-    declared
-        Domain and problem; None where there is only a model.
+    ``partition`` is the language over the model's states, ``word`` the word number of every node of
+    ``space``, which holds the plans of ``task`` (a number) and perhaps of further ones.
+    ``covered``: it is one of the language's candidate tasks, and nothing worse happens in it than
+    the language says; for any other task nothing is guaranteed.  ``holds``: the plans of each
+    sentence mix freely in the task, as ``verdict`` (None: there was none, or it did not fit into
+    the memory) said here. ``declared`` are domain and problem, None where there is only a model.
     """
 
     language: Language

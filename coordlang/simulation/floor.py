@@ -37,17 +37,7 @@ _REACHED = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """Places and walls in metres.
-
-    Attributes
-    ----------
-    points
-        Where the middle of each place is.
-    walls
-        Each from one point to another.
-    links
-        The pairs of places between which something moves.
-    """
+    """Where places and walls are, and the pairs of places between which something moves."""
 
     points: Mapping[str, Point]
     walls: tuple[Wall, ...]
@@ -67,22 +57,12 @@ class Floor:
 
 
 def floor_of(world: World, known: Mapping[str, Point], cell: float) -> Floor:
-    """Lay places out on a floor.
+    """Lay the places of a world out on a floor.
 
-    Parameters
-    ----------
-    world
-        The places of a domain, and their links.
-    known
-        Coordinates of places, x to the right and y down, as a file of coordinates has them; where
-        they are not all known, the names of the places have to say them (``c2-3``).
-    cell
-        Metres for one unit of the coordinates.
-
-    Raises
-    ------
-    BadInput
-        If the coordinates of the places are not known.
+    ``known`` are coordinates of places, x to the right and y down, as a file of coordinates has
+    them; where they are not all known, the names of the places have to say them (``c2-3``).
+    ``cell`` is the length of one unit of them in metres.  Raises `BadInput` if the coordinates are
+    not known.
     """
     links = tuple(sorted({link.ends for link in world.links}))
     points = _points(world.places, links, known)
@@ -129,14 +109,12 @@ def _points(
             "no action of this domain moves anything from place to place",
             remedy="Simulate a domain whose robots move between places.",
         )
-    if all(name in known for name in places):
-        return {name: known[name] for name in places}
-    found = from_names(places, links)
+    missing = [name for name in places if name not in known]
+    found = from_names(places, links) if missing else {name: known[name] for name in places}
     if found is None:
-        missing = [name for name in places if name not in known]
+        more = " .." if len(missing) > 5 else ""
         raise BadInput(
-            f"where the places lie is not known: {', '.join(missing[:5])}"
-            f"{' ..' if len(missing) > 5 else ''}",
+            f"where the places lie is not known: {', '.join(missing[:5])}{more}",
             remedy="Give a file with --coordinates, or coordinates.json beside the problem "
             "(`coordlang schema coordinates`), or call places as cells are: c2-3.",
         )
@@ -194,15 +172,7 @@ def _round(metres: float) -> float:
 
 @dataclass(slots=True)
 class Human:
-    """A human: where in the world, and where to next.
-
-    Attributes
-    ----------
-    place, before
-        The place that the human stands in, or walks to, and the one where the way began.
-    walks
-        Whether the human walks.
-    """
+    """A human in a place, or walking from ``before`` to ``place``, and then on."""
 
     place: str
     before: str
@@ -224,32 +194,23 @@ class Human:
     ) -> Human:
         """Put a human on the floor; where no robot starts or ends, unless the place is named.
 
-        Raises
-        ------
-        UsageError
-            If there is no such place, a robot starts there, or none is left.
+        Raises `UsageError` if there is no such place, a robot starts there, or none is left.
         """
-        places = sorted(set(floor.points) - {*starts, *goals})
-        if wanted in (_STANDING_SOMEWHERE, _WALKING):
-            if not places:
-                raise UsageError(
-                    "there is no place for a human: robots start or end in all of them",
-                    remedy="Leave out --human.",
-                )
-            place = random.choice(places)
-        elif wanted in starts:
+        free = sorted(set(floor.points) - {*starts, *goals})
+        named = wanted not in (_STANDING_SOMEWHERE, _WALKING)
+        if named and (wanted in starts or wanted not in floor.points):
+            why = "a robot starts in this place" if wanted in starts else "there is no such place"
             raise UsageError(
-                f"--human {echoed(wanted)}: a robot starts in this place",
-                remedy=f"Say another place, or {_STANDING_SOMEWHERE}.",
-            )
-        elif wanted in floor.points:
-            place = wanted
-        else:
-            raise UsageError(
-                f"--human {echoed(wanted)}: there is no such place",
+                f"--human {echoed(wanted)}: {why}",
                 remedy=f"Say a place such as {min(floor.points)}, or {_STANDING_SOMEWHERE}, or "
                 f"{_WALKING}.",
             )
+        if not named and not free:
+            raise UsageError(
+                "there is no place for a human: robots start or end in all of them",
+                remedy="Leave out --human.",
+            )
+        place = wanted if named else random.choice(free)
         ways: dict[str, list[str]] = {name: [] for name in floor.points}
         for one, other in floor.links:
             ways[one].append(other)
@@ -259,13 +220,8 @@ class Human:
     def velocity(self, at: Point, robots: Sequence[Point], clearance: float) -> tuple[float, float]:
         """Return how the human walks, in metres a second to the right and up.
 
-        Parameters
-        ----------
-        at, robots
-            Where the human and the robots are.
-        clearance
-            The human turns back where a robot ahead is nearer, from middle to middle, and stands
-            still where that leads to another one.
+        The human turns back where a robot ahead is nearer than ``clearance``, from middle to
+        middle, and stands still where that leads to another one.
         """
         if not self.walks:
             return 0.0, 0.0

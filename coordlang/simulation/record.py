@@ -195,10 +195,8 @@ def to_bytes(record: SimulationRecord) -> bytes:
 def read_simulation(path: str | Path) -> SimulationRecord:
     """Read a record of simulated runs.
 
-    Raises
-    ------
-    BadInput
-        For a file that is none, or whose runs do not have a pose of every robot at every time.
+    Raises `BadInput` for a file that is none, or whose runs do not have a pose of every robot at
+    every time.
     """
     position = Position(str(path))
     record = SIMULATION.decode(read_bytes(path), position)

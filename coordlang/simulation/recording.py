@@ -43,10 +43,7 @@ _FRAMES, _COLUMNS = 8, 4
 def recorded(record: SimulationRecord, run: RunRecord, kind: str) -> bytes:
     """Draw a run as a file of this kind, ``.gif``, ``.mp4`` or ``.png``.
 
-    Raises
-    ------
-    UsageError
-        If a package is not installed that writes such files.
+    Raises `UsageError` if a package is not installed that writes such files.
     """
     return _WRITERS[kind](record, run)
 

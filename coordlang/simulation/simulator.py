@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import Any
 
 from coordlang.simulation.floor import Floor, outlines
-from coordlang.simulation.pace import PACES
 from coordlang.simulation.robot import Body, Pose, Velocity
 from coordlang.sites.coordinates import Point
 from planners.system.errors import UsageError
@@ -41,11 +40,12 @@ POSITION_NOISE = 0.1
 class Settings(Body):
     """How robots are built and keep step.
 
-    ``step`` is one of `PACES`.  ``noise`` is the standard deviation of what wheels do, as a share
-    of what they are told, drawn anew in each tick; a tenth of it, in metres and in radians, is that
-    of where a robot believes to be.  ``lidar``: robots stop before what a lidar sees straight
-    ahead.  ``human`` is the place of a human that nobody but a lidar knows of, ``random`` for a
-    place drawn for each run, ``walking`` for one who walks about; None for nobody.
+    ``step`` is one of `coordlang.simulation.pace.PACES`.  ``noise`` is the standard deviation of
+    what wheels do, as a share of what they are told, drawn anew in each tick; a tenth of it, in
+    metres and in radians, is that of where a robot believes to be.  ``lidar``: robots stop before
+    what a lidar sees straight ahead.  ``human`` is the place of a human that nobody but a lidar
+    knows of, ``random`` for a place drawn for each run, ``walking`` for one who walks about; None
+    for nobody.
     """
 
     step: str = "clock"
@@ -55,11 +55,6 @@ class Settings(Body):
 
     def __post_init__(self) -> None:
         """Raise `UsageError` for what no robot can be built with."""
-        if self.step not in PACES:
-            raise UsageError(
-                f"--step {self.step}: there is no such way to keep step",
-                remedy=f"Say {', '.join(PACES[:-1])} or {PACES[-1]}.",
-            )
         for name in ("cell", "radius", "speed", "turn", "tick"):
             value = getattr(self, name)
             if not 0 < value < math.inf:
@@ -85,13 +80,7 @@ class Settings(Body):
 
 
 def require_simulator() -> Any:
-    """The class of ir-sim's worlds.
-
-    Raises
-    ------
-    UsageError
-        If ir-sim is not installed.
-    """
+    """The class of ir-sim's worlds; raises `UsageError` if ir-sim is not installed."""
     import matplotlib
 
     backend = matplotlib.get_backend()

@@ -84,13 +84,7 @@ class Mission:
         return self._drawn(f"{seed} plan")
 
     def atom_at(self, robot: str, place: str) -> str:
-        """Return the atom that says that a robot is in a place.
-
-        Raises
-        ------
-        UsageError
-            If there is none.
-        """
+        """Return the atom that a robot is in a place; raises `UsageError` if there is none."""
         for text, role in sorted(self.world.roles.items()):
             if role == ("at", robot, place):
                 return text
@@ -137,12 +131,8 @@ def mission(
 ) -> Mission:
     """Prepare the robots for runs of a task.
 
-    Raises
-    ------
-    NoPlanFits
-        If no optimal plan has the sentence.
-    BadInput
-        If no atom says where a robot is.
+    Raises `NoPlanFits` if no optimal plan has the sentence, `BadInput` if no atom says where a
+    robot is.
     """
     model, space = task_language.model, task_language.space
     plans = Plans.of(space, task_language.task)

@@ -47,12 +47,8 @@ def json_schema() -> dict[str, Any]:
 def read_coordinates(path: str | Path) -> dict[str, Point]:
     """Read a file of coordinates, ``{"coordinates": {"depot": [0, 0], "town": [1, 0]}}``.
 
-    x to the right, y down.  Names are lower case in the result.
-
-    Raises
-    ------
-    BadInput
-        For anything else, and if two places have the same coordinates.
+    x to the right, y down; names are lower case in the result.  Raises `BadInput` for anything
+    else, and if two places have the same coordinates.
     """
     position = Position(str(path))
     return checked(COORDINATES.decode(read_bytes(path), position).coordinates, position)

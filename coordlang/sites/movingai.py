@@ -80,60 +80,55 @@ def cell_name(cell: Cell) -> str:
 def read_map(path: Path) -> MovingMap:
     """Read a map in the format of movingai.com, with or without its ``type`` line.
 
-    Raises
-    ------
-    BadInput
-        For anything else, with the line.
+    Raises `BadInput` for anything else, with the line.
     """
-    rows, first = _map_rows(path, _lines(path, "map"))
-    for row, text in enumerate(rows):
-        if unknown := _UNKNOWN.search(text):
-            raise BadInput(
-                f"unknown character {unknown[0]!r} in the map",
-                position=Position(str(path), first + row, unknown.start() + 1),
-                remedy=f"Passable: {' '.join(PASSABLE)}; blocked: {' '.join(BLOCKED)}.",
-            )
+    lines = _lines(path, "map")
+    sizes, header = _header(path, lines)
+    rows = [line.rstrip() for line in lines[header:]]
+    while len(rows) > sizes["height"] and not rows[-1]:
+        rows.pop()
+    characters = f"Passable: {' '.join(PASSABLE)}; blocked: {' '.join(BLOCKED)}."
+    for number, row in enumerate(rows[: sizes["height"]], start=header + 1):
+        if len(row) != sizes["width"]:
+            what = f"this row has {len(row)} cells where the header says {sizes['width']}"
+            raise _wrong(what, "Correct the header or the rows.", path, number)
+        if unknown := _UNKNOWN.search(row):
+            what = f"unknown character {unknown[0]!r} in the map"
+            raise _wrong(what, characters, path, number, unknown.start() + 1)
+    if len(rows) != sizes["height"]:
+        last = header + 1 + min(len(rows), sizes["height"])
+        what = f"the map has {len(rows)} rows where the header says {sizes['height']}"
+        raise _wrong(what, "Correct the header or the rows.", path, last)
     if not any(character in row for row in rows for character in PASSABLE):
-        raise BadInput(
-            "this map has no passable cell",
-            position=Position(str(path), first, 1),
-            remedy=f"Passable: {' '.join(PASSABLE)}; blocked: {' '.join(BLOCKED)}.",
-        )
+        raise _wrong("this map has no passable cell", characters, path, header + 1)
     return MovingMap(tuple(rows))
 
 
 def read_agents(path: Path, grid: MovingMap, agents: int) -> tuple[Agent, ...]:
     """Read the first lines of a scenario, one for each robot.
 
-    Raises
-    ------
-    BadInput
-        Too few lines, a line of another form, another map's size, a cell that is blocked or outside
-        the map, and two robots with one start or one goal.
+    Raises `BadInput` for too few lines, a line of another form, another map's size, a cell that is
+    blocked or outside the map, and two robots with one start or one goal.
     """
     lines = [(n, text) for n, text in enumerate(_lines(path, "scenario"), 1) if text.strip()]
     if lines and lines[0][1].split()[0] == "version":
         lines = lines[1:]
     if len(lines) < agents:
-        raise BadInput(
-            f"this scenario has {len(lines):,} robots, and {agents:,} are asked for",
-            position=Position(str(path)),
-            remedy=f"Say --agents {len(lines)} or fewer."
-            if lines
-            else f"Expected a line for each robot: {_COLUMNS}.",
-        )
+        fewer = f"Say --agents {len(lines)} or fewer."
+        what = f"this scenario has {len(lines):,} robots, and {agents:,} are asked for"
+        raise _wrong(what, fewer if lines else f"Expected a line for each: {_COLUMNS}.", path)
     found: list[Agent] = []
     taken: dict[tuple[str, Cell], int] = {}
     for number, text in lines[:agents]:
-        position = Position(str(path), number, 1)
-        agent = _agent(text, grid, position)
+        agent = _agent(path, number, text, grid)
         for what, cell in (("start", agent.start), ("goal", agent.goal)):
             before = taken.setdefault((what, cell), number)
             if before != number:
-                raise BadInput(
+                raise _wrong(
                     f"two robots have the {what} {cell_name(cell)} (the other one: line {before})",
-                    position=position,
-                    remedy="No two robots can be in one cell: leave one of the lines out.",
+                    "No two robots can be in one cell: leave one of the lines out.",
+                    path,
+                    number,
                 )
         found.append(agent)
     return tuple(found)
@@ -144,13 +139,7 @@ def planning_files(map_file: Path, scenario: Path, agents: int) -> dict[str, str
 
     ``domain.pddl`` is the shipped grid domain, the problem has the scenario's name and the number
     of robots, and ``coordinates.json`` says where the report draws the cells (x: column, y: row).
-
-    Raises
-    ------
-    BadInput
-        See `read_map` and `read_agents`.
-    UsageError
-        Fewer than one robot.
+    Raises `BadInput` (see `read_map`, `read_agents`), and `UsageError` for fewer than one robot.
     """
     if agents < 1:
         raise UsageError(
@@ -196,14 +185,8 @@ def grid_problem_text(
 ) -> str:
     """Write a problem of the grid domain, in which robot number k is ``r{k+1}``.
 
-    Parameters
-    ----------
-    rows
-        The cells, row by row.
-    neighbours
-        Gives the cells that are adjacent to a cell, in the order in which they are written.
-    declare_robots
-        Whether the robots are objects of the problem; else they are constants of the domain.
+    ``rows`` are the cells, row by row; ``neighbours`` gives those adjacent to a cell, in the order
+    in which they are written.  Without ``declare_robots`` robots are constants of the domain.
     """
     robots = [f"r{number}" for number in range(1, len(starts) + 1)]
     listed = ["    " + " ".join(names) for names in rows]
@@ -242,20 +225,25 @@ def in_rows(cells: Mapping[str, Cell]) -> list[list[str]]:
     return [list(names) for _, names in groupby(cells, key=lambda name: cells[name][0])]
 
 
+def _wrong(
+    what: str, remedy: str, path: Path, line: int | None = None, column: int = 1
+) -> BadInput:
+    """The error of a file, in a line if there is one."""
+    where = Position(str(path)) if line is None else Position(str(path), line, column)
+    return BadInput(what, position=where, remedy=remedy)
+
+
 def _lines(path: Path, what: str) -> list[str]:
     data = read_bytes(path)
     for number, line in enumerate(data.splitlines(), start=1):
         if not line.isascii():
-            raise BadInput(
-                f"this is no {what}: a character that is not ASCII",
-                position=Position(str(path), number, 1),
-                remedy="Is it the right file, and not a packed one?",
-            )
+            said = f"this is no {what}: a character that is not ASCII"
+            raise _wrong(said, "Is it the right file, and not a packed one?", path, number)
     return data.decode("ascii").splitlines()
 
 
-def _map_rows(path: Path, lines: Sequence[str]) -> tuple[list[str], int]:
-    """The rows of the map, checked against its header, and the number of the first one's line."""
+def _header(path: Path, lines: Sequence[str]) -> tuple[dict[str, int], int]:
+    """The ``height`` and ``width`` of a map, and the number of its header's last line."""
     sizes: dict[str, int] = {}
     for number, line in enumerate(lines, start=1):
         match line.split():
@@ -266,71 +254,37 @@ def _map_rows(path: Path, lines: Sequence[str]) -> tuple[list[str], int]:
             ):
                 sizes[key] = size
             case ["map"] if len(sizes) == 2:
-                rows = _checked_rows(path, lines, number, sizes["height"], sizes["width"])
-                return rows, number + 1
+                return sizes, number
             case _:
-                raise BadInput(
+                raise _wrong(
                     f"unexpected {echoed(line)} in the header of a map",
-                    position=Position(str(path), number, 1),
-                    remedy="Expected 'height N' and 'width N' (once each, N from 1), then 'map'.",
+                    "Expected 'height N' and 'width N' (once each, N from 1), then 'map'.",
+                    path,
+                    number,
                 )
-    raise BadInput(
-        "this file has no line 'map'",
-        position=Position(str(path), max(1, len(lines)), 1),
-        remedy="Expected 'type octile', 'height N', 'width N', 'map', and then the rows.",
-    )
+    expected = "Expected 'type octile', 'height N', 'width N', 'map', and then the rows."
+    raise _wrong("this file has no line 'map'", expected, path, max(1, len(lines)))
 
 
-def _checked_rows(
-    path: Path, lines: Sequence[str], header: int, height: int, width: int
-) -> list[str]:
-    rows = [line.rstrip() for line in lines[header:]]
-    while len(rows) > height and not rows[-1]:
-        rows.pop()
-    remedy = "Correct the header or the rows."
-    for number, row in enumerate(rows[:height], start=header + 1):
-        if len(row) != width:
-            raise BadInput(
-                f"this row has {len(row)} cells where the header says {width}",
-                position=Position(str(path), number, 1),
-                remedy=remedy,
-            )
-    if len(rows) != height:
-        raise BadInput(
-            f"the map has {len(rows)} rows where the header says {height}",
-            position=Position(str(path), header + 1 + min(len(rows), height), 1),
-            remedy=remedy,
-        )
-    return rows
-
-
-def _agent(text: str, grid: MovingMap, position: Position) -> Agent:
+def _agent(path: Path, line: int, text: str, grid: MovingMap) -> Agent:
     """One line of a scenario; columns are parted by tabs, or by blanks."""
     words = text.split("\t") if "\t" in text else text.split()
     numbers = [_natural(word.strip()) for word in words[2:8]]
     known = [number for number in numbers if number is not None]
     if len(words) < 8 or len(known) < 6:
-        raise BadInput(
-            f"this is no line of a scenario: {echoed(text.strip())}",
-            position=position,
-            remedy=f"Expected {_COLUMNS}, parted by tabs, with whole numbers.",
-        )
+        expected = f"Expected {_COLUMNS}, parted by tabs, with whole numbers."
+        raise _wrong(f"this is no line of a scenario: {echoed(text.strip())}", expected, path, line)
     width, height, start_x, start_y, goal_x, goal_y = known
     if (height, width) != (grid.height, grid.width):
-        raise BadInput(
-            f"this line is for a map of width {width} and height {height}, not "
-            f"{grid.width} and {grid.height}",
-            position=position,
-            remedy="Give --map the map of this scenario, not scaled.",
-        )
+        what = f"this line is for a map of width {width} and height {height}, not "
+        remedy = "Give --map the map of this scenario, not scaled."
+        raise _wrong(f"{what}{grid.width} and {grid.height}", remedy, path, line)
     agent = Agent((start_y, start_x), (goal_y, goal_x))
-    for what, cell in (("start", agent.start), ("goal", agent.goal)):
+    for which, cell in (("start", agent.start), ("goal", agent.goal)):
         if cell not in grid:
-            raise BadInput(
-                f"the {what} is no passable cell of the map: x {cell[1]}, y {cell[0]}",
-                position=position,
-                remedy="x counts columns from the left and y rows from the top, both from 0.",
-            )
+            what = f"the {which} is no passable cell of the map: x {cell[1]}, y {cell[0]}"
+            remedy = "x counts columns from the left and y rows from the top, both from 0."
+            raise _wrong(what, remedy, path, line)
     return agent
 
 

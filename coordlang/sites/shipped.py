@@ -15,10 +15,7 @@ _INSTALLED = "shipped_domains"
 def shipped_domains() -> Path:
     """Return the folder with a folder for each shipped domain.
 
-    Raises
-    ------
-    UsageError
-        If the package was installed without them.
+    Raises `UsageError` if the package was installed without them.
     """
     package = Path(__file__).resolve().parents[1]
     for place in (package / _INSTALLED, package.parent / "domains"):

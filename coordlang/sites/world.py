@@ -32,16 +32,9 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """The things, the places and their links, and the role of every atom.
+    """The things (robots first), the places, and the role of every atom by its text.
 
-    Attributes
-    ----------
-    things
-        Robots first.
-    places, links
-        Links are what moves join, and what static atoms relate.
-    roles
-        By the text of the atom.
+    Links are what moves join, and what static atoms relate.
     """
 
     things: tuple[str, ...]
@@ -85,11 +78,8 @@ class World:
 def find_world(model: JointModel, states: Sequence[Sequence[str]]) -> World:
     """Find what of a model can be drawn.
 
-    Parameters
-    ----------
-    states
-        Known states, as the texts of their true atoms: what puts a thing into two places in one of
-        them does not say where it is.
+    ``states`` are known ones, as the texts of their true atoms: what puts a thing into two places
+    in one of them does not say where it is.
     """
     predicates, known = _locations(model)
     roles = _without_ambiguous(_location_roles(model, predicates, known), states)

@@ -6,12 +6,13 @@ This module imports unified-planning; `coordlang.unified.register` makes the fac
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from unified_planning.engines import (
@@ -43,7 +44,7 @@ from coordlang.execution.task_language import NoPlanFits, TaskLanguage, language
 from coordlang.unified import NAME
 from coordlang.unified.options import PLAN_KINDS, EngineOptions, in_parameters
 from coordlang.unified.plans import NoSteps, of_up, to_up
-from coordlang.unified.translation import FEATURES, Translated
+from coordlang.unified.translation import FEATURES, Translated, translate
 from planners.check.validate import validate
 from planners.grounding import idling_schemas
 from planners.loading import build
@@ -75,43 +76,25 @@ _STATUS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class _Solved:
-    """The optimal plans of a problem, under the sentence if one is given."""
-
-    found: Translated
-    space: PlanSpace
-    messages: list[LogMessage]
-
-
 class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanValidatorMixin):  # type: ignore[misc]
     """Plans of least makespan, in joint steps, for all robots of a problem together.
 
-    Parameters
-    ----------
-    robots, robot_type, unowned
-        Who acts, in a problem without agents: objects or their names; a type or its name; who owns
-        actions without a robot ("error", "environment" or "shared").  Without them the robots are
-        found as in PDDL (docs/pddl.md).
-    subactions
-        Each action is a whole joint step: action -> robot -> its part, as in joint-action PDDL.
-    concurrency
-        For a problem with agents, formulas about the same joint step as further preconditions:
-        action -> PDDL text, in which ``?agent`` is the one that acts and ``agent`` their type.
-    cost, remember_actions
-        As on the command line.
-    language, sentence
-        A language (or the name of its file) and a sentence: only plans with this sentence.  The
-        language brings robots and cost.
-    plan_kind
-        The kind of the plans, a `PlanKind`: partial-order (default), sequential or time-triggered.
-        Where each action is a whole step, or there is one robot, sequential is the default.
+    ``robots``, ``robot_type`` and ``unowned`` say who acts in a problem without agents: objects or
+    their names; a type or its name; who owns actions without a robot ("error", "environment" or
+    "shared").  Without them the robots are found as in PDDL (docs/pddl.md).  With ``subactions``
+    each action is a whole joint step: action -> robot -> its part, as in joint-action PDDL.
+    ``concurrency`` has, for a problem with agents, formulas about the same joint step as further
+    preconditions: action -> PDDL text, in which ``?agent`` is the one that acts and ``agent`` their
+    type.  ``cost`` and ``remember_actions`` are as on the command line.  ``language`` (or the name
+    of its file) and ``sentence``: only plans with this sentence; the language brings robots and
+    cost.
 
-    Raises
-    ------
-    UPUsageError
-        For a value that there is not, here or, if it contradicts the problem or the language, when
-        a problem is solved.
+    ``plan_kind`` is the kind of the plans, a `PlanKind`: partial-order (default), sequential or
+    time-triggered.  Where each action is a whole step, or there is one robot, sequential is the
+    default.
+
+    Raises `UPUsageError` for a value that there is not, here or, if it contradicts the problem or
+    the language, when a problem is solved.
     """
 
     def __init__(self, **parameters: Any) -> None:
@@ -164,66 +147,57 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         timeout: float | None = None,
         output_stream: Any = None,
     ) -> PlanGenerationResult:
-        _ignored(heuristic=heuristic, output_stream=output_stream)
-        solved = self._solved(problem, timeout)
-        if isinstance(solved, PlanGenerationResult):
-            return solved
-        return self._result(_done(problem), solved, Plans.of(solved.space), 0, problem)
+        first = next(self._get_solutions(problem, timeout))
+        return first if first.plan is None else replace(first, status=_done(problem))
 
     def _get_solutions(
         self, problem: Any, timeout: float | None = None, output_stream: Any = None
     ) -> Iterator[PlanGenerationResult]:
         """Every plan once: all but the last are `INTERMEDIATE`."""
-        _ignored(output_stream=output_stream)
-        end = None if timeout is None else time.monotonic() + timeout
-        solved = self._solved(problem, timeout)
-        if isinstance(solved, PlanGenerationResult):
-            yield solved
-            return
-        plans = Plans.of(solved.space)
-        for number in range(plans.count):
-            if end is not None and time.monotonic() > end:
-                yield self._none(Status.TIMEOUT, f"{number} of {plans.count} plans in time")
-                return
-            status = _done(problem) if number == plans.count - 1 else Status.INTERMEDIATE
-            yield self._result(status, solved, plans, number, problem)
-
-    def _solved(self, problem: Any, timeout: float | None) -> _Solved | PlanGenerationResult:
-        """The plans as a graph; or the result that says why there are none."""
         main = threading.current_thread() is threading.main_thread()
         if timeout is not None and not main:
             text = "coordlang: timeouts of the search hold in the main thread only"
-            warnings.warn(text, stacklevel=4)
+            warnings.warn(text, stacklevel=3)
+        end = math.inf if timeout is None else time.monotonic() + timeout
         try:
             with time_limit(timeout) if main else nullcontext():
-                return self._search(problem)
+                found, space, messages = self._search(problem)
         except (BadInput, UsageError) as error:
             raise UPUsageError(in_parameters(error)) from error
         except (CoordlangError, MemoryError) as error:
             status = next((s for kind, s in _STATUS.items() if isinstance(error, kind)), None)
             if status is None:
                 raise
-            return self._none(status, in_parameters(error) or "out of memory")
+            yield self._none(status, in_parameters(error) or "out of memory")
+            return
+        plans = Plans.of(space)
+        for number in range(plans.count):
+            if time.monotonic() > end:
+                yield self._none(Status.TIMEOUT, f"{number} of {plans.count} plans in time")
+                return
+            status = _done(problem) if number == plans.count - 1 else Status.INTERMEDIATE
+            yield self._result(status, found, plans, number, messages, problem)
 
-    def _search(self, problem: Any) -> _Solved:
+    def _search(self, problem: Any) -> tuple[Translated, PlanSpace, list[LogMessage]]:
         """The optimal plans, under the sentence if one is given."""
+        options = self._options
         with _notes() as messages:
-            found = self._options.translated(problem)
+            found = translate(problem, options.subactions, options.concurrency)
             self._refuse_metrics(problem)
-            if self._options.language is None:
-                loaded = build(found.domain, [found.problem], self._options.model_options(found))
-                return _Solved(found, search(loaded.model, loaded.tasks[0]), messages)
+            if options.language is None:
+                loaded = build(found.domain, [found.problem], options.model_options(found))
+                return found, search(loaded.model, loaded.tasks[0]), messages
             task_language = self._language_in(found)
-        tolerance, words = task_language.tolerance, self._options.sentence
+        tolerance = task_language.tolerance
         if not task_language.covered:
             text = "the language does not cover this task: it guarantees nothing here"
             messages.append(_warning(text))
         if tolerance is not None and tolerance.warning is not None:
             messages.append(_warning(tolerance.warning))
-        if words is None:
-            return _Solved(found, task_language.space, messages)
-        fits = task_language.plans_with(task_language.words_of(words))
-        return _Solved(found, fits, messages)
+        if options.sentence is None:
+            return found, task_language.space, messages
+        words = task_language.words_of(options.sentence)
+        return found, task_language.plans_with(words), messages
 
     def _refuse_metrics(self, problem: Any) -> None:
         """Raise `Unsupported` for a metric that is not ours, unless checks are to be skipped."""
@@ -242,11 +216,12 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         """
         language = self._options.language
         assert language is not None
-        provenance = replace(
-            language.provenance,
-            domain=_without(language.provenance.domain, "sha256"),
-            model=_without(language.provenance.model, "problem_sha256", "world_sha256"),
+        hashes = ("sha256", "problem_sha256", "world_sha256")
+        domain, model = (
+            {key: value for key, value in entries.items() if key not in hashes}
+            for entries in (language.provenance.domain, language.provenance.model)
         )
+        provenance = replace(language.provenance, domain=domain, model=model)
         return language_in_task(
             replace(language, provenance=provenance),
             found.domain,
@@ -255,7 +230,13 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         )
 
     def _result(
-        self, status: Status, solved: _Solved, plans: Plans, number: int, problem: Any
+        self,
+        status: Status,
+        found: Translated,
+        plans: Plans,
+        number: int,
+        messages: Sequence[LogMessage],
+        problem: Any,
     ) -> PlanGenerationResult:
         model = plans.space.model
         whole = model.is_joint_action or len(model.robots) == 1
@@ -266,8 +247,8 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         if model.cost != "makespan":
             metrics["second cost"] = str(second)
         ignored = [_warning(f"{metric} is ignored") for metric in _other_metrics(problem)]
-        plan = to_up(solved.found, plans, plans.unrank(number), kind, problem.environment)
-        return PlanGenerationResult(status, plan, self.name, metrics, [*solved.messages, *ignored])
+        plan = to_up(found, plans, plans.unrank(number), kind, problem.environment)
+        return PlanGenerationResult(status, plan, self.name, metrics, [*messages, *ignored])
 
     def _none(self, status: Status, why: str) -> PlanGenerationResult:
         messages = [LogMessage(LogLevel.INFO, why)]
@@ -282,8 +263,9 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         """
         try:
             with _notes() as messages:
-                found = self._options.translated(problem)
-                loaded = build(found.domain, [found.problem], self._options.model_options(found))
+                options = self._options
+                found = translate(problem, options.subactions, options.concurrency)
+                loaded = build(found.domain, [found.problem], options.model_options(found))
                 steps = of_up(found, loaded.model, loaded.team, plan)
                 texts = [step for step, _ in steps]
                 verdict = validate(found.domain, found.problem, loaded.team, texts)
@@ -362,13 +344,3 @@ def _other_metrics(problem: Any) -> list[str]:
 def _done(problem: Any) -> Status:
     """Optimal, unless a metric that is not ours was ignored (`skip_checks`)."""
     return Status.SOLVED_SATISFICING if _other_metrics(problem) else Status.SOLVED_OPTIMALLY
-
-
-def _ignored(**given: Any) -> None:
-    for name, value in given.items():
-        if value is not None:
-            warnings.warn(f"coordlang ignores {name}", stacklevel=5)
-
-
-def _without(entries: Mapping[str, Any], *keys: str) -> dict[str, Any]:
-    return {key: value for key, value in entries.items() if key not in keys}

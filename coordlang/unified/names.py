@@ -46,6 +46,7 @@ class PddlNames:
 class ProblemNames:
     """The PDDL names of a problem's types, fluents, actions, objects, agents and variables.
 
+    Those of types, objects and agents come first, so that they are kept where possible.
     ``declared`` are the predicates named so far; ``apart``: some action is not for all agents.
     """
 
@@ -53,20 +54,16 @@ class ProblemNames:
         self.problem = problem
         self.values = 0
         self.agents: tuple[Any, ...] = tuple(getattr(problem, "agents", ()))
-        self.types, self.predicates, self.actions, self.objects = (
-            PddlNames(),
-            PddlNames(),
-            PddlNames(),
-            PddlNames(),
-        )
-        self.variable_names = PddlNames()
+        self.types, self.predicates, self.actions = PddlNames(), PddlNames(), PddlNames()
+        self.objects, self.variable_names = PddlNames(), PddlNames()
         self.variable_names.keep(None, AGENT[1:])
         roots = {[*t.ancestors][-1].name for t in problem.user_types}
         if len(roots) == 1 and min(roots).lower() == "object":  # as its PDDL reader makes it
             self.types.keep(min(roots), "object")
-        # PddlNames of the problem come first, so that they are kept where possible.
         for t in problem.user_types:
             self.type_name(t)
+        #: The type of all agents.
+        self.agent_type = self.types.of(("agents",), "agent") if self.agents else ""
         for o in problem.all_objects:
             self.object_name(o)
         for agent in self.agents:
@@ -101,7 +98,7 @@ class ProblemNames:
         key = (fluent.name, types, owner is not None)
         name = self.predicates.of(key, fluent.name)
         if name not in self.declared:
-            whose = [f"?a - {self.agent_type()}"] if owner is not None else []
+            whose = [f"?a - {self.agent_type}"] if owner is not None else []
             args = [f"?x{n} - {t}" for n, t in enumerate(types)]
             self.declared[name] = listed(name, *whose, *args)
         return name
@@ -112,14 +109,10 @@ class ProblemNames:
             raise refused(f"parameters of type {kind}")
         return self.types.of(kind.name, kind.name)
 
-    def agent_type(self) -> str:
-        """The type of all agents."""
-        return self.types.of(("agents",), "agent")
-
     def own_type(self, agent: Any) -> str:
         """A type for one agent alone, if some action is not for all of them."""
         if not self.apart:
-            return self.agent_type()
+            return self.agent_type
         return self.types.of(("agent", agent.name), f"agent-{agent.name}")
 
     def object_name(self, thing: Any) -> str:
@@ -136,9 +129,9 @@ class ProblemNames:
             (self.type_name(t), self.type_name(t.father) if t.father else "object")
             for t in self.problem.user_types
         ]
-        kinds += [(self.own_type(agent), self.agent_type()) for agent in self.agents if self.apart]
+        kinds += [(self.own_type(agent), self.agent_type) for agent in self.agents if self.apart]
         if self.agents:
-            kinds.append((self.agent_type(), "object"))
+            kinds.append((self.agent_type, "object"))
         return [f"{name} - {father}" for name, father in kinds if name != "object"]
 
 

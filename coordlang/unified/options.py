@@ -14,14 +14,15 @@ from unified_planning.plans import PlanKind
 from coordlang.language.file import read_language
 from coordlang.language.recorded import options_of
 from coordlang.language.words import Language
-from coordlang.unified.translation import Concurrency, Subactions, Translated, translate
+from coordlang.unified.translation import Concurrency, Subactions, Translated
 from planners.pddl.model_options import ModelOptions
 from planners.pddl.robots import find_team
 from planners.system.errors import BadInput, CoordlangError, UsageError
-from planners.system.options import record_from
 
 #: The kinds of plans that the engine returns and validates.
 PLAN_KINDS = (PlanKind.PARTIAL_ORDER_PLAN, PlanKind.SEQUENTIAL_PLAN, PlanKind.TIME_TRIGGERED_PLAN)
+#: The parameters that are options of the model, too, and that a language may contradict.
+_MODEL = ("robots", "unowned", "cost", "remember_actions")
 _OPTION = re.compile(r"(?<![\w-])--([a-z]+(?:-[a-z]+)*)")
 
 
@@ -80,18 +81,12 @@ class EngineOptions:
                 f"there is no kind of plans {self.plan_kind}",
                 remedy="Plans are partial-order, sequential or time-triggered.",
             )
-        if self.robots and self.robot_type is not None:
-            raise UsageError("give robots or robot_type, not both", remedy="Leave out one.")
         if not isinstance(self.remember_actions, bool):
             raise UsageError(
                 f"remember_actions must not be {self.remember_actions}",
                 remedy="Give True or False.",
             )
-        self._without_language((), None)
-
-    def translated(self, problem: Any) -> Translated:
-        """Return the problem as PDDL; raises what `translate` raises."""
-        return translate(problem, self.subactions, self.concurrency)
+        self._without_language(self.robots, self.robot_type)
 
     def model_options(self, found: Translated) -> ModelOptions:
         """How a translated problem is to be understood.
@@ -103,10 +98,9 @@ class EngineOptions:
         kind = self.robot_type and found.types.get(self.robot_type, self.robot_type)
         if self.language is None:
             return self._without_language(robots, kind)
-        said: dict[str, object] = {"robots": robots, "unowned": self.unowned, "cost": self.cost}
-        said |= {"remember_actions": self.remember_actions}
-        given = {name: value for name, value in said.items() if value}
-        options = options_of(self.language, record_from(ModelOptions, given, "Coordlang"), given)
+        without = self._without_language(robots, None)
+        given = [name for name in _MODEL if getattr(self, name)]
+        options = options_of(self.language, without, given)
         if kind is not None:
             team = find_team(found.domain, found.problem, ModelOptions(robot_type=kind))
             if set(team.robots) != set(options.names):

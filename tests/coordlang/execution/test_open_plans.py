@@ -9,11 +9,12 @@ from random import Random
 
 import pytest
 
-from coordlang.execution.drawing import cut_note, plans_dot
-from coordlang.execution.open_plans import OpenPlans, PlanDag, open_plans_data, plan_dag
+from coordlang.execution.drawing import COLOURS, cut_note, inks, plans_dot
+from coordlang.execution.open_plans import PlanDag, open_plans_data, plan_dag
 from coordlang.execution.task_language import NoPlanFits, TaskLanguage
 from planners.search.plan_file import texts
-from planners.search.plans import Plan
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import Plan, Plans
 from tests.support.naive import plans_by_sentence
 from tests.support.task_languages import RANDOM, SHIPPED, random_task_languages, shipped
 
@@ -22,10 +23,11 @@ def check(task_language: TaskLanguage, seed: int) -> None:
     """Every sentence of the task, and sentences near them."""
     groups = plans_by_sentence(task_language)
     for words, plans in list(groups.items())[:40]:
-        understood = OpenPlans.of(task_language, task_language.words_of(words))
-        assert understood.count == len(plans)
-        assert set(understood.plans) == plans
-        check_dag(task_language, plan_dag(understood), plans)
+        said = task_language.words_of(words)
+        fits = task_language.plans_with(said)
+        assert Plans.of(fits).count == len(plans)
+        assert set(Plans.of(fits)) == plans
+        check_dag(task_language, plan_dag(task_language, said, fits), plans)
     random = Random(seed)
     for _ in range(8):
         check_broken(task_language, near(task_language, random, list(groups)), groups)
@@ -78,7 +80,7 @@ def check_broken(
     if not words or words in groups:
         return
     with pytest.raises(NoPlanFits) as refused:
-        OpenPlans.of(task_language, task_language.words_of(words))
+        task_language.plans_with(task_language.words_of(words))
     longest = max(k for k in range(len(words) + 1) if any(said[:k] == words[:k] for said in groups))
     assert refused.value.fitting == task_language.words_of(words)[:longest]
     following = {
@@ -102,17 +104,19 @@ def test_every_sentence_of_a_random_model(robots: int, number: int) -> None:
         check(task_language, seed)
 
 
-def most_open(name: str) -> OpenPlans:
-    """The plans of the sentence that leaves most plans open."""
+def most_open(name: str) -> tuple[TaskLanguage, tuple[int, ...], PlanSpace]:
+    """The sentence that leaves most plans open, and the plans."""
     task_language = shipped(name)[1]
     words = max(plans_by_sentence(task_language).items(), key=lambda item: len(item[1]))[0]
-    return OpenPlans.of(task_language, task_language.words_of(words))
+    said = task_language.words_of(words)
+    return task_language, said, task_language.plans_with(said)
 
 
 @pytest.mark.parametrize("most", [1, 7, 12, 20, 10_000])
 @pytest.mark.parametrize("name", ["grid/corners-4x4", "two-arms/pass-on", "grid/three-robots-3x3"])
 def test_a_cut_dag_says_what_is_missing(name: str, most: int) -> None:
-    whole, small = plan_dag(most_open(name)), plan_dag(most_open(name), most)
+    used, words, fits = most_open(name)
+    whole, small = plan_dag(used, words, fits), plan_dag(used, words, fits, most)
     steps = whole.nodes[-1].step + 1
     assert len(small.nodes) <= max(most, 2 * steps)
     kept = [node for node in small.nodes if not node.merged]
@@ -123,7 +127,7 @@ def test_a_cut_dag_says_what_is_missing(name: str, most: int) -> None:
         every = [node.plans for node in whole.nodes if node.step == step]
         assert plans == sorted(every, reverse=True)[: len(plans)]
     assert (cut_note(small) is None) == (small.cut == 0)
-    data = open_plans_data(most_open(name), [], small)
+    data = open_plans_data(used, words, Plans.of(fits), [], small)
     assert sum(node.get("merged", 0) for node in data["nodes"]) == small.cut
     assert all(("state" in node) != ("merged" in node) for node in data["nodes"])
     if small.cut:
@@ -135,12 +139,28 @@ def test_a_cut_dag_says_what_is_missing(name: str, most: int) -> None:
 
 @pytest.mark.parametrize("name", ["grid/corners-4x4", "handover/three-rooms", "elevator/two-calls"])
 def test_dot_has_every_node_and_edge(name: str) -> None:
-    graph = plan_dag(most_open(name))
+    graph = plan_dag(*most_open(name))
     text = plans_dot(graph)
     assert len(re.findall(r"^    n\d+ \[", text, re.M)) == len(graph.nodes)
     assert len(re.findall(r"^  n\d+ -> n\d+ \[", text, re.M)) == len(graph.edges)
     assert text.count("{") == text.count("}")
     assert all(line.count('"') % 2 == 0 for line in text.replace('\\"', "").splitlines())
+
+
+def test_words_have_colours_that_differ() -> None:
+    graph = plan_dag(*most_open("grid/three-robots-3x3"))
+    found = inks(graph)
+    assert set(found) == set(graph.sentence)
+    assert len({ink.fill for ink in found.values()}) == min(len(found), len(COLOURS))
+    for ink in found.values():  # legible: a contrast of 3 at least (WCAG, large or bold text)
+        light, dark = sorted((luminance(ink.fill), luminance(ink.text)), reverse=True)
+        assert (light + 0.05) / (dark + 0.05) >= 3
+
+
+def luminance(colour: str) -> float:
+    parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    red, green, blue = (p / 12.92 if p <= 0.03928 else ((p + 0.055) / 1.055) ** 2.4 for p in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
 
 
 # -- in a notebook
