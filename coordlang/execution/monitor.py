@@ -88,17 +88,14 @@ class Detour:
     do: tuple[str, ...] = ()
     never: tuple[str, ...] = ()
 
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            object.__setattr__(self, field.name, _texts(getattr(self, field.name)))
-
     @classmethod
     def of(cls, **wanted: Texts) -> Detour:
         """Each field as one text or several; None stands for idling."""
         return cls(**{name: _texts(value) for name, value in wanted.items()})
 
     def __and__(self, other: Detour) -> Detour:
-        return Detour(*((*getattr(self, f.name), *getattr(other, f.name)) for f in fields(self)))
+        pairs = ((getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
+        return Detour(*(tuple(dict.fromkeys((*one, *two))) for one, two in pairs))
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +120,7 @@ class Knowledge:
     Two sets of numbers ``state * facts + fact``: one object each for the garbage collector.
     """
 
-    def __init__(self, entry: Mapping[str, Any], where: str) -> None:
+    def __init__(self, entry: Mapping[str, Any], states: Sequence[Any], where: str) -> None:
         facts, others = _atoms(entry, "facts", where), _atoms(entry, "others", where)
         if len({*facts, *others}) < len(facts) + len(others):
             raise _broken(f"{where}: an atom occurs twice in 'facts' and 'others'")
@@ -133,9 +130,6 @@ class Knowledge:
         self.atoms |= dict.fromkeys(sorted(others))
         self._true: set[int] = set()
         self._unknown: set[int] = set()
-
-    def read(self, states: Sequence[Any]) -> None:
-        """Take in what the states of a file say."""
         for state, record in enumerate(states):
             for key, found in (("true", self._true), ("unknown", self._unknown)):
                 for fact in _get(record, key, list, f"state {state}"):
@@ -189,19 +183,6 @@ class Subplans:
     state: Sequence[int]
     left: Sequence[int]
 
-    @classmethod
-    def of(
-        cls, moves: Sequence[Mapping[str | None, int]], state: Sequence[int], left: Sequence[int]
-    ) -> Subplans:
-        """Keep the nodes from which a subplan is left; node 0 is one of them."""
-        kept = [node for node, count in enumerate(left) if count]
-        number = dict(zip(kept, range(len(kept)), strict=True))
-        return cls(
-            [{text: number[to] for text, to in moves[node].items() if left[to]} for node in kept],
-            [state[node] for node in kept],
-            [left[node] for node in kept],
-        )
-
     def first(self) -> tuple[str | None, ...]:
         """The first subplan in order."""
         node, done = 0, []
@@ -249,7 +230,13 @@ class Subplans:
             )
         if not any(left[:1]):
             return None
-        return Subplans.of(moves, [self.state[here] for here, _ in nodes], left)
+        kept = [number for number, count in enumerate(left) if count]
+        new = dict(zip(kept, range(len(kept)), strict=True))
+        return Subplans(
+            [{text: new[to] for text, to in moves[old].items() if left[to]} for old in kept],
+            [self.state[nodes[old][0]] for old in kept],
+            [left[old] for old in kept],
+        )
 
 
 def _made_in(detour: Detour, knowledge: Knowledge, state: int) -> int | None:
@@ -296,10 +283,9 @@ class Monitor:
         self.atoms = _text(entry, "atoms", where)
         if self.atoms not in ("exact", "own"):
             raise _broken(f"{where}: 'atoms' is {_shown(self.atoms)}, not exact or own")
-        self._knowledge = Knowledge(entry, where)
         states = _get(entry, "states", list, where)
         self._open = _read_subplans(entry, states)
-        self._knowledge.read(states)
+        self._knowledge = Knowledge(entry, states, where)
         self._most = max(MAX_NODES, _NODES_OF_STATE * len(states))
         self._here = self._step = 0
         self._promised = Detour()
@@ -362,7 +348,8 @@ class Monitor:
         """
         moves = self._open.moves[self._here]
         is_known = isinstance(subaction, str) and subaction in moves
-        text = subaction if is_known else _subaction(subaction)
+        plain = subaction if is_known else _plain(subaction)
+        text = None if plain == IDLE else plain
         if text not in moves:
             raise NotAllowed(self.robot, text, self._step, self.allowed())
         self._here = moves[text]
@@ -401,10 +388,7 @@ class Monitor:
             raise NotPossible(
                 f"step {self.step + 1}: {self.robot} has no subplan left for this{kept}"
             )
-        both = self._promised & promise
-        self._promised = Detour(
-            *(tuple(dict.fromkeys(getattr(both, f.name))) for f in fields(both))
-        )
+        self._promised &= promise
         self._open, self._here = found, 0
 
     def _making(self, detour: Detour) -> Subplans | None:
@@ -590,12 +574,12 @@ def _check_count(record: Mapping[str, Any], key: str, count: int, where: str) ->
 
 def _texts(value: Texts) -> tuple[str, ...]:
     several = [value] if value is None or isinstance(value, str) else value
-    return tuple(IDLE if text is None else _plain(text) for text in several)
+    return tuple(map(_plain, several))
 
 
-def _plain(text: str) -> str:
+def _plain(text: str | None) -> str:
     """PDDL text in lower case with single spaces; raises `MonitorError` for anything else."""
-    plain = _plain_or_none(text) if isinstance(text, str) else None
+    plain = IDLE if text is None else _plain_or_none(text) if isinstance(text, str) else None
     if plain is None:
         raise MonitorError(
             f"'{_shown(text)}' is no PDDL text such as (move r1 a b), and not 'idle'"
@@ -606,11 +590,6 @@ def _plain(text: str) -> str:
 def _plain_or_none(text: str) -> str | None:
     plain = _AROUND_PARENTHESES.sub(r"\1", " ".join(text.lower().split()))
     return plain if plain == IDLE or _PDDL_TEXT.fullmatch(plain) else None
-
-
-def _subaction(text: str | None) -> str | None:
-    plain = IDLE if text is None else _plain(text)
-    return None if plain == IDLE else plain
 
 
 def _matches(pattern: str, text: str | None) -> bool:

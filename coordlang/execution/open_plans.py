@@ -171,16 +171,20 @@ def open_plans_data(
         **to_json(plans, listed),
     }
     if graph is not None:
-        data["nodes"] = [_node_data(node) for node in graph.nodes]
+        data["nodes"] = [
+            {
+                **(
+                    {"merged": node.merged}
+                    if node.merged
+                    else {"state": node.key, "word": node.word, "said": node.words}
+                ),
+                "step": node.step,
+                "plans": json_count(node.plans),
+            }
+            for node in graph.nodes
+        ]
         data["edges"] = [
             {"from": edge.source, "to": edge.target, "actions": [list(a) for a in edge.actions]}
             for edge in graph.edges
         ]
     return data
-
-
-def _node_data(node: DagNode) -> dict[str, Any]:
-    numbers = {"step": node.step, "plans": json_count(node.plans)}
-    if node.merged:
-        return {"merged": node.merged, **numbers}
-    return {"state": node.key, "word": node.word, "said": node.words, **numbers}

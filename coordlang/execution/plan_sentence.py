@@ -135,19 +135,19 @@ def read_plan_file(path: str | Path, model: JointModel) -> list[tuple[Texts, ...
             position=error.position,
             remedy=error.remedy,
         ) from None
+
+    def spelling(text: str | None) -> str | None:
+        if text is None or text.strip().lower() == IDLE:
+            return None
+        return "(" + " ".join(re.findall(r"[^\s()]+", text.lower())) + ")"
+
     if not plans:
         raise BadInput(
             "there is no plan in it",
             position=Position(str(path)),
             remedy="`coordlang plans DOMAIN PROBLEM` writes plans.",
         )
-    return [tuple(tuple(map(_spelling, step)) for step in plan) for plan in plans]
-
-
-def _spelling(text: str | None) -> str | None:
-    if text is None or text.strip().lower() == IDLE:
-        return None
-    return "(" + " ".join(re.findall(r"[^\s()]+", text.lower())) + ")"
+    return [tuple(tuple(map(spelling, step)) for step in plan) for plan in plans]
 
 
 def _label_numbers(model: JointModel, step: Texts, number: int) -> tuple[int, ...]:

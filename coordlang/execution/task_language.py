@@ -194,7 +194,9 @@ def language_in_task(
     listed = recorded_list(language)
     options = options or options_of(language)
     loaded, recorded = model_of_listed(domain, [problem], listed, options, position)
-    unknown = _atoms(language) - set(loaded.model.codec.facts.texts)
+    atoms = set(" ".join(filter(None, language.states)).replace(") (", ")\0(").split("\0"))
+    atoms -= {"", *loaded.model.codec.facts.texts}
+    unknown = {atom for atom in atoms if not atom.startswith("(last ")}
     if unknown:
         # What can be true depends on where tasks start: the states in the language file must
         # be possible here.
@@ -256,10 +258,3 @@ def _covers(language: Language, space: PlanSpace, recorded: Sequence[PlanningTas
 
 def _literals(goal: Goal) -> frozenset[object]:
     return frozenset((goal,) if isinstance(goal, FullState) else conjuncts(goal))
-
-
-def _atoms(language: Language) -> set[str]:
-    """All atoms in the state keys, without those of remembered actions."""
-    keys = [key for key in language.states if key]
-    found = set(" ".join(keys).replace(") (", ")\0(").split("\0"))
-    return {atom for atom in found if atom and not atom.startswith("(last ")}

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from coordlang.execution.task_language import TaskLanguage
+from coordlang.explanation.cover import Cover
 from coordlang.explanation.lifted_words import LiftedWords
 from coordlang.explanation.text import term_text
-from coordlang.explanation.words import WordDescriptions, all_covers, describe_words, mapped_states
+from coordlang.explanation.words import all_covers, describe_words, mapped_states
 from coordlang.language.words import Language
 from coordlang.report.layout import graph_layout, place_layout, spread
 from coordlang.report.shown import Selection
@@ -49,13 +50,11 @@ def page_data(
     seed: int,
     known: Mapping[str, Point] | None = None,
     most_places: int = MOST_PLACES,
-    lifted: LiftedWords | None = None,
 ) -> dict[str, Any]:
     """Return the page's data for a language and the tasks to be shown.
 
     ``seed`` is that of the plans drawn of large tasks.  ``known`` are coordinates of places from a
     file; with more than ``most_places`` no map is drawn.
-    ``lifted`` has the formulas of words that are functions of features.
     """
     first = selection.tasks[0].language
     model = first.model
@@ -76,8 +75,7 @@ def page_data(
             "slack": model.slack,
             "one": f"{'a' if model.slack else 'an'} {model.kept_plan}",
         },
-        **(_lifted_words(language, lifted) if lifted else _words(language, model)),
-        "default": language.words.index(language.default),
+        "words": [{"name": word} for word in language.words],
         "things": list(world.things),
         **_map(world, known),
         "facts": [{"text": fact, "role": _role(fact, world)} for fact in facts],
@@ -121,61 +119,46 @@ def _listed_states(language: Language, tables: Tables) -> int:
     return len(keys)
 
 
-def _words(language: Language, model: JointModel) -> dict[str, Any]:
-    """The words in their own order; ``told``: in the order in which their formulas are to be read.
+def word_rows(
+    language: Language, model: JointModel, lifted: LiftedWords | None
+) -> tuple[list[dict[str, Any]], bool]:
+    """What the list of words shows, and whether formulas are to be read in its order.
 
-    Of a word, ``terms`` are those of its formula, None if none was sought, and ``rest`` says that
-    the formula is "every other state".
+    Of a word, ``terms`` are those of its formula, None if none was sought (then there are
+    ``examples``), and ``rest`` says that the formula is "every other state".  ``lifted`` has the
+    formulas of words that are functions of features.
     """
-    explained = 0 < len(language.states) <= _STATES_EXPLAINED
+    rules: Sequence[tuple[str, Cover | None]] = [(word, None) for word in language.words]
+    in_order = False
+    explained = lifted is None and 0 < len(language.states) <= _STATES_EXPLAINED
     if explained:
         mapped = mapped_states(language, model)
         descriptions = describe_words(mapped, all_covers(mapped))
-    else:
-        descriptions = WordDescriptions(tuple((w, None) for w in language.words), in_order=False)
+        rules, in_order = descriptions.rules, descriptions.in_order
     sizes = language.sizes()
-    found = {}
-    for word, cover in descriptions.rules:
-        if explained:  # without a cover: every other state
-            terms = [term_text(term) for term in cover.terms] if cover else []
-            entry = _told(terms, rest=cover is None)
-        else:
-            states = (key for key, own in language.states.items() if own == word)
-            entry = _told(None, examples=[*islice(states, _EXAMPLES)])
-        found[word] = {"name": word, "size": sizes[word], **entry}
-    return {
-        "words": [found[word] for word in language.words],
-        "told": {
-            "in_order": descriptions.in_order,
-            "order": [language.words.index(word) for word, _ in descriptions.rules],
-        },
-    }
-
-
-def _lifted_words(language: Language, lifted: LiftedWords) -> dict[str, Any]:
-    """The words with their formulas over features."""
-    sizes = language.sizes()
-    words = [
-        {"name": word, "size": sizes[word], **_told(lifted.terms.get(word, ()))}
-        for word in language.words
-    ]
-    return {
-        "words": words,
-        "told": {"in_order": False, "order": list(range(len(words)))},
-        "features": lifted.data()["features"],
-    }
-
-
-def _told(
-    terms: Sequence[str] | None, *, rest: bool = False, examples: Sequence[str] = ()
-) -> dict[str, Any]:
-    """What the row of a word shows; ``terms`` None: its formula was not sought."""
-    return {
-        "rest": rest,
-        "terms": None if terms is None else list(terms[:_TERMS]),
-        "more_terms": max(0, len(terms or ()) - _TERMS),
-        "examples": list(examples),
-    }
+    largest = max(sizes.values(), default=1) or 1
+    rows = []
+    for word, cover in rules:
+        terms: Sequence[str] | None = [] if explained else None
+        if lifted:
+            terms = lifted.terms.get(word, ())
+        elif cover:
+            terms = list(map(term_text, cover.terms))
+        states = (key for key, own in language.states.items() if own == word)
+        rows.append(
+            {
+                "name": word,
+                "number": language.words.index(word),
+                "size": sizes[word],
+                "share": round(100 * sizes[word] / largest, 1),
+                "default": word == language.default,
+                "rest": explained and cover is None,
+                "terms": None if terms is None else list(terms[:_TERMS]),
+                "more_terms": max(0, len(terms or ()) - _TERMS),
+                "examples": [*islice(states, _EXAMPLES)] if terms is None else [],
+            }
+        )
+    return rows, in_order
 
 
 def _map(world: World, known: Mapping[str, Point] | None) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from coordlang.explanation.lifted_words import lifted_words
 from coordlang.language.provenance import domain_sha256
 from coordlang.language.tolerance import percent
 from coordlang.language.words import Language
-from coordlang.report.data import MOST_PLACES, page_data
+from coordlang.report.data import MOST_PLACES, page_data, word_rows
 from coordlang.report.shown import select_tasks
 from coordlang.report.simulated import simulated_data, summary
 from coordlang.simulation.record import SimulationRecord
@@ -67,19 +67,23 @@ def make_report(
     task would be too large, and what `coordlang.report.shown.select_tasks` raises.
     """
     selection = select_tasks(language, domain, problems, tasks_shown, seed, options, position)
+    model = selection.tasks[0].language.model
     lifted = lifted_words(
         language,
         domain,
         problems[0],
-        selection.tasks[0].language.model,
+        model,
         coordinates or {},
         position or Position("the language file"),
     )
+    rows, in_order = word_rows(language, model, lifted)
+    features = lifted.data()["features"] if lifted else ()
+    words = {"words": rows, "in_order": in_order, "features": features}
     while True:
-        data = page_data(language, selection, seed, coordinates, most_places, lifted)
+        data = page_data(language, selection, seed, coordinates, most_places)
         if simulated is not None:
             data["simulated"] = simulated_data(simulated)
-        html = _render(language, domain, problems, data, seed, simulated)
+        html = _render(language, domain, problems, data, words, seed, simulated)
         if len(html) <= largest:
             candidates = int(language.provenance.tasks.get("count", 0))
             return Report(html, len(selection.tasks), candidates, selection.tasks[0].language)
@@ -97,6 +101,7 @@ def _render(
     domain: Domain,
     problems: Sequence[Problem],
     data: Mapping[str, Any],
+    words: Mapping[str, Any],
     seed: int,
     simulated: SimulationRecord | None,
 ) -> bytes:
@@ -104,21 +109,19 @@ def _render(
     from markupsafe import Markup
 
     here = files("coordlang.report")
+    *others, last = language.provenance.robots
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
     template = environment.from_string((here / "template.html").read_text("utf-8"))
-    words = _word_rows(data)
     return template.render(
         version=version("coordlang"),
         domain=domain.name,
         subtitle=problems[0].name if len(problems) == 1 and problems[0].name != domain.name else "",
-        robots=_listed(language.provenance.robots),
-        words=words,
-        in_order=data["told"]["in_order"],
-        features=data.get("features", ()),
+        robots=" and ".join(part for part in (", ".join(others), last) if part),
+        **words,
         all_listed=language.provenance.tasks.get("kind") == "all",
-        terms_open=_TERMS_OPEN if len(words) <= _FEW_WORDS else 1,
+        terms_open=_TERMS_OPEN if len(language.words) <= _FEW_WORDS else 1,
         figures=_figures(language, data["kept"]["plans"]),
         kept=data["kept"],
         may_fail=language.may_fail,
@@ -147,20 +150,6 @@ def _script() -> str:
             *((folder / name).read_text("utf-8") for name in names),
         )
     )
-
-
-def _word_rows(data: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The words in the order in which their formulas are to be read, with what their rows show."""
-    largest = max((word["size"] for word in data["words"]), default=1) or 1
-    return [
-        {
-            **data["words"][number],
-            "number": number,
-            "share": round(100 * data["words"][number]["size"] / largest, 1),
-            "default": number == data["default"],
-        }
-        for number in data["told"]["order"]
-    ]
 
 
 def _json(data: Mapping[str, Any]) -> str:
@@ -226,8 +215,3 @@ def _formula(text: str) -> Any:
 
 def _number(number: int) -> str:
     return f"{number:,}"
-
-
-def _listed(names: Sequence[str]) -> str:
-    """``r1``, ``r1 and r2``, ``r1, r2 and r3``."""
-    return " and ".join(part for part in (", ".join(names[:-1]), names[-1]) if part)

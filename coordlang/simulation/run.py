@@ -181,7 +181,11 @@ class _Going:
         changes = sum(len(robot.steps) + robot.done for robot in self.robots.values())
         if changes > self.changes:
             self.changes, self.last_change = changes, self.time
-        self.simulator.tick(velocities, self._walk())
+        walk = 0.0, 0.0
+        if self.human is not None:
+            clearance = 2 * self.settings.radius + 0.3 * self.settings.cell
+            walk = self.human.velocity(self.simulator.human(), self._middles(), clearance)
+        self.simulator.tick(velocities, walk)
         self.ticks += 1
         self._see_collisions()
         apart = (math.dist(one, other) for one, other in combinations(self._middles(), 2))
@@ -235,13 +239,6 @@ class _Going:
             self.wishes = [one for one in self.wishes if one not in wanted]
         visits = tuple(wish.visit for wish in wanted)
         return Sensed(self.time, (x, y, heading), ahead, heard, strangers, visits)
-
-    def _walk(self) -> tuple[float, float]:
-        """How the human walks."""
-        if self.human is None:
-            return 0.0, 0.0
-        clearance = 2 * self.settings.radius + 0.3 * self.settings.cell
-        return self.human.velocity(self.simulator.human(), self._middles(), clearance)
 
     def _middles(self) -> list[Point]:
         """Where the robots are."""

@@ -60,19 +60,13 @@ class World:
         for action in model.actions:
             if action.part_of(robot) != text:
                 continue
-            brought = set(self._brought(action))
+            added = (e.atom for e in action.effects if e.adds and e.condition == TRUE)
+            roles = (self.role(show(atom)) for atom in added)
+            brought = {(role[1], role[2]) for role in roles if role[0] == "at"}
             if action.parts:  # a joint action also moves the other robots
                 brought = {(t, place) for t, place in brought if t == model.robots[robot]}
             found.append(brought)
         return tuple(sorted(set.intersection(*found))) if found else ()
-
-    def _brought(self, action: GroundAction) -> Iterator[tuple[str, str]]:
-        """Yield the things and places of the unconditional additions of an action."""
-        for effect in action.effects:
-            if effect.adds and effect.condition == TRUE:
-                role = self.role(show(effect.atom))
-                if role[0] == "at":
-                    yield role[1], role[2]
 
 
 def find_world(model: JointModel, states: Sequence[Sequence[str]]) -> World:

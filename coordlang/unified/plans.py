@@ -48,7 +48,12 @@ def to_up(found: Translated, plans: Plans, plan: Plan, kind: Any, environment: A
     """A joint plan as a unified-planning plan of ``kind`` (a `PlanKind`)."""
     steps: list[list[Any]] = [[] for _ in plan]
     for number, text in numbered_actions(plans, plan):
-        steps[number].append(_instance(found, text))
+        schema, *args = text[1:-1].split()
+        members = found.schemas[schema]
+        agent = None if None in members else args.pop(0)
+        objects = tuple(found.objects[arg] for arg in args)
+        by = agent and found.agents[agent]
+        steps[number].append(ActionInstance(members[agent], objects, by))
     if kind == PlanKind.SEQUENTIAL_PLAN:
         return SequentialPlan([action for step in steps for action in step], environment)
     if kind == PlanKind.TIME_TRIGGERED_PLAN:
@@ -61,14 +66,6 @@ def to_up(found: Translated, plans: Plans, plan: Plan, kind: Any, environment: A
         for action in step
     }
     return PartialOrderPlan(followers, environment)
-
-
-def _instance(found: Translated, text: str) -> Any:
-    schema, *args = text[1:-1].split()
-    members = found.schemas[schema]
-    agent = None if None in members else args.pop(0)
-    objects = tuple(found.objects[arg] for arg in args)
-    return ActionInstance(members[agent], objects, agent and found.agents[agent])
 
 
 def of_up(

@@ -99,7 +99,12 @@ def translate(
     no action, `BadInput` for a problem without a robot.
     """
     subactions, concurrency = subactions or {}, concurrency or {}
-    _check_problem(problem)
+    if type(problem) not in (Problem, MultiAgentProblem):
+        raise refused(f"a {type(problem).__name__} is not supported")
+    if type(problem) is MultiAgentProblem and not problem.agents:
+        raise BadInput("the problem has no agent", remedy="Add one: problem.add_agent(..).")
+    if others := problem.kind.features - FEATURES - _METRICS:
+        raise refused(f"not supported: {', '.join(sorted(others))}")
     _check_parameters(problem, subactions, concurrency)
     writer = _Writer(problem, concurrency)
     domain_text, problem_text, schemas = writer.write(subactions)
@@ -113,17 +118,6 @@ def translate(
         agents={writer.agent_name(a): a for a in writer.agents},
         types={t.name: writer.type_name(t) for t in problem.user_types},
     )
-
-
-def _check_problem(problem: Any) -> None:
-    """Raise `Unsupported` for a class of problems, or a feature, that is not read."""
-    if type(problem) not in (Problem, MultiAgentProblem):
-        raise refused(f"a {type(problem).__name__} is not supported")
-    if type(problem) is MultiAgentProblem and not problem.agents:
-        raise BadInput("the problem has no agent", remedy="Add one: problem.add_agent(..).")
-    others = problem.kind.features - FEATURES - _METRICS
-    if others:
-        raise refused(f"not supported: {', '.join(sorted(others))}")
 
 
 def _check_parameters(problem: Any, subactions: Subactions, concurrency: Concurrency) -> None:

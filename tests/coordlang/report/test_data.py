@@ -15,7 +15,7 @@ from coordlang.commands.building import build_language
 from coordlang.execution.task_language import language_in_task
 from coordlang.language.candidates import all_pairs, from_problems
 from coordlang.language.sentences import sentence
-from coordlang.report import graph
+from coordlang.report import task as page_task
 from coordlang.report.data import page_data
 from coordlang.report.page import make_report
 from coordlang.report.shown import select_tasks
@@ -138,9 +138,9 @@ def test_random_models() -> None:
 
 def test_large_tasks_are_drawn() -> None:
     spoken = language_in_task(*make_language("grid", "three-robots-3x3", None))
-    whole = graph.plan_graph(spoken, 0)
-    exact = {s.words: s.plans for s in graph.shown_sentences(spoken, whole, 0)[0]}
-    part = graph.plan_graph(spoken, 0, most=60)
+    whole = page_task.plan_graph(spoken, 0)
+    exact = {s.words: s.plans for s in page_task.shown_sentences(spoken, whole, 0)[0]}
+    part = page_task.plan_graph(spoken, 0, most=60)
     assert whole.complete
     assert not part.complete
     assert 10 < len(part.edges) <= 60
@@ -150,7 +150,7 @@ def test_large_tasks_are_drawn() -> None:
     # whole plan.
     assert set(targets) | {spoken.start} == nodes
     assert set(sources) | {n for n in nodes if space.layer[n] == 0} == nodes
-    drawn, total = graph.shown_sentences(spoken, part, 0, most=60)
+    drawn, total = page_task.shown_sentences(spoken, part, 0, most=60)
     assert total is None
     assert drawn
     assert all(exact.get(s.words, s.plans) == s.plans for s in drawn)
