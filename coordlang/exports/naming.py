@@ -14,6 +14,7 @@ from itertools import pairwise
 
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.variables import truth
+from coordlang.explanation.words import Conjunction
 from coordlang.exports.membership import Terms
 from planners.classical import ClassicalAction, ClassicalTask, Condition
 from planners.joint.model import show

@@ -9,7 +9,7 @@ from random import Random
 
 import pytest
 
-from coordlang.execution.drawing import COLOURS, cut_note, inks, plans_dot
+from coordlang.execution.drawing import cut_note, plans_dot
 from coordlang.execution.open_plans import PlanDag, open_plans_data, plan_dag
 from coordlang.execution.task_language import NoPlanFits, TaskLanguage
 from planners.search.plan_file import texts
@@ -145,22 +145,6 @@ def test_dot_has_every_node_and_edge(name: str) -> None:
     assert len(re.findall(r"^  n\d+ -> n\d+ \[", text, re.M)) == len(graph.edges)
     assert text.count("{") == text.count("}")
     assert all(line.count('"') % 2 == 0 for line in text.replace('\\"', "").splitlines())
-
-
-def test_words_have_colours_that_differ() -> None:
-    graph = plan_dag(*most_open("grid/three-robots-3x3"))
-    found = inks(graph)
-    assert set(found) == set(graph.sentence)
-    assert len({ink.fill for ink in found.values()}) == min(len(found), len(COLOURS))
-    for ink in found.values():  # legible: a contrast of 3 at least (WCAG, large or bold text)
-        light, dark = sorted((luminance(ink.fill), luminance(ink.text)), reverse=True)
-        assert (light + 0.05) / (dark + 0.05) >= 3
-
-
-def luminance(colour: str) -> float:
-    parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
-    red, green, blue = (p / 12.92 if p <= 0.03928 else ((p + 0.055) / 1.055) ** 2.4 for p in parts)
-    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
 
 
 # -- in a notebook

@@ -20,9 +20,8 @@ from coordlang.commands.build import build
 from coordlang.commands.explain import explain
 from coordlang.execution.task_language import NoPlanFits, TaskLanguage, languages_in_tasks
 from coordlang.explanation.words import Conjunction
-from coordlang.exports import pddl as pddl_module
 from coordlang.exports.ltlf import export_ltlf, symbols_of
-from coordlang.exports.membership import Terms, exclusive_terms, short_terms
+from coordlang.exports.membership import exclusive_terms, short_terms
 from coordlang.exports.pddl import PddlExport, export_pddl, plan_names
 from coordlang.language.sentences import sentence
 from planners.classical import ClassicalTask, action_names
@@ -125,18 +124,6 @@ def test_one_term_in_every_state(lot: str) -> None:
 
 def satisfied(term: Conjunction, state: frozenset[str]) -> bool:
     return all((show(atom) in state) == value for atom, value in term.items())
-
-
-def test_a_word_named_in_two_ways_would_be_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A break of the code: with terms that overlap one plan has several counterparts."""
-    words, plans = max(by_sentence(rich()).items(), key=lambda s: len(s[1]))
-    assert len(planned(export_pddl(rich(), words))) == len(plans)
-
-    def twice(used: TaskLanguage) -> Terms:
-        return tuple((*terms, *terms) for terms in exclusive_terms(used))
-
-    monkeypatch.setattr(pddl_module, "exclusive_terms", twice)
-    assert len(planned(export_pddl(rich(), words))) > len(plans)
 
 
 # LTLf by definition (De Giacomo and Vardi 2013): a formula is true at a place of a finite sequence
