@@ -21,6 +21,7 @@ from coordlang.required.composition_walk import FAILED, Moves, can_fail, moves
 from coordlang.vocabulary.counterexamples import Counterexamples
 from coordlang.vocabulary.leads import NO_LEAD, NO_WORD, PARTED, Leads
 from coordlang.vocabulary.next_words import NextWords
+from coordlang.vocabulary.sat import Undecided
 from planners.joint.tables import Bools, Ints, unique_tuples
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
@@ -29,6 +30,8 @@ from planners.search.plan_space import PlanSpace
 _FAR = np.iinfo(np.int64).max // 4
 #: Random ways to a violation that are taken from one start at most.
 _RANDOM_WAYS = 40
+#: Moves of a step of a walk of one robot beside all others, at most: a tenth of a second.
+_AT_ONCE = 300_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,15 +85,18 @@ class CounterexampleWalk:
     def __init__(self, choices: Choices) -> None:
         self._choices, self._index = choices, EdgeIndex.of(choices.space)
 
-    def failing(self, word: Ints, most: int, ways: int = 1) -> list[Counterexamples]:
+    def failing(
+        self, word: Ints, most: int, ways: int = 1, at_once: float = np.inf
+    ) -> list[Counterexamples]:
         """Those that differ at the fewest steps, and drawn ones; one table for a number of steps.
 
-        See `many_counterexamples`.
+        See `many_counterexamples`.  `Undecided` if a step of the walk has more moves than
+        ``at_once``.
         """
         space = self._choices.space
         if not self._choices.requires[space.starts].any():
             return []
-        layers = _Walk(self._choices, self._index, word).layers()
+        layers = _Walk(self._choices, self._index, word, at_once).layers()
         _backward(space, layers)
         return _retrace(space, layers, most, ways * _RANDOM_WAYS)
 
@@ -111,13 +117,19 @@ class TwoPlans:
         self._robots = space.robots
         self._walks = [_one_and_others(space, robot) for robot in range(space.robots)]
 
-    def failing(self, word: Ints, most: int, ways: int = 1) -> list[Counterexamples]:
-        """Some of them, about ``most`` for each robot; see `CounterexampleWalk.failing`."""
+    def failing(self, word: Ints, most: int) -> list[Counterexamples]:
+        """Some of them, about ``most`` for each robot; see `CounterexampleWalk.failing`.
+
+        Raises
+        ------
+        Undecided
+            If there is too much to walk.
+        """
         found = []
         for robot, (edges, walk) in enumerate(self._walks):
             plan = np.full(self._robots, 1)
             plan[robot] = 0
-            for two in walk.failing(word, most, ways):
+            for two in walk.failing(word, most, at_once=_AT_ONCE):
                 all_edges = edges[two.edges[:, :, plan]]
                 found.append(Counterexamples(two.start, all_edges, two.states[:, plan]))
         return found
@@ -136,8 +148,8 @@ def _one_and_others(space: PlanSpace, robot: int) -> tuple[Ints, CounterexampleW
 class _Walk:
     """The nodes from which some mixture can fail and the plans' sentences can agree."""
 
-    def __init__(self, choices: Choices, index: EdgeIndex, word: Ints) -> None:
-        self._choices, self._index = choices, index
+    def __init__(self, choices: Choices, index: EdgeIndex, word: Ints, at_once: float) -> None:
+        self._choices, self._index, self._at_once = choices, index, at_once
         self._space = choices.space
         before, after = word[self._space.sources], word[self._space.targets()]
         #: (edges): the word that a plan enters, `NO_WORD` where it goes on in its word.
@@ -176,6 +188,9 @@ class _Walk:
     def _expand(self, nodes: Ints) -> tuple[_Layer, Ints]:
         """A layer with the moves out of its nodes, and the nodes that they lead to."""
         robots, failed = self._space.robots, len(self._space)
+        degrees = self._space.out_degrees[nodes[:, :robots]]
+        if degrees.prod(axis=1, dtype=np.float64).sum() > self._at_once:
+            raise Undecided
         sources: list[Ints] = [np.zeros(0, np.int64)]
         edges: list[Ints] = [np.zeros((0, robots), np.int64)]
         children: list[Ints] = [np.zeros((0, 2 * robots), np.int64)]

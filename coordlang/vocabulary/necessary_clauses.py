@@ -12,16 +12,15 @@ from coordlang.language.warping import Clause
 from coordlang.required.choices import Choices
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.clauses import without_implied
-from coordlang.vocabulary.counterexample_walk import CounterexampleWalk, TwoPlans
+from coordlang.vocabulary.counterexample_walk import CounterexampleWalk
 from coordlang.vocabulary.counterexamples import Counterexamples, Mixtures, many_counterexamples
 from coordlang.vocabulary.job import Evidence
+from coordlang.vocabulary.stutter_free_mixtures import StutterFreeMixtures
 from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
 
 #: So many failing tuples are always wanted of a walk, which finds many in one go.
 _OF_WALK = 20_000
-#: So many of each robot's walk beside all others.
-_OF_TWO_PLANS = 1_000
 
 
 @dataclass(frozen=True)
@@ -33,8 +32,8 @@ class TaskPart:
     choices
         The robots' choices in the plan space of just these tasks.
     finder
-        Finds those of its plans that fail: for two robots a walk, else sets; for more robots and
-        stutter-free words two plans walked in step come before sets.
+        Finds those of its plans that fail: for two robots a walk, else sets.  Sets of another kind
+        do so where every step of more than two robots enters another word.
     """
 
     choices: Choices
@@ -53,8 +52,8 @@ class TaskPart:
         return self.choices.space
 
     @cached_property
-    def _two_plans(self) -> TwoPlans:
-        return TwoPlans(self.space)
+    def _stutter_free(self) -> StutterFreeMixtures:
+        return StutterFreeMixtures(self.choices)
 
     def failing(
         self, word: Ints, most: int, ways: int = 1, steps: int = sys.maxsize
@@ -83,9 +82,7 @@ class TaskPart:
         if isinstance(self.finder, CounterexampleWalk):
             return self.finder.failing(nodes, max(most, _OF_WALK), ways)
         if (nodes[self.space.sources] != nodes[self.space.targets()]).all():
-            found = self._two_plans.failing(nodes, _OF_TWO_PLANS, ways)
-            if found:
-                return found
+            return self._stutter_free.failing(nodes, most, steps)
         return many_counterexamples(self.finder, nodes, most, ways, steps)
 
 
