@@ -19,7 +19,7 @@ from planners.pddl import read_domain, read_problem
 from planners.pddl.factored import read_factored
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
-from planners.search.doubled import note_doubled
+from planners.search.state_variables import note_doubled
 from planners.system.errors import Position, UsageError
 from planners.system.files import names_format, read_bytes
 from planners.system.notebook import Presented

@@ -35,7 +35,7 @@ from coordlang.commands.options import (
     output_option,
     progress_option,
 )
-from planners.search.heuristics import HeuristicName, SearchHeuristic
+from planners.search import HeuristicName, SearchHeuristic
 from planners.system.errors import UsageError
 from planners.system.options import group, option
 

@@ -17,13 +17,13 @@ from planners.joint.tables import Rows, find_rows, unique_rows
 from planners.loading import PlanningInstance, build
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
+from planners.search.goals import searched
 from planners.search.kept_plans import search
 from planners.search.optimal_plans import joined, plan_spaces, solvable
 from planners.search.plan_space import PlanSpace
 from planners.search.portions import Explored, PlanSpaces, Searched, Source
 from planners.search.reachable import Space, explore
 from planners.search.state_variables import state_variables
-from planners.search.unreachable import searched
 from planners.system.errors import BadInput, Position, ProvedImpossible, note
 
 Kind = Literal["problems", "all", "file"]

@@ -12,17 +12,15 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from planners.joint.model import JointModel, Options, PlanningTask, Steps
+from planners.joint.model import Goal, JointModel, Options, PlanningTask, Steps
 from planners.joint.tables import Ints, Rows
 from planners.search.exact_bound import ExactBound, exact_bound
-from planners.search.goals import FAR
+from planners.search.goals import FAR, searched
 from planners.search.heuristics import Heuristic
 from planners.search.layers import Edges, StateTable, grown, joined_edges
 from planners.search.optimal_states import OptimalStates
 from planners.search.reachable import PieceSizes
-from planners.search.sampled_ways import mostly_lead
 from planners.search.state_variables import StateVariable
-from planners.search.unreachable import searched
 from planners.system.errors import ProvedImpossible
 
 #: The layer of a state that was not met in this round.
@@ -44,6 +42,9 @@ _TRIED = 4
 _MET, _GROWN = -1, -2
 #: Bytes of the states that joint steps lead to, composed at a time.
 _BYTES = 1 << 28
+#: States from which ways are tried, the ways that are followed from each, and the share of them
+#: that has to lead to the goal.
+_SAMPLED, _WAYS, _MOST = 50, 4, 0.5
 
 
 def probe_size(model: JointModel, bound: int, pieces: PieceSizes) -> int:
@@ -69,7 +70,7 @@ class BoundedSearch:
     states
         Those of each layer of the last round, the start first; goal states are in the last layer.
     edges
-        ``edges[k]`` lead from layer k to the next one; None where they were too many to keep.
+        ``edges[k]`` lead from layer k to the next one.
     composed
         Joint steps that were composed, in all rounds.
     """
@@ -86,7 +87,7 @@ class BoundedSearch:
         self._variables = variables
         self.table = StateTable(model.codec.width)
         self.states: list[Ints] = []
-        self.edges: list[Edges | None] = []
+        self.edges: list[Edges] = []
         self.composed = self.rounds = self.bound = 0
         #: Per state the lower bound, and the layer that it was met in, in this round.
         self._h: Ints = np.zeros(0, np.int64)
@@ -154,7 +155,6 @@ class BoundedSearch:
         self._depth[:] = _NEVER
         self._depth[start] = 0
         self.states, self.edges = [start], []
-        kept = 0
         beyond = FAR
         while not self._model.holds(self._task.goal, self.table.rows(self.states[-1])).any():
             depth = len(self.states)
@@ -169,8 +169,7 @@ class BoundedSearch:
             new = np.flatnonzero(self._depth[: len(self.table)] == depth)
             if not len(new):
                 return beyond
-            kept += len(edges.source)
-            self.edges.append(edges if kept <= self._pieces.kept else None)
+            self.edges.append(edges)
             self.states.append(new)
         return _MET
 
@@ -178,11 +177,6 @@ class BoundedSearch:
     def _probe(self) -> int:
         """Joint steps that may be composed, where they are limited."""
         return probe_size(self._model, self.bound, self._pieces)
-
-    def edges_into(self, depth: int) -> Edges:
-        """The joint steps into a layer of the last round, composed again, however many they are."""
-        self._limited = False
-        return self._expand(self.states[depth - 1], depth)[0]
 
     def so_far(self) -> str:
         """How far it got, for messages."""
@@ -263,3 +257,44 @@ def _combinations(options: Options) -> float:
     for first, _ in options:
         counts *= np.diff(first)
     return float(counts.sum())
+
+
+def mostly_lead(
+    model: JointModel, goal: Goal, heuristic: Heuristic, rows: Rows, left: int, most: int
+) -> bool:
+    """Whether more than half of some states have a way to the goal in ``left`` joint steps.
+
+    Where they do and costs do not count, hardly a state within the bound is useless, and a solver
+    that is asked which labels optimal plans have can leave nothing out (robots on open grids).  A
+    way that is found is one; that none was found proves nothing.  No, too, once about ``most``
+    joint steps are composed.
+
+    Parameters
+    ----------
+    heuristic
+        By its bounds ways that are too long are left out.
+    rows
+        The states, of which some are asked for, evenly.
+    """
+    assert heuristic.value is not None
+    rows = rows[:: -(-len(rows) // _SAMPLED)]
+    begin, composed = np.arange(len(rows)), 0
+    leads = np.zeros(len(rows), np.bool_)
+    while left and len(begin) and composed <= most:
+        left -= 1
+
+        def only(states: Rows, options: Options, left: int = left) -> Options:
+            return heuristic.in_time(states, options, left)[0] if heuristic.in_time else options
+
+        steps = model.successors(rows, only)
+        composed += len(steps)
+        begin, bounds = begin[steps.source], heuristic.value(steps.result)
+        # Of the joint steps from each beginning that are in time those with the least bounds.
+        best = np.flatnonzero(bounds <= left)
+        best = best[np.lexsort((bounds[best], begin[best]))]
+        best = best[np.arange(len(best)) - np.searchsorted(begin[best], begin[best]) < _WAYS]
+        begin, rows = begin[best], steps.result[best]
+        leads[begin[model.holds(goal, rows)]] = True
+        open_ = ~leads[begin]
+        begin, rows = begin[open_], rows[open_]
+    return bool(leads.mean() > _MOST)

@@ -1,36 +1,37 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Exact bounds from a SAT solver: what is left after them is on optimal plans, and nothing else.
 
-First the least makespan, then the least second component, then the labels that some optimal plan
-has in each step; then, state by state, whether an optimal plan passes through it
-(`planners.search.optimal_states`).  The solver's models are only hints (states and costs come from
-the joint model); its refutations are trusted.  A question that is not decided with some effort is
-answered with yes: more is searched then.
+First the least makespan, then the least second component (where no action costs more than 1), then
+the labels that some optimal plan has in each step; then, state by state, whether an optimal plan
+passes through it (`planners.search.optimal_states`).  The solver's models are only hints (states
+and costs come from the joint model); its refutations are trusted.  A question that is not decided
+with some effort is answered with yes: more is searched then.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import closing
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
-from functools import partial
-from itertools import product
+from itertools import count, product
 
 import numpy as np
 
+from planners.joint.composition import ComposingStepper
 from planners.joint.model import JointModel, Options, PlanningTask
-from planners.joint.tables import Bools, Rows
-from planners.search.cheapest import cheapest
-from planners.search.mutexes import mutexes
+from planners.joint.tables import Bools, Ints, Rows
+from planners.search.goals import goal_facts
 from planners.search.plan_formula import PlanFormula, TooManyClauses
 from planners.search.questions import FixedPlans, Literals, OutOfEffort, Plan
 from planners.search.reachable import PieceSizes
 from planners.search.state_variables import StateVariable
 from planners.system.limits import reaching
 
-#: What a makespan that is refuted at once costs for each of its steps, in conflicts; the clauses of
-#: one step more are counted, too: of a task without plan there would be ever more.
-_EASY = 20
+#: What each step of a makespan that is refuted at once costs, in conflicts, besides its clauses: of
+#: a task without plan there would be ever more.
+_EASY, _CLAUSES = 20, 10
+#: Conflicts for the least second component; without it more is searched.
+_LEAST_COST = 300_000
 #: What to try besides a larger limit.
 SMALLER = "a task with a shorter plan, fewer objects or fewer robots"
 
@@ -70,21 +71,19 @@ def exact_bound(
     are spent.  Of a task without plan none is found.
     """
     try:
-        pairs = partial(mutexes, model, task.init)
-        formula = PlanFormula(model, task.goal, variables, pairs, pieces.effort)
-    except TooManyClauses:
-        return None
-    try:
-        with closing(formula), reaching(formula.so_far, SMALLER):
-            plan = _shortest(formula, task, at_least)
-            plans = formula.fixed(task.init, len(plan))
-    except OutOfEffort:
+        formula = PlanFormula.of(model, task, variables)
+        plans = _shortest(formula, task, at_least, pieces.effort)
+    except (TooManyClauses, OutOfEffort):
         return None
     try:
         with reaching(plans.so_far, SMALLER):
-            if model.cost != "makespan":
-                plan, cheap = cheapest(plans, model, task, plan)
-                plans.require(cheap)
+            plan = plans.labels_chosen()
+            plans.simplify()
+            if max(int(costs.max(initial=0)) for costs in _label_costs(model)) == 1:
+                with suppress(OutOfEffort), plans.at_most(_LEAST_COST):
+                    cheap = _least_cost(plans, model, task)
+                    plan = plans.labels_chosen()
+                    plans.require(cheap)
             plans.without_limit()
             used = _used(plans, model, plan, pieces.question)
             plans.simplify()
@@ -94,62 +93,164 @@ def exact_bound(
         raise
 
 
-def _shortest(formula: PlanFormula, task: PlanningTask, at_least: int) -> Plan:
-    makespan = at_least
-    while (plan := formula.plan(task.init, makespan)) is None:
-        formula.spend(_EASY * makespan + formula.clauses_of_step)
-        makespan += 1
-    return plan
+def _shortest(formula: PlanFormula, task: PlanningTask, at_least: int, effort: int) -> FixedPlans:
+    """The shortest plans, one of which was found."""
+    for makespan in count(at_least):
+        plans = formula.plans(task.init, makespan, effort)
+        with ExitStack() as ended, reaching(plans.so_far, SMALLER):
+            ended.callback(plans.close)
+            if plans.holds():
+                ended.pop_all()
+                break
+            plans.spend(makespan * (_EASY + int((formula.step == 0).sum()) // _CLAUSES))
+        effort = plans.left
+    return plans
 
 
 def _used(plans: FixedPlans, model: JointModel, plan: Plan, effort: int) -> list[list[Bools]]:
     """Which labels occur where in optimal plans: each that is found shows one a robot and step.
 
-    First those that occur in no step at all are looked for: one refutation does for all steps.
+    What is not decided may all occur.
     """
-    found = _Used(plans, [len(own) for own in model.labels], plan, effort)
-    robots = range(len(model.robots))
-    steps = range(plans.steps)
-    for robot in robots:
-        found.ask(robot, steps)
-    for step, robot in product(steps, robots):
-        found.ask(robot, [step])
-    return found.used
+    found = [[np.zeros(len(own), np.bool_) for own in model.labels] for _ in plan]
 
-
-class _Used:
-    """The labels that were found in optimal plans: ``used[k][robot]`` (labels)."""
-
-    def __init__(self, plans: FixedPlans, sizes: Sequence[int], plan: Plan, effort: int) -> None:
-        self._plans, self._effort = plans, effort
-        self.used = [[np.zeros(size, np.bool_) for size in sizes] for _ in plan]
-        self._enter(plan)
-
-    def _enter(self, plan: Plan) -> None:
-        for own, labels in zip(self.used, plan, strict=True):
+    def enter(plan: Plan) -> None:
+        for own, labels in zip(found, plan, strict=True):
             for used, label in zip(own, labels, strict=True):
                 used[label] = True
 
-    def ask(self, robot: int, steps: Sequence[int]) -> None:
-        """Find, or refute, all labels that a robot has in none of some steps, as far as is known.
-
-        If that is not decided for one step, they may all occur there.
-        """
-        while others := self._unknown(robot, steps):
+    enter(plan)
+    for step, robot in product(range(plans.steps), range(len(model.robots))):
+        used = found[step][robot]
+        while len(unknown := np.flatnonzero(~used)):
+            others = [plans.label(step, robot, label) for label in unknown.tolist()]
             try:
-                with self._plans.at_most(self._effort):
-                    holds = self._plans.holds([self._plans.some_of(others)])
+                with plans.at_most(effort):
+                    holds = plans.holds([plans.some_of(others)])
             except OutOfEffort:
-                if len(steps) == 1:
-                    self.used[steps[0]][robot][:] = True
+                used[:] = True
                 break
             if not holds:
-                self._plans.require([-literal for literal in others])
+                plans.require([-literal for literal in others])
                 break
-            self._enter(self._plans.labels_chosen())
+            enter(plans.labels_chosen())
+    return found
 
-    def _unknown(self, robot: int, steps: Sequence[int]) -> Literals:
-        """The literals of labels that the robot was not found to have in any of these steps."""
-        unknown = ~np.any([self.used[step][robot] for step in steps], axis=0)
-        labels = np.flatnonzero(unknown).tolist()
-        return [self._plans.label(step, robot, label) for step in steps for label in labels]
+
+# ---- the least second component, by cores
+
+
+class _Sums:
+    """The sums that are assumed to be small, by the literal that says that one is larger.
+
+    A sum is a counter: its k-th literal is implied where more than k of some others hold.
+    """
+
+    def __init__(self, plans: FixedPlans) -> None:
+        self._plans = plans
+        #: Assumed to be false: the sum that each belongs to, and its place there.
+        self.open: dict[int, tuple[Literals | None, int]] = {}
+        self._times: dict[int, Literals] = {}
+
+    def add_actions(self, model: JointModel, task: PlanningTask) -> None:
+        """Assume of every action that costs something that it is not chosen at all.
+
+        By none of the robots that are alike: which one of them does it does not matter.
+        """
+        kinds = _kinds(model, task)
+        alike: dict[tuple[str, ...], Literals] = {}
+        for robot, costs in enumerate(_label_costs(model)):
+            own = model.robots[robot]
+            for label in np.flatnonzero(costs).tolist():
+                words = model.labels[robot][label].strip("()").split()
+                action = tuple(kinds[robot] if word == own else word for word in words)
+                times = [self._plans.label(step, robot, label) for step in range(self._plans.steps)]
+                alike.setdefault(action, []).extend(times)
+        for times in alike.values():
+            done = self._plans.any_of(times)
+            self._times[done] = times
+            self.open[done] = (None, 0)
+
+    def relax(self, core: Literals) -> None:
+        """Let as many of a core's literals hold as must; more, or one more often, is paid anew."""
+        for literal in core:
+            own, place = self.open.pop(literal)
+            if own is None:
+                own = self._plans.counter(self._times.pop(literal))
+            self._assume(own, place + 1)
+        if len(core) > 1:
+            together = self._plans.counter(core)
+            place = 1
+            while place < len(together) and self._plans.must(together[place]):
+                place += 1
+            self._assume(together, place)
+
+    def _assume(self, sums: Literals, place: int) -> None:
+        """Assume that no more than this many of some literals hold."""
+        if place < len(sums):
+            self.open[sums[place]] = (sums, place)
+
+
+def _label_costs(model: JointModel) -> list[Ints]:
+    """Per robot the second cost component of each of its labels."""
+    assert isinstance(model.stepper, ComposingStepper)
+    return model.stepper.costs
+
+
+def _least_cost(plans: FixedPlans, model: JointModel, task: PlanningTask) -> Literals:
+    """Literals that all hold in the cheapest plans, and in no other plans.
+
+    There are plans, and costs are 0 or 1.  The last answer of the solver is one of the cheapest.
+    First the cost is assumed to be 0: no action that costs something is done.  The solver answers
+    with a core, some of these assumptions that cannot hold together.  Each core raises the lower
+    bound by one, and from then on one of its actions may be done, and for more there are new
+    assumptions (core-guided MaxSAT, OLL; Andres, Kaufmann, Matheis and Schaub 2012).  The cost of a
+    plan is the number of refuted assumptions and the number of these literals that do not hold (if
+    a sum is said to be larger only where it is), so the literals say the same as a bound on the
+    cost, but each of few actions: much follows from them at once.  Cores that have nothing in
+    common are looked for first, for these are small.
+
+    Raises `planners.search.questions.OutOfEffort`.
+    """
+    sums = _Sums(plans)
+    sums.add_actions(model, task)
+    while cores := list(_disjoint(plans, set(sums.open))):
+        for core in cores:
+            sums.relax(core)
+    return [-literal for literal in sorted(sums.open)]
+
+
+def _disjoint(plans: FixedPlans, assumed: set[int]) -> Iterator[Literals]:
+    """Cores without a common literal, until what is assumed besides holds."""
+    while not plans.holds([-literal for literal in sorted(assumed)]):
+        core = _smaller(plans, plans.core(assumed))
+        assumed -= set(core)
+        yield core
+
+
+def _kinds(model: JointModel, task: PlanningTask) -> list[str]:
+    """For each robot the first one that is like it: start and goal are the same without names."""
+
+    def about(robot: str) -> list[set[tuple[str, ...]]]:
+        wanted = goal_facts(model, task.goal)
+        true = model.codec.true_facts(model.codec.facts_part(task.init))
+        atoms = [[model.codec.facts.atoms[fact] for fact in facts] for facts in (true, wanted)]
+        return [
+            {(a.predicate, *("" if arg == robot else arg for arg in a.args)) for a in own}
+            for own in ([atom for atom in part if robot in atom.args] for part in atoms)
+        ]
+
+    known = [about(robot) for robot in model.robots]
+    return [model.robots[known.index(own)] for own in known]
+
+
+def _smaller(plans: FixedPlans, core: Literals) -> Literals:
+    """A core that is no larger: what is needed of it, asked again while that helps."""
+    while len(core) > 1:
+        answer = plans.holds([-literal for literal in core])
+        assert not answer, "a core was refuted"
+        again = plans.core(core)
+        if len(again) >= len(core):
+            break
+        core = again
+    return core

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a goal needs, and how facts become true."""
+"""What a goal needs, how facts become true, and what is said of a goal out of reach."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
 from planners.joint.conditions import split_condition
-from planners.joint.model import FullState, Goal, JointModel
+from planners.joint.model import FullState, Goal, JointModel, show
 from planners.joint.tables import Ints, Rows
 from planners.pddl.formula_tree import required_atoms
 from planners.pddl.lifted import Formula
@@ -15,6 +15,10 @@ from planners.pddl.lifted import Formula
 FAR = 2**30
 #: A table of states -> a lower bound for each, or `FAR`.
 Values = Callable[[Rows], Ints]
+#: States in which the reason why actions cannot share a step is looked for.
+_LOOK_AT = 1_000
+#: Actions that are never possible, of which a message says why.
+_SHOWN = 3
 
 
 def goal_facts(model: JointModel, goal: Goal) -> frozenset[int]:
@@ -42,3 +46,48 @@ def positive_facts(model: JointModel, formula: Formula) -> set[int]:
     """The facts that single literals of a condition need to be true."""
     literals, _ = split_condition(formula, model.evaluator)
     return {fact for fact, positive in literals if positive}
+
+
+def searched(model: JointModel, goal: Goal, seen: Rows, left_out: int = 0) -> str:
+    """What was searched without reaching a goal, and why it may be out of reach.
+
+    Facts that no action makes true, of the goal or of what actions of a robot need, else what kept
+    robots from acting together most often.  ``seen`` are the states that were searched,
+    ``left_out`` counts those next to them from which not even actions that delete nothing lead to
+    the goal.
+    """
+    said = "No other state can be reached."
+    if left_out:
+        said = (
+            f"{len(seen):,} {'state was' if len(seen) == 1 else 'states were'} searched. "
+            f"From {left_out:,} more the goal could not be reached even if no action deleted "
+            "anything."
+        )
+    elif len(seen) > 1:
+        said = f"All {len(seen):,} reachable states were searched."
+    lacking = _lacking(model, goal)
+    if lacking:
+        return "\n  ".join((said, *lacking))
+    looked_at = model.codec.facts_part(seen[:: len(seen) // _LOOK_AT + 1])
+    found = model.stepper.frequent_conflict(looked_at)
+    if found is None:
+        return said
+    why, states = found
+    return (
+        f"{said}\n  Of pairs of actions that cannot share a step, the one met most often "
+        f"({states:,} of {len(looked_at):,} states looked at): {why}."
+    )
+
+
+def _lacking(model: JointModel, goal: Goal) -> list[str]:
+    """Sentences about what nothing makes true.
+
+    Of robots that lack something static (a tool, perhaps as it is meant) only if an atom of the
+    goal is out of reach of all.
+    """
+    atoms = () if isinstance(goal, FullState) else required_atoms(goal)
+    missing = [show(atom) for atom in atoms if atom not in model.codec.facts]
+    said = [f"The goal needs {atom}, and nothing makes it true." for atom in missing[:1]]
+    limited = () if missing else {one.robot for one in model.impossible if not one.is_fluent}
+    never = [one for one in model.impossible if one.robot not in limited]
+    return said + [str(one) for one in never[:_SHOWN]]

@@ -15,21 +15,18 @@ from itertools import pairwise
 import numpy as np
 
 from planners.joint.model import Goal, JointModel, PlanningTask
-from planners.joint.tables import Bools, Ints, Numbers, Rows, ranges, unique_rows
+from planners.joint.tables import Bools, Ints, Rows, unique_rows
 from planners.search.bounded_search import BoundedSearch
 from planners.search.exact_bound import SMALLER
+from planners.search.goals import searched
 from planners.search.heuristics import search_heuristic
-from planners.search.layers import Edges
+from planners.search.layers import Edges, joined_edges
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, PieceSizes, Space
 from planners.search.slack import explore_within, require_rest, seeing, seen_rows
 from planners.search.state_variables import state_variables
-from planners.search.unreachable import searched
 from planners.system.errors import ProvedImpossible
 from planners.system.limits import reaching
-
-#: Where fewer than one in so many states are new, only the joint steps into these are looked at.
-_FEW = 8
 
 _FAR = np.iinfo(np.int64).max // 4
 
@@ -109,76 +106,41 @@ def search_with_effort(
 def _backward(model: JointModel, task: PlanningTask, forward: BoundedSearch) -> PlanSpace:
     """Keep the edges that lead to the goal in time and at least cost, from the last layer back."""
     table, last = forward.table, forward.states[-1]
-    goals = last[model.holds(task.goal, table.rows(last))]
     value = np.full(len(table), _FAR)
-    value[goals] = 0
-    node = np.full(len(table), -1)
-    tables = [_numbered(table.rows(goals), goals, node)]
-    best = [np.zeros(len(goals), np.int64)]
-    counts = [np.zeros(len(goals), np.int64)]
-    edges: list[Edges] = []
-    for depth in range(len(forward.states) - 1, 0, -1):
-        below = forward.edges[depth - 1] or forward.edges_into(depth)
-        forward.edges[depth - 1] = None  # they are many, and not needed again
-        below = below.only(node[below.target] >= 0)
-        first = _runs(below.source)
-        here = below.source[first].astype(np.int64)
+    value[last[model.holds(task.goal, table.rows(last))]] = 0
+    kept: list[Edges] = []
+    while forward.edges:
+        below = forward.edges.pop()  # they are many, and not needed again
+        below = below.only(value[below.target] < _FAR)
         through = value[below.target] + below.cost
-        value[here] = np.minimum.reduceat(through, first)
-        below = below.only(through == value[below.source])
-        into = node[below.target]
-        node[forward.states[depth]] = -1
-        tables.append(_numbered(table.rows(here), here, node))
-        first = _runs(below.source)
-        number = np.empty(len(here), np.int64)
-        number[node[here]] = np.arange(len(here))  # the source at each place of the table
-        count = np.diff(first, append=len(below.source))[number]
-        order = ranges(first[number], count)
-        edges.append(
-            Edges(below.source, into[order], below.labels[order], below.cost[order]).compact()
-        )
-        counts.append(count)
-        best.append(value[here[number]])
-    offsets = np.cumsum([0, *(len(t) for t in tables)])
-    graph = PlanSpace(
+        np.minimum.at(value, below.source, through)
+        kept.append(below.only(through == value[below.source]))
+    edges = joined_edges(kept, len(model.robots))
+    layer = np.full(len(table), -1)
+    for depth, states in enumerate(reversed(forward.states)):
+        layer[states] = depth
+    alive = np.flatnonzero(value < _FAR)
+    rows, state = unique_rows(table.rows(alive))
+    order = np.lexsort((state, layer[alive]))
+    alive, state = alive[order], state[order]
+    node = np.full(len(table), -1)
+    node[alive] = np.arange(len(alive))
+    source = node[edges.source]
+    by_source = np.argsort(source, kind="stable")
+    return PlanSpace(
         model=model,
-        rows=np.concatenate(tables),
-        state=np.arange(offsets[-1]),
-        goal=np.zeros(offsets[-1], np.int64),
-        layer=np.repeat(np.arange(len(tables)), np.diff(offsets)),
-        first=np.cumsum(np.concatenate([[0], *counts])),
-        target=np.concatenate([_none(), *(e.target + offsets[k] for k, e in enumerate(edges))]),
-        labels=np.concatenate(
-            [np.zeros((0, len(model.robots)), np.int32), *(e.labels for e in edges)],
-            dtype=np.int32,
-            casting="unsafe",
-        ),
-        cost=np.concatenate([_none(), *(e.cost for e in edges)]),
+        rows=rows,
+        state=state,
+        goal=np.zeros(len(alive), np.int64),
+        layer=layer[alive],
+        first=np.searchsorted(source[by_source], np.arange(len(alive) + 1)),
+        target=node[edges.target[by_source]],
+        labels=edges.labels[by_source].astype(np.int32),
+        cost=edges.cost[by_source].astype(np.int64),
         goals=(task.goal,),
-        starts=np.array([offsets[-2]]),
-        second=best[-1][:1],
-    )
-    return _sort_states(graph).reduced()
-
-
-def _runs(numbers: Numbers) -> Ints:
-    """Where each run of equal numbers begins."""
-    fresh = np.ones(len(numbers), np.bool_)
-    fresh[1:] = numbers[1:] != numbers[:-1]
-    return np.flatnonzero(fresh)
-
-
-def _numbered(rows: Rows, states: Ints, node: Ints) -> Rows:
-    """The rows of different states, sorted; ``node`` gets each one's number among them."""
-    table, number = unique_rows(rows)
-    node[states] = number
-    return table
-
-
-def _sort_states(graph: PlanSpace) -> PlanSpace:
-    """The same graph with a sorted table of states."""
-    rows, number = unique_rows(graph.rows)
-    return replace(graph, rows=rows, state=number[graph.state])
+        starts=node[forward.states[0]],
+        second=value[forward.states[0]],
+    ).reduced()
 
 
 def joined(spaces: Sequence[PlanSpace]) -> PlanSpace:
@@ -299,21 +261,21 @@ def distances(space: Space, reached: Bools) -> Ints:
     """Least makespan from every state to every goal, (goals, states), -1 where there is none.
 
     ``reached`` (goals, states): which states satisfy which goal.  Breadth first from all goals at
-    once, backward, with a bit for each goal: O(joint steps x goals / 64) for a layer at most, and
-    only joint steps into states that are new for some goal where these are few.
+    once, backward, with a bit for each goal: O(joint steps x goals / 64) for a layer.
     """
     result = np.where(reached, 0, -1)
     new = _as_bits(reached.T)
     seen = new.copy()
-    back = _BackwardSteps.of(space)
+    leading = np.flatnonzero(np.diff(space.first))
     steps = 0
-    while len(changed := np.flatnonzero(new.any(axis=1))):
+    while len(leading) and len(changed := np.flatnonzero(new.any(axis=1))):
         if steps:
-            which, goal = np.nonzero(
-                np.unpackbits(new[changed].view(np.uint8), axis=1, count=len(reached))
-            )
+            bits = np.unpackbits(new[changed].view(np.uint8), axis=1, count=len(reached))
+            which, goal = np.nonzero(bits)
             result[goal, changed[which]] = steps
-        new = back.before(new, changed) & ~seen
+        before = np.zeros_like(new)
+        before[leading] = np.bitwise_or.reduceat(new[space.target], space.first[leading])
+        new = before & ~seen
         seen |= new
         steps += 1
     return result
@@ -326,39 +288,6 @@ def _as_bits(table: Bools) -> Rows:
     bits = np.packbits(table, axis=1)
     packed[:, : bits.shape[1]] = bits
     return packed.view(np.uint64)
-
-
-@dataclass(frozen=True, slots=True)
-class _BackwardSteps:
-    """The joint steps of a space by their target: ``first`` delimits their ``source``."""
-
-    space: Space
-    first: Ints
-    source: Ints
-
-    @classmethod
-    def of(cls, space: Space) -> _BackwardSteps:
-        order = np.argsort(space.target, kind="stable")
-        first = np.searchsorted(space.target[order], np.arange(len(space) + 1))
-        return cls(space, first, space.sources[order])
-
-    def before(self, bits: Rows, changed: Ints) -> Rows:
-        """For each state the bits of all states one joint step on; those not changed have none."""
-        found = np.zeros_like(bits)
-        if len(changed) * _FEW > len(bits):
-            leading = np.flatnonzero(np.diff(self.space.first))
-            if len(leading):
-                following = bits[self.space.target]
-                found[leading] = np.bitwise_or.reduceat(following, self.space.first[leading])
-            return found
-        counts = self.first[changed + 1] - self.first[changed]
-        source = self.source[ranges(self.first[changed], counts)]
-        order = np.argsort(source, kind="stable")
-        states, start = np.unique(source[order], return_index=True)
-        if len(states):
-            following = bits[np.repeat(changed, counts)[order]]
-            found[states] = np.bitwise_or.reduceat(following, start)
-        return found
 
 
 def _second_costs(space: Space, distance: Ints) -> tuple[Ints, PlanSpace]:

@@ -3,14 +3,12 @@
 
 Planning as satisfiability (Kautz and Selman 1992) with the joint steps of this model: every robot
 has exactly one label in a step, labels that may not share a step exclude each other, a fact changes
-only where an effect changes it.  Steps are counted from the goal, so that one formula answers for
-every state how many steps lead from it to the goal.
+only where an effect changes it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, suppress
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -19,13 +17,13 @@ import numpy as np
 from planners.grounding import GroundAction
 from planners.joint.composition import ComposingStepper
 from planners.joint.interference import Choices
-from planners.joint.model import FullState, Goal, JointModel
+from planners.joint.model import FullState, Goal, JointModel, PlanningTask
 from planners.joint.step_clauses import Clause, clauses
 from planners.joint.tables import Ints, Rows
 from planners.pddl.formula_tree import Leaf, negated
 from planners.pddl.lifted import TRUE, Formula
-from planners.search.mutexes import Pair
-from planners.search.questions import FixedPlans, Literals, OutOfEffort, Plan, Questions
+from planners.search.mutexes import mutexes
+from planners.search.questions import FixedPlans, Literals
 from planners.search.state_variables import StateVariable
 
 
@@ -34,28 +32,54 @@ class TooManyClauses(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class StepFormula:
-    """The clauses of one step, over the variables of its state and the facts of the next one.
+class PlanFormula:
+    """The clauses of one step of a plan, and of the goal, each followed by 0.
 
-    Variable k (from 1) of a step is fact k - 1, then come labels, robot by robot, then helping
-    variables; ``size`` is how many there are.  ``size + k`` is variable k of the next state.
+    Variable k (from 1) of a step is fact k - 1, true in the state before it, then come labels,
+    robot by robot, then helping variables; ``size`` is how many there are.  ``size + k`` is
+    variable k of the next step.
     """
 
+    model: JointModel
     size: int
     first_label: tuple[int, ...]
-    clauses: tuple[tuple[int, ...], ...]
+    step: Ints
+    goal: Ints
+
+    @classmethod
+    def of(
+        cls, model: JointModel, task: PlanningTask, variables: Sequence[StateVariable]
+    ) -> PlanFormula:
+        """The formula of a task, whose states have one value of each of the variables.
+
+        Raises `TooManyClauses`.
+        """
+        goal = list(_goal_clauses(model, task.goal))
+        size, first_label, step = _Builder(model).build(variables, task.init)
+        return cls(model, size, first_label, _flat(step), _flat(goal))
+
+    def plans(self, row: Rows, steps: int, effort: int) -> FixedPlans:
+        """The plans of so many steps from a state to the goal, as a formula to be closed.
+
+        Variables are numbered from the goal back: solvers take far longer the other way round.
+        """
+        before = self.size * np.arange(steps, 0, -1)[:, None]
+        number = np.abs(self.step)
+        number[number > self.size] -= 2 * self.size
+        facts = np.full(len(self.model.codec.facts), -1)
+        facts[self.model.codec.true_facts(row)] = 1
+        begin = (1 + self.size * steps + np.arange(len(facts))) * facts
+        clauses = (
+            self.goal,
+            (np.sign(self.step) * (number + before)).reshape(-1),
+            np.column_stack((begin, np.zeros_like(begin))).reshape(-1),
+        )
+        sizes = [len(own) for own in self.model.labels]
+        return FixedPlans(np.concatenate(clauses), before + self.first_label, sizes, effort)
 
 
-def step_formula(
-    model: JointModel, variables: Sequence[StateVariable], pairs: Callable[[], Sequence[Pair]]
-) -> StepFormula:
-    """The clauses of a step whose state has one value of each variable, and none of the pairs.
-
-    These are asked for when all conditions are written.
-
-    Raises `TooManyClauses`.
-    """
-    return _Builder(model).build(variables, pairs)
+def _flat(clauses: Iterable[Sequence[int]]) -> Ints:
+    return np.array([literal for clause in clauses for literal in (*clause, 0)], np.int64)
 
 
 def clauses_of(model: JointModel, formula: Formula, robot: int, label: int) -> list[Clause]:
@@ -87,33 +111,26 @@ class _Builder:
         self._implied: dict[tuple[int, bytes], int] = {}
 
     def build(
-        self, variables: Sequence[StateVariable], pairs: Callable[[], Sequence[Pair]]
-    ) -> StepFormula:
+        self, variables: Sequence[StateVariable], init: Rows
+    ) -> tuple[int, tuple[int, ...], list[tuple[int, ...]]]:
+        """How many variables a step has, the first label of each robot, and the clauses."""
         for variable in variables:
             self._exactly_one([fact + 1 for fact in variable.facts])
         for robot, own in enumerate(self._stepper.labelled):
-            self._one_label(robot, len(own))
+            self._exactly_one([self._label(robot, label) for label in range(len(own))])
             for label, action in enumerate(own):
                 if action is not None:
                     self._action(robot, label, action)
         for i, j in combinations(range(len(self._model.robots)), 2):
             self._apart(i, j)
         known = {fact: number for number, own in enumerate(variables) for fact in own.facts}
-        for one, other in pairs():
+        for one, other in mutexes(self._model, init):
             if one == other:
                 self.clauses.append((-(one + 1),))
             elif one not in known or known[one] != known.get(other):
                 self.clauses.append((-(one + 1), -(other + 1)))
-        following = self._facts_follow()
-        # Variables of the next state come after all of this step's.
-        shifted = [
-            tuple(self._next(lit) if is_next else lit for lit, is_next in clause)
-            for clause in following
-        ]
-        return StepFormula(self._size, self.first_label, (*self.clauses, *shifted))
-
-    def _next(self, literal: int) -> int:
-        return literal + self._size if literal > 0 else literal - self._size
+        self._facts_follow()
+        return self._size, self.first_label, self.clauses
 
     def _fresh(self) -> int:
         self._size += 1
@@ -121,9 +138,6 @@ class _Builder:
 
     def _label(self, robot: int, label: int) -> int:
         return self.first_label[robot] + label
-
-    def _one_label(self, robot: int, count: int) -> None:
-        self._exactly_one([self._label(robot, label) for label in range(count)])
 
     def _exactly_one(self, variables: Literals) -> None:
         """Of some variables; at most one, by a chain: "one of those up to here"."""
@@ -216,141 +230,14 @@ class _Builder:
             ]
         return self._implied[key]
 
-    def _facts_follow(self) -> list[tuple[tuple[int, bool], ...]]:
+    def _facts_follow(self) -> None:
         """What is true in the next state; added facts are, whatever deletes them, too."""
-        found: list[tuple[tuple[int, bool], ...]] = []
         for fact in range(self._facts):
             now, adders, deleters = fact + 1, self._adders[fact], self._deleters[fact]
-            adding = tuple((adder, False) for adder in adders)
-            found += [((-adder, False), (now, True)) for adder in adders]
-            found += [((-deleter, False), *adding, (-now, True)) for deleter in deleters]
-            found.append(((-now, True), (now, False), *adding))
-            found.append(((now, True), (-now, False), *((d, False) for d in deleters)))
-        return found
-
-
-#: Conflicts for a question, after which it is asked of a solver of its own.
-_SOON = 1_000
-
-
-class PlanFormula(Questions):
-    """Whether a state has a plan of so many steps; exact.
-
-    ``variables`` and ``pairs()`` of facts that are never true together hold in the states that are
-    asked for and in all that follow; ``effort`` are the solver's conflicts that may be spent.
-
-    Raises
-    ------
-    TooManyClauses
-        Where a condition cannot be written as clauses.
-    OutOfEffort
-        By questions that are not decided within ``effort``.
-    """
-
-    def __init__(
-        self,
-        model: JointModel,
-        goal: Goal,
-        variables: Sequence[StateVariable],
-        pairs: Callable[[], Sequence[Pair]],
-        effort: int,
-    ) -> None:
-        self.model = model
-        self._step = step_formula(model, variables, pairs)
-        super().__init__(effort, self._step.size)
-        self._steps = 0
-        #: Per step its variables begin after this one; the goal's state is the first.
-        self._base = [0]
-        self._active: Literals = []
-        #: The clauses of a step one after the other, each with 0 at its end.
-        self._flat: Ints = np.array(
-            [k for clause in self._step.clauses for k in (*clause, 0)], np.int64
-        )
-        #: Where each of them begins.
-        self._begins: Ints = np.flatnonzero(np.append(0, self._flat[:-1]) == 0)
-        for clause in _goal_clauses(model, goal):
-            self.add(clause)
-
-    def so_far(self) -> str:
-        """What is asked just now, for messages."""
-        return (
-            f"question {self.calls:,} to the SAT solver, about plans of {self._steps} joint steps; "
-            f"{self.variables:,} variables"
-        )
-
-    # ---- the formula
-
-    def _require_steps(self, steps: int) -> None:
-        while self._steps < steps:
-            self._add_step()
-
-    def _add_step(self) -> None:
-        size, base, following = self._step.size, self.variables, self._base[-1]
-        self.variables += size + 1
-        active = self.variables
-        number = np.abs(self._flat)
-        moved = np.sign(self._flat) * np.where(
-            number <= size, number + base, number - size + following
-        )
-        self.add_all(np.insert(moved, self._begins, -active))
-        self._base.append(base)
-        self._active.append(active)
-        self._steps += 1
-
-    @property
-    def clauses_of_step(self) -> int:
-        """How many clauses one step more has."""
-        return len(self._step.clauses)
-
-    # ---- questions
-
-    def solvable(self, row: Rows, steps: int) -> bool:
-        """Whether a plan of exactly so many steps leads from a state to the goal."""
-        return self.holds(self._begun(row, steps))
-
-    def plan(self, row: Rows, steps: int) -> Plan | None:
-        """A plan of exactly so many steps from a state to the goal, if there is one.
-
-        What is not decided soon is asked of a solver that knows of no other beginning.
-        """
-        with suppress(OutOfEffort), self.at_most(_SOON):
-            return self.labels_chosen(steps) if self.solvable(row, steps) else None
-        with closing(self.with_units(self._begun(row, steps))) as alone:
-            found = alone.holds([])
-            self.left = alone.left
-            return alone.chosen(self._first(steps), self._sizes) if found else None
-
-    def _begun(self, row: Rows, steps: int) -> Literals:
-        """Literals that say: so many steps are taken, from this state on."""
-        self._require_steps(steps)
-        facts = np.full(len(self.model.codec.facts), -1)
-        facts[self.model.codec.true_facts(row)] = 1
-        numbers = self._base[steps] + 1 + np.arange(len(facts))
-        return [*self._active[:steps], *(facts * numbers).tolist()]
-
-    def fixed(self, row: Rows, steps: int) -> FixedPlans:
-        """The plans of so many steps from this state, for many easy questions.
-
-        What is fixed is simplified away; what is assumed may be part of every clause learnt.
-        """
-        clauses = self.clauses[:]
-        for literal in self._begun(row, steps):
-            clauses.extend((literal, 0))
-        return FixedPlans(clauses, self._first(steps), self._sizes, self.left)
-
-    def _first(self, steps: int) -> Ints:
-        """The variables of the robots' first labels, from the first of so many steps on."""
-        base = np.array(self._base[steps:0:-1], np.int64)
-        first: Ints = base[:, None] + np.array(self._step.first_label)
-        return first
-
-    @property
-    def _sizes(self) -> list[int]:
-        return [len(own) for own in self.model.labels]
-
-    def labels_chosen(self, steps: int) -> Plan:
-        """The robots' labels in the plan that the last answer found, from its first step on."""
-        return self.chosen(self._first(steps), self._sizes)
+            then = now + self._size
+            self.clauses += [(-adder, then) for adder in adders]
+            self.clauses += [(-deleter, *adders, -then) for deleter in deleters]
+            self.clauses += [(-then, now, *adders), (then, -now, *deleters)]
 
 
 def _goal_clauses(model: JointModel, goal: Goal) -> Iterator[Literals]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Questions to a SAT solver about a formula that grows, with a limit on the effort they take."""
+"""Questions to a SAT solver about plans, with a limit on the effort they take."""
 
 from __future__ import annotations
 
@@ -37,50 +37,82 @@ class OutOfEffort(Exception):
     """The solver did not decide a question with the effort that was left."""
 
 
-class Questions:
-    """A formula in clauses, and whether it holds.
+class FixedPlans:
+    """Which sequences of labels are plans of a task with a fixed number of steps, as clauses.
 
-    ``effort`` are the solver's conflicts that may be spent; ``variables`` is how many there are.
+    Parameters
+    ----------
+    clauses
+        A formula, each clause followed by 0.
+    first
+        Per step and robot the variable of its first label; the others follow.
+    sizes
+        Per robot how many labels there are.
+    effort
+        The solver's conflicts that may be spent.
+
+    Attributes
+    ----------
+    first
+        As the parameter, in the variables of the formula as it is now.
+    left
+        The effort that is left.
+    calls
+        Questions that were asked.
     """
 
-    def __init__(self, effort: int, variables: int) -> None:
-        #: The effort that is left.
-        self.left = effort
-        #: Questions that were asked.
-        self.calls = 0
-        self.variables = variables
+    def __init__(self, clauses: Ints, first: Ints, sizes: Sequence[int], effort: int) -> None:
+        self.first, self.steps, self._sizes = first, len(first), sizes
+        self.left, self.calls = effort, 0
+        self._take(clauses)
+
+    def _take(self, clauses: Ints) -> None:
+        """Let this be the formula, in a solver of its own."""
+        labels = self.first[-1:, -1:].sum() + self._sizes[-1] - 1
+        self.variables = max(int(np.abs(clauses).max(initial=0)), int(labels))
         #: All clauses, each followed by 0.
-        self.clauses = array("i")
-        self._solver = sat_solver(SOLVER)
+        self.clauses = array("i", np.asarray(clauses, np.intc).tobytes())
+        self._solver = sat_solver(SOLVER, split_clauses(clauses))
+
+    def simplify(self) -> None:
+        """Eliminate what can be: mostly far fewer variables are left, other than those of labels.
+
+        There are plans.
+        """
+        self.close()
+        runs = np.tile(self._sizes, self.steps)
+        labels = ranges(self.first.reshape(-1), runs)
+        found = [(*clause, 0) for clause in simplified(self.clauses, labels.tolist())]
+        literals = np.fromiter(chain.from_iterable(found), np.int64)
+        # Labels get the first numbers, then the other variables in the order in which they occur.
+        known, at = np.unique(np.append(labels, np.abs(literals[literals != 0])), return_index=True)
+        number = np.zeros(int(known[-1]) + 1, np.int64)
+        number[known[np.argsort(at)]] = 1 + np.arange(len(known))
+        self.first = number[self.first]
+        self._take(np.sign(literals) * number[np.abs(literals)])
 
     def close(self) -> None:
         """Give the solver back."""
         self._solver.delete()
 
+    def so_far(self) -> str:
+        """What is asked just now, for messages."""
+        return (
+            f"question {self.calls:,} to the SAT solver, about plans of {self.steps} joint steps; "
+            f"{self.variables:,} variables"
+        )
+
     # ---- the formula
+
+    def label(self, step: int, robot: int, label: int) -> int:
+        """The variable of a robot's label in a step, from 0."""
+        return int(self.first[step, robot]) + label
 
     def add(self, clause: Sequence[int]) -> None:
         """Let one of these literals be true."""
         self.clauses.extend(clause)
         self.clauses.append(0)
         self._solver.add_clause(clause)
-
-    def add_all(self, clauses: array[int] | Ints) -> None:
-        """Add clauses, each followed by 0."""
-        self.clauses.frombytes(np.asarray(clauses, np.intc).tobytes())
-        for clause in split_clauses(clauses):
-            self._solver.add_clause(clause)
-
-    def with_units(self, literals: Sequence[int]) -> Questions:
-        """The same formula, where these literals are true, in a solver of its own.
-
-        It often refutes in half the time what takes long with the literals assumed: what follows
-        from them is simplified away, and is in no clause that it learns.
-        """
-        found = Questions(self.left, self.variables)
-        found.add_all(self.clauses)
-        found.require(literals)
-        return found
 
     def fresh(self) -> int:
         """A new variable."""
@@ -121,7 +153,7 @@ class Questions:
 
     # ---- the questions
 
-    def holds(self, literals: Sequence[int]) -> bool:
+    def holds(self, literals: Sequence[int] = ()) -> bool:
         """Whether the formula holds with these literals."""
         self.calls += 1
         while True:
@@ -135,18 +167,15 @@ class Questions:
         """Whether a literal must be true, where that is seen by unit propagation."""
         return not propagates(self._solver, [-literal])
 
-    def chosen(self, first: Ints, sizes: Sequence[int]) -> Plan:
-        """In the model of the last answer, of each run of variables the first that is true.
-
-        ``first`` (steps, robots) is where runs begin, ``sizes`` (robots) how long they are.
-        """
+    def labels_chosen(self) -> Plan:
+        """The robots' labels in the plan that the last answer found."""
         true = np.array(self._solver.get_model()) > 0
         return [
             tuple(
                 int(np.argmax(true[begin - 1 : begin - 1 + size]))
-                for begin, size in zip(step, sizes, strict=True)
+                for begin, size in zip(step, self._sizes, strict=True)
             )
-            for step in first.tolist()
+            for step in self.first.tolist()
         ]
 
     def core(self, literals: Iterable[int]) -> Literals:
@@ -176,68 +205,3 @@ class Questions:
             yield
         finally:
             self.left = before - (given - self.left)
-
-
-class FixedPlans(Questions):
-    """Which sequences of labels are plans, as clauses say it.
-
-    Parameters
-    ----------
-    clauses
-        A formula, each clause followed by 0.
-    first
-        Per step, from the first one on, and robot the variable of its first label; the others
-        follow.
-    sizes
-        Per robot how many labels there are.
-    effort
-        The solver's conflicts that may be spent.
-
-    Attributes
-    ----------
-    first
-        As the parameter, in the variables of this formula.
-    """
-
-    def __init__(self, clauses: array[int], first: Ints, sizes: Sequence[int], effort: int) -> None:
-        self.steps, self._sizes = len(first), sizes
-        runs = np.tile(sizes, self.steps)
-        super().__init__(effort, int(runs.sum()))
-        labels = ranges(first.reshape(-1), runs)
-        self.first: Ints = 1 + (np.cumsum(runs) - runs).reshape(first.shape)
-        self._take(clauses, labels)
-
-    def simplify(self) -> None:
-        """Eliminate what can be, now that more is required; other variables are forgotten."""
-        self.close()
-        known, self.clauses = self.clauses, array("i")
-        self._solver = sat_solver(SOLVER)
-        self._take(known, np.arange(1, int(self.first[-1, -1]) + self._sizes[-1]))
-
-    def _take(self, clauses: array[int], labels: Ints) -> None:
-        """Clauses, simplified: variables of labels come first, others that occur after them."""
-        found = simplified(clauses, labels.tolist())
-        lengths = np.fromiter(map(len, found), np.int64, len(found))
-        literals = np.fromiter(chain.from_iterable(found), np.int64, int(lengths.sum()))
-        variables = np.abs(literals)
-        number = np.zeros(int(max(variables.max(initial=0), labels.max(initial=0))) + 1, np.int64)
-        number[labels] = np.arange(1, len(labels) + 1)
-        others, at = np.unique(variables[number[variables] == 0], return_index=True)
-        self.variables = len(labels) + len(others)
-        number[others[np.argsort(at)]] = np.arange(len(labels) + 1, self.variables + 1)
-        self.add_all(np.insert(np.sign(literals) * number[variables], np.cumsum(lengths), 0))
-
-    def so_far(self) -> str:
-        """What is asked just now, for messages."""
-        return (
-            f"question {self.calls:,} to the SAT solver, about plans of {self.steps} joint steps "
-            f"from the start; {self.variables:,} variables"
-        )
-
-    def label(self, step: int, robot: int, label: int) -> int:
-        """The variable of a robot's label in a step, from 0."""
-        return int(self.first[step, robot]) + label
-
-    def labels_chosen(self) -> Plan:
-        """The robots' labels in the plan that the last answer found."""
-        return self.chosen(self.first, self._sizes)

@@ -25,8 +25,6 @@ class PieceSizes:
     ----------
     states, steps
         States expanded at a time, and the joint steps that this should give.
-    kept
-        Joint steps kept from a forward search; beyond, layers are expanded again on the way back.
     pairs
         (goal, state) pairs handled in one plan space when many tasks are asked for.
     probe
@@ -39,7 +37,6 @@ class PieceSizes:
 
     states: int = 20_000
     steps: int = 4_000_000
-    kept: int = 40_000_000
     pairs: int = 2_000_000
     probe: int = 100_000
     effort: int = 5_000_000

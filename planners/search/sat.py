@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-import threading
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from functools import cache
 from typing import Any, Literal
 
@@ -20,9 +18,6 @@ _BLOCK = 1 << 16
 #: Rounds of elimination: what one leaves, the next one may eliminate.  Three take up to twice as
 #: long as one, and the questions that follow fewer conflicts (logistics 14-0: a sixth fewer).
 _ROUNDS = 3
-
-#: Has ``now``: whether this thread is in a solver.
-_SOLVING = threading.local()
 
 #: The solvers in use.  None of MapleChrono and MapleCM: they take SIGALRM for themselves, below
 #: Python, so that no time limit would be heard any more.
@@ -53,41 +48,17 @@ def sat_solver(name: SolverName, clauses: Iterable[Sequence[int]] = ()) -> Any:
 def solve_slice(solver: Any, conflicts: int, assumptions: Sequence[int] = ()) -> bool | None:
     """Whether the clauses can be satisfied; None if ``conflicts`` did not decide it.
 
-    Signals are heard before and after, and not while the solver works.  python-sat would leave it
-    at SIGINT by ``longjmp`` from wherever it is, the allocation of memory included, and would leave
-    its handler behind: then the process crashes or hangs.
+    Signals are heard before and after, and not while the solver works.
     """
     solver.conf_budget(conflicts)
-    with _deaf():
-        answer = solver.solve_limited(assumptions=list(assumptions))
+    answer = solver.solve_limited(assumptions=list(assumptions))
     return None if answer is None else bool(answer)
 
 
 def propagates(solver: Any, assumptions: Sequence[int]) -> bool:
     """Whether unit propagation meets no conflict; signals are heard as by `solve_slice`."""
-    with _deaf():
-        good, _ = solver.propagate(assumptions=list(assumptions))
+    good, _ = solver.propagate(assumptions=list(assumptions))
     return bool(good)
-
-
-@contextmanager
-def _deaf() -> Iterator[None]:
-    """Solvers of this thread take no signals inside, as they take none in another one."""
-    _hear_only_outside()
-    _SOLVING.now = True
-    try:
-        yield
-    finally:
-        _SOLVING.now = False
-
-
-@cache
-def _hear_only_outside() -> None:
-    """Let python-sat ask `_SOLVING`, too, whether it is in the main thread; for good."""
-    from pysat.solvers import MainThread
-
-    own = MainThread.check
-    MainThread.check = staticmethod(lambda: not getattr(_SOLVING, "now", False) and own())
 
 
 def simplified(clauses: array[int], kept: Sequence[int]) -> list[list[int]]:
@@ -127,7 +98,14 @@ def split_clauses(clauses: array[int] | Ints, block: int = _BLOCK) -> Iterator[l
 
 @cache
 def _solver_class() -> Any:
-    from pysat.solvers import Solver
+    """The solvers of python-sat, which from now on leave SIGINT to Python.
+
+    In the main thread they would be left at SIGINT by ``longjmp`` from wherever they are, the
+    allocation of memory included, and leave a handler behind: the process crashes or hangs.
+    """
+    from pysat.solvers import MainThread, Solver
+
+    MainThread.check = staticmethod(lambda: False)
 
     class Whole(Solver):  # type: ignore[misc]
         """A solver that is freed once, though a signal arrives when it has just been freed."""

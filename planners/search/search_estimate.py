@@ -10,9 +10,8 @@ from planners.joint.model import JointModel, PlanningTask
 from planners.joint.tables import Rows
 from planners.search.bounded_search import probe_size
 from planners.search.goals import FAR, Values
-from planners.search.heuristics import search_heuristic
+from planners.search.heuristics import relaxed, search_heuristic
 from planners.search.reachable import PIECES, Exploration
-from planners.search.relaxed import relaxed
 from planners.search.state_variables import state_variables
 
 #: Joint steps composed for all layers together, at most.

@@ -7,10 +7,11 @@ from array import array
 from contextlib import closing
 from itertools import product
 
+import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.search.questions import Questions
+from planners.search.questions import FixedPlans
 from planners.search.sat import sat_solver, simplified
 
 VARIABLES = 6
@@ -56,9 +57,13 @@ def test_variables_that_are_not_kept_go() -> None:
 def test_clauses_that_are_added_at_once_say_the_same_as_one_by_one(
     clauses: list[list[int]],
 ) -> None:
-    with closing(Questions(100, VARIABLES)) as one, closing(Questions(100, VARIABLES)) as many:
+    first = np.ones((1, 1), np.int64)
+    none, every = (np.array(own, np.int64) for own in ((), flat(clauses)))
+    with (
+        closing(FixedPlans(none, first, [VARIABLES], 100)) as one,
+        closing(FixedPlans(every, first, [VARIABLES], 100)) as many,
+    ):
         for clause in clauses:
             one.add(clause)
-        many.add_all(flat(clauses))
         assert many.clauses == one.clauses
-        assert many.holds([]) == one.holds([]) == bool(kept_values(clauses, []))
+        assert many.holds() == one.holds() == bool(kept_values(clauses, []))

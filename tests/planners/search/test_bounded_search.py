@@ -14,7 +14,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from planners.loading import PlanningInstance, load
+from planners.loading import PlanningInstance
 from planners.pddl.model_options import Cost, ModelOptions
 from planners.search.heuristics import CHOICES
 from planners.search.optimal_plans import search, search_with_effort
@@ -22,18 +22,18 @@ from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 from planners.search.reachable import PIECES
 from planners.system.errors import BadInput, ProvedImpossible
-from tests.support.domains import DOMAINS, world_of
+from tests.support.domains import world_of
 from tests.support.random_models import random_threes
 from tests.support.random_spaces import blind_search, random_instance
 from tests.support.texts import model_of
 
-#: Searches that ask the solver at once, with effort for all or some of its answers, and one that
-#: composes steps again on the way back.
+#: Searches that ask the solver at once, with effort for all or some of its answers, and one in small
+#: pieces.
 PIECE_SIZES = (
     PIECES,
     replace(PIECES, probe=0, effort=3_000),
-    replace(PIECES, probe=0, effort=100_000, kept=0, states=3),
-    replace(PIECES, kept=0, states=2, steps=5),
+    replace(PIECES, probe=0, effort=100_000, states=3),
+    replace(PIECES, states=2, steps=5),
     replace(PIECES, probe=0, question=0),
     replace(PIECES, probe=0, effort=300, question=0),
 )
@@ -163,19 +163,6 @@ FAMILIES: dict[str, Callable[[int], PlanningInstance | None]] = {
 def test_bounds_lose_no_optimal_plan(family: str, seeds: range) -> None:
     met = compared(map(FAMILIES[family], seeds))
     assert min(met["solved"], met["unsolvable"]) >= 5
-
-
-def test_steps_are_composed_again_however_many_there_were() -> None:
-    """Those on the way back count for no limit of the way there."""
-    files = DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "corners-6x6.pddl"]
-    again = 0
-    for cost, probe in zip(COSTS, (100, 200, 300), strict=True):
-        loaded = load(*files, ModelOptions(cost=cost))
-        pieces = replace(PIECES, probe=probe, kept=0)
-        found, effort = search_with_effort(loaded.model, loaded.tasks[0], pieces)
-        again += effort.steps > probe and "SAT" not in effort.heuristic
-        equal(found, blind_search(loaded.model, loaded.tasks[0]))
-    assert again
 
 
 def test_on_open_grids_no_solver_is_asked() -> None:

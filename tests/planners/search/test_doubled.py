@@ -13,8 +13,8 @@ from planners.loading import build
 from planners.pddl import parse_domain, parse_problem, read_domain, read_problem
 from planners.pddl.lifted import Atom
 from planners.pddl.sexpr import Source
-from planners.search.doubled import note_doubled
 from planners.search.reachable import explore
+from planners.search.state_variables import note_doubled
 from planners.system.errors import Note
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
