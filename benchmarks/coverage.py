@@ -219,9 +219,9 @@ def one(name: str, cost: str, heuristic: str) -> Figures:
         "second": second,
         "plans": counts(space)[int(space.starts[0])],
         "nodes": len(space),
-        "states": effort.states,
-        "steps": effort.steps,
-        "bound": effort.heuristic,
+        "states": len(effort.table),
+        "steps": effort.composed,
+        "bound": effort.bounded_by,
     }
 
 

@@ -21,7 +21,7 @@ from planners.search.goals import searched
 from planners.search.kept_plans import search
 from planners.search.optimal_plans import joined, plan_spaces, solvable
 from planners.search.plan_space import PlanSpace
-from planners.search.portions import Explored, PlanSpaces, Searched, Source
+from planners.search.portions import Explored, Searched, Source
 from planners.search.reachable import Space, explore
 from planners.search.state_variables import state_variables
 from planners.system.errors import BadInput, Position, ProvedImpossible, note
@@ -57,9 +57,7 @@ class Candidates:
     @cached_property
     def spaces(self) -> Sequence[PlanSpace]:
         """The optimal plans of the tasks, in batches over one common table of states."""
-        if isinstance(self.source, Searched):
-            return (self.source.plans,)
-        return PlanSpaces(self.source)
+        return self.source.spaces
 
     @property
     def model(self) -> JointModel:

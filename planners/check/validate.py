@@ -43,15 +43,10 @@ def validate(
 ) -> Verdict:
     """Check that every step is legal where it is taken and that the goal holds at the end.
 
-    Parameters
-    ----------
-    plan
-        ``plan[k][i]`` is the subaction of robot ``i`` in step ``k``, such as ``"(move r1 a b)"``,
-        or None if it idles. In joint-action PDDL it is the filled-in template of the subaction
-        comment.
-    init, goal
-        Another task than the problem's own: its true fluents (statics come from the problem) and
-        its goal.
+    ``plan[k][i]`` is the subaction of robot ``i`` in step ``k``, such as ``"(move r1 a b)"`` (in
+    joint-action PDDL the filled-in template of the subaction comment), or None if it idles.
+    ``init`` (true fluents; statics come from the problem) and ``goal`` are of another task than the
+    problem's own.
 
     Raises `BadInput` where two applicable joint actions with the same subactions have different
     results.

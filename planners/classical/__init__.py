@@ -56,15 +56,9 @@ def compile_classical(
 ) -> ClassicalTask:
     """The classical form of a task.
 
-    Explicit with at most ``limit`` classical actions, else select-then-apply.
-
-    Parameters
-    ----------
-    limit
-        0 asks for select-then-apply.  Joint-action PDDL, whose ground actions are classical actions
-        already, may exceed it.
-    longest
-        The makespan, in joint steps, up to which `ClassicalTask.cost` has to be sure.
+    Explicit with at most ``limit`` classical actions (joint-action PDDL, whose ground actions are
+    classical actions already, may exceed it), else select-then-apply.  ``longest`` is the makespan
+    up to which `ClassicalTask.cost` has to be sure.
     """
     team = selectors_of(model)
     step_cost = team.highest_cost * longest + 1

@@ -92,20 +92,11 @@ def optimal_cost(
     """The optimal cost of a task according to Fast Downward.
 
     It stops where the `planners.system.limits.time_limit` around is over; its translator and its
-    search may have the memory that this process may have.
+    search may have the memory that this process may have.  No process is left behind.  For
+    ``limit`` and ``longest`` see `planners.classical.compile_classical`; where a plan turns out to
+    have more steps, it is asked again.
 
-    Parameters
-    ----------
-    limit, longest
-        See `planners.classical.compile_classical`; where a plan turns out to have more steps than
-        ``longest``, it is asked again.
-
-    Raises
-    ------
-    OutOfTime, OutOfMemory
-        A limit is met.  No process is left behind.
-    FastDownwardFailed
-        Fast Downward broke down; the end of what it said is in the message.
+    Raises `FastDownwardFailed`, with the end of what it said, if it broke down.
     """
     while True:
         classical = compile_classical(model, task, limit, longest)

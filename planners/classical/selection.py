@@ -64,10 +64,7 @@ def _of_selections(team: Selectors, model: JointModel) -> Callable[[GroundLeaf],
 class _Stages:
     """The stages of a step in their order, and the facts that say which one it is.
 
-    Attributes
-    ----------
-    first
-        The fact that a step begins, and the one before is over.
+    ``first`` is the fact that a step begins, and the one before is over.
     """
 
     def __init__(self, names: Sequence[str], late: Iterable[StagedAction]) -> None:

@@ -31,25 +31,14 @@ STAGES = ("check", "undo", "apply")
 class StagedAction:
     """A ground action of the robot that owns it first, as the select-then-apply form needs it.
 
-    Attributes
-    ----------
-    number, label, robot
-        Which action it is, its text, and its first owner.
-    selected
-        The fact that its first owner has selected it.
-    literals
-        What selecting it requires of the state; None if that contradicts itself.
-    checks
-        What is checked when all robots have selected: the other conjuncts of its precondition.
-    adds, deletes
-        Its unconditional effects.
-    groups
-        Its conditional effects, by condition: (condition, (adds, deletes)).
-    early
-        The atoms that it may delete in a step in which it, or another action, may add them: their
-        deletes come before all adds of the step.  `staged_actions` decides this.
+    ``selected`` is the fact that its first owner, ``robot``, has selected it; ``literals`` what
+    that requires of the state (None if it contradicts itself), ``checks`` what is checked when all
+    have selected: the other conjuncts of its precondition.  ``adds`` and ``deletes`` are its
+    unconditional effects, ``groups`` the others, by condition: (condition, (adds, deletes)).
     """
 
+    #: The atoms that it may delete in a step in which it, or another action, may add them: their
+    #: deletes come before all adds of the step.  `staged_actions` decides this.
     early: frozenset[Atom] = frozenset()
 
     def __init__(
@@ -145,11 +134,7 @@ class Immediate:
 
     An action is none of them if several robots own it, if something of it is checked or undone, if
     a formula that is checked names it, or if an action beside it reads what it has written.
-
-    Attributes
-    ----------
-    marks
-        The facts without which actions are ruled out until the step is over, see `mark`.
+    ``marks`` are the facts without which actions are ruled out until the step is over.
     """
 
     def __init__(self, team: Selectors, actions: Sequence[StagedAction]) -> None:

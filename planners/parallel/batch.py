@@ -43,21 +43,9 @@ _LARGEST = 4
 class Batch:
     """Jobs of one kind, each of which is done by ``function(shared, job)``.
 
-    Attributes
-    ----------
-    name
-        What is done, for messages.
-    function
-        A function of a module, without side effects that a second call would disturb: a job whose
-        worker is lost is done again.
-    shared
-        What all jobs need; every worker gets it once.
-    jobs
-        In the order in which they are begun.
-    identity
-        A hash of all that ``shared`` says, the same in every process (`digest`).
-    efforts
-        The estimated work of each job, in nodes times robots.
+    A job whose worker is lost is done again: a second call must disturb nothing.  Every worker gets
+    ``shared`` once; ``identity`` is a `digest` of all that it says, ``name`` says what is done, in
+    messages, and ``efforts`` are the estimated work of each job, in nodes times robots.
     """
 
     name: str
@@ -136,15 +124,8 @@ class Store:
     begins with a hash of its key and of all that follows: a file that is damaged, or has the name
     of another one, is said and not believed.
 
-    Attributes
-    ----------
-    path
-        The folder; it is made when it is written to.
-    most_bytes
-        What it and the folders beside it with the same name up to the last ``-`` may take: where it
-        is more, files that were not used for longest go.  None: no bound.
-    say
-        Called with a line of text for each file that is not believed.
+    The folder is made when it is written to.  Where it and the folders beside it with the same name
+    up to the last ``-`` take more than ``most_bytes``, files that were not used for longest go.
     """
 
     path: Path

@@ -53,19 +53,8 @@ def connected(
 ) -> Iterator[Cluster]:
     """Connect to a running cluster, and leave nothing of ours on it.
 
-    Parameters
-    ----------
-    where
-        The address of its scheduler, or the file that the scheduler has written.
-    packages
-        The packages whose code does the jobs: it must be the same on all workers.
-    note
-        Called with a line of text for a person: that there are no workers yet.
-
-    Raises
-    ------
-    UsageError
-        Where no scheduler answers.
+    ``where`` is the address of its scheduler, or the file that the scheduler has written.  Raises
+    `UsageError` where no scheduler answers.
     """
     is_address = _ADDRESS.fullmatch(where) and not Path(where).exists()
     address = where if is_address else _address_in(where)
@@ -133,14 +122,8 @@ class Cluster:
 
         What they share is a plugin of the workers, so that one that joins later has it, too.
 
-        Raises
-        ------
-        UsageError
-            If a worker has other versions than are here.
-        OutOfMemory
-            If several workers are lost in one job.
-        ClusterFailed
-            If the scheduler is gone.
+        Raises `UsageError` if a worker has other versions than are here, `OutOfMemory` if several
+        are lost in one job, `ClusterFailed` if the scheduler is gone.
         """
         name = f"coordlang-{uuid4().hex}"
         packed = pickle.dumps((batch.function, batch.shared), pickle.HIGHEST_PROTOCOL)

@@ -43,13 +43,8 @@ def in_processes(
     """Have some jobs of a batch done by ``count`` processes, which end with the block.
 
     ``memory`` are the bytes that each may take beyond what its libraries need; None: no limit.
-
-    Raises
-    ------
-    concurrent.futures.BrokenExecutor
-        If a process is lost.
-    UsageError, OutOfMemory
-        If no process can be started.
+    Raises `BrokenExecutor` if a process is lost, `UsageError` or `OutOfMemory` if none can be
+    started.
     """
     context = _Context()
     packed = pickle.dumps((batch.function, batch.shared), pickle.HIGHEST_PROTOCOL)

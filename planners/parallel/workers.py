@@ -31,22 +31,9 @@ Begin = Callable[[Batch, Sequence[Any]], AbstractContextManager[list[Future[Outc
 
 @dataclass(frozen=True, slots=True)
 class Workers:
-    """Who does jobs.
+    """Who does jobs: a cluster, or this process; with efforts above ``worth`` worker processes.
 
-    Without a cluster jobs are done one after another in this process, or by worker processes where
-    there are several jobs whose efforts sum to ``worth``.  Memory that is left is divided among
-    them.
-
-    Attributes
-    ----------
-    processes
-        The greatest number of worker processes.
-    cluster
-        Other machines in place of them.
-    kept
-        Results that are known, and where others are kept.
-    worth
-        The sum of efforts from which processes are started.
+    Memory that is left is divided among these.  Results that are ``kept`` are not worked out again.
     """
 
     processes: int = 1
@@ -60,12 +47,7 @@ class Workers:
         Errors of jobs are raised in the same order, so they do not depend on the number of
         workers.  What is under way is ended when this is closed.
 
-        Raises
-        ------
-        OutOfMemory
-            For a job whose workers are lost.
-        UsageError
-            If no worker can be started.
+        Raises `OutOfMemory` for a job whose workers are lost, `UsageError` if none can be started.
         """
         kept = self.kept
         keys = [] if kept is None else batch.keys()
@@ -142,25 +124,14 @@ def workers(
     packages: tuple[str, ...] = ("planners",),
     note: Callable[[str], None] = lambda _: None,
 ) -> Iterator[Workers]:
-    """Who does jobs, for the block.
+    """Who does jobs, for the block: ``jobs`` processes at most (None: one for each core).
 
-    Parameters
-    ----------
-    jobs
-        The greatest number of processes on this machine; None: one for each core.
-    scheduler
-        The scheduler of a running Dask cluster, by address or file, in place of processes here.
-    resume
-        A folder in which finished jobs are kept, and found again.
-    packages
-        The packages whose code does the jobs.
-    note
-        Called with a line of text for a person: a damaged file, a cluster without workers.
+    In place of these the cluster of a Dask ``scheduler``, given by address or file, whose code of
+    ``packages`` must be as here.  Finished jobs are kept, and found again, in the folder
+    ``resume``.  ``note`` is called with lines of text for a person: a damaged file, a cluster
+    without workers.
 
-    Raises
-    ------
-    UsageError
-        Where there is no such cluster, or no such folder can be made.
+    Raises `UsageError` where there is no such cluster, or no such folder can be made.
     """
     with ExitStack() as stack:
         kept = None if resume is None else Store(_made(Path(resume)), say=note)

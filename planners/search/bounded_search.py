@@ -63,16 +63,9 @@ class _GrownError(Exception):
 class BoundedSearch:
     """Layers of states within a bound that grows until the goal is met.
 
-    Attributes
-    ----------
-    table
-        The states that were met in all rounds.
-    states
-        Those of each layer of the last round, the start first; goal states are in the last layer.
-    edges
-        ``edges[k]`` lead from layer k to the next one.
-    composed
-        Joint steps that were composed, in all rounds.
+    ``table`` has the states that were met in all ``rounds``, in which so many joint steps were
+    ``composed``; ``states`` are those of each layer of the last round, the start first (goal states
+    are in the last layer), and ``edges[k]`` lead from layer k to the next one.
     """
 
     def __init__(
@@ -143,6 +136,11 @@ class BoundedSearch:
             return self.bound
         self._optimal = OptimalStates(self.exact.plans, self._pieces.question)
         return self.exact.makespan
+
+    @property
+    def bounded_by(self) -> str:
+        """The heuristic, with ``+ SAT`` where a solver was asked."""
+        return f"{self._heuristic.name} + SAT" if self.exact else self._heuristic.name
 
     def close(self) -> None:
         """Give the solver back."""
@@ -267,14 +265,7 @@ def mostly_lead(
     Where they do and costs do not count, hardly a state within the bound is useless, and a solver
     that is asked which labels optimal plans have can leave nothing out (robots on open grids).  A
     way that is found is one; that none was found proves nothing.  No, too, once about ``most``
-    joint steps are composed.
-
-    Parameters
-    ----------
-    heuristic
-        By its bounds ways that are too long are left out.
-    rows
-        The states, of which some are asked for, evenly.
+    joint steps are composed.  Some of the states, ``rows``, are asked for, evenly.
     """
     assert heuristic.value is not None
     rows = rows[:: -(-len(rows) // _SAMPLED)]

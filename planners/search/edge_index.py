@@ -56,11 +56,6 @@ class EdgeTrees:
     """The targets of each node's edges, by the robots' labels one after another.
 
     A tree for each node, made when it is asked for: robot 1's label -> robot 2's -> .. -> target.
-
-    Parameters
-    ----------
-    space
-        The plan space.
     """
 
     def __init__(self, space: PlanSpace) -> None:

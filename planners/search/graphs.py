@@ -23,24 +23,9 @@ _THREADS = "OPENBLAS_NUM_THREADS"
 def parts_of_graph(
     size: int, sources: Ints, targets: Ints, *, directed: bool = False
 ) -> tuple[int, Ints]:
-    """The components of a graph, with ``directed`` the strong ones.
+    """How many components a graph has (with ``directed`` strong ones), and each node's number.
 
-    Parameters
-    ----------
-    size
-        The number of nodes.
-    sources, targets
-        (edges) the ends of each edge.
-
-    Returns
-    -------
-    tuple
-        How many components there are, and the number of each node's.
-
-    Raises
-    ------
-    OutOfMemory
-        See `csgraph`.
+    ``sources`` and ``targets`` are the ends of each edge.  Raises `OutOfMemory` as `csgraph` does.
     """
     sparse = csgraph()
     from scipy.sparse import csr_matrix
@@ -53,11 +38,8 @@ def parts_of_graph(
 def csgraph() -> Any:
     """The module ``scipy.sparse.csgraph``.
 
-    Raises
-    ------
-    OutOfMemory
-        If the limit on the address space leaves no room for it: BLAS would ask for memory without
-        end while it is loaded, and hear no signal.
+    Raises `OutOfMemory` if the limit on the address space leaves no room for it: BLAS would ask for
+    memory without end while it is loaded, and hear no signal.
     """
     left = address_space_left()
     if "scipy.sparse.csgraph" in sys.modules or left == math.inf:

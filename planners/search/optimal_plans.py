@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -31,28 +31,6 @@ from planners.system.limits import reaching
 _FAR = np.iinfo(np.int64).max // 4
 
 
-@dataclass(frozen=True, slots=True)
-class SearchEffort:
-    """What a search took: machine-independent work.
-
-    Attributes
-    ----------
-    heuristic
-        What it was bounded by, with ``+ SAT`` where a solver was asked.
-    rounds
-        How many bounds were tried.
-    states
-        The different states that were met.
-    steps
-        The joint steps that were composed, in all rounds.
-    """
-
-    heuristic: str
-    rounds: int
-    states: int
-    steps: int
-
-
 def search(
     model: JointModel, task: PlanningTask, pieces: PieceSizes = PIECES, heuristic: str = "auto"
 ) -> PlanSpace:
@@ -61,12 +39,8 @@ def search(
     Forward in layers, bounded by ``heuristic`` (`planners.search.heuristics`), then back along
     optimal edges.  With slack the least makespan is found first, and then what is within the bound.
 
-    Raises
-    ------
-    ProvedImpossible
-        If the goal cannot be reached.
-    UsageError
-        If robots cannot wait in the goal, and there is slack.
+    Raises `ProvedImpossible` if the goal cannot be reached, `UsageError` if there is slack and
+    robots cannot wait in the goal.
     """
     if not model.slack:
         return search_with_effort(model, task, pieces, heuristic)[0]
@@ -87,8 +61,8 @@ def search_within(
 
 def search_with_effort(
     model: JointModel, task: PlanningTask, pieces: PieceSizes = PIECES, heuristic: str = "auto"
-) -> tuple[PlanSpace, SearchEffort]:
-    """The plans as `search` finds them, and the work that it took."""
+) -> tuple[PlanSpace, BoundedSearch]:
+    """The plans as `search` finds them, and how they were found."""
     with reaching(lambda: f"looking for bounds of {task.name}", SMALLER):
         variables = state_variables(model, task.init)
         chosen = search_heuristic(heuristic, model, task, variables)
@@ -98,9 +72,7 @@ def search_with_effort(
         reaching(forward.so_far, SMALLER),
     ):
         forward.run()
-        found = _backward(model, task, forward)
-    name = f"{chosen.name} + SAT" if forward.exact else chosen.name
-    return found, SearchEffort(name, forward.rounds, len(forward.table), forward.composed)
+        return _backward(model, task, forward), forward
 
 
 def _backward(model: JointModel, task: PlanningTask, forward: BoundedSearch) -> PlanSpace:
@@ -191,21 +163,10 @@ def plan_spaces(
 ) -> Iterator[PlanSpace]:
     """The optimal plans of many tasks over one explored space, in batches of goals.
 
-    One backward pass per goal serves every initial state.
+    One backward pass per goal serves every initial state.  ``tasks`` are goals with tables of
+    initial states; None: every other state that can reach the goal.
 
-    Parameters
-    ----------
-    space
-        The reachable states.
-    tasks
-        Goals with tables of initial states; None: every other state that can reach the goal.
-    pieces
-        How many pairs of a goal and a state make a batch.
-
-    Raises
-    ------
-    ProvedImpossible
-        For a task whose goal cannot be reached.
+    Raises `ProvedImpossible` for a task whose goal cannot be reached.
     """
     size = max(1, pieces.pairs // max(1, len(space) * (1 + space.model.slack)))
     for start in range(0, len(tasks), size):

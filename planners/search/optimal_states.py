@@ -26,14 +26,8 @@ class OptimalStates:
     """Which states of a search optimal plans pass through.
 
     Of each state a cheapest way is kept as its last step: what the way costs, the state before, and
-    what the robots do there.
-
-    Parameters
-    ----------
-    plans
-        What optimal plans satisfy.
-    effort
-        Conflicts for one question; without an answer the state is kept.
+    what the robots do there.  ``plans`` say what optimal plans satisfy; a state is kept where
+    ``effort`` conflicts do not answer its question.
     """
 
     def __init__(self, plans: FixedPlans, effort: int) -> None:

@@ -19,7 +19,6 @@ import numpy as np
 from planners.joint.conditions import Labels
 from planners.joint.model import Goal, JointModel
 from planners.joint.tables import Bools, Ints, Rows, ranges
-from planners.system.notebook import counted, html_table
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,17 +83,6 @@ class PlanSpace:
             f"PlanSpace(tasks={len(self.starts)}, layers={len(self.layers)}, nodes={len(self)}, "
             f"edges={len(self.target)})"
         )
-
-    def _repr_html_(self) -> str:
-        """A table for notebooks: nodes, states and edges of each layer, the first step on top."""
-        rows = []
-        for layer, span in reversed(list(enumerate(self.layers))):
-            states = len(np.unique(self.state[span]))
-            edges = int(self.first[span.stop] - self.first[span.start])
-            numbers = (layer, span.stop - span.start, states, edges)
-            rows.append([f"{number:,}" for number in numbers])
-        caption = f"{self.model.kept_plans} of {counted(len(self.starts), 'task')}"
-        return html_table(("steps left", "nodes", "states", "edges"), rows, caption)
 
     @property
     def layers(self) -> list[slice]:
@@ -172,12 +160,8 @@ class PlanSpace:
     ) -> list[int] | None:
         """The edges of a plan from a node that begins with these labels of some robots.
 
-        None if there is none.  It goes on with first edges to a goal.  O(edges).
-
-        Parameters
-        ----------
-        robots, steps
-            The robots, and step by step the labels of each of them.
+        ``steps`` are their labels, step by step.  None if there is no such plan.  It goes on with
+        first edges to a goal.  O(edges).
         """
         layers: list[dict[int, tuple[int, int]]] = [{node: (-1, -1)}]  # node -> (before, edge)
         for labels in steps:
@@ -346,19 +330,11 @@ class PlanSpace:
     ) -> PlanSpace:
         """A plan space of one task that unfolds part of ``space``: copies of its nodes and edges.
 
-        Parameters
-        ----------
-        layers
-            For each layer, from the start down, the nodes of ``space`` that its nodes are copies
-            of.
-        steps
-            The edges between consecutive layers, one fewer than there are layers.
-        task
-            The task of ``space`` whose second cost component is kept; the new task starts at the
-            only node of the first layer.
-        ends
-            Which nodes of the last layer count (default: all); what leads to none of them is left
-            out.  At least one path must end in them.
+        ``layers`` are, from the start down, the nodes of ``space`` that each layer's nodes are
+        copies of, ``steps`` the edges between consecutive layers.  The new task starts at the only
+        node of the first layer, and keeps the second cost component of ``task``.  What leads to
+        none of the ``ends`` (of the last layer's nodes; default: all) is left out; some path must
+        lead there.
         """
         alive = [np.ones(len(layers[-1]), np.bool_) if ends is None else ends]
         for nodes_above, step in zip(reversed(layers[:-1]), reversed(steps), strict=True):

@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import overload
 
 import numpy as np
 
@@ -54,6 +53,11 @@ class Explored:
         tasks = self.goals[goals.start : goals.stop]
         (space,) = plan_spaces(self.space, tasks, PieceSizes(pairs=sys.maxsize))
         return space
+
+    @property
+    def spaces(self) -> tuple[PlanSpace, ...]:
+        """The plan spaces of all tasks, in batches of goals."""
+        return tuple(plan_spaces(self.space, self.goals))
 
     def only(self, goals: Ints) -> Explored:
         """The tasks of some of the goals, given by number."""
@@ -119,6 +123,11 @@ class Searched:
         return plans.with_tasks(plans.starts[mine], plans.second[mine])
 
     @property
+    def spaces(self) -> tuple[PlanSpace, ...]:
+        """The plan spaces of all tasks."""
+        return (self.plans,)
+
+    @property
     def rows(self) -> Rows:
         """The table of all states."""
         return self.plans.rows
@@ -151,33 +160,6 @@ class Searched:
 
 #: Where plan spaces come from; it is sent to other processes.
 Source = Explored | Searched
-
-
-class PlanSpaces(Sequence[PlanSpace]):
-    """All plan spaces of a source in batches, each made when it is asked for, and then kept."""
-
-    def __init__(self, source: Explored) -> None:
-        self._source = source
-        slack = source.space.model.slack
-        size = max(1, PIECES.pairs // max(1, len(source.space) * (1 + slack)))
-        count = len(source.goals)
-        self._batches = [range(low, min(low + size, count)) for low in range(0, count, size)]
-        self._made: dict[int, PlanSpace] = {}
-
-    def __len__(self) -> int:
-        return len(self._batches)
-
-    @overload
-    def __getitem__(self, number: int) -> PlanSpace: ...
-    @overload
-    def __getitem__(self, number: slice) -> Sequence[PlanSpace]: ...
-    def __getitem__(self, number: int | slice) -> PlanSpace | Sequence[PlanSpace]:
-        if isinstance(number, slice):
-            return [self[k] for k in range(*number.indices(len(self)))]
-        at = range(len(self))[number]
-        if at not in self._made:
-            self._made[at] = self._source.portion(self._batches[at])
-        return self._made[at]
 
 
 def cut(efforts: Ints, portion: float = PORTION) -> list[range]:

@@ -40,25 +40,9 @@ class OutOfEffort(Exception):
 class FixedPlans:
     """Which sequences of labels are plans of a task with a fixed number of steps, as clauses.
 
-    Parameters
-    ----------
-    clauses
-        A formula, each clause followed by 0.
-    first
-        Per step and robot the variable of its first label; the others follow.
-    sizes
-        Per robot how many labels there are.
-    effort
-        The solver's conflicts that may be spent.
-
-    Attributes
-    ----------
-    first
-        As the parameter, in the variables of the formula as it is now.
-    left
-        The effort that is left.
-    calls
-        Questions that were asked.
+    Each clause is followed by 0.  ``first`` is per step and robot the variable of its first label,
+    in the formula as it is now; as many others follow as ``sizes`` says for the robot.  Of the
+    effort, in conflicts of the solver, so much is ``left`` after so many ``calls``.
     """
 
     def __init__(self, clauses: Ints, first: Ints, sizes: Sequence[int], effort: int) -> None:

@@ -19,26 +19,17 @@ FEWER = "fewer objects or robots"
 
 @dataclass(frozen=True, slots=True)
 class PieceSizes:
-    """How much is handled at a time: bounds of memory, which change no result.
+    """How much is handled at a time: bounds of memory and work, which change no result."""
 
-    Parameters
-    ----------
-    states, steps
-        States expanded at a time, and the joint steps that this should give.
-    pairs
-        (goal, state) pairs handled in one plan space when many tasks are asked for.
-    probe
-        Joint steps of a forward search that may be bounded exactly, before it is.
-    effort
-        Conflicts that a SAT solver may spend on these bounds.
-    question
-        Conflicts that it may spend on one question about what optimal plans do.
-    """
-
+    #: States expanded at a time, and the joint steps that this should give.
     states: int = 20_000
     steps: int = 4_000_000
+    #: (goal, state) pairs handled in one plan space when many tasks are asked for.
     pairs: int = 2_000_000
+    #: Joint steps of a forward search that may be bounded exactly, before it is.
     probe: int = 100_000
+    #: Conflicts that a SAT solver may spend on these bounds, and on one question about what optimal
+    #: plans do.
     effort: int = 5_000_000
     question: int = 20_000
 
@@ -108,14 +99,8 @@ def blocks(
 class Exploration:
     """A breadth-first search from some initial states (a table of rows), layer by layer.
 
-    Attributes
-    ----------
-    layer
-        The states that were new in the last step; ``seen`` are all so far, sorted.
-    depth
-        How many joint steps they are from the initial states.
-    composed
-        How many joint steps were composed.
+    ``layer`` are the states that were new in the last step, ``depth`` joint steps from the initial
+    ones; ``seen`` are all so far, sorted; ``composed`` joint steps were composed.
     """
 
     def __init__(self, model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> None:

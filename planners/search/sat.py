@@ -27,17 +27,7 @@ SolverName = Literal["cadical153", "glucose4", "glucose42", "maplesat", "minisat
 def sat_solver(name: SolverName, clauses: Iterable[Sequence[int]] = ()) -> Any:
     """A solver of python-sat that a signal at any moment leaves whole.
 
-    Parameters
-    ----------
-    name
-        The name that python-sat has for it.
-    clauses
-        The first clauses.
-
-    Returns
-    -------
-    pysat.solvers.Solver
-        A context manager; it is given back by ``delete()``.
+    It has some clauses; it is a context manager, and is given back by ``delete()``.
     """
     solver = _solver_class()(name=name)
     for clause in clauses:
@@ -64,12 +54,7 @@ def propagates(solver: Any, assumptions: Sequence[int]) -> bool:
 def simplified(clauses: array[int], kept: Sequence[int]) -> list[list[int]]:
     """Clauses that allow the same values of the kept variables, mostly over far fewer variables.
 
-    Parameters
-    ----------
-    clauses
-        Each followed by 0; they can be satisfied.
-    kept
-        Variables; others may be eliminated, and every one of them may be left without a clause.
+    ``clauses`` (each followed by 0) can be satisfied.  Any variable may be left without a clause.
     """
     from pysat.solvers import Cadical153
 

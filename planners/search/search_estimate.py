@@ -26,44 +26,27 @@ _COUNTED = 1_000
 
 @dataclass(frozen=True, slots=True)
 class SearchEstimate:
-    """The first layers of a task, and how the search for its plans would begin.
+    """The first layers of a task, and how the search for its plans would begin."""
 
-    Attributes
-    ----------
-    labels
-        By robot, how many labels (idling included) it has in all.
-    choices
-        By robot, how many of them are possible at the start.
-    layers
-        States by their distance from the start, in joint steps; all of each layer.
-    next_steps
-        The joint steps out of the last layer, where they are too many to be looked at: products of
-        the robots' own choices, in a layer of many states estimated from a part of them.  None if
-        every reachable state is in ``layers``.
-    makespan
-        The least makespan where a layer has a goal state, else None.
-    hmax
-        A lower bound on the makespan, the least one where it is known; None if there is no plan.
-    heuristic
-        What `planners.search.heuristics` chooses.
-    at_least
-        Its lower bound on the makespan; None if it proves that there is no plan.
-    within
-        How many states of each of the first layers are within this bound.
-    solver_after
-        Joint steps within this bound, after which a SAT solver would be asked for the optimal cost;
-        None if never.
-    """
-
+    #: By robot, how many labels (idling included) it has in all, and how many at the start.
     labels: dict[str, int]
     choices: dict[str, int]
+    #: States by their distance from the start, in joint steps; all of each layer.
     layers: tuple[int, ...]
+    #: The joint steps out of the last layer, where they are too many to be looked at: products of
+    #: the robots' own choices.  None if every reachable state is in ``layers``.
     next_steps: int | None
+    #: The least makespan where a layer has a goal state, else None.
     makespan: int | None
+    #: A lower bound on the makespan, the least one where it is known; None if there is no plan.
     hmax: int | None
+    #: What `planners.search.heuristics` chooses, and its lower bound on the makespan; None if it
+    #: proves that there is no plan.
     heuristic: str
     at_least: int | None
+    #: How many states of each of the first layers are within this bound.
     within: tuple[int, ...]
+    #: Joint steps after which a SAT solver would be asked for the optimal cost; None if never.
     solver_after: int | None
 
     @property

@@ -101,15 +101,7 @@ def seen_rows(model: JointModel, rows: Rows) -> Rows:
 
 
 def seeing(graph: PlanSpace, left: Ints, rows: Rows) -> PlanSpace:
-    """A graph whose states say what is left of the slack.
-
-    Parameters
-    ----------
-    left
-        (nodes) the slack that is left.
-    rows
-        `seen_rows` of the graph's states.
-    """
+    """A graph whose states say what is ``left`` (nodes) of the slack, over `seen_rows`."""
     model = graph.model
     own = graph.rows[graph.state].copy()
     for slack, fact in enumerate(model.slack_facts):

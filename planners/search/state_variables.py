@@ -31,13 +31,9 @@ _SHAPES = 3
 class StateVariable:
     """A group of facts of which exactly one is true.
 
-    Attributes
-    ----------
-    facts
-        Their numbers, sorted: the variable's values.
-    changes
-        For each action that may change it, by number in `JointModel.actions`: the facts of the
-        variable that it needs to be true (none: it does not say), and the one that it makes true.
+    ``facts`` are its values by number, sorted; ``changes``, for each action that may change it, by
+    number in `JointModel.actions`: the facts of the variable that it needs to be true (none: it
+    does not say), and the one that it makes true.
     """
 
     facts: tuple[int, ...]

@@ -145,6 +145,3 @@ def test_dot_has_every_node_and_edge(name: str) -> None:
     assert len(re.findall(r"^  n\d+ -> n\d+ \[", text, re.M)) == len(graph.edges)
     assert text.count("{") == text.count("}")
     assert all(line.count('"') % 2 == 0 for line in text.replace('\\"', "").splitlines())
-
-
-# -- in a notebook
