@@ -22,7 +22,7 @@ from planners.search.kept_plans import search
 from planners.search.optimal_plans import joined, plan_spaces, solvable
 from planners.search.plan_space import PlanSpace
 from planners.search.portions import Explored, Searched, Source
-from planners.search.reachable import Space, explore
+from planners.search.reachable import Exploration, Space, explore
 from planners.search.state_variables import state_variables
 from planners.system.errors import BadInput, Position, ProvedImpossible, note
 
@@ -32,8 +32,6 @@ Kind = Literal["problems", "all", "file"]
 #: tasks: they are searched one by one.
 MOST_STATES = 20_000
 MOST_STEPS = 4_000_000
-#: States expanded at a time.
-_PIECE = 500
 
 
 @dataclass(frozen=True)
@@ -202,22 +200,15 @@ def explored_if_small(model: JointModel, inits: Rows) -> Space | None:
 
     Work is bounded before it is done: by products of the robots' own choices.
     """
-    layer, _ = unique_rows(inits)
-    seen, left = layer, MOST_STEPS
-    while len(layer):
-        fresh = [layer[:0]]
-        for start in range(0, len(layer), _PIECE):
-            rows = layer[start : start + _PIECE]
-            left -= model.stepper.most_steps(model.codec.facts_part(rows))
-            if left < 0:
-                return None
-            fresh.append(unique_rows(model.successors(rows).result)[0])
-        new, _ = unique_rows(np.concatenate(fresh))
-        layer = new[find_rows(seen, new) < 0]
-        seen, _ = unique_rows(np.concatenate((seen, layer)))
-        if len(seen) > MOST_STATES:
+    found, left = Exploration(model, inits), MOST_STEPS
+    while len(found.layer):
+        if len(found.seen) > MOST_STATES:
             return None
-    return explore(model, inits)
+        left -= model.stepper.most_steps(model.codec.facts_part(found.layer))
+        if left < 0:
+            return None
+        found.enter(found.expand())
+    return found.space()
 
 
 def _surely_unreachable(model: JointModel, starts: Rows, inits: Rows) -> list[int]:

@@ -266,11 +266,11 @@ def _second_costs(space: Space, distance: Ints) -> tuple[Ints, PlanSpace]:
     node = np.full((space.model.slack + 1, *distance.shape), -1)
     node[slack, goal, state] = np.arange(len(goal))
     source, step = space.steps_from(state)
-    after = distance[goal[source], space.targets(step)]
+    after = distance[goal[source], space.target[step]]
     left = layer[source] - 1 - after  # the slack after the step: never more than before
     keep = (after >= 0) & (left >= 0) & (layer[source] > 0)
     source, step, left = source[keep], step[keep], left[keep]
-    target = node[left, goal[source], space.targets(step)]
+    target = node[left, goal[source], space.target[step]]
     cost = space.cost[step]
     value = np.where(layer == 0, 0, _FAR)
     if cost.any():

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,34 +66,9 @@ class Space:
         counts = self.first[states + 1] - self.first[states]
         return np.repeat(np.arange(len(states)), counts), ranges(self.first[states], counts)
 
-    def targets(self, steps: Ints) -> Ints:
-        """The states that these steps lead to."""
-        found: Ints = self.target[steps]
-        return found
-
     def numbers(self, rows: Rows) -> Ints:
         """The numbers of states given as rows, -1 for those that are not reachable."""
         return find_rows(self.rows, rows)
-
-
-def blocks(
-    model: JointModel,
-    rows: Rows,
-    pieces: PieceSizes = PIECES,
-    only: Callable[[Rows, Options], Options] | None = None,
-) -> Iterator[tuple[int, Steps]]:
-    """`JointModel.successors` of a long table in pieces.
-
-    (number of the piece's first row, its steps).
-
-    The first piece is short; how many steps its states have says how long the next ones may be.
-    """
-    start, size = 0, min(pieces.states, 500)
-    while start < len(rows):
-        steps = model.successors(rows[start : start + size], only)
-        yield start, steps
-        start += size
-        size = max(1, min(pieces.states, int(pieces.steps * size / max(1, len(steps)))))
 
 
 class Exploration:
@@ -116,16 +91,22 @@ class Exploration:
     ) -> Rows:
         """The states after the layer's joint steps that were not seen before, sorted.
 
-        With ``keep`` the steps are kept for `space`.
+        With ``keep`` the steps are kept for `space`.  The first piece of the layer is short; how
+        many steps its states have says how long the next ones may be.
         """
         fresh = self.seen[:0]
-        for start, steps in blocks(self._model, self.layer, self._pieces, only):
+        start, size = 0, min(self._pieces.states, 500)
+        while start < len(self.layer):
+            rows = self.layer[start : start + size]
+            steps = self._model.successors(rows, only)
             self.composed += len(steps)
             if keep:
-                self._sources.append(self.layer[start:])
+                self._sources.append(rows)
                 self._steps.append(steps)
             new, _ = unique_rows(steps.result)
             fresh, _ = unique_rows(np.concatenate((fresh, new[find_rows(self.seen, new) < 0])))
+            start += size
+            size = max(1, min(self._pieces.states, self._pieces.steps * size // (len(steps) or 1)))
         return fresh
 
     def enter(self, new: Rows) -> None:
