@@ -27,9 +27,9 @@ from planners.search.reachable import PieceSizes
 from planners.search.state_variables import StateVariable
 from planners.system.limits import reaching
 
-#: What each step of a makespan that is refuted at once costs, in conflicts, besides its clauses: of
-#: a task without plan there would be ever more.
-_EASY, _CLAUSES = 20, 10
+#: What each step of a refuted makespan costs in conflicts, besides its clauses, however easy it is:
+#: of a task without plan there would be ever more.
+_EASY = 100
 #: Conflicts for the least second component; without it more is searched.
 _LEAST_COST = 300_000
 #: What to try besides a larger limit.
@@ -102,7 +102,7 @@ def _shortest(formula: PlanFormula, task: PlanningTask, at_least: int, effort: i
             if plans.holds():
                 ended.pop_all()
                 break
-            plans.spend(makespan * (_EASY + int((formula.step == 0).sum()) // _CLAUSES))
+            plans.spend(makespan * (_EASY + int((formula.step == 0).sum())))
         effort = plans.left
     return plans
 
