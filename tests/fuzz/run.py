@@ -6,31 +6,26 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import signal
 import sys
 import tempfile
-import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 
-from tests.fuzz.mutations import MUTATIONS, as_bytes, odd_name
+from tests.fuzz.mutations import MUTATIONS, odd_name
+from tests.support.command import Outcome
 from tests.support.domains import DOMAINS, SHARED
-from tests.support.forks import fork_command, fresh_command
+from tests.support.forks import fork_command
 
-TIME_LIMIT, MEMORY_LIMIT = 5, "2G"
-#: Seconds beyond the limit before a run counts as a hang.
-GRACE = 3
-#: What a run may read and write in its working directory.
-FILES = ("domain.pddl", "problem.pddl", "language.json")
+LIMITS = ("--time-limit", "5", "--memory-limit", "2G")
+#: Seconds until a run counts as a hang.
+HANGS = 8
 #: docs/cli.md.  32 is left out: no external program should fail here.
 DOCUMENTED = frozenset({0, 1, 2, 3, 11, 22, 23, 31, 34, 130})
-#: Every so many mutants one is run in a new interpreter.
-_FRESH = 25
-_PLACE = re.compile(r":\d+:\d+: ")
+#: What is run on the files; ``build`` writes a language.
+COMMANDS = (("plans", "--count"), ("coordination",), ("build", "-o", "language.json"))
 #: Errors of a PDDL file that have no place inside it.
 _PLACELESS = ("no such file", "found an empty file", "binary file")
 #: Pairs of files that are read without an error, with the options they need: ours, and others'.
@@ -69,16 +64,13 @@ class Pair:
 
 def pairs(*, foreign: bool = True) -> list[Pair]:
     """The files to break; without ``foreign`` only those that come with the project."""
-
     found = []
     for place, lines in ((DOMAINS, _SHIPPED), (SHARED / "foreign", _FOREIGN if foreign else "")):
         for line in lines.strip().splitlines() if place.is_dir() else ():
-            folder, *names, options = (
-                line.split(maxsplit=3) if "--" in line else [*line.split(), ""]
-            )
-            paths = (place / folder / f"{name}.pddl" for name in names)
-            one, other = (p.read_bytes().decode("utf-8", "surrogateescape") for p in paths)
-            found.append(Pair(folder, one, other, tuple(options.split())))
+            folder, domain, problem, *options = line.split()
+            paths = (place / folder / f"{name}.pddl" for name in (domain, problem))
+            texts = (path.read_bytes().decode("utf-8", "surrogateescape") for path in paths)
+            found.append(Pair(folder, *texts, tuple(options)))
     return found
 
 
@@ -86,19 +78,14 @@ def pairs(*, foreign: bool = True) -> list[Pair]:
 class Mutant:
     """A broken pair of files and the command to run on it."""
 
-    number: int
-    what: str
+    name: str
     pair: Pair
-    domain: bytes
-    problem: bytes
-    command: str
+    command: tuple[str, ...]
 
     @property
     def arguments(self) -> list[str]:
-        """The command line."""
-        own = {"plans": ["--count"], "coordination": [], "build": ["-o", "language.json"]}
-        limits = ["--time-limit", str(TIME_LIMIT), "--memory-limit", MEMORY_LIMIT]
-        return [self.command, *FILES[:2], *own[self.command], *self.pair.options, *limits]
+        name, *own = self.command
+        return [name, "domain.pddl", "problem.pddl", *own, *self.pair.options, *LIMITS]
 
 
 def mutant(number: int, seed: int, sources: Sequence[Pair]) -> Mutant:
@@ -116,78 +103,39 @@ def mutant(number: int, seed: int, sources: Sequence[Pair]) -> Mutant:
             domain = domain if which == "problem" else change(domain, random)
             problem = problem if which == "domain" else change(problem, random)
         done.append(f"{change.__name__} ({which})")
-    command = ("plans", "coordination", "build")[number % 3]
-    return Mutant(number, ", ".join(done), pair, as_bytes(domain), as_bytes(problem), command)
+    command = COMMANDS[number % 3]
+    name = f"#{number} {pair.name}, {', '.join(done)}, {command[0]}"
+    return Mutant(name, Pair(pair.name, domain, problem, pair.options), command)
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What a run did; ``code`` is None for one that had to be killed or that died."""
-
-    code: int | None
-    out: str
-    err: str
-    seconds: float
-    left: tuple[str, ...] = ()
-
-
-def run(folder: Path, arguments: Sequence[str], *, fresh: bool) -> Outcome:
-    """Run ``coordlang ARGUMENTS`` in the folder ``work``."""
+def run(folder: Path, m: Mutant) -> tuple[Outcome, set[str]]:
+    """Run it in an empty folder: what it ended with, and what it left there."""
     for name in ("work", "tmp"):
-        (folder / name).mkdir(exist_ok=True)
-    command = fresh_command if fresh else fork_command
-    start = time.perf_counter()
-    process = command(*arguments, before=partial(_enter, folder))
-    code = process.join(TIME_LIMIT + GRACE).code
-    seconds = time.perf_counter() - start
-    out, err = ((folder / name).read_text("utf-8", "replace") for name in ("out", "err"))
-    left = (*_files_left(folder), *_processes_left(process.pid))
-    return Outcome(None if code < 0 else code, out, err, seconds, left)
+        (folder / name).mkdir(parents=True)
+    for name, text in (("domain.pddl", m.pair.domain), ("problem.pddl", m.pair.problem)):
+        (folder / "work" / name).write_bytes(text.encode("utf-8", "surrogateescape"))
+
+    def enter() -> None:
+        os.chdir(folder / "work")
+        os.environ["TMPDIR"] = tempfile.tempdir = str(folder / "tmp")
+
+    outcome = fork_command(*m.arguments, before=enter).join(HANGS)
+    found = {str(path.relative_to(folder)) for path in folder.rglob("*")}
+    return outcome, found - {"work", "tmp", "work/domain.pddl", "work/problem.pddl"}
 
 
-def _enter(folder: Path) -> None:
-    """A session of its own, the folders for its files, and files for what it says."""
-    os.setsid()
-    os.chdir(folder / "work")
-    os.environ["TMPDIR"] = str(folder / "tmp")
-    tempfile.tempdir = None
-    for number, name in ((1, "out"), (2, "err")):
-        os.dup2(os.open(folder / name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
-
-
-def _files_left(folder: Path) -> Iterator[str]:
-    for path in (*(folder / "tmp").iterdir(), *(folder / "work").iterdir()):
-        if path.name not in FILES:
-            yield str(path.relative_to(folder))
-            shutil.rmtree(path) if path.is_dir() else path.unlink()
-
-
-def _processes_left(session: int) -> Iterator[str]:
-    """The processes of a session whose first one has ended; they are ended."""
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            state, _, _, own = path.read_text().rpartition(")")[2].split()[:4]
-        except OSError:
-            continue
-        if int(own) == session and state != "Z":
-            yield f"process {path.parent.name}"
-            os.kill(int(path.parent.name), signal.SIGKILL)
-
-
-def complaint(m: Mutant, outcome: Outcome, written: bool) -> str | None:
+def complaint(m: Mutant, outcome: Outcome, left: set[str]) -> str | None:
     """What is wrong with an outcome, or None."""
     code, err = outcome.code, outcome.err
     for sign in ("Traceback", "Exception ignored", "Fatal Python error"):
         if sign in err:
             return f"{sign!r} on stderr (exit {code})"
-    if code is None:
-        return f"no answer after {outcome.seconds:.1f} s: a hang, or the process died"
+    if code < 0:
+        return f"no answer: a hang, or the process died (signal {-code})"
     if code not in DOCUMENTED:
         return f"exit code {code}"
-    if outcome.left:
-        return f"left behind: {', '.join(outcome.left)}"
-    if written != (m.command == "build" and code in (0, 3)):
-        return f"exit code {code} and {'a' if written else 'no'} language file"
+    if left != ({"work/language.json"} if m.command[0] == "build" and code in (0, 3) else set()):
+        return f"exit code {code}, and there are the files {sorted(left)}"
     if code == 0:
         return None if outcome.out.strip() else "no output"
     if code == 2 and m.pair.options:
@@ -197,57 +145,27 @@ def complaint(m: Mutant, outcome: Outcome, written: bool) -> str | None:
     if code in (31, 34):
         if "domain.pddl" not in err and "problem.pddl" not in err:
             return f"exit code {code}: the message names no file"
-        if not _PLACE.search(err) and not any(text in err for text in _PLACELESS):
+        if not re.search(r":\d+:\d+: ", err) and not any(text in err for text in _PLACELESS):
             return f"exit code {code}: the message names no line"
     return None
 
 
-@dataclass
-class Report:
-    """The sum of a run: how often each command ended with each code, and what was wrong."""
-
-    codes: Counter[tuple[str, str]] = field(default_factory=Counter)
-    failures: list[str] = field(default_factory=list)
-    slowest: list[tuple[float, str]] = field(default_factory=list)
-
-    def text(self) -> str:
-        slow = [f"  {seconds:6.2f} s  {what}" for seconds, what in reversed(self.slowest)]
-        codes = [f"  {name:14}{code:>7}{n:9}" for (name, code), n in sorted(self.codes.items())]
-        head = f"{len(self.failures)} failures of {self.codes.total()} mutants"
-        return "\n".join(["exit codes", *codes, "", "slowest", *slow, "", head, *self.failures])
-
-
 def fuzz(
-    numbers: Sequence[int],
-    seed: int,
-    sources: Sequence[Pair],
-    *,
-    keep: Path,
-    show: bool = False,
-) -> Report:
-    """Run mutants and judge them; files of failures go to ``keep``."""
-    report = Report()
-    with tempfile.TemporaryDirectory(prefix="fuzz-") as name:
-        for done, number in enumerate(numbers):
-            _judge(mutant(number, seed, sources), Path(name), report, keep)
-            if show and done % 20 == 0:
-                print(f"\r\033[K{done} of {len(numbers)} ..", end="", file=sys.stderr, flush=True)
-    return report
+    numbers: Iterable[int], seed: int, sources: Sequence[Pair], *, keep: Path
+) -> tuple[Counter[tuple[str, int]], list[str]]:
+    """Run mutants and judge them: how often each command ended with each code, and what was wrong.
 
-
-def _judge(m: Mutant, folder: Path, report: Report, keep: Path) -> None:
-    work = folder / "work"
-    work.mkdir(exist_ok=True)
-    for name, data in zip(FILES, (m.domain, m.problem), strict=False):
-        (work / name).write_bytes(data)
-    language = work / FILES[2]
-    language.unlink(missing_ok=True)
-    outcome = run(folder, m.arguments, fresh=m.number % _FRESH == 0)
-    what = f"#{m.number} {m.pair.name}, {m.what}, {m.command}"
-    report.codes[m.command, "killed" if outcome.code is None else str(outcome.code)] += 1
-    report.slowest = sorted([*report.slowest, (outcome.seconds, what)])[-5:]
-    if why := complaint(m, outcome, language.exists()):
-        report.failures.append(f"  {what}: {why}\n{outcome.err.strip()[-600:]}")
-        shutil.copytree(work, keep / f"{m.number:06}", dirs_exist_ok=True)
-        text = f"{why}\n{m.what}\n\ncoordlang {' '.join(m.arguments)}\n\n{outcome.err}"
-        (keep / f"{m.number:06}" / "why.txt").write_text(text, errors="replace")
+    The files of failures go to ``keep``.
+    """
+    codes: Counter[tuple[str, int]] = Counter()
+    failures = []
+    for number in numbers:
+        m = mutant(number, seed, sources)
+        with tempfile.TemporaryDirectory(prefix="fuzz-") as name:
+            outcome, left = run(Path(name), m)
+            codes[m.command[0], outcome.code] += 1
+            if why := complaint(m, outcome, left):
+                failures.append(f"{m.name}: {why}\n{outcome.err.strip()[-600:]}")
+                shutil.copytree(name, keep / f"{number:06}", dirs_exist_ok=True)
+                print(*m.arguments, failures[-1], sep=" ", file=sys.stderr)
+    return codes, failures
