@@ -12,8 +12,7 @@ from xml.etree import ElementTree
 
 import families
 import pytest
-from generate import main, scenario
-from gridmap import open_grid
+from generate import main
 
 from planners.loading import load
 from planners.search.optimal_plans import search
@@ -121,21 +120,6 @@ def test_usage(arguments: list[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main(arguments)
     assert caught.value.code == 2
-
-
-@pytest.mark.parametrize(
-    ("robots", "starts", "goals"),
-    [
-        (1, ["c0-0"], ["c2-2"]),
-        (2, ["c0-0", "c2-2"], ["c2-2", "c0-0"]),
-        (3, ["c0-0", "c1-1", "c2-2"], ["c1-1", "c2-2", "c0-0"]),
-    ],
-)
-def test_where_robots_go_when_nothing_is_said(
-    robots: int, starts: list[str], goals: list[str]
-) -> None:
-    made = scenario("s", open_grid(3, 3), robots=robots)
-    assert ([*made.starts], [*made.goals]) == (starts, goals)
 
 
 @pytest.mark.parametrize(

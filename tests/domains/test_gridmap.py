@@ -10,7 +10,6 @@ import pytest
 from gridmap import GridMap, open_grid, path, read_map, ring, rooms_and_corridors, two_rooms
 
 from planners.system.errors import BadInput
-from tests.support.domains import SHARED
 
 
 def written(tmp_path: Path, text: str) -> Path:
@@ -40,11 +39,6 @@ def test_maps_by_size(grid: GridMap, cells: int, edges: int, cell: str, near: li
     assert connected(grid)
     assert (len(grid.cells), len(grid.edges)) == (cells, edges)
     assert grid.neighbours(cell) == near
-
-
-def test_open_grid() -> None:
-    assert list(open_grid(2, 3).cells) == ["c0-0", "c0-1", "c0-2", "c1-0", "c1-1", "c1-2"]
-    assert open_grid(2, 3).distance("c0-0", "c1-2") == 3
 
 
 def test_random_rooms_are_connected_and_small() -> None:
@@ -110,20 +104,3 @@ def test_what_is_wrong_with_a_map_and_where(
     with pytest.raises(BadInput, match=message) as caught:
         read_map(file)
     assert str(caught.value).startswith(str(file) + line)
-
-
-@pytest.mark.foreign
-def test_maps_that_others_wrote() -> None:
-    if not SHARED.is_dir():
-        pytest.skip(f"{SHARED} is not here")
-    expected = {
-        "6x6": 36,
-        "empty-8-8": 64,
-        "tree": 7,
-        "loop-chain": 9,
-        "lacam-2x1": 2,
-        "corners": 12,
-    }
-    sizes = {file.stem: len(read_map(file).cells) for file in (SHARED / "maps").glob("*.map")}
-    assert expected.items() <= sizes.items()
-    assert all(sizes.values())

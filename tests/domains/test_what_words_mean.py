@@ -16,7 +16,7 @@ from coordlang.commands.building import build_language
 from coordlang.language.words import Language
 from coordlang.verification.by_definition import verify
 from planners.joint.states import split_atoms
-from tests.support.foreign_tasks import Feature, Plan, agreement, exactly, who, who_does_what
+from tests.support.agreement import Feature, Plan, agreement, exactly, parts, who, who_does_what
 from tests.support.pages import candidates
 
 #: Says of a state, given as its atoms, whether it belongs to a word.
@@ -126,25 +126,21 @@ def test_the_words_of_the_readme_are_a_smallest_language(
     assert guarantee.size == len(words) + 1
 
 
-def moves(plan: Plan) -> frozenset[tuple[int, str]]:
-    return frozenset((robot, text) for step in plan for robot, text in enumerate(step) if text)
+moves = who_does_what()
 
 
 def first(schema: str) -> Feature:
     """Who does the first subaction of this schema."""
 
     def feature(plan: Plan) -> frozenset[int]:
-        steps = [
-            frozenset(r for r, text in enumerate(step) if text and text.startswith(f"({schema} "))
-            for step in plan
-        ]
-        return next(filter(None, steps), frozenset())
+        found = parts(plan, [schema])
+        return frozenset(robot for step, robot, _ in found if step == found[0][0])
 
     return feature
 
 
 def aside(plan: Plan) -> frozenset[int]:
-    return frozenset(robot for robot, text in moves(plan) if text.endswith(" c0-4)"))
+    return frozenset(robot for _, robot, text in parts(plan, []) if text.endswith(" c0-4)"))
 
 
 @pytest.mark.thorough
