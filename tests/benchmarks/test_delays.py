@@ -5,21 +5,18 @@ from __future__ import annotations
 
 from collections import defaultdict
 from fractions import Fraction
-from itertools import combinations, product
+from itertools import product
 from random import Random
 
 import pytest
 
-from benchmarks.paper import delays
-from benchmarks.paper.late_robots import DelayTrials, Execution, Part
-from benchmarks.paper.recipe import Record, Settings
+from benchmarks.paper.late_robots import DelayTrials, Execution
 from benchmarks.paper.suite import WORLDS, language_for
 from benchmarks.paper.task_choices import sentence_of
 from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
 from coordlang.required.failure import failure_probability
-from planners.joint.model import JointModel, PlanningTask
-from planners.joint.tables import Rows
-from planners.search.plans import Plan, Plans
+from planners.joint.model import PlanningTask
+from planners.search.plans import Plans
 from tests.support.domains import world_of
 
 
@@ -59,17 +56,6 @@ def test_without_delays_the_exact_failure_probability(said: str) -> None:
     assert (exact.mean == 0) == (said == "minimal")
 
 
-def test_without_delays_plans_and_coordination_languages_never_fail() -> None:
-    for said in ("minimal", "slack"):
-        used = languages(said)
-        for together in (False, True):
-            trials = DelayTrials(used, together=together)
-            for yields in (False, True):
-                runs, well, late = trials.sample(0.0, yields, 20, Random(1))
-                assert well == runs
-                assert late <= runs * used[0].model.slack
-
-
 def swap() -> tuple[Execution, PlanningTask, tuple[int, ...], tuple[int, ...]]:
     """The three cells, where the robots change places: r1 goes a c b, r2 goes b a."""
     loaded = world_of("three-cells", "problem").loaded
@@ -106,58 +92,3 @@ def test_a_delay_by_hand() -> None:
     assert steps(rest, False, *late) is None  # r1 moves to b, where r2 still is
     assert steps(rest, True, *late) == 3
     assert steps(r2, False, 0.0, 1.0) is None  # r1 is late: r2 moves to a, where it still is
-
-
-def fails_late(model: JointModel, task: PlanningTask, plan: Plan, most: int) -> bool:
-    """Whether a plan fails in some run in which each robot is delayed at most so many steps."""
-    execution = Execution(model)
-    parts = [execution.part_of(plan, robot) for robot in range(len(model.robots))]
-    steps = range(len(plan) + most * len(parts))
-    for late in product(*(combinations(steps, most) for _ in parts)):
-        found = _with_delays(execution, task.init, parts, late)
-        if found is None or not model.holds(task.goal, found[None, :])[0]:
-            return True
-    return False
-
-
-def _with_delays(
-    execution: Execution, init: Rows, parts: list[Part], late: tuple[tuple[int, ...], ...]
-) -> Rows | None:
-    """The state at the end, where robot i is delayed in the joint steps ``late[i]``."""
-    done, state, step = [0] * len(parts), init, 0
-    while any(n < len(part) for n, part in zip(done, parts, strict=True)):
-        now = [
-            (part[n],) if n < len(part) and step not in late[robot] else ()
-            for robot, (n, part) in enumerate(zip(done, parts, strict=True))
-        ]
-        ended = execution.run(state, now, 0.0, False, Random(0)) if any(now) else (state, 1)
-        if ended is None:
-            return None
-        state = ended[0]
-        done = [n + len(own) for n, own in zip(done, now, strict=True)]
-        step += 1
-    return state
-
-
-def test_no_plan_of_a_swap_on_the_three_cells_survives_one_delay() -> None:
-    """So by Proposition 27 no language is 1-delay-robust there."""
-    here = world_of("three-cells", "problem")
-    model, task, plans = here.loaded.model, here.loaded.tasks[0], [*Plans.of(here.plans)]
-    assert len(plans) == 4
-    assert all(fails_late(model, task, plan, 1) for plan in plans)
-    assert not any(fails_late(model, task, plan, 0) for plan in plans)
-
-
-def test_units_are_reproducible_and_the_section_shows_them() -> None:
-    settings = Settings(samples=1, quick=True)
-    units = [unit for unit in delays.units(settings) if unit.parameters["world"] == "GW1"][:2]
-    results = [delays.run(unit, settings) for unit in units]
-    assert results[0] == delays.run(units[0], settings)
-    done = zip(units, results, strict=True)
-    section = delays.section([Record(u.key, u.parameters, "done", found) for u, found in done])
-    text = "".join(map(str, section.blocks))
-    runs, well, _ = results[0]["as they come"][delays.DELAYS.index(0.1)]
-    assert "| said | GW1 |" in text
-    assert f"| plan | {100 * well / runs:.1f}, " in text
-    assert [figure.name for figure in section.figures] == ["delays"]
-    section.figures[0].draw()

@@ -7,15 +7,14 @@ from random import Random
 
 import pytest
 
-from benchmarks.paper.disruptions import subaction_trials, success_rates, warehouse_trials
+from benchmarks.paper.disruptions import success_rates, warehouse_trials
 from benchmarks.paper.suite import language_for
 from benchmarks.paper.task_choices import Disruption, TaskChoices
-from benchmarks.paper.warehouse import LAYOUTS, WAREHOUSES, deliveries, human_in, listed_tasks
+from benchmarks.paper.warehouse import WAREHOUSES, deliveries, human_in, listed_tasks
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.required.failure import wilson
 from planners.search.plans import Plan
 from tests.support import naive
-from tests.support.domains import all_tasks
 from tests.support.task_languages import task_languages, three_cells
 
 
@@ -85,23 +84,6 @@ def test_three_cells_by_hand() -> None:
     assert not TaskChoices(one).succeeds(0, (1, 2, 0), disruptions[1])
 
 
-def test_deliveries() -> None:
-    for rows, columns in ((3, 3), (3, 5)):
-        for layout in LAYOUTS:
-            every = deliveries(rows, columns, layout)
-            assert len(every) == len(set(every)) == 48
-            for one in every:
-                distances = {
-                    abs(int(a[1]) - int(b[1])) + abs(int(a[3]) - int(b[3]))
-                    for a, b in zip(one.fetch, one.bring, strict=True)
-                }
-                assert distances == {columns - 1 + (rows - 1 if layout == "across" else 0)}
-                assert one.legs[-1] == (one.fetch, one.bring)
-            # 12 starts times 4 places to fetch, less 4 that are there already; bringing is among
-            # these.
-            assert len(listed_tasks(every)) == 44
-
-
 def test_a_warehouse_by_enumeration() -> None:
     """Success rates of the smallest warehouse: every delivery, cell and pair of plans looked at."""
     world, rows, columns = WAREHOUSES["open 3x3"]
@@ -136,23 +118,3 @@ def test_a_warehouse_by_enumeration() -> None:
     for what in ("plan", "sentence"):
         low, high = wilson(drawn[what], drawn["runs"])
         assert low < exact[what] < high
-
-
-def test_subactions_that_fail_are_needed_by_some_plan() -> None:
-    candidates = all_tasks("tray", "serve")
-    language = task_languages("tray", "serve")[0].language
-    trials = subaction_trials(candidates, language)
-    by_task: dict[int, set[str]] = {}
-    for trial in trials.trials:
-        by_task.setdefault(trial.tasks[0], set()).add(trials.disruptions[trial.disruption].name)
-    model, space = candidates.model, trials.choices.space
-    for task in Random(0).sample(range(len(space.starts)), 30):
-        used = {
-            (robot, label)
-            for plan in naive.listed(space, task, 1000)
-            for step in plan
-            for robot, label in enumerate(step)
-            if label
-        }
-        names = {f"{model.robots[r]} {model.labels[r][n]}" for r, n in used}
-        assert by_task.get(task, set()) == names

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.frame import KeptRows, asked_for, markdown, run_python
+from benchmarks.frame import KeptRows, asked_for, run_python
 
 NAMES = ("depot/pfile1", "depot/pfile13", "depot/pfile3", "taxi/p01")
 
@@ -55,8 +55,3 @@ def test_processes_end_at_their_limits() -> None:
     assert run_python(("-c", "while True: pass"), cpu=1).why == "no time"
     assert run_python(("-c", "import time; time.sleep(60)"), most=0.2).why == "no time"
     assert run_python(("-c", "bytearray(9 << 30)"), cpu=60).why == "no memory"
-
-
-def test_tables() -> None:
-    text = markdown(("a", "b"), [["x", 1234], ["y", None]])
-    assert text == "| a | b |\n| --- | --: |\n| x | 1,234 |\n| y | – |"

@@ -37,14 +37,6 @@ def test_expectations(sizes: tuple[int, ...]) -> None:
         assert ours == all_games(sizes, liked)
 
 
-def test_three_cells_by_hand() -> None:
-    """Two sentences of two plans each."""
-    assert expected_for_plans(4, 1) == Fraction(5, 2)
-    assert expected_for_sentences((2, 2), 1) == Fraction(3, 2)
-    # Two liked plans are in one sentence in 2 of 6 cases, else in both.
-    assert expected_for_sentences((2, 2), 2) == Fraction(2, 6) * Fraction(3, 2) + Fraction(4, 6)
-
-
 def test_games_played() -> None:
     random = Random(1)
     games = [play((3, 2, 1), 2, random) for _ in range(4000)]

@@ -10,17 +10,13 @@ import numpy as np
 import pytest
 
 from benchmarks.paper import communication, flexibility
-from benchmarks.paper.sentences import SentenceStatistics, task_statistics
+from benchmarks.paper.sentences import task_statistics
 from benchmarks.paper.state_orders import SYSTEMATIC, greedy_partitions, systematic_orders
-from benchmarks.paper.table1 import find_by_brute_force, pairs_of_plans
 from coordlang.language.flexibility import flexibility as measured
 from coordlang.language.partition import Partition
-from coordlang.language.sentences import sentence_counts
 from coordlang.required.divergences import states_on_plans
 from coordlang.required.failure import wilson
 from coordlang.verification.by_definition import verify
-from planners.system.errors import OutOfMemory
-from tests.support import naive
 from tests.support.domains import all_tasks
 from tests.support.task_languages import task_languages, three_cells
 
@@ -47,21 +43,6 @@ def test_three_cells_by_hand() -> None:
     assert wanted.items() <= communication.measures([task]).items()
 
 
-def test_means_are_over_the_right_tasks() -> None:
-    """Two tasks of two steps: one sentence of three words with one plan, one of a single word with
-    five.
-    """
-    tasks = [
-        SentenceStatistics(2, {(0, 1, 2): 1}, (0, 1, 2), (0, 1, 2)),
-        SentenceStatistics(2, {(0,): 5}, (0,), (0,)),
-    ]
-    two, one = round(2 / 3, 6), round(1 / 3, 6)
-    wanted: dict[str, float] = {"differing": 1, "tasks": 2, "saving_differing": two, "saving": one}
-    assert wanted.items() <= communication.measures(tasks).items()
-    wanted = {"open": 3, "several": 1, "open_several": 5, "plans": 3}
-    assert wanted.items() <= flexibility.measures(tasks).items()
-
-
 def test_the_same_as_the_library_measures() -> None:
     tasks = task_languages("grid", "gw2-2x3")
     space, word = tasks[0].space, tasks[0].word
@@ -70,14 +51,6 @@ def test_the_same_as_the_library_measures() -> None:
     assert [float(t.expected_open) for t in ours] == pytest.approx(theirs.expected.tolist())
     assert [t.plans[t.first] for t in ours] == pytest.approx(theirs.first.tolist())
     assert [float(t.expected_words) for t in ours] == pytest.approx(theirs.words.tolist())
-
-
-def test_too_many_sentences_are_not_counted() -> None:
-    one = task_languages("grid", "gw2-2x3")[0]
-    with pytest.raises(OutOfMemory):
-        sentence_counts(one.space, one.word, most_steps=10)
-    with pytest.raises(OutOfMemory):
-        sentence_counts(one.space, one.word, most_of_node=1)
 
 
 def test_all_orders_make_languages_of_different_sizes() -> None:
@@ -95,18 +68,6 @@ def test_all_orders_make_languages_of_different_sizes() -> None:
         assert verify(table, candidates.spaces).holds
     assert list(sizes)[:6] == [*SYSTEMATIC, "random 1"]
     assert len(set(sizes.values())) > 1
-
-
-def test_brute_force_says_why_it_has_nothing() -> None:
-    candidates = all_tasks("three-cells")
-    assert find_by_brute_force(candidates, 60.0, 0)["words"] == 3
-    pairs = sum(
-        len(naive.listed(space, task, 1000)) ** 2
-        for space in candidates.spaces
-        for task in range(len(space.starts))
-    )
-    assert pairs_of_plans(candidates) == pairs
-    assert find_by_brute_force(all_tasks("grid", "gw2-2x3"), 0.5, 0)["why"] == "out of time"
 
 
 @pytest.mark.parametrize(

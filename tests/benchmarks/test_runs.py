@@ -4,10 +4,6 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,10 +12,8 @@ import pytest
 
 from benchmarks.paper import communication, game
 from benchmarks.paper.__main__ import main
-from benchmarks.paper.recipe import Recipe, Settings, Unit
+from benchmarks.paper.recipe import Settings
 from benchmarks.paper.runner import attempt, is_known, kept, run
-from tests.support.domains import ROOT
-from tests.support.jobs import until
 
 GAME, COMMUNICATION = game.RECIPE, communication.RECIPE
 QUICK = Settings(samples=2, quick=True)
@@ -63,17 +57,6 @@ def test_a_run_that_was_cut_off_goes_on(finished: Path, tmp_path: Path) -> None:
     assert (tmp_path / "game.jsonl").read_text() == "".join(again)
 
 
-def test_other_parameters_are_other_results(finished: Path) -> None:
-    rows = kept(finished, GAME)
-
-    def known(settings: Settings) -> bool:
-        return all(is_known(unit, rows, settings) for unit in GAME.units(settings))
-
-    assert known(QUICK)
-    assert not known(replace(QUICK, seed=1))
-    assert not known(replace(QUICK, samples=3))
-
-
 def test_limits_of_units(tmp_path: Path) -> None:
     short = replace(QUICK, limit=0.01)
     unit = COMMUNICATION.units(short)[0]
@@ -86,43 +69,6 @@ def test_limits_of_units(tmp_path: Path) -> None:
     for other in ({"status": "out of memory"}, {"status": "done", "result": {"absent": "a map"}}):
         rows.keep({**line, **other})
         assert not is_known(unit, rows, short)
-
-
-def failing(unit: Unit, settings: Settings) -> dict[str, Any]:
-    """A unit with an error, and one without."""
-    if unit.key == "GWB5/minimal":
-        raise ValueError("an error in a unit")
-    return {}
-
-
-@pytest.mark.thorough
-def test_an_error_ends_the_run_and_keeps_what_is_done(tmp_path: Path) -> None:
-    recipe = Recipe("game", "", GAME.units, failing, GAME.section)
-    with pytest.raises(ValueError, match="an error in a unit"):
-        run(recipe, QUICK, tmp_path)
-    assert set(lines(tmp_path)) >= {"GWB5/greedy", "GWB5/separating"}
-
-
-def group_lives(group: int) -> bool:
-    try:
-        os.killpg(group, 0)
-    except ProcessLookupError:
-        return False
-    return True
-
-
-@pytest.mark.thorough
-def test_an_interrupt_leaves_no_process(tmp_path: Path) -> None:
-    module = ["benchmarks.paper", "game", "--quick", "--results"]
-    command = [sys.executable, "-m", *module, str(tmp_path)]
-    process = subprocess.Popen(command, cwd=ROOT, start_new_session=True, stderr=subprocess.PIPE)
-    until(lambda: (tmp_path / "game.jsonl").exists() or process.poll() is not None, 120)
-    assert process.poll() is None, process.communicate()
-    os.killpg(process.pid, signal.SIGINT)
-    process.communicate(timeout=60)
-    assert process.returncode != 0
-    until(lambda: not group_lives(process.pid), 120)
-    assert len(lines(tmp_path)) < len(GAME.units(QUICK))
 
 
 def test_command(finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Iterator
 from itertools import product
 from math import log2
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,18 +14,13 @@ import pytest
 from benchmarks.paper import silence
 from benchmarks.paper.recipe import Record, Settings
 from benchmarks.paper.silence import plan_bits, sentence_bits
-from benchmarks.paper.suite import WORLDS, World
+from benchmarks.paper.suite import WORLDS
 from coordlang.required.divergences import required_nodes
-from coordlang.sites.movingai import planning_files
 from coordlang.vocabulary.flexibility_bound import bits_bounds
 from planners.search.plans import Plan
 from tests.support import naive
 from tests.support.candidates import listed, on_graph
-from tests.support.domains import SHARED
 from tests.support.random_spaces import random_spaces
-
-foreign = pytest.mark.foreign
-there = pytest.mark.skipif(not SHARED.is_dir(), reason=f"{SHARED} is not there")
 
 
 def test_bits_are_the_entropy_of_the_sentences() -> None:
@@ -101,32 +95,3 @@ def test_the_curve_of_the_smallest_grid() -> None:
     assert "| GW1 | 7.58* | 3.79* | 0* |" in str(shown.blocks[1])
     assert [figure.name for figure in shown.figures] == ["silence-words", "silence-bits"]
     assert all(figure.draw() for figure in shown.figures)
-
-
-@foreign
-@there
-@pytest.mark.slow
-def test_inseparable_plans_leave_failures_whatever_is_said() -> None:
-    """Box pushing: there is no language over states, but two words are better than silence."""
-    world = World("boxpushing", "boxpushing", "p2_3_2_1_1_0", "problem", SHARED / "foreign")
-    found = silence.curve(world, seed=0, most=2)
-    silent, two = found["points"]
-    assert silent["mean"] == pytest.approx(0.8231, abs=1e-4)
-    assert 0.3 < two["mean"] < 0.8
-
-
-@foreign
-@there
-def test_two_words_through_a_tunnel(tmp_path: Path) -> None:
-    """One robot waits where the lane ends: a bit says which, and no division takes less."""
-    folder, scenario = tmp_path / "tunnel", tmp_path / "t.scen"
-    scenario.write_text(
-        "version 1\n1\ttunnel.map\t4\t6\t0\t2\t0\t5\t3\n1\ttunnel.map\t4\t6\t0\t5\t0\t0\t5\n"
-    )
-    texts = planning_files(SHARED / "maps" / "tunnel.map", scenario, 2)
-    folder.mkdir()
-    for name, text in texts.items():
-        (folder / name.replace("t-2", "problem")).write_text(text)
-    found = silence.curve(World("tunnel", "tunnel", "problem", "problem", tmp_path), seed=0)
-    assert [round(point["mean"], 3) for point in found["points"]] == [0.499, 0]
-    assert found["points"][1]["bits"] == found["least_bits"] == 0.9984

@@ -3,14 +3,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
-import pytest
-
-from benchmarks.paper import floors, simulation
+from benchmarks.paper import simulation
 from benchmarks.paper.driving import counted, is_well
-from benchmarks.paper.floors import DRAWS, FLOORS, foreign_map, tasks_of
+from benchmarks.paper.floors import FLOORS, tasks_of
 from benchmarks.paper.recipe import Record, Settings, Unit
 from coordlang.simulation.record import EventRecord, RunRecord
 from planners.search.plans import Plans
@@ -60,27 +57,8 @@ def test_tasks_of_floors_require_coordination() -> None:
     assert all(any(naive.failing(own, 2)) for own in plans)
 
 
-@pytest.mark.thorough
-def test_tasks_are_drawn_the_same_each_time() -> None:
-    floor = FLOORS["GWB7, 3 robots"]
-    first, again = (tasks_of(floor, 0) for _ in range(2))
-    assert dict(first[0].states) == dict(again[0].states)
-    assert len(first[1]) == 10 < DRAWS
-
-
 def done(unit: Unit, result: dict[str, Any]) -> Record:
     return Record(unit.key, unit.parameters, "done", result)
-
-
-def test_what_is_absent_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(floors, "FOREIGN", tmp_path)
-    floor = FLOORS["maze 11x11, 2 robots"]
-    assert not foreign_map(floor).exists()
-    (unit,) = (unit for unit in simulation.units(Settings()) if unit.key == floor.key)
-    result = simulation.run(unit, Settings())
-    assert result == {"absent": "the map maze-11-11.map"}
-    shown = simulation.section([done(unit, result)])
-    assert "Not run: maze 11x11, 2 robots, for want of the map maze-11-11.map." in shown.blocks
 
 
 def test_units_are_reproducible_and_the_section_shows_them() -> None:
@@ -102,18 +80,3 @@ def test_units_are_reproducible_and_the_section_shows_them() -> None:
     assert "| T-map, 2 | 3 | 1 | 1 |" in text
     assert "| sentence, clock | 2 | 2 | 0 | 0 | 0 | 2 | 2 | 0.0 |" in text
     assert "| open 3x3, across, minimal | 3 |" in text
-
-
-@pytest.mark.thorough
-def test_the_detour_is_made_and_the_other_robot_does_the_same() -> None:
-    settings = Settings(samples=1)
-    (unit,) = (unit for unit in simulation.units(settings) if unit.key == "detour")
-    result = simulation.run(unit, settings)
-    for pace in ("clock", "barrier"):
-        found = result[pace]
-        assert found["granted"] == found["passed"] == found["other_same"] == found["well"] == 1
-        before, after = found["messages"]
-        assert before == after
-    text = "\n".join(map(str, simulation.section([done(unit, result)]).blocks))
-    assert "motivating" in text
-    assert "50 of the 52 parts of r1 through c2-7" in text
