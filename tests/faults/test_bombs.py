@@ -164,17 +164,6 @@ def test_ten_thousand_types_one_below_the_other() -> None:
             parse_domain(typed(types.replace("t9999 - t10000", "t9999 - t4000")))
 
 
-def test_cycles_of_types() -> None:
-    for types, cycle in (
-        ("a - b b - c c - a", "a - b - c - a"),
-        ("x - a a - b b - (either c a) c - d", "a - b - a"),
-    ):
-        with pytest.raises(BadInput, match=rf"the types form a cycle: {cycle}(\n|$)"):
-            parse_domain(typed(types))
-    for types in ("d - (either b c) b - a c - a e - (either d a)", "a - a"):
-        assert parse_domain(typed(types))
-
-
 DOMAIN = """(define (domain d) (:requirements :typing :multi-agent) (:types robot thing)
   (:constants o1 - thing)
   (:predicates (done ?r - robot) (linked ?a ?b - thing) (p ?a ?b ?c ?d ?e ?f - thing))

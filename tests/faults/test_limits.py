@@ -6,8 +6,8 @@ One table line for each run under a limit is printed (``-s``).
 
 from __future__ import annotations
 
-import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -22,7 +22,6 @@ from coordlang.language.file import read_language
 from coordlang.sites.movingai import planning_files
 from tests.support.command import Command, own_process
 from tests.support.domains import DOMAINS
-from tests.support.edited_fields import changed, places
 from tests.support.forks import fork_command
 
 GRID = DOMAINS / "grid"
@@ -191,12 +190,11 @@ def test_numbers_of_a_language_and_its_certificate(coordlang: Command, tmp_path:
     report = ("report", language, *files, "-o", page)
     for file, commands in ((language, (verify, report)), (proof, (verify,))):
         text = file.read_text()
-        data = json.loads(text)
-        numbers = [at for at, value in places(data) if type(value) in (int, float)]
-        for place in numbers[:44:11]:
+        numbers = [*re.finditer(r"(?<=[ :\[])\d+(?=[,\n\]}])", text)]
+        for number in numbers[:: 1 + len(numbers) // 5]:
             for value in ("9" * 5_000, f"-{'9' * 5_000}", '"x"', "1e999", "0.5"):
-                file.write_text(json.dumps(changed(data, place, "HERE")).replace('"HERE"', value))
+                file.write_text(text[: number.start()] + value + text[number.end() :])
                 for command in commands:
                     ended = coordlang(*command)
-                    assert ended.code in (0, 1, 31), (place, value[:9], ended)
+                    assert ended.code in (0, 1, 31), (number, value[:9], ended)
         file.write_text(text)

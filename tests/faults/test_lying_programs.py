@@ -6,8 +6,6 @@ off or none: nothing wrong is certified, and no agreement or "no plan" is false.
 from __future__ import annotations
 
 import json
-import resource
-from functools import partial
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -23,7 +21,6 @@ from planners.classical.fast_downward import FastDownwardFailed, answered, total
 from planners.search import sat
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
-from tests.support.forks import fork_command
 
 #: Worlds in which three words are least for all pairs of states.
 _WORLDS = ("t-map/problem", "grid/gw1-2x2", "three-cells/problem")
@@ -137,15 +134,3 @@ def test_a_plan_that_is_cut_off_or_none(tmp_path: Path, monkeypatch: pytest.Monk
         plan.write_text("\n".join(some))
         with pytest.raises(FastDownwardFailed, match="actions that are no plan of its task"):
             answered(task, tmp_path, 0)
-
-
-@pytest.mark.parametrize("size", [0, 700, 4_000])
-def test_a_disk_that_is_full_at_some_length(size: int) -> None:
-    limit = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (size, size))
-    ended = fork_command("check", *files(_WORLDS[2]), before=limit).join()
-    assert "internal error" not in ended.err
-    if ended.code == 0:
-        assert ended.out.startswith("coordlang      makespan 2\nFast Downward  makespan 2 ")
-    else:
-        assert (ended.code, ended.out) == (3, ""), ended
-        assert ended.err.startswith("coordlang: ")

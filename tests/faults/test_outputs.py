@@ -121,23 +121,6 @@ def test_data_is_on_the_disk_before_the_name_is(
     assert done == ["fsync", "replace"]
 
 
-def test_a_file_that_goes_while_it_is_asked_for_denies_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Two processes with one cache: one lets an entry go that the other has just seen there."""
-    path = tmp_path / "entry"
-    path.write_text("old")
-    access = os.access
-
-    def gone_first(asked: str | Path, mode: int) -> bool:
-        path.unlink(missing_ok=True)
-        return access(asked, mode)
-
-    monkeypatch.setattr(os, "access", gone_first)
-    write_atomically(path, b"new")
-    assert path.read_bytes() == b"new"
-
-
 @pytest.mark.parametrize("mode", [0o600, 0o640, 0o666, 0o755])
 def test_a_file_that_is_replaced_keeps_its_permissions(
     mode: int, here: Path, monkeypatch: pytest.MonkeyPatch

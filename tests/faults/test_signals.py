@@ -9,26 +9,21 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
-from contextlib import suppress
 from itertools import combinations
 from pathlib import Path
-from random import Random
 from types import FrameType
 from typing import Any, get_args
 
 import pysolvers
 import pytest
 
-from coordlang.commands.building import build_language
-from coordlang.vocabulary.sat import PartitionProblem
 from planners.search.sat import SolverName, propagates, sat_solver, solve_slice
 from planners.system.errors import OutOfTime
 from planners.system.limits import time_left, time_limit
 from planners.system.signals import ENDING, Interrupted, Interruptions, postponed_signals
 from planners.system.writing import write_atomically
-from tests.support.domains import DOMAINS, all_tasks
+from tests.support.domains import DOMAINS
 from tests.support.forks import fork
 
 FILES = [str(DOMAINS / "grid" / name) for name in ("domain.pddl", "gw1-2x2.pddl")]
@@ -146,58 +141,6 @@ def test_signals_wait() -> None:
 # ---- SAT solvers
 
 OURS = ("cadical153", "glucose42", "maplesat")
-
-
-def colouring(size: int, solver: SolverName) -> PartitionProblem:
-    """Nearly half of all pairs of 60 states lie in different words: seconds with 12 words."""
-    choice = Random(5)
-    problem = PartitionProblem(range(60), size, solver)
-    for b in range(60):
-        for a in range(b):
-            if choice.random() < 0.45:
-                problem.separate_one([(a, b)])
-    return problem
-
-
-def solve_until_interrupted(solver: SolverName) -> None:
-    """Solve again and again; after an interrupt the memory is used as before."""
-    Interruptions()
-    with suppress(KeyboardInterrupt):
-        while True:
-            problem = colouring(12, solver)
-            try:
-                problem.solve()
-            finally:
-                problem.close()
-    left = [bytearray(size) for size in range(1, 5000, 2)]
-    problem = colouring(20, solver)
-    problem.solve(2_000)
-    problem.close()
-    del left
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _all_is_loaded() -> None:
-    """An interrupted import is another matter ."""
-    colouring(1, "cadical153").close()
-    build_language(all_tasks("grid", "gw1-2x2"), "minimal")
-
-
-@pytest.mark.parametrize("solver", OURS[:2])
-def test_interrupts_while_solvers_work(solver: SolverName) -> None:
-    """One, or two soon after each other; 70: the second one came after the first was caught."""
-    choice = Random(solver)
-    for turn in range(5):
-        process = fork(lambda: solve_until_interrupted(solver))
-        time.sleep(choice.uniform(0.03, 0.25))
-        process.send(signal.SIGINT)
-        if turn % 2:
-            time.sleep(choice.uniform(0.0, 0.05))
-            with suppress(ProcessLookupError):
-                process.send(signal.SIGINT)
-        ended = process.join(30)
-        assert ended.code in (0, 70)
-        assert ended.code == 0 or "planners.system.signals.Interrupted: SIGINT" in ended.err, ended
 
 
 @pytest.mark.parametrize("solver", get_args(SolverName))

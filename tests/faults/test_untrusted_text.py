@@ -110,14 +110,17 @@ class World:
         return done
 
 
+Make = Callable[[dict[str, str]], World]
+
+
 @pytest.fixture
-def bare(coordlang: Command, tmp_path: Path) -> Callable[[dict[str, str]], World]:
+def bare(coordlang: Command, tmp_path: Path) -> Make:
     """A world of PDDL files only."""
     return lambda names: World(coordlang, tmp_path, names)
 
 
 @pytest.fixture
-def corridor(bare: Callable[[dict[str, str]], World]) -> World:
+def corridor(bare: Make) -> World:
     return bare({}).written()
 
 
@@ -170,9 +173,7 @@ report LIFTED PDDL -o -
 
 
 @pytest.mark.parametrize("kind", ["markup", "words"])
-def test_names_are_quoted_wherever_they_are_written(
-    bare: Callable[[dict[str, str]], World], kind: str, tmp_path: Path
-) -> None:
+def test_names_are_quoted_wherever_they_are_written(bare: Make, kind: str, tmp_path: Path) -> None:
     world = bare(NAMES[kind]).written()
     world.words["R1"] = [world.names["r1"]]
     for line in SHOWING.strip().splitlines():
@@ -222,9 +223,7 @@ def fast_downward(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["markup", "words"])
-def test_exported_names_are_read_by_fast_downward(
-    bare: Callable[[dict[str, str]], World], kind: str, tmp_path: Path
-) -> None:
+def test_exported_names_are_read_by_fast_downward(bare: Make, kind: str, tmp_path: Path) -> None:
     world = bare(NAMES[kind]).written()
     for n, form in enumerate(("--max-actions 2000", "--max-actions 0", "--for pyperplan")):
         out, line = tmp_path / f"out{n}", f"export SPOKEN SENTENCE {form}"
@@ -236,9 +235,7 @@ def test_exported_names_are_read_by_fast_downward(
         assert world.run("say SPOKEN PLAN").out.split("\n")[0] == world.words["SENTENCE"][0]
 
 
-def test_words_of_pddl_as_predicates_are_renamed(
-    bare: Callable[[dict[str, str]], World], tmp_path: Path
-) -> None:
+def test_words_of_pddl_as_predicates_are_renamed(bare: Make, tmp_path: Path) -> None:
     """Facts are atoms without arguments: their names are the exported ones."""
     names = ["p", "increase", "at", "always", "when", "imply", "total-cost", "-x", "_", "9"]
     actions = " ".join(
@@ -261,9 +258,7 @@ def test_words_of_pddl_as_predicates_are_renamed(
 
 
 @pytest.mark.parametrize("bad", BAD, ids=ascii)
-def test_names_with_such_characters_are_refused(
-    bare: Callable[[dict[str, str]], World], bad: str
-) -> None:
+def test_names_with_such_characters_are_refused(bare: Make, bad: str) -> None:
     for name in (*OWN[:8], "a"):
         done = bare({name: f"{name}{bad}x"}).refuses("plans PDDL", bad)
         place = "p" if name == "swap" else "d"
@@ -271,7 +266,7 @@ def test_names_with_such_characters_are_refused(
 
 
 def test_a_comment_is_no_name_but_one_about_subactions_is(
-    bare: Callable[[dict[str, str]], World],
+    bare: Make,
 ) -> None:
     world = bare({})
     world.write(DOMAIN="; a title \x1b[1m \u202e\n" + CORRIDOR)
@@ -371,7 +366,7 @@ def test_bad_utf8_is_bad_input_with_the_offset(corridor: World) -> None:
         path.write_bytes(good)
 
 
-def test_latin_1_is_read_in_comments_of_pddl_only(bare: Callable[[dict[str, str]], World]) -> None:
+def test_latin_1_is_read_in_comments_of_pddl_only(bare: Make) -> None:
     world = bare({"r1": "\u00e9"})  # a name in UTF-8 beside comments in Latin 1
     domain, problem = world.path["DOMAIN"], world.path["PROBLEM"]
     problem.write_bytes(b"; \xfc\n" + problem.read_bytes())
@@ -385,7 +380,7 @@ def test_latin_1_is_read_in_comments_of_pddl_only(bare: Callable[[dict[str, str]
     assert re.search(r"d\.pddl:4:19: ", done.err), done.err
 
 
-def test_arguments_that_are_no_text(bare: Callable[[dict[str, str]], World]) -> None:
+def test_arguments_that_are_no_text(bare: Make) -> None:
     world = bare({})
     for line in ("plans BAD BAD", "plans PDDL --robots BAD", "build PDDL -o /none/BAD.json"):
         world.refuses(line, "\udcff")

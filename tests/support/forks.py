@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from planners.system.signals import ENDING
-from tests.support.command import Outcome, own_process
+from tests.support.command import Outcome
 
 
 @dataclass(frozen=True)
@@ -87,16 +87,5 @@ def fork_command(*arguments: object, before: Callable[[], object] = lambda: None
         before()
         sys.argv = ["coordlang", *map(str, arguments)]
         main()
-
-    return fork(work)
-
-
-def fresh_command(*arguments: object, before: Callable[[], object] = lambda: None) -> Fork:
-    """Run ``coordlang ..`` in a new interpreter, after ``before``."""
-
-    def work() -> None:
-        before()
-        command = own_process(*arguments)
-        os.execv(command[0], command)
 
     return fork(work)
