@@ -9,7 +9,7 @@ import pytest
 
 from coordlang.commands.main import run
 from tests.support.command import Command, Outcome
-from tests.support.domains import DOMAINS, Worlds, world_of
+from tests.support.domains import DOMAINS
 
 
 @pytest.fixture(autouse=True)
@@ -39,9 +39,3 @@ def language(coordlang: Command, t_map: tuple[Path, Path], tmp_path: Path) -> Pa
     path = tmp_path / "language.json"
     assert coordlang("build", *t_map, "--tasks", "all", "--method", "greedy", "-o", path).code == 0
     return path
-
-
-@pytest.fixture(scope="session")
-def world() -> Worlds:
-    """``world(folder, problem)``: the model, its reachable states and all optimal plans."""
-    return world_of

@@ -20,7 +20,7 @@ from planners.search.optimal_plans import plan_spaces
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 from planners.search.reachable import Space, explore
-from tests.support.domains import Worlds, read
+from tests.support.domains import read, world_of
 
 STYLES = ("grid", "grid-joint")
 
@@ -35,8 +35,8 @@ def to_every_state(space: Space) -> PlanSpace:
 @pytest.mark.parametrize(
     "problem", ["gw1-2x2", "gw2-2x3", "gw4-3x3", "gwb1-2x4", "gwb5-3x3", "corners-4x4"]
 )
-def test_both_styles_are_the_same_model(world: Worlds, problem: str) -> None:
-    one, other = (world(style, problem).space for style in STYLES)
+def test_both_styles_are_the_same_model(problem: str) -> None:
+    one, other = (world_of(style, problem).space for style in STYLES)
     assert one.model.codec.facts == other.model.codec.facts
     assert (one.rows == other.rows).all()
     # Only MA-PDDL has the step in which nobody moves.
@@ -47,9 +47,9 @@ def test_both_styles_are_the_same_model(world: Worlds, problem: str) -> None:
 
 
 @pytest.mark.parametrize("problem", ["three-cells", "t-map", "gw2-2x3", "gwb1-2x4", "corners-4x4"])
-def test_joint_schemas_are_disjoint(world: Worlds, problem: str) -> None:
+def test_joint_schemas_are_disjoint(problem: str) -> None:
     """Planners that do not compare what actions do would count a plan twice."""
-    actions = world("grid-joint", problem).loaded.model.actions
+    actions = world_of("grid-joint", problem).loaded.model.actions
     meant = Counter((action.parts, frozenset(conjuncts(action.precondition))) for action in actions)
     assert [key for key, times in meant.items() if times > 1] == []
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 import re
 from itertools import pairwise
 from pathlib import Path
-from xml.etree import ElementTree
 
 import pytest
 
@@ -20,8 +19,8 @@ from planners.pddl.model_options import Cost, ModelOptions
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from planners.system.limits import time_limit
-from tests.support.domains import DOMAINS, Worlds, read
-from tests.support.pages import Row, blocks, candidates, commands, links, run_command, table
+from tests.support.domains import DOMAINS, read, world_of
+from tests.support.pages import Row, blocks, candidates, commands, run_command, table
 
 #: The folders, and how the robots are found in each.
 WORLDS = {
@@ -68,8 +67,8 @@ def test_every_folder_is_described() -> None:
     ("folder", "row"),
     [pytest.param(f, r, id=f"{f}-{r['problem']}", marks=marks(f, r)) for f, r in PROBLEMS],
 )
-def test_the_table_of_problems(world: Worlds, folder: str, row: Row) -> None:
-    here = world(folder, row["problem"])
+def test_the_table_of_problems(folder: str, row: Row) -> None:
+    here = world_of(folder, row["problem"])
     assert len(here.space) == int(row["states"])
     assert here.plans.cost_of(0)[0] == int(row["makespan"])
     assert Plans.of(here.plans).count == int(row["optimal plans"])
@@ -126,23 +125,6 @@ def test_the_commands_in_the_readme(
     assert {command.text.split()[1] for command in run} >= {"build", "verify"}
     for command in run:
         run_command(command, folder, monkeypatch)
-
-
-@pytest.mark.parametrize("folder", WORLDS)
-def test_the_picture_and_a_problem_of_each_kind(world: Worlds, folder: str) -> None:
-    assert f"{folder}.svg" in links(DOMAINS / folder / "README.md")
-    svg = "{http://www.w3.org/2000/svg}"
-    root = ElementTree.parse(DOMAINS / folder / f"{folder}.svg").getroot()
-    shown = [element.text for element in root.iter(f"{svg}text")]
-    name, _, problem = (root.findtext(f"{svg}title") or "").partition(": ")
-    assert name == folder
-    # Every robot carries its name, so that no colour has to be told from another one.
-    assert set(world(folder, problem).loaded.model.robots) <= set(shown)
-    rows = [row for other, row in PROBLEMS if other == folder]
-    assert {row["coordination"] for row in rows} == {"required", "not required"}
-    assert all("with fewest actions" in row for row in rows)
-    assert 2 <= len(rows) <= 4
-    assert all(10 <= int(row["states"]) <= 2000 for row in rows)
 
 
 @pytest.mark.thorough

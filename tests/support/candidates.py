@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
-from itertools import count, product
+from itertools import chain, count, islice, product
 from random import Random
 
 from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
@@ -19,7 +19,6 @@ from planners.search.plans import Plan
 from planners.system.errors import ProvedImpossible
 from tests.support import naive
 from tests.support.composition_walk import first_break, steps_of
-from tests.support.domains import all_tasks
 from tests.support.random_models import graph_text, random_model
 from tests.support.texts import parsed
 
@@ -125,25 +124,9 @@ def partitions(states: list[int], size: int) -> Iterator[dict[int, int]]:
 
 @cache
 def small_worlds(states: int = 7, number: int = 16) -> tuple[Candidates, ...]:
-    """Tasks of two and three robots that require coordination, with few states and few plans."""
-    found: list[Candidates] = []
-    worlds = [("grid", "gw1-2x2"), ("three-cells", "problem"), ("t-map", "problem")]
-    for seed in range(10_000):
-        random = Random(seed)
-        drawn: Candidates | None
-        if seed % 3:
-            drawn = on_graph(seed, 2 + seed % 2)
-        else:
-            drawn = some_tasks(all_tasks(*random.choice(worlds)), random, random.randint(1, 4))
-        if drawn is None or states_of(drawn.spaces) > states or not requiring(drawn):
-            continue
-        if any(inseparable(space) is not None for space in drawn.spaces):
-            continue
-        try:
-            failing(drawn)
-        except naive.TooLarge:
-            continue
-        found.append(drawn)
-        if len(found) == number:
-            return tuple(found)
-    raise AssertionError("too few small worlds")
+    """Tasks of two and three robots in turn that require coordination, with few states and plans."""
+    two, three = (
+        (found for _, found in small_candidates(n, states=states, plans=MOST) if requiring(found))
+        for n in (2, 3)
+    )
+    return tuple(islice(chain.from_iterable(zip(two, three, strict=True)), number))

@@ -8,9 +8,9 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -18,6 +18,7 @@ import psutil
 import pytest
 
 from tests.support.domains import ROOT
+from tests.support.jobs import until
 
 needs_distributed = pytest.mark.skipif(
     find_spec("distributed") is None,
@@ -68,36 +69,29 @@ class Started:
         self._process.wait()
 
 
+_HERE = "--host 127.0.0.1 --no-dashboard --dashboard-address 127.0.0.1:0"
+SCHEDULER = f"dask scheduler --scheduler-file scheduler.json --port 0 {_HERE}"
+WORKER = f"dask worker --scheduler-file scheduler.json --nworkers 1 --nthreads 1 --memory-limit 1GiB {_HERE}"
+
+
+@dataclass
 class Cluster:
     """A scheduler, and workers that are started one by one; ``file`` names the scheduler."""
 
-    def __init__(self, folder: Path, scheduler: str, workers: str) -> None:
-        if shutil.which("dask", path=ENVIRONMENT["PATH"]) is None:
-            pytest.skip("the program dask is not there")
-        self._folder, self._workers = folder, workers
-        self.file = folder / "scheduler.json"
-        self.scheduler = Started(f"exec {scheduler}", folder, "scheduler")
-        end = time.monotonic() + 60
-        while not (self.file.exists() and self.file.stat().st_size):
-            assert time.monotonic() < end, self.scheduler.log.read_text()
-            time.sleep(0.05)
-        self.workers: list[Started] = []
+    folder: Path
+    command: str
+    scheduler: Started
+    workers: list[Started] = field(default_factory=list)
+
+    @property
+    def file(self) -> Path:
+        return self.folder / "scheduler.json"
 
     def add_worker(self) -> Started:
         """Start one more ``dask worker``."""
         name = f"worker-{len(self.workers)}"
-        self.workers.append(Started(f"exec {self._workers}", self._folder, name))
+        self.workers.append(Started(f"exec {self.command}", self.folder, name))
         return self.workers[-1]
-
-    def end(self) -> None:
-        """End all processes."""
-        for started in (*self.workers, self.scheduler):
-            started.end()
-
-
-_HERE = "--host 127.0.0.1 --no-dashboard --dashboard-address 127.0.0.1:0"
-SCHEDULER = f"dask scheduler --scheduler-file scheduler.json --port 0 {_HERE}"
-WORKER = f"dask worker --scheduler-file scheduler.json --nworkers 1 --nthreads 1 --memory-limit 1GiB {_HERE}"
 
 
 @contextmanager
@@ -105,10 +99,14 @@ def running_cluster(
     folder: Path, workers: int, scheduler: str = SCHEDULER, worker: str = WORKER
 ) -> Iterator[Cluster]:
     """A cluster with so many ``dask worker`` commands, until the block ends."""
-    cluster = Cluster(folder, scheduler, worker)
+    if shutil.which("dask", path=ENVIRONMENT["PATH"]) is None:
+        pytest.skip("the program dask is not there")
+    cluster = Cluster(folder, worker, Started(f"exec {scheduler}", folder, "scheduler"))
     try:
+        until(lambda: cluster.file.exists() and cluster.file.stat().st_size)
         for _ in range(workers):
             cluster.add_worker()
         yield cluster
     finally:
-        cluster.end()
+        for started in (*cluster.workers, cluster.scheduler):
+            started.end()

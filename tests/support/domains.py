@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -30,10 +29,6 @@ class World:
     loaded: PlanningInstance
     space: Space
     plans: PlanSpace
-
-
-#: ``world(folder, problem)``
-Worlds = Callable[[str, str], World]
 
 
 @cache

@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-import heapq
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
+
+import networkx as nx
 
 from planners.classical import ClassicalTask
 
@@ -92,27 +93,17 @@ def successors(
 def optimal_plans(plain: ClassicalTask) -> OptimalPlans:
     """Everything that can be reached, and Dijkstra's algorithm from the goals back."""
     edges: dict[PlainState, list[tuple[int, int, PlainState]]] = {}
-    into = defaultdict(list)
+    back: nx.DiGraph[PlainState] = nx.DiGraph()
     todo = [plain.init]
     after = successors(plain)
     while todo:
         if (state := todo.pop()) in edges:
             continue
         edges[state] = [*after(state)]
-        for _, cost, target in edges[state]:
-            into[target].append((cost, state))
+        for _, cost, target in sorted(edges[state], key=lambda edge: -edge[1]):
+            back.add_edge(target, state, weight=cost)  # the cheapest one stays
             todo.append(target)
-    number = {state: n for n, state in enumerate(edges)}
-    distance = {state: 0 for state in edges if holds(plain.goal, state)}
-    queue = [(0, number[state]) for state in distance]
-    heapq.heapify(queue)
-    states = [*edges]
-    while queue:
-        far, place = heapq.heappop(queue)
-        if far > distance[states[place]]:
-            continue
-        for cost, before in into[states[place]]:
-            if far + cost < distance.get(before, far + cost + 1):
-                distance[before] = far + cost
-                heapq.heappush(queue, (far + cost, number[before]))
+    back.add_nodes_from(edges)
+    goals = {state for state in edges if holds(plain.goal, state)}
+    distance = nx.multi_source_dijkstra_path_length(back, goals) if goals else {}
     return OptimalPlans(plain, edges, distance)

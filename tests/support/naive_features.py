@@ -5,6 +5,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from itertools import product
+
+import networkx as nx
 
 from coordlang.lifted.features import (
     UNDEFINED,
@@ -39,46 +42,48 @@ Objects = Mapping[str, frozenset[str]]
 
 def value(feature: Feature, objects: Objects, statics: State, state: State) -> int:
     """What a feature is in a state."""
-    if isinstance(feature, Same):
-        here, there = _object(feature.one, state), _object(feature.other, state)
-        return UNDEFINED if here is None or there is None else here == there
-    if isinstance(feature, Sign):
-        one, other = (_number(n, objects, statics, state) for n in (feature.one, feature.other))
-        if one is None or other is None:
-            return UNDEFINED
-        return (one > other) - (one < other)
-    number = _number(feature.number, objects, statics, state)
-    if number is None:
+
+    def number(asked: Number) -> int | None:
+        return _number(asked, objects, statics, state)
+
+    match feature:
+        case Same(one, other):
+            here, there = _object(one, state), _object(other, state)
+            return UNDEFINED if here is None or there is None else here == there
+        case Sign(one, other):
+            left, right = number(one), number(other)
+            if left is None or right is None:
+                return UNDEFINED
+            return (left > right) - (left < right)
+    found = number(feature.number)
+    if found is None:
         return UNDEFINED
-    if isinstance(feature, Residue):
-        return number % feature.modulus
-    return min(number, feature.most)
+    return found % feature.modulus if isinstance(feature, Residue) else min(found, feature.most)
 
 
 def _number(number: Number, objects: Objects, statics: State, state: State) -> int | None:
-    if isinstance(number, Size):
-        return len(members(number.concept, objects, statics, state))
-    if isinstance(number, Gap):
-        linked = _linked(number.relation, statics)
-        found = [
-            _steps(a, b, linked)
-            for a in members(number.one, objects, statics, state)
-            for b in members(number.other, objects, statics, state)
-        ]
-        return min((steps for steps in found if steps is not None), default=None)
-    if isinstance(number, Count):
-        atoms = state.get(number.predicate, ())
-        return sum(
-            1
-            for args in atoms
-            if len(args) == len(number.args)
-            and all(wanted in ("_", own) for wanted, own in zip(number.args, args, strict=True))
-        )
-    if isinstance(number, Distance):
-        ends = _object(number.one, state), _object(number.other, state)
-        return None if None in ends else _steps(*ends, _linked(number.relation, statics))
-    place = _object(number.term, state)
-    return None if place is None else _attribute(number, place, statics)
+    match number:
+        case Size():
+            return len(members(number.concept, objects, statics, state))
+        case Gap():
+            linked = _linked(number.relation, statics)
+            ends = (members(c, objects, statics, state) for c in (number.one, number.other))
+            found = [_steps(a, b, linked) for a, b in product(*ends)]
+            return min((steps for steps in found if steps is not None), default=None)
+        case Count():
+            return sum(
+                len(args) == len(number.args)
+                and all(wanted in ("_", own) for wanted, own in zip(number.args, args, strict=True))
+                for args in state.get(number.predicate, ())
+            )
+        case Distance():
+            here, there = _object(number.one, state), _object(number.other, state)
+            if here is None or there is None:
+                return None
+            return _steps(here, there, _linked(number.relation, statics))
+        case Attribute():
+            place = _object(number.term, state)
+            return None if place is None else _attribute(number, place, statics)
 
 
 def members(concept: Concept, objects: Objects, statics: State, state: State) -> set[str]:
@@ -139,21 +144,11 @@ def _attribute(number: Attribute, place: str, statics: State) -> int | None:
     return steps if any(place in pair for pair in pairs) else None
 
 
-def _linked(relation: str, statics: State) -> dict[str, set[str]]:
-    linked: dict[str, set[str]] = {}
-    for a, b in statics.get(relation, ()):
-        linked.setdefault(a, set()).add(b)
-        linked.setdefault(b, set()).add(a)
-    return linked
+def _linked(relation: str, statics: State) -> nx.Graph[str]:
+    return nx.Graph(statics.get(relation, ()))
 
 
-def _steps(start: str | None, end: str | None, linked: Mapping[str, set[str]]) -> int | None:
-    if start not in linked:
+def _steps(start: str, end: str, linked: nx.Graph[str]) -> int | None:
+    if start not in linked or end not in linked or not nx.has_path(linked, start, end):
         return None
-    reached, steps = {start}, 0
-    while end not in reached:
-        further = reached.union(*(linked[place] for place in reached if place is not None))
-        if further == reached:
-            return None
-        reached, steps = further, steps + 1
-    return steps
+    return int(nx.shortest_path_length(linked, start, end))

@@ -8,7 +8,6 @@ from functools import cache
 import numpy as np
 
 from planners.joint.model import JointModel, PlanningTask
-from planners.joint.tables import Rows
 from planners.search.plans import Plan
 
 #: A joint step: its labels, its cost, and the state that it leads to.
@@ -25,22 +24,11 @@ class Sequences:
     def __init__(self, model: JointModel, task: PlanningTask, most: int = 4_000) -> None:
         self.model, self.task, self.most = model.without_slack, task, most
         self.steps = cache(self._steps)
-        self.holds = cache(self._holds)
 
-    def _row(self, state: bytes) -> Rows:
-        return np.frombuffer(state, np.uint64)[None, :]
-
-    def _steps(self, state: bytes) -> tuple[Step, ...]:
-        found = self.model.successors(self._row(state))
-        return tuple(
-            (tuple(labels), int(cost), row.tobytes())
-            for labels, cost, row in zip(
-                found.labels.tolist(), found.cost, found.result, strict=True
-            )
-        )
-
-    def _holds(self, state: bytes) -> bool:
-        return bool(self.model.holds(self.task.goal, self._row(state))[0])
+    def _steps(self, state: bytes) -> list[Step]:
+        found = self.model.successors(np.frombuffer(state, np.uint64)[None, :])
+        rows = zip(found.labels.tolist(), found.cost.tolist(), found.result, strict=True)
+        return [(tuple(labels), cost, row.tobytes()) for labels, cost, row in rows]
 
     def of_length(self, length: int) -> dict[Plan, int]:
         """All that end in the goal after so many steps, each with what it costs."""
@@ -53,15 +41,14 @@ class Sequences:
             ]
             if len(reached) > self.most:
                 raise TooMany
-        return {plan: paid for plan, paid, state in reached if self.holds(state)}
-
-    def makespan(self, most: int) -> int | None:
-        """The least number of steps, None if it is larger."""
-        return next((k for k in range(most + 1) if self.of_length(k)), None)
+        rows = np.frombuffer(b"".join(state for *_, state in reached), np.uint64)
+        rows = rows.reshape(len(reached), len(self.task.init))
+        holds = self.model.holds(self.task.goal, rows)
+        return {plan: paid for (plan, paid, _), ends in zip(reached, holds, strict=True) if ends}
 
     def within(self, slack: int) -> set[Plan] | None:
         """The plans within slack, with a rest at the end; None where the task is too hard."""
-        makespan = self.makespan(4)
+        makespan = next((k for k in range(5) if self.of_length(k)), None)
         if makespan is None:
             return None
         found = self.of_length(makespan + slack)

@@ -23,18 +23,14 @@ from coordlang.language.partition import Partition
 from coordlang.language.words import Language
 from coordlang.required.miscoordination import Inseparable
 from coordlang.verification.by_definition import verify
-from planners.loading import build
-from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans
-from planners.search.reachable import explore
 from planners.system.errors import ProvedImpossible
 from tests.support import naive
 from tests.support.domains import DOMAINS, all_tasks, own_task
 from tests.support.naive_choices import Listed, listed
-from tests.support.random_models import graph_text, random_chores, random_model
-from tests.support.texts import parsed
+from tests.support.random_models import random_chores, random_model
 
 #: (robots, random models): some always, more of them in CI.
 RANDOM = [(2, 25), (3, 25), *(pytest.param(n, 120, marks=pytest.mark.thorough) for n in (2, 3))]
@@ -138,31 +134,27 @@ def random_task_languages(
 
 
 def random_task_language(seed: int, robots: int) -> tuple[Candidates, TaskLanguage]:
-    """A task of a random model, one of its longer ones, under a random partition; some states are
-    left to the default.
+    """The task of a random model with most choices, under a random partition; some states are left
+    to the default.
 
     No coordination language, mostly: saying and understanding, searching and wishing do not depend
     on it.
     """
-    random = Random(seed)
-    if seed % 2 == 0:
-        domain, problem, options = random_chores(seed, robots)
-    elif seed % 5 == 0:
-        domain, problem, options = random_model(seed, robots)
-    else:  # robots on a graph
-        options = ModelOptions(cost=random.choice(["makespan", "makespan", "makespan+actions"]))
-        text, task = graph_text(random, robots)
-        domain, problem = parsed(text, task)
-    try:
-        if seed % 2 == 0:
-            candidates = from_problems(domain, [problem], options)
-        else:
-            candidates = from_listed(
-                domain, [problem], [long_task(random, domain, problem, options)], options
-            )
-    except ProvedImpossible:
-        raise Unsuitable from None
-    if not 0 < Plans.of(candidates.spaces[0]).count <= 300:
+    random, candidates = Random(seed), candidates_of(seed, robots)
+    space, task = tasks_of(candidates, seed)[0]
+    if candidates.loaded.options.remember_actions:
+        raise Unsuitable
+    if not candidates.listed:  # all pairs of states: one of them, or some literals of its goal
+        codec, goal = candidates.model.codec, space.goals[space.goal[space.starts[task]]]
+        true = {codec.facts.texts[fact] for fact in goal.facts}
+        literals = [fact if fact in true else f"(not {fact})" for fact in codec.facts.texts]
+        if random.random() < 0.3:
+            literals = random.sample(literals, random.randint(1, len(literals)))
+        init = codec.decode(space.rows[space.state[space.starts[task]]])
+        listed = ListedTask(tuple(init), tuple(literals))
+        loaded = candidates.loaded
+        candidates = from_listed(loaded.domain, loaded.problems, [listed], loaded.options)
+    if not 1 < Plans.of(candidates.spaces[0]).count <= 300:
         raise Unsuitable
     size = random.choice([1, 2, 2, 3, 3, 4, 5])
     used = sorted(set(candidates.spaces[0].state.tolist()))
@@ -170,33 +162,6 @@ def random_task_language(seed: int, robots: int) -> tuple[Candidates, TaskLangua
     partition = {n: random.randrange(size) for n in mapped}
     language = Language.of(Partition.of_states(candidates.rows, partition), candidates.model)
     return candidates, next(languages_in_tasks(language, candidates))
-
-
-def long_task(
-    random: Random, domain: Domain, problem: Problem, options: ModelOptions
-) -> ListedTask:
-    """From one reachable state to another one that is far from it, or to some of its literals."""
-    loaded = build(domain, [problem], options)
-    codec = loaded.model.codec
-    space = explore(loaded.model, loaded.tasks[0].init[None, :])
-    if not 1 < len(space) <= 400:
-        raise Unsuitable
-    farthest: list[tuple[int, int, list[int]]] = []
-    for start in random.sample(range(len(space)), min(8, len(space))):
-        layer, seen, depth = [start], {start}, 0
-        while after := sorted(
-            {t for s in layer for t in space.target[space.first[s] : space.first[s + 1]].tolist()}
-            - seen
-        ):
-            layer, depth = after, depth + 1
-            seen.update(layer)
-        farthest.append((depth, start, layer))
-    _, start, layer = max(farthest)
-    true = set(codec.decode(space.rows[random.choice(layer)]))
-    literals = [fact if fact in true else f"(not {fact})" for fact in codec.facts.texts]
-    if random.random() < 0.3:
-        literals = random.sample(literals, random.randint(1, len(literals)))
-    return ListedTask(tuple(codec.decode(space.rows[start])), tuple(literals))
 
 
 def candidates_of(seed: int, robots: int) -> Candidates:
