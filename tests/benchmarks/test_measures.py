@@ -4,20 +4,13 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from random import Random
 
-import numpy as np
 import pytest
 
 from benchmarks.paper import communication, flexibility
 from benchmarks.paper.sentences import task_statistics
-from benchmarks.paper.state_orders import SYSTEMATIC, greedy_partitions, systematic_orders
 from coordlang.language.flexibility import flexibility as measured
-from coordlang.language.partition import Partition
-from coordlang.required.divergences import states_on_plans
 from coordlang.required.failure import wilson
-from coordlang.verification.by_definition import verify
-from tests.support.domains import all_tasks
 from tests.support.task_languages import task_languages, three_cells
 
 #: r1 a..b, r2 b..a in two steps.  In between they may be in (a, c), (b, c), (c, a) or (c, b); (a,
@@ -51,23 +44,6 @@ def test_the_same_as_the_library_measures() -> None:
     assert [float(t.expected_open) for t in ours] == pytest.approx(theirs.expected.tolist())
     assert [t.plans[t.first] for t in ours] == pytest.approx(theirs.first.tolist())
     assert [float(t.expected_words) for t in ours] == pytest.approx(theirs.words.tolist())
-
-
-def test_all_orders_make_languages_of_different_sizes() -> None:
-    candidates = all_tasks("grid", "gw2-2x3")
-    states = states_on_plans(candidates.spaces).tolist()
-    for order in systematic_orders(candidates, states).values():
-        assert sorted(order) == states
-    orders = {(*order,) for order in systematic_orders(candidates, states).values()}
-    assert len(orders) == len(SYSTEMATIC)
-    sizes = {}
-    for name, words in greedy_partitions(candidates, 15, Random(0)):
-        sizes[name] = int(words.max()) + 1
-        names = tuple(f"w{n}" for n in range(int(words.max()) + 1))
-        table = Partition(names, candidates.rows, words.astype(np.int64), 0)
-        assert verify(table, candidates.spaces).holds
-    assert list(sizes)[:6] == [*SYSTEMATIC, "random 1"]
-    assert len(set(sizes.values())) > 1
 
 
 @pytest.mark.parametrize(

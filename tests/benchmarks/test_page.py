@@ -4,12 +4,11 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from xml.etree import ElementTree
 
 from benchmarks.paper import table1
 from benchmarks.paper.__main__ import RECIPES
-from benchmarks.paper.page import page_of, write_page
+from benchmarks.paper.page import page_of
 from benchmarks.paper.recipe import Settings
 from benchmarks.paper.reported import TABLE_1
 from benchmarks.paper.runner import is_known, kept
@@ -63,16 +62,3 @@ def test_table_1_has_the_papers_tasks_and_states() -> None:
         words = [result["words"] for result in found]
         assert words == sorted(words)
         assert all(result["verified"] for result in found)
-
-
-def test_a_page_of_nothing_much(tmp_path: Path) -> None:
-    """No results, no sections; a figure is drawn for those there are, each time the same bytes."""
-    page = tmp_path / "page.md"
-    write_page(RECIPES, WHOLE, tmp_path, page)
-    assert "##" not in page.read_text()
-    (tmp_path / "game.jsonl").write_bytes((FOLDER / "game.jsonl").read_bytes())
-    write_page(RECIPES, WHOLE, tmp_path, page)
-    first = (tmp_path / "game.svg").read_bytes()
-    assert "(./game.svg)" in page.read_text()
-    write_page(RECIPES, WHOLE, tmp_path, page)
-    assert (tmp_path / "game.svg").read_bytes() == first

@@ -5,10 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from benchmarks.paper import simulation
 from benchmarks.paper.driving import counted, is_well
 from benchmarks.paper.floors import FLOORS, tasks_of
-from benchmarks.paper.recipe import Record, Settings, Unit
 from coordlang.simulation.record import EventRecord, RunRecord
 from planners.search.plans import Plans
 from tests.support import naive
@@ -55,28 +53,3 @@ def test_tasks_of_floors_require_coordination() -> None:
     assert (len(language.words), len(tasks)) == (3, 12)
     plans = [[*Plans.of(used.space, used.task)] for used in tasks]
     assert all(any(naive.failing(own, 2)) for own in plans)
-
-
-def done(unit: Unit, result: dict[str, Any]) -> Record:
-    return Record(unit.key, unit.parameters, "done", result)
-
-
-def test_units_are_reproducible_and_the_section_shows_them() -> None:
-    settings = Settings(samples=1, quick=True)
-    units = simulation.units(settings)
-    keys = ["T-map, 2 robots", "handover, 2 robots", "open 3x3/across/minimal"]
-    assert [unit.key for unit in units] == keys
-    records = [done(unit, simulation.run(unit, settings)) for unit in units]
-    assert simulation.run(units[0], settings) == records[0].result
-    for floor in records[:2]:
-        for pace in ("clock", "barrier"):
-            result = floor.result["sentence"][pace]
-            assert (result["well"], result["collisions"], result["agree"]) == (1, 0, 1)
-    for agreement in ("plan", "sentence"):
-        result = records[2].result[agreement]
-        assert result["well"] == result["model"] - result["model_only"] + result["floor_only"]
-    section = simulation.section(records)
-    text = "".join(map(str, section.blocks))
-    assert "| T-map, 2 | 3 | 1 | 1 |" in text
-    assert "| sentence, clock | 2 | 2 | 0 | 0 | 0 | 2 | 2 | 0.0 |" in text
-    assert "| open 3x3, across, minimal | 3 |" in text

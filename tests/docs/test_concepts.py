@@ -5,9 +5,8 @@ from __future__ import annotations
 
 import pkgutil
 import re
-from itertools import product
 
-from coordlang.required.miscoordination import inseparable, miscoordination
+from coordlang.required.miscoordination import inseparable
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans
@@ -71,21 +70,6 @@ def test_failing_after_the_plans_have_met() -> None:
     assert plans.rank(mixed) is None
     # Two steps of the mixture begin an optimal plan: only the third one breaks.
     assert any(plan[:2] == mixed[:2] for plan in plans)
-
-
-def test_three_robots_need_three_plans() -> None:
-    """Flags: every two of the plans aaa, bbb, ccc mix well, and all three do not."""
-    good = [parts for parts in product("abc", repeat=3) if len(set(parts)) < 3]
-    space = joint_space([(" ".join(parts), "", "(p0)") for parts in good], 3, "(p0)")
-    plans = Plans.of(space)
-    everything = set(plans)
-    assert len(everything) == 21
-    same = [plan for plan in plans if len(set(plan[0])) == 1]
-    assert len(same) == 3
-    for two in product(same, repeat=2):
-        assert all(naive.mixture(chosen) in everything for chosen in product(two, repeat=3))
-    assert naive.mixture(tuple(same)) not in everything
-    assert miscoordination(space, 0) is not None
 
 
 def test_names_of_the_table_exist() -> None:

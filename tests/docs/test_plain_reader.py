@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import gzip
 import re
 import sys
 from pathlib import Path
@@ -67,16 +66,6 @@ def test_reader_says_the_same(
                 words.update(expected)
     assert compared >= 132
     assert len(words) > 2
-
-
-def test_reader_uses_the_default_and_refuses(reader: dict[str, Any], tmp_path: Path) -> None:
-    language = {"states": {"(p)": "w1"}, "default": "w0"}
-    said = reader["sentence"](language, [["(p)"], [], ["(q)", "(p)"], ["(p)"]])
-    assert said == ["w1", "w0", "w1"]
-    path = tmp_path / "x.json.gz"
-    path.write_bytes(gzip.compress(b'{"format": "coordlang/language", "version": 2}'))
-    with pytest.raises(ValueError, match="version 1"):
-        reader["read_language"](path)
 
 
 def test_files_of_the_page(reader: dict[str, Any], tmp_path: Path) -> None:

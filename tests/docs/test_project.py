@@ -58,15 +58,6 @@ def test_dependencies_are_those_that_are_imported() -> None:
     assert declared == used - extra - OWN - set(sys.stdlib_module_names)
 
 
-def test_tested_versions_of_python_are_supported() -> None:
-    least = PROJECT["requires-python"].removeprefix(">=")
-    tested = re.findall(r"Python :: (3\.\d+)", "\n".join(PROJECT["classifiers"]))
-    assert tested[0] == least
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert all(version in readme for version in tested)
-    assert f"{sys.version_info.major}.{sys.version_info.minor}" in tested
-
-
 def test_every_file_names_its_licence() -> None:
     line = "# SPDX-License-Identifier: GPL-3.0-or-later\n"
     assert [path for path in PYTHON_FILES if not path.read_text("utf-8").startswith(line)] == []

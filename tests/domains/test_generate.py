@@ -57,20 +57,6 @@ def test_the_shipped_files_are_what_the_generator_writes(tmp_path: Path) -> None
     assert [name for name in written if written[name] != shipped[name]] == []
 
 
-def test_pictures_are_self_contained_and_say_what_they_show() -> None:
-    pictures = sorted(DOMAINS.glob("*/*.svg"))
-    assert {p.stem for p in pictures} >= {p.stem for p in DOMAINS.glob("grid/*.pddl")} - {"domain"}
-    walls = {"gw3-2x4": 0, "gwb1-2x4": 2, "gwb4-2x5": 3}  # rings of two rows have some
-    for picture in pictures:
-        root = ElementTree.parse(picture).getroot()
-        tags = {element.tag.rpartition("}")[2] for element in root.iter()}
-        assert tags <= {"svg", "title", "desc", "rect", "line", "circle", "text"}
-        assert "starts in" in (root.findtext("{http://www.w3.org/2000/svg}desc") or "")
-        assert not [key for element in root.iter() for key in element.attrib if "href" in key]
-        lines = len(root.findall("{http://www.w3.org/2000/svg}line"))
-        assert lines == walls.get(picture.stem, lines) or picture.parent.name != "grid"
-
-
 @pytest.mark.parametrize(("style", "domain"), [("agents", "grid"), ("joint", "grid-joint")])
 def test_one_problem_with_everything(tmp_path: Path, style: str, domain: str) -> None:
     problem, picture, tasks = (tmp_path / name for name in ("p.pddl", "p.svg", "t.json"))
@@ -111,15 +97,6 @@ def test_errors_of_the_command(
     captured = capsys.readouterr()
     assert message in captured.err
     assert captured.out == ""
-
-
-@pytest.mark.parametrize(
-    "arguments", [["ring", "1x4"], ["open", "0x3"], ["open", "3"], ["circle", "3x3"], []]
-)
-def test_usage(arguments: list[str]) -> None:
-    with pytest.raises(SystemExit) as caught:
-        main(arguments)
-    assert caught.value.code == 2
 
 
 @pytest.mark.parametrize(

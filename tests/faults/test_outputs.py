@@ -35,7 +35,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-FILES = [(*BUILD, "-o"), (*BUILD, "-o", "l.json", "--certificate"), ("tasks", *CELLS, "-o"), None]
+FILES = [(*BUILD, "-o", "l.json", "--certificate"), None]
 FOLDERS = [("export", "l", *CELLS, "w0", "-o"), ("inspect", *CELLS, "--write")]
 UNWRITABLE = {
     "": "its name is empty",

@@ -6,9 +6,7 @@ the table), and against the table of docs/pddl.md.
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Hashable
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -111,66 +109,6 @@ def test_fast_downward_agrees(name: str, limit: int, cost: str) -> None:
     assert answer == search(loaded.model, loaded.tasks[0]).cost_of(0)
     assert answer is not None
     assert answer[0] == KNOWN[name][1]
-
-
-def test_both_forms_of_workshop_have_the_same_plans_of_fewest_actions(
-    capfd: pytest.CaptureFixture[str],
-) -> None:
-    """The network form only forbids more in steps that no plan needs: pressing both switches,
-    unlocking twice.
-    """
-    forms = [arguments(name) for name in ("workshop", "workshop-cn")]
-    for cost in ("makespan", "makespan+actions"):
-        one, other = (
-            output(capfd, "plans", *form, "--max", "100", "--cost", cost) for form in forms
-        )
-        assert one["plans"] == other["plans"]
-    steps = [output(capfd, "inspect", *form, "--states")["joint_steps"] for form in forms]
-    assert steps[0] > steps[1]
-
-
-@pytest.mark.slow
-def test_logistics_by_counting(capfd: pytest.CaptureFixture[str]) -> None:
-    """About 1.5e13 plans, never listed (half a minute)."""
-    place = SHARED / "foreign" / "logistics00"
-    files = str(place / "domain.pddl"), str(place / "problogistics-4-0.pddl")
-    for cost, count in (("makespan", 15236699241648), ("makespan+actions", 3584)):
-        options = "--robots", "tru1,tru2,apn1", "--count", "--cost", cost
-        found = output(capfd, "plans", *files, *options)
-        assert (found["optimal_cost"], found["count"]) == (13, count)
-
-
-DURATIVE = "durative actions (:durative-action) are not supported"
-
-
-@pytest.mark.parametrize(
-    ("path", "message"),
-    [
-        ("durative/domain.pddl", f"domain.pddl:25:1: {DURATIVE}"),
-        ("derived/domain.pddl", "domain.pddl:21:3: derived predicates (axioms) (:derived) are not"),
-        (
-            "multirobot-ros/domain_turtlebot_demo_multirobot.pddl",
-            f"multirobot.pddl:20:1: {DURATIVE}",
-        ),
-    ],
-)
-def test_refused(path: str, message: str, capfd: pytest.CaptureFixture[str]) -> None:
-    domain = SHARED / "refuse" / path
-    problem = next(iter(sorted(domain.parent.glob("p*.pddl"))), domain)
-    assert run(["plans", str(domain), str(problem)]) == 34
-    assert message in capfd.readouterr().err
-
-
-def test_the_numeric_sample_is_plain_strips(capfd: pytest.CaptureFixture[str]) -> None:
-    """`refuse/numeric` has no number, function or metric: nothing to refuse, and it is read."""
-    files = [str(SHARED / "refuse" / "numeric" / f"{name}.pddl") for name in ("domain", "problem")]
-    text = "".join(re.sub(";.*", "", Path(file).read_text()) for file in files)
-    assert not re.search(r":functions|:metric|increase|assign|[<>=]|(?<=[\s(])[-+]?[\d.]", text)
-    data = output(capfd, "plans", *files, "--robots", "driver,truck", "--count")
-    # By hand: walk (meanwhile the truck is loaded), board, drive, drive, unload.
-    assert data["optimal_cost"] == 5
-    assert run(["plans", *files, "--count"]) == 31
-    assert "domain.pddl:4:2: which objects are the robots?" in capfd.readouterr().err
 
 
 # ---- languages for varied tasks

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ways to break a PDDL text: its tokens, groups, literals, names, sections and bytes."""
+"""Ways to break a PDDL text: its tokens, groups, literals, names and bytes."""
 
 from __future__ import annotations
 
@@ -100,43 +100,6 @@ def odd_name(text: str, random: Random) -> str:
     return renamed(text, dict.fromkeys(chosen, random.choice(ODD if odd else plain or ["x"])))
 
 
-_MANY = (
-    *("(:action a{n} :parameters (?r - robot))", "(:action a{n} :parameters () :effect (p{n}))"),
-    *("(:predicates (p{n}) (q{n} ?x))", "(:types t{n} - t{m})", "(:constants c{n})", "(:init)"),
-    "(:requirements :r{n})",
-)
-#: Sections that are odd, empty or of another language.
-_FOREIGN = (
-    *("(:durative-action x)", "(:derived (p ?x) (q ?x))", "(:constraints (and))", "(:init)", "()"),
-    *("(:functions (f) - number)", "(:metric minimize (total-time))", "(:objects a b)", "x", "(x)"),
-    *("(:goal (and))", "(:types a - b b - a)", "(:types object)", "(:functions)", "(:constants)"),
-    *("(:types a - (either b c) object)", "(:predicates (= ?a ?b))", "(:predicates ())"),
-    *("(:predicates p)", "(:action)", "(:action x)", "(:action x y)", "(:action x :parameters)"),
-    *("(:action (x))", "(:action x :agent)", "(:action x :agent ?a :parameters (?x))"),
-    *("(:functions (total-cost))", "(:constants a - )", "(:constants - a)", "(:domain)"),
-    *("(:domain x y)", "(:length)", "(:private)", "; subaction\n", "(:concurrency-constraint v)"),
-    "(:action x ; subaction r1 (x)\n)",
-    "(:action x :parameters (?x) :effect (increase (total-cost) 1e400))",
-    f"(:action x :parameters (?r - robot) :effect (increase (total-cost) {'9' * 400}))",
-    f"(:action x :parameters (?r - robot) :effect (increase (total-cost) {'9' * 20}))",
-    "(:action x :parameters (?a ?b ?c ?d ?e ?f ?g ?h) :effect (and))",
-)
-
-
-def more_sections(text: str, random: Random) -> str:
-    """A section of `_FOREIGN`, or many of `_MANY` or of objects, before a section."""
-    section = random.choice((*_FOREIGN, *2 * _MANY, "(:objects zz{n})", "(:constants zz{n} - {k})"))
-    kind = random.choice(("object", "robot", "cell", "agent"))
-    number = 1 if section in _FOREIGN else random.choice((50, 2_000))
-    at = random.choice([m.start() for m in re.finditer(r"\(:", text)] or [len(text)])
-    sections = (section.format(n=n, m=n + 1, k=kind) for n in range(number))
-    return f"{text[:at]}{' '.join(sections)} {text[at:]}"
-
-
-def truncate(text: str, random: Random) -> str:
-    return text[: random.randrange(len(text) + 1)]
-
-
 def random_bytes(text: str, random: Random) -> str:
     data = bytearray(text.encode("utf-8", "surrogateescape"))
     for _ in range(random.choice((1, 2, 10, 200)) if data else 0):
@@ -150,7 +113,5 @@ MUTATIONS: dict[Mutation, float] = {
     edit_tokens: 20,
     edit_groups: 30,
     odd_name: 10,
-    more_sections: 5,
-    truncate: 1,
-    random_bytes: 1,
+    random_bytes: 2,
 }

@@ -67,10 +67,10 @@ def pairs(*, foreign: bool = True) -> list[Pair]:
     found = []
     for place, lines in ((DOMAINS, _SHIPPED), (SHARED / "foreign", _FOREIGN if foreign else "")):
         for line in lines.strip().splitlines() if place.is_dir() else ():
-            folder, domain, problem, *options = line.split()
-            paths = (place / folder / f"{name}.pddl" for name in (domain, problem))
-            texts = (path.read_bytes().decode("utf-8", "surrogateescape") for path in paths)
-            found.append(Pair(folder, *texts, tuple(options)))
+            folder, *names = line.split()[:3]
+            data = [(place / folder / f"{name}.pddl").read_bytes() for name in names]
+            domain, problem = (text.decode("utf-8", "surrogateescape") for text in data)
+            found.append(Pair(folder, domain, problem, tuple(line.split()[3:])))
     return found
 
 

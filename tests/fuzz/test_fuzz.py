@@ -14,7 +14,7 @@ from tests.support.command import Outcome
 @pytest.mark.parametrize(
     ("numbers", "seed"),
     [
-        (range(30), 1),
+        (range(20), 1),
         *(
             pytest.param(range(start, start + 250), 0, marks=pytest.mark.slow)
             for start in range(0, 2000, 250)
