@@ -30,8 +30,8 @@ from planners.search.plan_space import PlanSpace
 _FAR = np.iinfo(np.int64).max // 4
 #: Random ways to a violation that are taken from one start at most.
 _RANDOM_WAYS = 40
-#: Moves of a step of a walk of one robot beside all others, at most: a tenth of a second.
-_AT_ONCE = 300_000
+#: Moves of a step of a walk of one robot beside all others, at most: half a second.
+_AT_ONCE = 2_000_000
 
 
 @dataclass(frozen=True, slots=True)

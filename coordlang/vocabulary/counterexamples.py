@@ -37,7 +37,7 @@ _Ahead = tuple[tuple[Words, int], ...]
 #: plans that go on so, with those words that others have not said yet.
 _Option = tuple[int, Words, tuple[Words, int], int]
 #: Plans of which a mixture is made, as edges.
-Plans = tuple[tuple[int, ...], ...]
+_Plans = tuple[tuple[int, ...], ...]
 #: Draws in a row that bring nothing new, after which a node is left.
 _FAMILIAR = 4
 #: A mixture that fails: each robot's steps (codes) so far, and a sentence that all can say.
@@ -130,7 +130,7 @@ def many_counterexamples(
     mixtures.say(word, steps)
     nodes = np.flatnonzero(choices.requires & space.descendants(space.starts)).tolist()
     random = Random(0)  # always the same ones
-    found: dict[int, list[Plans]] = {}
+    found: dict[int, list[_Plans]] = {}
     effort = sys.maxsize
     for node in mixtures.suspects_first(nodes):
         failing = mixtures.failing(node)
@@ -146,13 +146,13 @@ def many_counterexamples(
             break
         wanted = min(ways * _RANDOM_WAYS, most // len(found) - 1)
         plans += sorted(mixtures.others(node, wanted, random))
-    by_steps: dict[int, list[tuple[int, Plans]]] = {}
+    by_steps: dict[int, list[tuple[int, _Plans]]] = {}
     for node, listed in found.items():
         by_steps.setdefault(int(space.layer[node]), []).extend((node, own) for own in listed)
-    return [table_of(choices, by_steps[steps]) for steps in sorted(by_steps)]
+    return [_table(choices, by_steps[steps]) for steps in sorted(by_steps)]
 
 
-def table_of(choices: Choices, found: Sequence[tuple[int, Plans]]) -> Counterexamples:
+def _table(choices: Choices, found: Sequence[tuple[int, _Plans]]) -> Counterexamples:
     """Tuples as a table: the node of each, and the edges of its plans."""
     space = choices.space
     start = np.array([node for node, _ in found], np.int64)
@@ -334,7 +334,7 @@ class Mixtures:
 
     # ---- plans of a mixture
 
-    def near_plans(self, node: int, failing: _Failing, random: Random) -> Plans:
+    def near_plans(self, node: int, failing: _Failing, random: Random) -> _Plans:
         """Plans of which a failing mixture is made, near to each other.
 
         Each is made to go where the one before goes as far as it can, and then the first one where
@@ -346,9 +346,9 @@ class Mixtures:
             plans.append(self._plan(node, robot, codes[robot], sentence, plans[-1], random))
         return (plans[-1], *plans[2:-1])
 
-    def others(self, node: int, most: int, random: Random) -> set[Plans]:
+    def others(self, node: int, most: int, random: Random) -> set[_Plans]:
         """More plans of mixtures from a node of which one fails, drawn at random."""
-        found: set[Plans] = set()
+        found: set[_Plans] = set()
         familiar = 0
         while len(found) < most and familiar < _FAMILIAR:
             failing = self.failing(node, random)

@@ -177,7 +177,7 @@ class MinimalSearch:
                 return
 
     def _find_stutter_free(self, budget: Budget) -> None:
-        """Look for stutter-free languages with fewer words than the best one.
+        """Look for a stutter-free language with fewer words than the best one.
 
         From below, where partitions are refuted soonest and most is learnt of the others, too; then
         nearer and nearer to the number that suffices.
@@ -190,11 +190,10 @@ class MinimalSearch:
                 size = max(size + 1, between(size, self.upper))
                 continue
             self._partitions.drop_stutter_free(size)
-            if found is None:
-                size = self._least_stutter_free = size + 1
-            else:
+            if found is not None:
                 self._offer(found)
-                size = between(self._least_stutter_free, self.upper)
+                return
+            size = self._least_stutter_free = size + 1
 
     def _try_abstractions(self) -> None:
         """Take the first abstraction whose abstract states, each with a word, are a language."""

@@ -16,7 +16,6 @@ from coordlang.required.choices import Choices
 from coordlang.vocabulary.counterexample_walk import CounterexampleWalk, TwoPlans
 from coordlang.vocabulary.counterexamples import Counterexample, Mixtures, many_counterexamples
 from coordlang.vocabulary.stutter_free import StutterFree
-from coordlang.vocabulary.stutter_free_mixtures import StutterFreeMixtures
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import BadInput, ProvedImpossible, UsageError
 from tests.support import naive
@@ -97,7 +96,7 @@ def test_stutter_free_words_are_refuted_where_listing_refutes_them(
     random = Random(seeds.start)
     answers: Counter[bool] = Counter()
     for _, space in random_spaces(seeds, robots, 3_000):
-        mixtures = StutterFreeMixtures(Choices(space))
+        mixtures, walk = Mixtures(Choices(space)), TwoPlans(space)
         for words in (2, 3, 4):
             word = stutter_free(space, words, random)
             if word is None:
@@ -107,11 +106,12 @@ def test_stutter_free_words_are_refuted_where_listing_refutes_them(
             except naive.TooLarge:
                 break
             nodes = np.array(word)[space.state]
-            for found in (mixtures.failing(nodes, 20), mixtures.of_sets(nodes, 20)):
-                assert bool(found) != holds
-                for table in found:
-                    for row in range(len(table)):
-                        check(space, table.one(row), word)
+            found, two_plans = many_counterexamples(mixtures, nodes, 20), walk.failing(nodes, 20)
+            assert bool(found) != holds
+            assert bool(two_plans) != holds if space.robots == 2 else not (two_plans and holds)
+            for table in (*found, *two_plans):
+                for row in range(len(table)):
+                    check(space, table.one(row), word)
             answers[holds] += 1
     print(f"{robots or 'any'} robots: {dict(answers)}")
     assert min(answers[True], answers[False]) >= 5
