@@ -26,17 +26,6 @@ def lifted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_what_was_learned_as_json(coordlang: Command, tmp_path: Path) -> None:
-    path = tmp_path / "l.json"
-    outcome = coordlang(
-        "lift", GRID, *RINGS, "--tasks", "all", "--prefer", "features", "-o", path, "--json",
-        "--jobs", "1",
-    )  # fmt: skip
-    data = json.loads(outcome.out)
-    assert (outcome.code, data["words"], data["fewest_proved"]) == (0, 3, True)
-    assert len(json.loads(path.read_text())["words"]) == 3
-
-
 def test_files_on_stdout(
     coordlang: Command, lifted: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -16,7 +16,6 @@ import pytest
 from coordlang.language.candidates import all_pairs
 from coordlang.language.partition import Partition
 from coordlang.lifted.features import Feature
-from coordlang.lifted.language import LiftedLanguage
 from coordlang.lifted.learning import Instance, Learned, SimplestHitting, learn
 from coordlang.lifted.pool import pool_of
 from coordlang.verification.by_definition import verify
@@ -100,22 +99,6 @@ def test_what_is_held_back_is_learned_from_where_it_refutes() -> None:
     assert holds(instance("grid", "gw2-2x3"), both.features)
     assert holds(instance("grid", "gw1-2x2"), both.features)
     assert both.rounds > alone.rounds
-
-
-def test_values_that_nobody_has_seen_are_words_of_their_own() -> None:
-    large = instance("grid", "gw3-2x4")
-    learned = learn([instance("grid", "gw1-2x2"), instance("grid", "gw2-2x3")])
-    values = {vector: f"w{number}" for vector, number in learned.word.items() if number < 2}
-    lifted = LiftedLanguage(learned.features, ("w0", "w1"), values, ("r1", "r2"))
-    partition = lifted.partition(large.states)
-    vectors = large.vectors(learned.features)
-    assert partition.words[:2] == ("w0", "w1")
-    assert all(word.startswith("v") for word in partition.words[2:])
-    assert len(partition.words) == len(np.unique(vectors, axis=0)) > 2
-    words = [
-        partition.words[number] for number in partition.word_of(large.candidates.rows).tolist()
-    ]
-    assert len({*zip(words, map(tuple, vectors.tolist()), strict=True)}) == len(partition.words)
 
 
 # Fewer words

@@ -142,11 +142,3 @@ def test_stopped_repairs_are_languages(phase: str, monkeypatch: pytest.MonkeyPat
     assert found.partition is checked[-1]
     assert found.changes_bound <= len(whole.changed) <= len(found.changed)
     assert found.new_words_bound <= max(whole.new_words, found.new_words)
-
-
-def test_first_fit_is_not_the_end() -> None:
-    """On the open 2x2 grid fewer states than chance suggests, and fewer new words than states."""
-    job, kept = one_word_for_all()
-    found = repair(job, kept, 1, 0)
-    assert len(found.changed) == found.changes_bound
-    assert 2 <= found.new_words == found.new_words_bound < len(found.changed)

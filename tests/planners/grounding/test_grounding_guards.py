@@ -80,20 +80,6 @@ def test_the_same_joint_steps_as_by_definition(
     assert "too large" not in met
 
 
-def test_conditions_with_constants_repeated_variables_and_more_types() -> None:
-    domain = """(define (domain d) (:types robot place - thing) (:constants hub - place)
-        (:predicates (at ?x - thing ?y - place) (way ?a ?b ?c) (seen ?a ?b) (lit))
-        (:action go :agent ?r - robot :parameters (?x - (either robot place) ?p - place ?q)
-         :precondition (and (and (at ?r ?p) (way ?p ?x ?p)) (way hub ?q ?q) (not (lit)))
-         :effect (and (forall (?z - place) (when (and (seen ?z ?z) (lit)) (at ?r ?z)))
-                      (lit) (seen ?q ?x) (not (at ?r ?p)))))"""
-    problem = """(define (problem p) (:domain d) (:objects r1 r2 - robot a b - place)
-        (:init (at r1 a) (at r2 b) (way a b a) (way a r2 a) (way b a a) (way hub b b) (way hub r1 r1)
-               (seen a a) (seen hub b)) (:goal (lit)))"""
-    labels = {action.label for action in model_of(domain, problem).model.actions}
-    assert labels == {f"(go r1 {x} a {q})" for x in ("b", "r2") for q in ("b", "r1")}
-
-
 def test_few_instances_are_tried() -> None:
     """Of 9,000 subactions that a precondition forbids those that can be done; of 3,000 places those
     to which there is a way.  Looking at all takes minutes.

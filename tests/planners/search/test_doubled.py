@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from planners.loading import build
-from planners.pddl import parse_domain, parse_problem, read_domain, read_problem
+from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Atom
-from planners.pddl.sexpr import Source
+from planners.search.doubled import note_doubled
 from planners.search.reachable import explore
 from planners.search.state_variables import note_doubled
 from planners.system.errors import Note
@@ -24,14 +24,6 @@ FIRST = [
     for d in DOMAINS.iterdir()
     if (d / "domain.pddl").is_file()
 ]
-#: A robot has as many free or holding hands as at the start, and may have two.
-HANDS = """(define (domain hands) (:types robot hand ball)
- (:predicates (free ?r - robot ?h - hand) (holds ?r - robot ?h - hand ?b - ball) (down ?b - ball))
- (:action take :agent ?r - robot :parameters (?h - hand ?b - ball)
-  :precondition (and (free ?r ?h) (down ?b))
-  :effect (and (holds ?r ?h ?b) (not (free ?r ?h)) (not (down ?b))))
- (:action put :agent ?r - robot :parameters (?h - hand ?b - ball) :precondition (holds ?r ?h ?b)
-  :effect (and (free ?r ?h) (down ?b) (not (holds ?r ?h ?b)))))"""
 
 
 def noted(domain_path: Path, problem_path: Path, more: frozenset[Atom]) -> list[str]:
@@ -70,18 +62,6 @@ def test_a_second_place_is_noted(place: str) -> None:
     about = {n for n, a in enumerate(loaded.model.codec.facts) if at.args[0] == a.args[0]}
     counts = [len(about.intersection(loaded.model.codec.true_facts(row))) for row in rows]
     assert max(counts) == 2
-
-
-def test_two_free_hands_are_no_mistake() -> None:
-    domain = parse_domain(Source("d", HANDS))
-    text = (
-        "(define (problem p) (:domain hands) (:objects r1 - robot left right - hand b - ball)"
-        " (:init (free r1 left) (free r1 right) (down b)) (:goal (holds r1 left b)))"
-    )
-    problem = parse_problem(Source("p", text), domain)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", Note)
-        note_doubled(domain, [problem], build(domain, [problem]).model)
 
 
 def test_the_command_says_it_once(coordlang: Command, tmp_path: Path) -> None:

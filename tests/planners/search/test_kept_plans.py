@@ -179,15 +179,6 @@ def test_a_full_disk_is_said(
     assert (len(searches), entries(folder)) == (1, [])
 
 
-def test_a_folder_that_cannot_be_written_to(tmp_path: Path, searches: list[str]) -> None:
-    (tmp_path / "file").write_text("")
-    world = loaded()
-    for place in (tmp_path / "file", tmp_path / "file" / "below"):
-        with keeping_plans(plan_store(place)), pytest.warns(Note, match="not kept"):
-            search(world.model, world.tasks[0])
-    assert len(searches) == 2
-
-
 def test_a_folder_that_is_only_read(
     folder: Store, searches: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
