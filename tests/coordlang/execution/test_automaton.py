@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The least automaton of graphs that are far more nondeterministic than robots' plans are."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from random import Random
+
+from coordlang.execution.automaton import determinise
+from tests.support.layered_spaces import layered_space
+from tests.support.naive_choices import accepted
+
+Word = tuple[int, ...]
+
+
+def random_edges(random: Random) -> tuple[list[int], list[list[tuple[int, int]]]]:
+    """The sizes of layers, the goal's first, and the edges (label, target) of each node."""
+    sizes = [*(random.randint(1, 4) for _ in range(random.randint(1, 4))), 1]
+    edges: list[list[tuple[int, int]]] = [[] for _ in range(sizes[0])]
+    for below, here in pairwise(sizes):
+        after = range(len(edges) - below, len(edges))
+        edges += [
+            sorted({(random.randrange(2), random.choice(after)) for _ in range(4)})
+            for _ in range(here)
+        ]
+    return sizes, edges
+
+
+def futures(edges: list[list[tuple[int, int]]], nodes: frozenset[int]) -> frozenset[Word]:
+    """What may follow from some nodes."""
+    found = {
+        (label, *rest)
+        for node in nodes
+        for label, target in edges[node]
+        for rest in futures(edges, frozenset({target}))
+    }
+    return frozenset(found or {()})
+
+
+def test_least_automaton_of_any_graph() -> None:
+    merged = 0
+    for seed in range(300):
+        sizes, edges = random_edges(Random(seed))
+        start = frozenset({len(edges) - 1})
+        subsets = layer = {start}
+        while any(edges[node] for nodes in layer for node in nodes):
+            layer = {
+                frozenset(to for node in nodes for own, to in edges[node] if own == label)
+                for nodes in layer
+                for label in {own for node in nodes for own, _ in edges[node]}
+            }
+            subsets = subsets | layer
+        automaton = determinise(layered_space(sizes, edges), 0)
+        assert accepted([dict(automaton.moves(n)) for n in range(len(automaton))]) == futures(
+            edges, start
+        )
+        assert automaton.count == len(futures(edges, start))
+        least = len({futures(edges, nodes) for nodes in subsets})
+        assert len(automaton) == least
+        merged += len(subsets) > least
+    assert merged >= 30
