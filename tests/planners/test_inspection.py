@@ -7,12 +7,11 @@ import re
 
 from planners.inspection import inspect
 from planners.joint.composition import ComposingStepper
-from planners.loading import PlanningInstance, build
-from planners.pddl import parse_domain, parse_problem
+from planners.loading import PlanningInstance
 from planners.pddl.model_options import ModelOptions
-from planners.pddl.sexpr import Source
 from planners.search.reachable import explore
 from tests.support.random_pddl import random_model
+from tests.support.texts import model_of
 
 PUSHING = """(define (domain pushing) (:types robot place heavy light)
   (:predicates (at ?r - robot ?p - place) (in ?x - (either heavy light) ?p - place) (glows ?p - place) (seen ?p - place))
@@ -33,13 +32,8 @@ TASK = """(define (problem p) (:domain pushing) (:objects r1 r2 - robot a b - pl
   ( :goal (forall (?x - heavy) (or (in ?x b) (not (seen a))))))"""
 
 
-def made(domain: str, problem: str, options: ModelOptions | None = None) -> PlanningInstance:
-    lifted = parse_domain(Source("d.pddl", domain))
-    return build(lifted, [parse_problem(Source("p.pddl", problem), lifted)], options)
-
-
 def test_what_can_never_be_is_shown() -> None:
-    found = inspect(made(PUSHING, TASK))
+    found = inspect(model_of(PUSHING, TASK))
     assert found.impossible == ("carry", "melt")
     assert found.never == ("glows",)
     assert found.objects == {"heavy": 1, "place": 2, "robot": 2}
@@ -47,14 +41,14 @@ def test_what_can_never_be_is_shown() -> None:
 
 
 def test_formulas_are_shown_with_what_is_there() -> None:
-    assert inspect(made(PUSHING, TASK)).formulas == (
+    assert inspect(model_of(PUSHING, TASK)).formulas == (
         "(push r1 anvil a b) speaks of (push r2 anvil a b) in the same step",
         "(look r1 a) forbids (look r2 a) in the same step",
     )
     # The partner's places in the wrong order: it would have to push the other way from where the
     # anvil is not.
     misread = PUSHING.replace("(push ?o ?x ?from ?to)", "(push ?o ?x ?from ?from)")
-    shown = inspect(made(misread, TASK)).formulas
+    shown = inspect(model_of(misread, TASK)).formulas
     assert (
         "(push r1 anvil a b) speaks of (push r2 anvil a a), which no robot can ever do, in the same step"
         in shown
@@ -63,7 +57,8 @@ def test_formulas_are_shown_with_what_is_there() -> None:
 
 def test_the_goal_is_the_one_that_was_understood() -> None:
     assert (
-        inspect(made(PUSHING, TASK)).goal == "(forall (?x - heavy) (or (in ?x b) (not (seen a))))"
+        inspect(model_of(PUSHING, TASK)).goal
+        == "(forall (?x - heavy) (or (in ?x b) (not (seen a))))"
     )
 
 
@@ -98,7 +93,7 @@ def test_the_example_can_happen_in_random_models() -> None:
     shown = hidden = 0
     for seed in range(60):
         text = random_model(seed, ("agent", "plain")[seed % 2])
-        loaded = made(text.domain, text.problem, ModelOptions(unowned=text.unowned))
+        loaded = model_of(text.domain, text.problem, ModelOptions(unowned=text.unowned))
         found = inspect(loaded)
         if found.example is None:
             hidden += found.interfering > 0

@@ -83,14 +83,6 @@ def instance(folder: str, stem: str) -> Instance:
     return Instance(all_tasks(folder, stem))
 
 
-def test_four_words_for_rings() -> None:
-    """Two features, each with two values, that two small rings show."""
-    known = [instance("grid", stem) for stem in ("gwb1-2x4", "gwb2-3x3")]
-    learned = learn(known, [instance("grid", "gwb4-2x5"), instance("grid", "gwb3-3x4")])
-    assert len(learned.features) == 2
-    assert [words for *_, words in learned.sizes] == [4, 4, 4, 4]
-
-
 def test_what_is_held_back_is_learned_from_where_it_refutes() -> None:
     """What suffices on 2x2 does not on 2x3."""
     alone = learn([instance("grid", "gw1-2x2")])

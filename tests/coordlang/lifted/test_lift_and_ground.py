@@ -71,15 +71,6 @@ def test_a_larger_problem(rings: Lifted) -> None:
     assert coordlang.verify(language, GRID, LARGER, jobs=1)
 
 
-def test_one_word_needs_no_feature() -> None:
-    files = DOMAINS / "lock" / "domain.pddl", DOMAINS / "lock" / "let-in.pddl"
-    lifted = coordlang.lift(*files, jobs=1).language
-    assert lifted.features == ()
-    found = coordlang.explain(coordlang.ground(lifted, *files, tasks="own", jobs=1), *files)
-    assert found.words.lifted is not None
-    assert found.words.lifted.terms == {"w0": ("true",)}
-
-
 def test_an_unverified_language_covers_nothing(rings: Lifted, plan: Path) -> None:
     language = coordlang.ground(rings.language, GRID, LARGER, verified=False, jobs=1)
     assert language.guarantee.method == "lifted; not verified here"

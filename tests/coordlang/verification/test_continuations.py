@@ -10,7 +10,7 @@ from itertools import product
 
 import pytest
 
-from coordlang.verification.continuations import Continuations, SequenceSets
+from coordlang.verification.sets import Continuations, SequenceSets
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 from tests.support.random_spaces import random_spaces, runs

@@ -11,10 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.check.rules import Rules
 from planners.loading import PlanningInstance
 from planners.pddl import parse_domain
-from planners.pddl.lifted import Atom, Domain
+from planners.pddl.lifted import Domain
 from planners.pddl.sexpr import Source
 from planners.system.errors import BadInput
 from tests.support.joint_twin import check_model
@@ -178,26 +177,6 @@ def test_random_networks() -> None:
 
     compare()
     assert seen.get("several states", 0) >= 30, seen
-
-
-def test_an_action_that_satisfies_both_itself_is_still_linked() -> None:
-    """(v, w) dependent and `a` in both: it needs nobody, but it is meant to be done together with
-    the others in v.
-    """
-    loaded = model_of(
-        """(define (domain d) (:types robot) (:predicates (p) (q) (n))
-      (:action a :agent ?r - robot :parameters () :effect (and (not (p)) (q)))
-      (:action b :agent ?r - robot :parameters () :precondition (p) :effect (n))
-      (:concurrency-constraint v :parameters () :bounds (1 inf) :actions ((a) (b)))
-      (:concurrency-constraint w :parameters () :bounds (1 inf) :actions ((a)))
-      (:positive-dependence v w))""",
-        "(define (problem p) (:domain d) (:objects r1 r2 - robot) (:init (p)) (:goal (q)))",
-    )
-    steps = loaded.model.successors(loaded.tasks[0].init[None, :])
-    found = {loaded.model.texts(row) for row in steps.labels}
-    rules = Rules(loaded.domain, loaded.problems[0], loaded.team)
-    assert ("(a r1)", "(b r2)") in found
-    assert rules.broken_rule(frozenset({Atom("p", ())}), ("(a r1)", "(b r2)")) is None
 
 
 def test_a_network_of_joint_actions_is_refused() -> None:

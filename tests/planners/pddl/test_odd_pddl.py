@@ -118,9 +118,7 @@ CASES: dict[str, Case] = {
     "agent inside the parameters": case(
         2, d(AGENT, ":parameters (:agent ?r - robot ?x ?y - room)")
     ),
-    "agent at their end": case(2, d(AGENT, ":parameters (?x ?y - room :agent ?r - robot)")),
     "agent again in them": case(2, d(AGENT, ":agent ?r :parameters (?r - robot ?x ?y - room)")),
-    "agent in parentheses": case(2, d(":agent ?r - robot", ":agent (?r - robot)")),
     "agent behind them": case(2, d(AGENT, ":parameters (?x ?y - room) :agent ?r - robot")),
     "untyped agent": case(
         2, UNTYPED, p(OBJECTS, "r1 r2 a b c", "(:init", "(:init (robot r1) (robot r2)")
@@ -137,7 +135,6 @@ CASES: dict[str, Case] = {
     "three robots": case(4, DOMAIN, THREE),
     "nobody's action": case((31, "d.pddl:7:47: action (ring) names no robot"), BELL),
     "of the environment": case(6, BELL, RUNG, "--unowned environment"),
-    "of it, fewest actions": case(1, BELL, RUNG, "--unowned environment --cost makespan+actions"),
     "of all together": case(1, BELL, RUNG, "--unowned shared"),
     "--robot-type of others": case((2, "--robot-type"), options="--robot-type room"),
     "--robot-type that is nothing": case((2, "--robot-type"), options="--robot-type nonsense"),
@@ -154,12 +151,10 @@ CASES: dict[str, Case] = {
         2, d("(:types robot room)", "(:types robot - mobile mobile - thing room - place)")
     ),
     "two parents": case(2, d("robot room)", "robot - m robot - n room m n - object)")),
-    "either parents": case(2, d("robot room)", "robot - (either m n) room m n)")),
     "object among the types": case(2, d("robot room)", "object - thing robot room - object)")),
     "either in a parameter": case(
         2, d(AGENT, ":agent ?r - robot :parameters (?x ?y - (either room robot))")
     ),
-    "an object of either type": case(2, DOMAIN, p("c - room", "c - (either room robot)")),
     "a parameter of type object": case(
         2, d(AGENT, ":agent ?r - robot :parameters (?x ?y - object)")
     ),
@@ -168,9 +163,6 @@ CASES: dict[str, Case] = {
     ),
     "constants before the predicates": case(
         2, d("(:pred", "(:constants a - room) (:pred"), p("a b c", "b c")
-    ),
-    "constants at the end": case(
-        2, DOMAIN.rstrip()[:-1] + "(:constants a - room))", p("a b c", "b c")
     ),
     "a constant is an object again": case(
         2, d("(:pred", "(:constants a - room) (:pred"), p(OBJECTS, "r1 r2 - robot b c - room a")
@@ -187,7 +179,6 @@ CASES: dict[str, Case] = {
     ),
     "private objects": case(2, DOMAIN, p(OBJECTS, "r2 - robot a b c - room (:private r1 - robot)")),
     # sections
-    "no requirements": case(2, d("(:requirements :typing)", "")),
     "requirements of others": case(
         2, d(":typing", ":typing :foo :durative-actions :numeric-fluents")
     ),
@@ -223,7 +214,6 @@ CASES: dict[str, Case] = {
     ),
     # formulas
     "an empty goal": case(1, DOMAIN, goal("()")),
-    "a goal without conjuncts": case(1, DOMAIN, goal("(and)")),
     "a goal that holds already": case(1, DOMAIN, goal("(and (at r1 a) (at r2 b))")),
     "a negative goal": case(3, DOMAIN, goal("(not (at r1 a))")),
     "imply in the goal": case(3, DOMAIN, goal("(imply (at r1 a) (at r1 b))")),
@@ -239,7 +229,6 @@ CASES: dict[str, Case] = {
         (31, "expected one '(:goal FORMULA)'"), DOMAIN, goal("(at r1 c)) (:goal (at r2 a)")
     ),
     "imply": case(2, where("(imply (= ?x ?x) (door ?x ?y))")),
-    "equality of objects": case(2, where("(not (= ?x ?y)) (= ?r ?r)")),
     "= among the predicates": case(2, where("(= ?r ?r)", PREDICATE, f"{PREDICATE} (= ?x ?y)")),
     "a parameter shadowed": case(2, where("(exists (?x - room) (at ?r ?x))")),
     "a quantifier shadowed": case(2, where("(forall (?x - room) (exists (?x - room) (at ?r ?x)))")),
@@ -325,13 +314,9 @@ CASES: dict[str, Case] = {
         change(PRICED, "(= (far a b) 3)", ""),
         COST,
     ),
-    "a cost that is a fraction": case(
-        (31, "the cost (far a b) has no whole value"), COSTLY, change(PRICED, " 3)", " 3.5)"), COST
-    ),
     "costs whose sum passes 2^63": case(
         (31, "cost"), COSTLY, change(PRICED, " 3)", f" {HUGE})", "b a) 1", f"b a) {HUGE}"), COST
     ),
-    "a cost above 2^63": case((31, "cost"), COSTLY, change(PRICED, " 3)", f" {10**20})"), COST),
     "a cost of 400 digits": case((31, "cost"), COSTLY, change(PRICED, " 3)", f" {LONG})"), COST),
     "a constant cost of 400 digits": case(
         (34, "d.pddl"), change(COSTLY, "(far ?x ?y)))", f"{LONG}))"), PROBLEM, COST

@@ -14,19 +14,17 @@ from random import Random
 
 import pytest
 
-from planners.check.validate import validate
 from planners.classical import compile_classical
-from planners.loading import PlanningInstance, build, task_of
-from planners.pddl import parse_domain, parse_problem
+from planners.loading import PlanningInstance, task_of
 from planners.pddl.lifted import And, Formula, Not
 from planners.pddl.model_options import ModelOptions
-from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plans import Plans
 from planners.search.reachable import explore
 from tests.support.naive_classical import optimal_plans
 from tests.support.naive_joint_steps import Labels, TooLarge, Twin
 from tests.support.random_pddl import Kind, random_model
+from tests.support.texts import model_of, parsed
 
 Price = Callable[[str], int]
 
@@ -50,18 +48,14 @@ def priced(seed: int, kind: Kind) -> tuple[PlanningInstance, Price]:
         pieces[number] = re.sub(
             r":effect \((?:and ?)?", f":effect (and {cost}", pieces[number], count=1
         )
-    domain = parse_domain(
-        Source(
-            "d", "".join(pieces).replace("(:predicates", "(:functions (price ?x)) (:predicates", 1)
-        )
-    )
-    plain = parse_problem(Source("p", text.problem), domain)
+    functions = "(:functions (price ?x)) (:predicates"
+    priced_domain = "".join(pieces).replace("(:predicates", functions, 1)
+    _, plain = parsed(priced_domain, text.problem)
     prices = {name: random.randrange(4) for name in sorted(plain.objects)}
     known = " ".join(f"(= (price {name}) {value})" for name, value in prices.items())
-    problem = parse_problem(
-        Source("p", text.problem.replace("(:init", f"(:init {known}", 1)), domain
-    )
-    loaded = build(domain, [problem], ModelOptions(unowned=text.unowned, cost="makespan+cost"))
+    priced_problem = text.problem.replace("(:init", f"(:init {known}", 1)
+    options = ModelOptions(unowned=text.unowned, cost="makespan+cost")
+    loaded = model_of(priced_domain, priced_problem, options)
 
     def price(label: str) -> int:
         name, *args = label.strip("()").split()
@@ -157,12 +151,9 @@ def test_idling_costs_what_the_cheapest_action_that_is_idling_costs(
     It does not matter that nobody can ever rest.  Without a price only waiting is left, for 7,
     with any of 24 ** 9 arguments.
     """
-    domain = parse_domain(Source("d", _WAYS))
     known = "" if price is None else f"(= (price r1) {price})"
-    problem = parse_problem(
-        Source("p", _OVER.format(price=known, more=" ".join(f"p{k}" for k in range(20)))), domain
-    )
-    loaded = build(domain, [problem], ModelOptions(cost="makespan+cost"))
+    text = _OVER.format(price=known, more=" ".join(f"p{k}" for k in range(20)))
+    loaded = model_of(_WAYS, text, ModelOptions(cost="makespan+cost"))
     model, task = loaded.model, loaded.tasks[0]
     assert model.idling_costs == (7 if price is None else price, 5)
     for heuristic in ("auto", "blind", "projections", "relaxed"):
@@ -173,20 +164,3 @@ def test_idling_costs_what_the_cheapest_action_that_is_idling_costs(
         found = optimal_plans(plain)
         assert found.cost is not None
         assert (plain.cost(found.cost), found.count()) == ((2, cost), count)
-
-
-def test_what_belonged_to_an_environment_that_is_not_there_costs_nobody() -> None:
-    """The environment could do nothing but idle, so there is none; no robot pays for its idling."""
-    domain = """(define (domain d) (:types robot place) (:predicates (at ?r - robot ?p - place))
-      (:action go :parameters (?r - robot ?a ?b - place) :precondition (at ?r ?a)
-        :effect (and (not (at ?r ?a)) (at ?r ?b) (increase (total-cost) 3)))
-      (:action tick :parameters () :effect (increase (total-cost) 7)))"""
-    problem = """(define (problem p) (:domain d) (:objects r1 r2 - robot a b - place)
-      (:init (at r1 a) (at r2 a)) (:goal (at r1 b)))"""
-    read = parse_domain(Source("d", domain))
-    options = ModelOptions(("r1", "r2"), unowned="environment", cost="makespan+cost")
-    loaded = build(read, [parse_problem(Source("p", problem), read)], options)
-    assert loaded.model.robots == ("r1", "r2")
-    assert search(loaded.model, loaded.tasks[0]).cost_of(0) == (1, 3)
-    verdict = validate(read, loaded.problems[0], loaded.team, [["(go r1 a b)", "(tick)"]])
-    assert "it belongs to no robot" in verdict.reason

@@ -16,11 +16,9 @@ import numpy as np
 import pytest
 
 from planners.joint.model import PlanningTask
-from planners.loading import PlanningInstance, build
+from planners.loading import PlanningInstance
 from planners.parallel.batch import Store
-from planners.pddl import parse_domain, parse_problem
 from planners.pddl.model_options import Cost, ModelOptions
-from planners.pddl.sexpr import Source
 from planners.search import kept_plans, optimal_plans
 from planners.search.kept_plans import (
     default_folder,
@@ -35,6 +33,7 @@ from planners.search.plan_space import PlanSpace
 from planners.system.errors import BadInput, Note, ProvedImpossible
 from tests.support.domains import DOMAINS
 from tests.support.random_pddl import KINDS, random_model
+from tests.support.texts import model_of
 
 GRID = (DOMAINS / "grid" / "domain.pddl").read_text()
 PROBLEM = (DOMAINS / "grid" / "gw4-3x3.pddl").read_text()
@@ -43,8 +42,7 @@ PROBLEM = (DOMAINS / "grid" / "gw4-3x3.pddl").read_text()
 def loaded(
     domain: str = GRID, problem: str = PROBLEM, options: ModelOptions | None = None
 ) -> PlanningInstance:
-    lifted = parse_domain(Source("d", domain))
-    return build(lifted, [parse_problem(Source("p", problem), lifted)], options)
+    return model_of(domain, problem, options)
 
 
 @pytest.fixture

@@ -9,15 +9,14 @@ import pytest
 from coordlang.commands.inspect import feasibility
 from planners.joint.model import JointModel
 from planners.joint.tables import Rows, find_rows, unique_rows
-from planners.loading import PlanningInstance, build
-from planners.pddl import parse_domain, parse_problem
-from planners.pddl.model_options import ModelOptions
-from planners.pddl.sexpr import Source
+from planners.loading import PlanningInstance
 from planners.search.optimal_plans import search
 from planners.search.reachable import explore
 from planners.search.search_estimate import estimate
 from planners.system.errors import BadInput, ProvedImpossible
+from tests.support.joint_twin import built
 from tests.support.random_pddl import random_model
+from tests.support.texts import model_of
 
 MANY = 10**9
 
@@ -33,8 +32,7 @@ def walking(robots: int, places: int, goal: str) -> PlanningInstance:
     problem = f"""(define (problem p) (:domain walk)
       (:objects {" ".join(f"r{k}" for k in range(robots))} - robot {" ".join(f"p{k}" for k in range(places))} - place)
       (:init {" ".join(lines + starts)}) (:goal {goal}))"""
-    lifted = parse_domain(Source("d.pddl", WALK))
-    return build(lifted, [parse_problem(Source("p.pddl", problem), lifted)])
+    return model_of(WALK, problem)
 
 
 def naive_layers(model: JointModel, init: Rows) -> list[int]:
@@ -55,10 +53,7 @@ def test_layers_bounds_and_choices_are_those_of_the_whole_search(style: str) -> 
     solved = unsolved = 0
     for seed in range(40):
         text = random_model(seed, style)  # type: ignore[arg-type]
-        lifted = parse_domain(Source("d.pddl", text.domain))
-        problem = parse_problem(Source("p.pddl", text.problem), lifted)
-        options = ModelOptions(unowned=text.unowned)
-        loaded = build(lifted, [problem], options)
+        loaded = built(text)
         model, task = loaded.model, loaded.tasks[0]
         try:
             found, layers = estimate(model, task, MANY, MANY)
