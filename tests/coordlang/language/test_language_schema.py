@@ -163,15 +163,6 @@ def test_several_words_of_a_state_are_refused(coordlang: Command, tmp_path: Path
     assert coordlang("verify", path, *RUNNING, "--tasks", "all").code == 0
 
 
-def test_further_keys_are_ignored(written: dict[str, Any]) -> None:
-    data = copy.deepcopy(written) | {"note": "by me"}
-    data["guarantee"]["note"] = 1
-    assert valid(data)
-    assert language_from_bytes(json.dumps(data).encode(), HERE) == language_from_bytes(
-        json.dumps(written).encode(), HERE
-    )
-
-
 BY_HAND = {
     "format": "coordlang/language",
     "version": 1,
