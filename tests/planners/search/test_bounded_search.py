@@ -165,19 +165,6 @@ def test_bounds_lose_no_optimal_plan(family: str, seeds: range) -> None:
     assert min(met["solved"], met["unsolvable"]) >= 5
 
 
-def test_steps_are_composed_again_however_many_there_were() -> None:
-    """Those on the way back count for no limit of the way there."""
-    files = DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "corners-6x6.pddl"]
-    again = 0
-    for cost, probe in zip(COSTS, (200, 100, 300), strict=True):
-        loaded = load(*files, ModelOptions(cost=cost))
-        pieces = replace(PIECES, probe=probe, kept=0)
-        found, effort = search_with_effort(loaded.model, loaded.tasks[0], pieces)
-        again += effort.steps > probe and "SAT" not in effort.heuristic
-        equal(found, blind_search(loaded.model, loaded.tasks[0]))
-    assert again
-
-
 def test_on_open_grids_no_solver_is_asked() -> None:
     task = world_of("grid", "corners-8x8").loaded
     plans, effort = search_with_effort(task.model, task.tasks[0], replace(PIECES, probe=400))

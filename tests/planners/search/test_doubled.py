@@ -12,7 +12,6 @@ import pytest
 from planners.loading import build
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Atom
-from planners.search.doubled import note_doubled
 from planners.search.reachable import explore
 from planners.search.state_variables import note_doubled
 from planners.system.errors import Note
