@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-import coordlang
+import coordlang as api
 from coordlang.commands.inputs import read_coordinates_of
 from coordlang.commands.lift import Lifted
 from coordlang.lifted.file import lifted_from_bytes, read_lifted, to_bytes
@@ -20,6 +20,8 @@ from coordlang.required.miscoordination import Inseparable
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.sexpr import Source
 from planners.system.errors import BadInput, Note, Position, ProvedImpossible, Refuted, UsageError
+from tests.coordlang.report.conftest import data_of
+from tests.support.command import Command
 from tests.support.domains import DOMAINS
 
 GRID = DOMAINS / "grid" / "domain.pddl"
@@ -31,14 +33,21 @@ SMALL = DOMAINS / "grid" / "gw1-2x2.pddl"
 
 @pytest.fixture(scope="module")
 def rings() -> Lifted:
-    return coordlang.lift(GRID, *RINGS, tasks="all", jobs=1)
+    return api.lift(GRID, *RINGS, tasks="all", jobs=1)
 
 
 @pytest.fixture(scope="module")
 def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("plans") / "one.plan"
-    found = coordlang.plans(GRID, LARGER)
+    found = api.plans(GRID, LARGER)
     path.write_text(found.ipc(next(iter(found))))
+    return path
+
+
+@pytest.fixture(scope="module")
+def lifted(rings: Lifted, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("lifted") / "rings.json"
+    rings.save(path)
     return path
 
 
@@ -57,7 +66,7 @@ def test_what_is_learned_is_said(rings: Lifted) -> None:
 
 
 def test_the_same_bytes_again(rings: Lifted, tmp_path: Path) -> None:
-    again = coordlang.lift(GRID, *RINGS, tasks="all", jobs=1)
+    again = api.lift(GRID, *RINGS, tasks="all", jobs=1)
     assert to_bytes(again.language) == to_bytes(rings.language)
     path = tmp_path / "l.json.gz"
     rings.save(path)
@@ -65,40 +74,40 @@ def test_the_same_bytes_again(rings: Lifted, tmp_path: Path) -> None:
 
 
 def test_a_larger_problem(rings: Lifted) -> None:
-    language = coordlang.ground(rings.language, GRID, LARGER, jobs=1)
+    language = api.ground(rings.language, GRID, LARGER, jobs=1)
     assert language.guarantee.method == "lifted; verified here"
     assert language.provenance.tasks["count"] == 8010
-    assert coordlang.verify(language, GRID, LARGER, jobs=1)
+    assert api.verify(language, GRID, LARGER, jobs=1)
 
 
 def test_an_unverified_language_covers_nothing(rings: Lifted, plan: Path) -> None:
-    language = coordlang.ground(rings.language, GRID, LARGER, verified=False, jobs=1)
+    language = api.ground(rings.language, GRID, LARGER, verified=False, jobs=1)
     assert language.guarantee.method == "lifted; not verified here"
-    said = coordlang.say(language, GRID, LARGER, plan)
+    said = api.say(language, GRID, LARGER, plan)
     assert not said.covered
-    assert coordlang.verify(language, GRID, LARGER, tasks="all", jobs=1)
-    verified = coordlang.ground(rings.language, GRID, LARGER, jobs=1)
-    assert coordlang.say(verified, GRID, LARGER, plan).covered
-    assert said.sentence == coordlang.say(verified, GRID, LARGER, plan).sentence
+    assert api.verify(language, GRID, LARGER, tasks="all", jobs=1)
+    verified = api.ground(rings.language, GRID, LARGER, jobs=1)
+    assert api.say(verified, GRID, LARGER, plan).covered
+    assert said.sentence == api.say(verified, GRID, LARGER, plan).sentence
 
 
 def test_a_refuted_language_is_not_written(rings: Lifted) -> None:
     """Words of rings are none of an open grid, whatever the file claims."""
     with pytest.raises(Refuted, match=r"no coordination language for gw2-2x3.* on gwb1-2x4"):
-        coordlang.ground(rings.language, GRID, OPEN, jobs=1)
-    assert not coordlang.verify(rings.language, GRID, OPEN, tasks="all", jobs=1)
+        api.ground(rings.language, GRID, OPEN, jobs=1)
+    assert not api.verify(rings.language, GRID, OPEN, tasks="all", jobs=1)
 
 
 def test_a_lifted_language_is_used_as_it_is(rings: Lifted, plan: Path) -> None:
     """In a task whose states are in no table: say, understand, choices, explain."""
     lifted = rings.language
-    said = coordlang.say(lifted, GRID, LARGER, plan)
+    said = api.say(lifted, GRID, LARGER, plan)
     assert said.covered
-    assert coordlang.understand(lifted, GRID, LARGER, said.sentence).count >= 1
-    found = coordlang.choices(lifted, GRID, LARGER, said.sentence, check=True)
+    assert api.understand(lifted, GRID, LARGER, said.sentence).count >= 1
+    found = api.choices(lifted, GRID, LARGER, said.sentence, check=True)
     assert found.guaranteed
     assert found.monitor("r1").allowed()
-    explained = coordlang.explain(lifted, GRID, LARGER)
+    explained = api.explain(lifted, GRID, LARGER)
     assert "w3: column(at(r1)) >= 1 and row(at(r1)) >= 1" in str(explained)
     assert explained.words.head.startswith("4 words for 1 task of r1, r2; lifted; verified here")
 
@@ -109,26 +118,26 @@ def test_a_lifted_language_is_used_as_it_is(rings: Lifted, plan: Path) -> None:
 def test_another_domain(rings: Lifted) -> None:
     folder = DOMAINS / "push-box"
     with pytest.raises(BadInput, match="belongs to another domain"):
-        coordlang.ground(rings.language, folder / "domain.pddl", folder / "next-door.pddl")
+        api.ground(rings.language, folder / "domain.pddl", folder / "next-door.pddl")
 
 
 def test_other_robots(rings: Lifted) -> None:
     three = DOMAINS / "grid" / "three-robots-3x3.pddl"
     with pytest.raises(BadInput, match="about r1, r2, and the robots here are r1, r2, r3"):
-        coordlang.ground(rings.language, GRID, three, tasks=None, jobs=1)
+        api.ground(rings.language, GRID, three, tasks=None, jobs=1)
     with pytest.raises(BadInput, match="the robots are r1, r2, r3, those of gwb1-2x4 r1, r2"):
-        coordlang.lift(GRID, RINGS[0], three, jobs=1)
+        api.lift(GRID, RINGS[0], three, jobs=1)
 
 
 def test_what_contradicts_what_was_learned(rings: Lifted) -> None:
     with pytest.raises(UsageError, match="is a lifted language"):
-        coordlang.build(GRID, LARGER, start=rings.language)
+        api.build(GRID, LARGER, start=rings.language)
     with pytest.raises(UsageError, match="--check and --factored"):
-        coordlang.lift(factored=GRID.parent, check=[SMALL])
+        api.lift(factored=GRID.parent, check=[SMALL])
     with pytest.raises(UsageError, match=r"--robots r1 contradicts the domain"):
-        coordlang.ground(rings.language, GRID, LARGER, robots=["r1"])
+        api.ground(rings.language, GRID, LARGER, robots=["r1"])
     with pytest.raises(UsageError, match=r"--cost makespan\+actions contradicts"):
-        coordlang.ground(rings.language, GRID, LARGER, cost="makespan+actions")
+        api.ground(rings.language, GRID, LARGER, cost="makespan+actions")
 
 
 def test_a_problem_without_tasks(rings: Lifted, tmp_path: Path) -> None:
@@ -140,16 +149,16 @@ def test_a_problem_without_tasks(rings: Lifted, tmp_path: Path) -> None:
         + ")(:goal (at r1 c0-0)))"
     )
     with pytest.raises(ProvedImpossible, match="there is no candidate task") as error:
-        coordlang.lift(GRID, OPEN, stuck, tasks="all", jobs=1)
+        api.lift(GRID, OPEN, stuck, tasks="all", jobs=1)
     assert "stuck.pddl" in str(error.value)
     with pytest.raises(ProvedImpossible, match="there is no candidate task"):
-        coordlang.ground(rings.language, GRID, stuck, jobs=1)
+        api.ground(rings.language, GRID, stuck, jobs=1)
 
 
 @pytest.mark.parametrize("wrong", [{"prefer": "nothing"}, {"complexity": 0}, {"seed": -1}])
 def test_wrong_options(wrong: dict[str, object]) -> None:
     with pytest.raises(UsageError):
-        coordlang.lift(GRID, OPEN, jobs=1, **wrong)
+        api.lift(GRID, OPEN, jobs=1, **wrong)
 
 
 def test_an_empty_claim_helps_nobody(rings: Lifted) -> None:
@@ -157,13 +166,13 @@ def test_an_empty_claim_helps_nobody(rings: Lifted) -> None:
     data = json.loads(to_bytes(rings.language))
     data["values"], data["verified"] = {}, []
     lifted = lifted_of(data)
-    language = coordlang.ground(lifted, GRID, LARGER, jobs=1)
+    language = api.ground(lifted, GRID, LARGER, jobs=1)
     assert set(language.words) == {"v0.0", "v0.1", "v1.0", "v1.1"}
-    unverified = coordlang.ground(lifted, GRID, LARGER, verified=False, jobs=1)
+    unverified = api.ground(lifted, GRID, LARGER, verified=False, jobs=1)
     assert unverified.guarantee.method == "lifted; not verified here"
     data["features"] = []
     with pytest.raises(Refuted):
-        coordlang.ground(lifted_of({**data, "words": ["w0"]}), GRID, LARGER, jobs=1)
+        api.ground(lifted_of({**data, "words": ["w0"]}), GRID, LARGER, jobs=1)
 
 
 def lifted_of(data: dict[str, object]) -> LiftedLanguage:
@@ -203,11 +212,11 @@ def test_damaged_files(name: str, rings: Lifted) -> None:
 
 def test_features_that_give_other_words_are_not_shown(rings: Lifted) -> None:
     """A language file whose table was changed by hand."""
-    language = coordlang.ground(rings.language, GRID, LARGER, jobs=1)
+    language = api.ground(rings.language, GRID, LARGER, jobs=1)
     key = next(iter(language.states))
     changed = replace(language, states={**language.states, key: "w3"})
     with pytest.warns(Note, match="do not give its states their words"):
-        assert "column(" not in str(coordlang.explain(changed, GRID, LARGER))
+        assert "column(" not in str(api.explain(changed, GRID, LARGER))
 
 
 INSEPARABLE = """(define (domain d) (:requirements :typing) (:types robot)
@@ -228,10 +237,10 @@ def test_plans_with_the_same_states(tmp_path: Path) -> None:
         "(:goal (and (done r1) (done r2))))"
     )
     with pytest.raises(Inseparable, match="pass through the same states") as error:
-        coordlang.lift(domain, problem, jobs=1)
+        api.lift(domain, problem, jobs=1)
     assert error.value.position == Position(str(problem))
     with pytest.raises(ProvedImpossible, match="tells states apart") as remembering:
-        coordlang.lift(domain, problem, remember_actions=True, jobs=1)
+        api.lift(domain, problem, remember_actions=True, jobs=1)
     for raised in (error, remembering):
         assert "Features see what is true, and not what was done last" in str(raised.value)
 
@@ -241,7 +250,7 @@ def test_coordinates_given_as_objects() -> None:
     small = parse_problem(Source("small", SMALL.read_text()), read_domain(GRID))
     assert read_coordinates_of({"C0-0": (0.0, 1.0)}, small) == {"c0-0": (0.0, 1.0)}
     with pytest.raises(BadInput, match="the coordinates must be between"):
-        coordlang.lift(GRID, SMALL, coordinates={"c0-0": (float("nan"), 0.0)}, jobs=1)
+        api.lift(GRID, SMALL, coordinates={"c0-0": (float("nan"), 0.0)}, jobs=1)
 
 
 def test_coordinates_that_are_missing(rings: Lifted, tmp_path: Path) -> None:
@@ -250,7 +259,113 @@ def test_coordinates_that_are_missing(rings: Lifted, tmp_path: Path) -> None:
     text = RINGS[0].read_text()
     problem.write_text(text.replace("c0-", "upper").replace("c1-", "lower"))
     with pytest.raises(Refuted, match=r"are they known here \(--coordinates\)\?"):
-        coordlang.ground(rings.language, GRID, problem, jobs=1)
+        api.ground(rings.language, GRID, problem, jobs=1)
     points = {f"{row}{x}": (x, y) for y, row in enumerate(("upper", "lower")) for x in range(4)}
-    language = coordlang.ground(rings.language, GRID, problem, coordinates=points, jobs=1)
+    language = api.ground(rings.language, GRID, problem, coordinates=points, jobs=1)
     assert language.guarantee.method == "lifted; verified here"
+
+
+# At the terminal: exit codes, files, the page
+
+
+def test_files_on_stdout(
+    coordlang: Command, lifted: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """``-`` is stdout, and no file of that name; what is said goes to stderr."""
+    monkeypatch.chdir(tmp_path)
+    out = coordlang("lift", GRID, *RINGS, "--tasks", "all", "-o", "-", "--jobs", "1")
+    assert (out.code, out.out) == (0, lifted.read_text())
+    assert "4 words, functions of 2 features" in out.err
+    assert coordlang("ground", lifted, GRID, LARGER, "-o", "l.json", "--jobs", "1").code == 0
+    out = coordlang("ground", lifted, GRID, LARGER, "-o", "-", "--jobs", "1")
+    assert (out.code, out.out) == (0, Path("l.json").read_text())
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["l.json"]
+
+
+def test_where_the_memory_does_not_suffice(
+    coordlang: Command, lifted: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is written all the same, covers nothing, and exit code 3 says that it lacks the proof."""
+
+    def too_large(*_: object) -> None:
+        raise api.OutOfMemory("the walk would need 47 GiB")
+
+    monkeypatch.setattr("coordlang.commands.lift.verify_candidates", too_large)
+    language = tmp_path / "language.json"
+    outcome = coordlang("ground", lifted, GRID, LARGER, "-o", language, "--jobs", "1")
+    assert outcome.code == 3
+    assert "not verified here: the walk would need 47 GiB" in outcome.err
+    assert json.loads(language.read_text())["tasks"]["count"] == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (("lift", GRID), 2),
+        (("lift", GRID, OPEN, "--tasks", "all", "--complexity", "3", "-o", "x.json"), 11),
+        (("lift", GRID, "missing.pddl", "-o", "x.json"), 31),
+        (("ground", "missing.json", GRID, OPEN, "-o", "x.json"), 31),
+    ],
+)
+def test_exit_codes(
+    arguments: tuple[object, ...], code: int, coordlang: Command, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    assert coordlang(*arguments).code == code
+    assert not (tmp_path / "x.json").exists()
+
+
+def test_the_report_shows_the_features(coordlang: Command, lifted: Path, tmp_path: Path) -> None:
+    """Words have the same numbers, and so colours, on every map; states are coloured by them."""
+    page = tmp_path / "page.html"
+    assert coordlang("report", lifted, GRID, LARGER, "-o", page).code == 0
+    text = page.read_text()
+    assert "The words are functions of features" in text
+    data = data_of(page.read_bytes())
+    assert [word["name"] for word in data["words"]] == ["w0", "w1", "w2", "w3"]
+    assert data["words"][3]["terms"] == ["column(at(r1)) >= 1 and row(at(r1)) >= 1"]
+    corner = [
+        data["words"][word]["name"]
+        for state, word in zip(data["states"], data["state_words"], strict=True)
+        if "(at r1 c0-0)" in {data["facts"][fact]["text"] for fact in state}
+    ]
+    assert set(corner) == {"w0"}
+
+
+def test_coordinates_beside_the_problem(coordlang: Command, tmp_path: Path) -> None:
+    """Places without telling names: a file says where they are, and features use it."""
+    text = OPEN.read_text().replace("c0-", "upper").replace("c1-", "lower")
+    domain, problem, out = tmp_path / "d.pddl", tmp_path / "p.pddl", tmp_path / "l.json"
+    domain.write_text(GRID.read_text())
+    problem.write_text(text)
+    points = {f"{row}{x}": [x, y] for y, row in enumerate(("upper", "lower")) for x in range(3)}
+    (tmp_path / "coordinates.json").write_text(json.dumps({"coordinates": points}))
+    outcome = coordlang(
+        "lift", domain, problem, "--tasks", "all", "--complexity", "5", "-o", out, "--jobs", "1"
+    )
+    assert outcome.code == 0
+    assert "column(at(" in outcome.out
+    assert coordlang("ground", out, domain, problem, "-o", tmp_path / "g.json").code == 0
+    explained = coordlang("explain", tmp_path / "g.json", domain, problem)
+    assert "column(at(" in explained.out
+
+
+def test_a_limit_ends_the_search_for_fewer_words(
+    coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The words that are verified already are written: exit code 3; 130 after an interrupt."""
+    late = api.OutOfTime("the time limit is over")
+    for error, code in ((late, 3), (MemoryError(), 3), (KeyboardInterrupt(), 130)):
+
+        def stop(*_: object, error: BaseException = error) -> None:
+            raise error
+
+        monkeypatch.setattr("coordlang.lifted.learning.merge_classes", stop)
+        path = tmp_path / f"{code}.json"
+        outcome = coordlang(
+            "lift", GRID, SMALL, "--tasks", "all", "--prefer", "features", "-o", path, "--jobs", 1
+        )
+        assert outcome.code == code
+        assert "the best words so far are written: they are verified" in outcome.err
+        assert len(json.loads(path.read_text())["words"]) > 1
