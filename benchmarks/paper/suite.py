@@ -10,7 +10,7 @@ from pathlib import Path
 from benchmarks.frame import DOMAINS
 from benchmarks.paper.recipe import Record
 from benchmarks.paper.reported import TABLE_1
-from coordlang.commands.building import build_few_words, build_language
+from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
 from coordlang.language.listed import ListedTask, read_task_file
 from coordlang.language.words import Language
@@ -122,7 +122,7 @@ def language_for(
     candidates = world.candidates(listed, options)
     if method in ("few", "silence"):
         words = {"few": 2, "silence": 1}[method]
-        built = build_few_words(candidates, words, seed=seed)
+        built = build_language(candidates, words=words, seed=seed)
     elif method == "flexible":
         built = build_language(candidates, "minimal", seed=seed, prefer="flexible")
     else:

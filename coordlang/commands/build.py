@@ -13,18 +13,18 @@ from time import monotonic, perf_counter
 from typing import Any
 
 import coordlang
-from coordlang.commands.building import build_few_words, build_language
-from coordlang.commands.built import Built, built_text
-from coordlang.commands.inputs import Arguments, PlanningInput, public, read_language, say_size
+from coordlang.commands.building import Built, build_language
+from coordlang.commands.inputs import Arguments, PlanningInput, note_size, public, read_language
 from coordlang.commands.options import EFFORT, LanguageSource
 from coordlang.commands.records import BuildOptions
-from coordlang.commands.repairing import repair_language
 from coordlang.commands.terminal import (
     UNPROVED,
     code_of_interrupt,
     echo,
     line_width,
     note_single_robot,
+    say,
+    tell,
     why_stopped,
     working,
 )
@@ -34,6 +34,7 @@ from coordlang.language.recorded import check_domain, with_recorded
 from coordlang.language.words import Language
 from coordlang.required.task_answers import requiring
 from coordlang.verification.certificate_file import Certificate, write_certificate
+from coordlang.vocabulary import EXACT
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import OutOfTime, ProvedImpossible, UsageError
 from planners.system.limits import run_until_stopped, start_clock, stop_clock, time_left
@@ -51,45 +52,40 @@ def build(arguments: Arguments, options: BuildOptions) -> Built:
 
     Where ``words`` are too few for one, the result is none, and says so (``failures``).  A language
     to repair (``start``) also serves the tasks that it records, unless the map has changed.  The
-    language does not depend on ``jobs``, ``scheduler`` and ``resume``.
-
-    Raises
-    ------
-    Inseparable
-        If plans that do not mix pass through the same states; ``remember_actions`` helps.
-    ProvedImpossible
-        For a candidate task without a plan, unless such tasks are skipped.
-    OutOfTime, OutOfMemory
-        If a limit was hit before there was any verified language; later the language so far is
-        returned, with ``stopped`` set.
+    language does not depend on ``jobs``, ``scheduler`` and ``resume``.  Raises `Inseparable` if
+    plans that do not mix pass through the same states; ``remember_actions`` helps,
+    `ProvedImpossible` for a candidate task without a plan, unless such tasks are skipped, and
+    `OutOfTime` or `OutOfMemory` if a limit was hit before there was any verified language; later
+    the language so far is returned, with ``stopped`` set.
     """
-    start = options.start
+    way = options.way
     begin, deadline = perf_counter(), monotonic() + time_left()
     files = arguments.read()
-    if start is None:
+    old = None
+    if options.start is None:
         candidates = _candidates(files, options, files.source.model)
     else:
-        old, candidates = _to_repair(start, files, options)
+        old, candidates = _to_repair(options.start, files, options)
     seconds = {"space": perf_counter() - begin}
-    say_size(candidates, options.work.note or options.progress)
+    note_size(candidates)
     fewest = requiring(candidates.spaces) if candidates.kind != "all" else None
     with options.work.opened() as workers:
-        how: dict[str, Any] = {"workers": workers, "seed": options.way.seed}
-        if options.progress is not None:
-            how["progress"] = options.progress
-        if options.words is not None:
-            built = build_few_words(candidates, options.words, worst=options.worst, **how)
-        elif start is not None:
-            built = repair_language(candidates, old, **how)
-        else:
-            reserve = _FOR_CERTIFICATE if options.certificate else options.reserve
-            built = build_language(candidates, reserve=reserve, **asdict(options.way) | how)
+        built = build_language(
+            candidates,
+            options=way,
+            words=options.words,
+            worst=options.worst,
+            start=old,
+            reserve=_FOR_CERTIFICATE if options.certificate else 0.0,
+            progress=say,
+            workers=workers,
+        )
     seconds |= built.seconds
     language = _with_producer(
         built.language,
         version=coordlang.__version__,
         arguments=_arguments(options),
-        seed=options.way.seed,
+        seed=way.seed,
         solver=f"python-sat {version('python-sat')}",
         seconds={name: round(value, 3) for name, value in seconds.items()},
     )
@@ -146,8 +142,8 @@ def _with_producer(language: Language, **more: Any) -> Language:
 def show_build(built: Built, options: BuildOptions) -> int:
     """Write the language and its certificate, and say what was found."""
     output, certificate = options.output, options.certificate
-    for name in built.skipped:
-        echo(f"coordlang: left out, it has no plan: {name}", err=True)
+    for name in built.candidates.skipped:
+        tell(f"left out, it has no plan: {name}")
     note_single_robot(built.candidates.model.robots)
     proof, unproved = _certificate(built) if certificate else (None, None)
     stop_clock()  # the work is done; from here on it is saved
@@ -155,13 +151,12 @@ def show_build(built: Built, options: BuildOptions) -> int:
     try:
         if certificate and proof is not None and stopped is None:
             _write_certificate(built, proof, output, certificate)
-        if options.as_json and output != "-":
+        to_stderr = output == "-"
+        if options.as_json and not to_stderr:
             echo(json.dumps(built.data()))
         else:
-            to_stderr = output == "-"
             place = "stdout" if to_stderr else visible(output)
-            text = built_text(built, line_width(err=to_stderr))
-            echo(f"{text}written to {place}", err=to_stderr)
+            echo(f"{built.text(line_width(err=to_stderr))}written to {place}", err=to_stderr)
     except KeyboardInterrupt as error:
         stopped = error
     return _exit_code(built, output, certificate, stopped)
@@ -203,14 +198,9 @@ def _certificate(built: Built) -> tuple[Certificate | None, BaseException | None
             proofs.append(built.certificate())
 
     stopped = run_until_stopped(prove)
-    if stopped is None:
-        return proofs[0], None
-    if not isinstance(stopped, KeyboardInterrupt):
-        echo(
-            "coordlang: no certificate is written: there was no time or memory left for it",
-            err=True,
-        )
-    return None, stopped
+    if stopped is not None and not isinstance(stopped, KeyboardInterrupt):
+        tell("no certificate is written: there was no time or memory left for it")
+    return (None if stopped else proofs[0]), stopped
 
 
 def _write_certificate(built: Built, proof: Certificate, output: str, path: str) -> None:
@@ -220,22 +210,19 @@ def _write_certificate(built: Built, proof: Certificate, output: str, path: str)
         error.reached = _written(built, output)
         raise
     if not built.guarantee.proved_minimal:
-        echo(
-            "coordlang: the certificate proves a lower bound of "
-            f"{counted(built.guarantee.lower_bound, 'word')}, not that {built.guarantee.size:,} "
-            "are the fewest",
-            err=True,
-        )
+        bound = counted(built.guarantee.lower_bound, "word")
+        least = f"not that {built.guarantee.size:,} are the fewest"
+        tell(f"the certificate proves a lower bound of {bound}, {least}")
 
 
 def _exit_code(
     built: Built, output: str, certificate: str | None, ended: BaseException | None
 ) -> int:
     """The exit code; says what ended the work early: ``ended`` after the language was built."""
-    proved, exact = built.guarantee.proved_minimal, built.is_exact
+    proved, exact = built.guarantee.proved_minimal, built.guarantee.method in EXACT
     stopped = ended or built.stopped
     if isinstance(stopped, KeyboardInterrupt):
-        echo(f"coordlang: interrupted; {_written(built, output, certificate)}", err=True)
+        tell(f"interrupted; {_written(built, output, certificate)}")
         return code_of_interrupt(stopped)
     if stopped is not None:
         reason = why_stopped(stopped)
@@ -243,20 +230,18 @@ def _exit_code(
             reason += ", a part of it kept for the certificate"
         short_of = "" if proved and exact else ", without proof"
         best = "language" if built.few_words is None else "partition into words"
-        echo(f"coordlang: {reason}; the best {best} so far is written{short_of}", err=True)
-    if exact:
-        return 0 if proved and ended is None else UNPROVED
-    return 0 if stopped is None else UNPROVED
+        tell(f"{reason}; the best {best} so far is written{short_of}")
+    is_short = not proved or ended is not None if exact else stopped is not None
+    return UNPROVED if is_short else 0
 
 
 def _written(built: Built, output: str, certificate: str | None = None) -> str:
     """What is written when the work ends early, and what is proved of it."""
     where = "" if output == "-" else f" to {output}"
+    text = f"the best language so far is written{where}: it is "
+    text += "verified" if built.verdict.holds else "no coordination language"
     if built.guarantee.proved_minimal:
         text = f"the language is written{where}: it is verified and proved minimal"
-    else:
-        text = f"the best language so far is written{where}: it is "
-        text += "verified" if built.verdict.holds else "no coordination language"
     if certificate is None or is_device(certificate):
         return text
     # The certificate of another language went when this one was written.

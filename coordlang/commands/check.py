@@ -48,10 +48,7 @@ class CrossCheck(Presented):
 def check(files: Arguments, options: CheckOptions) -> CrossCheck:
     """Compare our optimal cost with Fast Downward's.
 
-    Raises
-    ------
-    CoordlangError
-        If Fast Downward gives no answer.
+    Raises `CoordlangError` if Fast Downward gives no answer.
     """
     loaded = files.instance()
     task = loaded.tasks[0]

@@ -17,7 +17,7 @@ from coordlang.commands.inputs import Arguments, InTask, public
 from coordlang.commands.layout import alike, columns, named, wrapped
 from coordlang.commands.options import File
 from coordlang.commands.records import ChoicesOptions
-from coordlang.commands.terminal import REFUTED, covered_code, echo, line_width, note, write
+from coordlang.commands.terminal import REFUTED, covered_code, echo, line_width, write
 from coordlang.commands.witness import witness_text
 from coordlang.execution import choices as execution
 from coordlang.execution.choices import RobotChoices, SentenceChoices, to_bytes
@@ -31,8 +31,8 @@ from coordlang.required.miscoordination import Miscoordination
 from planners.pddl.model_options import names_in
 from planners.search.plan_file import json_count
 from planners.search.plans import Plans
-from planners.system.errors import Refuted, UsageError
-from planners.system.notebook import counted, html_table
+from planners.system.errors import Refuted, UsageError, note
+from planners.system.notebook import counted
 from planners.system.writing import write_atomically
 
 #: Additions that are made to count how often choices fail, some seconds of work.
@@ -71,9 +71,9 @@ class RobotsChoices(InTask):
     @property
     def failure(self) -> Fraction | None:
         """How often robots fail that draw plans of the sentence; None: too much to count."""
+        used = self.used
         if self.guaranteed:
             return Fraction(0)
-        used = self.used
         try:
             return failure_of_sentence(used.space, used.start, self.found.fits, _ADDITIONS)
         except TooManyToCount:
@@ -108,23 +108,14 @@ class RobotsChoices(InTask):
         """Write a choices file, for `Monitor.read` on the robot; complete or not at all."""
         write_atomically(fspath(path), to_bytes(self.found, self.chosen))
 
-    def _repr_html_(self) -> str:
-        rows = [(robot, f"{number:,}") for robot, number in self.subplans.items()]
-        return html_table(("robot", "subplans"), rows, f'under "{self.sentence}"')
-
 
 @public(ChoicesOptions)
 def choices(files: Arguments, options: ChoicesOptions) -> RobotsChoices:
     """Find the subplans that each robot may follow under a sentence, whatever the others choose.
 
-    Raises
-    ------
-    NoPlanFits
-        If no optimal plan has the sentence.
-    UsageError
-        For a robot that there is none of.
-    OutOfMemory
-        If the automata, or with ``check`` the combinations, do not fit into the memory.
+    Raises `NoPlanFits` if no optimal plan has the sentence, `UsageError` for a robot that there is
+    none of, and `OutOfMemory` if the automata, or with ``check`` the combinations, do not fit into
+    the memory.
     """
     said = files.needed("SENTENCE")
     used = files.task().used
@@ -168,25 +159,25 @@ def show_choices(found: RobotsChoices, options: ChoicesOptions) -> int:
 
 def _guarantee_code(found: RobotsChoices, check: bool) -> int:
     """The exit code of what is guaranteed; writes to stderr what is not."""
-    is_claimed = found.tolerance is not None and found.tolerance.may_fail
-    is_tolerated = found.covered and not check and is_claimed
+    may_fail = found.tolerance is not None and found.tolerance.may_fail
+    is_tolerated = found.covered and not check and may_fail
     if found.witness is not None:
         if is_tolerated:
             failure = found.failure
             share = "" if failure is None else f" in {percent(float(failure))} of all runs"
-            echo(f"choices of this task miscoordinate{share}, for example:", err=True)
+            said = f"choices of this task miscoordinate{share}, for example:"
         else:
             why = "the language does not cover it"
             if found.covered:
                 why = "the file holds no coordination language"
-            echo(f"coordlang: refuted: choices of this task miscoordinate; {why}", err=True)
-        echo(witness_text(found.witness, line_width(err=True)), err=True)
+            said = f"coordlang: refuted: choices of this task miscoordinate; {why}"
+        echo(f"{said}\n{witness_text(found.witness, line_width(err=True))}", err=True)
         if not is_tolerated:
             return REFUTED
     if check and not found.covered:
         note("the language does not cover this task; --check proved this sentence")
         return 0
-    return covered_code(found.covered, found.tolerance)
+    return covered_code(found)
 
 
 def _followed(
@@ -207,12 +198,12 @@ def _followed(
 
 
 def _monitor_text(at: Monitor, answer: Answer | None) -> str:
+    may = " or ".join(text or "idle" for text in at.allowed())
+    lines = [
+        f"step {at.step + 1}: {at.robot} may do {may}; {counted(at.remaining, 'subplan')} left"
+    ]
     if at.finished:
         lines = [f"{at.robot} has done all its {counted(at.step, 'step')}"]
-    else:
-        may = " or ".join(text or "idle" for text in at.allowed())
-        left = counted(at.remaining, "subplan")
-        lines = [f"step {at.step + 1}: {at.robot} may do {may}; {left} left"]
     if answer is not None and not answer:
         lines.append("the detour is not possible any more, whatever it does")
     elif answer is not None:

@@ -7,7 +7,7 @@ A command calls the Python function of its name and shows the result; nothing el
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from importlib import import_module
 from pathlib import Path
@@ -15,11 +15,11 @@ from typing import Any, get_args, get_origin
 
 import click
 
-from coordlang.commands.options import CommandOptions, Kept, Limits, OutputFile
-from coordlang.commands.terminal import echo, line_width, note, working
-from planners.system.errors import CoordlangError, OutOfTime, UsageError
+from coordlang.commands.options import CommandOptions, Limits, OutputFile
+from coordlang.commands.terminal import SAYING, echo, line_width, working
+from planners.system.errors import CoordlangError, OutOfTime, UsageError, note
 from planners.system.limits import default_memory_limit, limited_memory, require_memory, time_limit
-from planners.system.options import Given, options_of, record_from
+from planners.system.options import Option, options_of, record_from
 
 #: Arguments that --factored stands for.
 _PDDL = ("DOMAIN", "PROBLEM", "PROBLEMS...")
@@ -38,29 +38,35 @@ def command_of(
     `coordlang.commands.inputs.public`, and ``show_NAME``, which gets the result and the options,
     writes, and returns the exit code, None for 0.
     """
-    records = [record, Kept, Limits] if record.keeps_plans else [record, Limits]
-    named = {each.name: each for kind in records for each in options_of(kind)}
-    on_cli = [each for each in named.values() if each.option.only != "python"]
+    on_cli = [each for each in options_of(record) if each.only != "python"]
+    if not record.keeps_plans:
+        on_cli = [each for each in on_cli if each.name != "no_cache"]
+    named = {each.name: each for each in on_cli}
 
     def called(arguments: tuple[str, ...] = (), **values: object) -> int | None:
-        given = {key: value for key, value in values.items() if _was_given(key)}
-        read = _positional(record, named, arguments, given)
-        own, kept, limits = (
-            {each.name: given[each.name] for each in options_of(kind) if each.name in given}
-            for kind in (record, Kept, Limits)
-        )
+        context = click.get_current_context()
+        said = click.core.ParameterSource.COMMANDLINE
+        given = {k: v for k, v in values.items() if context.get_parameter_source(k) is said}
+        is_factored, read = given.get("factored") is not None, {}
+        if record.alone is None or record.alone not in given:
+            read = positional(record.takes, arguments, is_factored=is_factored)
+        elif arguments or is_factored:
+            instead = f"{named[record.alone].spelling} {named[record.alone].metavar} alone"
+            raise click.UsageError(f"expected {instead}, without {record.takes}")
+        files = [(each, given[each.name]) for each in on_cli if each.name in given]
+        if given.get("as_json") and "form" in named:
+            if (form := given.get("form", "json")) != "json":
+                short = "--json is short for --format json"
+                raise click.UsageError(f"{short}: leave out --format {form}")
+            given["form"] = "json"
         module = loaded(f"coordlang.commands.{record.module or name}")
-        is_kept = record.keeps_plans and not record_from(Kept, kept, name).no_cache
+        options = record_from(record, given, name, on_cli=True)
+        is_kept = record.keeps_plans and not options.no_cache
         cache = _keeping() if is_kept else nullcontext()
-        with limited(record_from(Limits, limits, name)), cache, _said(own.get("resume")):
-            with working(record.doing) as progress:
-                for key, value in (("progress", progress), ("note", note)):
-                    if key in named and named[key].kind == Callable[[str], None]:
-                        own[key] = value
-                options = record_from(record, own, name, on_cli=True)
-                given_files = [(each, given[each.name]) for each in on_cli if each.name in given]
-                outputs = [*_named_outputs(given_files), *options.outputs()]
-                check_outputs(outputs, _read_files(arguments, given_files))
+        with limited(options.limits), cache, _said(given.get("resume")):
+            with working(record.doing) as context.meta[SAYING]:
+                outputs, inputs = _files(arguments, files)
+                check_outputs([*outputs, *options.outputs()], inputs)
                 result = getattr(module, name).with_record(options, **read)
             shown: int | None = getattr(module, f"show_{name}")(result, options)
             return shown
@@ -68,29 +74,6 @@ def command_of(
     argument = click.Argument(["arguments"], nargs=-1, type=FILE, metavar=record.takes)
     params = [*([argument] if record.takes else []), *map(_click_option, on_cli)]
     return click.Command(name, params=params, callback=called, help=record.__doc__)
-
-
-def _was_given(name: str) -> bool:
-    """Whether this parameter of the command stands on the command line."""
-    source = click.get_current_context().get_parameter_source(name)
-    return source is click.core.ParameterSource.COMMANDLINE
-
-
-def _positional(
-    record: type[CommandOptions],
-    named: Mapping[str, Given],
-    arguments: tuple[str, ...],
-    given: Mapping[str, object],
-) -> dict[str, object]:
-    """The arguments by name; none where the option is given in whose presence there are none."""
-    is_factored = given.get("factored") is not None
-    if record.alone is None or record.alone not in given:
-        return positional(record.takes, arguments, is_factored=is_factored)
-    if arguments or is_factored:
-        alone = named[record.alone]
-        instead = f"{alone.spelling} {alone.option.metavar} alone"
-        raise click.UsageError(f"expected {instead}, without {record.takes}")
-    return {}
 
 
 def positional(takes: str, given: tuple[str, ...], *, is_factored: bool) -> dict[str, object]:
@@ -154,33 +137,31 @@ def _said(resume: object) -> Iterator[None]:
         raise
 
 
-def _paths(value: object) -> list[str]:
-    return [*map(str, value)] if isinstance(value, tuple) else [str(value)]
+def _files(
+    arguments: tuple[str, ...], given: Iterable[tuple[Option, object]]
+) -> tuple[list[OutputFile], list[str]]:
+    """The files that options name, or that are written into a folder that one names; and others.
 
-
-def _read_files(arguments: tuple[str, ...], given: Iterable[tuple[Given, object]]) -> list[str]:
-    """Files that no output may overwrite: arguments, what is read beside them, those of options."""
+    These no output may overwrite: arguments, what is read beside them, those of options.
+    """
+    outputs: list[OutputFile] = []
     read = [*arguments, *(str(Path(path).parent / "coordinates.json") for path in arguments)]
     for each, value in given:
+        paths = [*map(str, value)] if isinstance(value, tuple) else [str(value)]
         if each.name == "factored":
-            read += map(str, Path(str(value)).glob("*.pddl"))
-        elif _names_file(each) and not each.option.is_output:
-            read += _paths(value)
-    return read
-
-
-def _named_outputs(given: Iterable[tuple[Given, object]]) -> Iterator[OutputFile]:
-    """The files that options name, or that are written into a folder that one names."""
-    for each, value in given:
-        paths = _paths(value) if each.option.is_output else []
-        for number, path in enumerate(paths, 1):
+            read += map(str, Path(paths[0]).glob("*.pddl"))
+        elif not each.is_output and _names_file(each):
+            read += paths
+        for number, path in enumerate(paths if each.is_output else (), 1):
             spelling = each.spelling if len(paths) == 1 else f"{each.spelling} {number}"
             if each.name != "output" and path == "-":
                 raise UsageError(f"{spelling} -: this cannot go to stdout", remedy="Name a file.")
-            if each.option.metavar != "DIR":
-                yield OutputFile(spelling, path)
-            for file in each.option.files:
-                yield OutputFile(spelling, os.path.join(path, file) if path else "", True)
+            if each.metavar != "DIR":
+                outputs.append(OutputFile(spelling, path))
+            for file in each.files:
+                place = os.path.join(path, file) if path else ""
+                outputs.append(OutputFile(spelling, place, makes_folder=True))
+    return outputs, read
 
 
 def check_outputs(outputs: Iterable[OutputFile], inputs: Iterable[str]) -> None:
@@ -195,37 +176,27 @@ def check_outputs(outputs: Iterable[OutputFile], inputs: Iterable[str]) -> None:
     for option, path, makes_folder in outputs:
         if path is None or path == "-":
             continue
+        what, remedy = "", "Give the output another name."
         if reason := why_unwritable(path, makes_folder=makes_folder):
             what = f"{option} {path} cannot be written: {reason}"
-            raise UsageError(what, remedy="Name a file in a folder that you may write to.")
-        if is_device(path):
+            remedy = "Name a file in a folder that you may write to."
+        elif is_device(path):
             continue  # a device or a pipe is written to, and never replaced
-        if os.path.exists(path) and any(os.path.samefile(path, other) for other in read):
-            raise UsageError(
-                f"{option} {path} would overwrite an input file",
-                remedy="Give the output another name.",
-            )
-        other = written.setdefault(os.path.realpath(path), option)
-        if other != option:
-            raise UsageError(
-                f"{other} and {option} name the same file: {path}",
-                remedy="Give each a file of its own.",
-            )
+        elif os.path.exists(path) and any(os.path.samefile(path, other) for other in read):
+            what = f"{option} {path} would overwrite an input file"
+        elif (other := written.setdefault(os.path.realpath(path), option)) != option:
+            what = f"{other} and {option} name the same file: {path}"
+        if what:
+            raise UsageError(what, remedy=remedy)
 
 
-def _names_file(given: Given) -> bool:
-    return any(part in (given.option.metavar or "") for part in (*_FILES, "DIR"))
+def _names_file(given: Option) -> bool:
+    return any(part in (given.metavar or "") for part in (*_FILES, "DIR"))
 
 
-def _click_option(given: Given) -> click.Option:
+def _click_option(given: Option) -> click.Option:
     """The option of click's: what it takes comes from the type of the record's field."""
-    described = given.option
-    keywords: dict[str, Any] = {
-        "help": described.help,
-        "metavar": described.metavar,
-        "required": described.required,
-        "multiple": given.default == (),
-    }
+    keywords: dict[str, Any] = {"multiple": given.default == ()}
     if given.kind is bool:
         keywords |= {"is_flag": True, "default": given.default, "flag_value": not given.default}
     elif given.values:
@@ -237,6 +208,7 @@ def _click_option(given: Given) -> click.Option:
     elif _names_file(given):
         keywords["type"] = FILE
     is_shown = given.default not in (None, ()) and not isinstance(given.default, bool)
-    if is_shown and not described.required:
+    if is_shown and not given.required:
         keywords |= {"default": given.default, "show_default": True}
+    keywords |= {"help": given.help, "metavar": given.metavar, "required": given.required}
     return click.Option([*given.spellings, given.name], **keywords)

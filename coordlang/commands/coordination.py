@@ -8,39 +8,38 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from coordlang.commands.inputs import Arguments, public
+from coordlang.commands.inputs import Arguments, extended, public
 from coordlang.commands.layout import WIDTH
 from coordlang.commands.records import CoordinationOptions
 from coordlang.commands.terminal import note_single_robot, show_answer
 from coordlang.commands.witness import witness_data, witness_text
 from coordlang.language.tolerance import percent
-from coordlang.required.failure import FailureEstimate, Failures, mean
+from coordlang.required.failure import Failures, mean
 from coordlang.required.miscoordination import Miscoordination
-from coordlang.required.task_answers import FewestActions, answers
+from coordlang.required.task_answers import TaskAnswer, answers
 from planners.search.plan_file import json_count
-from planners.system.notebook import Presented, counted, html_table
+from planners.system.notebook import Presented, counted
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class TaskCoordination(Presented):
+class TaskCoordination(Presented, TaskAnswer):
     """Whether one task requires coordination (RC); true iff it does.
 
-    ``witness`` has two optimal plans whose mixture is none, or is None.  ``failure`` is how often
-    robots miscoordinate that draw their plans uniformly, independently and without a word: exact;
-    None where that is too much to count, and ``estimate`` is drawn.  Plans take up to ``slack``
-    joint steps more than the (least) ``makespan``.  ``fewest`` says what would hold of the plans
-    with the fewest actions alone, if it is better.
+    ``witness`` has two optimal plans whose mixture is none, or is None.  Plans take up to ``slack``
+    joint steps more than the (least) ``makespan``.
     """
 
-    problem: str
-    makespan: int
-    plans: int
-    witness: Miscoordination | None
-    failure: Fraction | None = Fraction(0)
-    estimate: FailureEstimate | None = None
+    problem: str = ""
     slack: int = 0
-    fewest: FewestActions | None = None
     shown = ("problem", "makespan", "plans", "required", "failure")
+
+    @property
+    def failure(self) -> Fraction | None:
+        """How often robots miscoordinate that draw their plans uniformly and without a word.
+
+        None where that is too much to count.
+        """
+        return self.failures.mean
 
     @property
     def required(self) -> bool:
@@ -52,6 +51,7 @@ class TaskCoordination(Presented):
 
     def data(self) -> dict[str, Any]:
         """The answer as JSON data."""
+        estimate = self.failures.estimate
         return {
             "problem": self.problem,
             "makespan": self.makespan,
@@ -59,7 +59,7 @@ class TaskCoordination(Presented):
             "requires_coordination": self.required,
             "miscoordination": witness_data(self.witness),
             "failure": None if self.failure is None else float(self.failure),
-            **({"failure_estimate": self.estimate.data()} if self.estimate else {}),
+            **({"failure_estimate": estimate.data()} if estimate else {}),
             **({"slack": self.slack} if self.slack else {}),
             **({"fewest_actions": self.fewest.data()} if self.fewest else {}),
         }
@@ -79,19 +79,14 @@ class TaskCoordination(Presented):
         line = f"{self.problem}: {plans}; coordination {answer}"
         if self.witness is None:
             return line
-        return f"{line}{self._failure_text()}\n\n{witness_text(self.witness, width)}"
-
-    def _failure_text(self) -> str:
-        """How often robots fail in silence, as a line of its own."""
-        fewest = f"\n{self.fewest.text()}" if self.fewest else ""
+        share = self.failures.estimate.text() if self.failures.estimate else None
         if self.failure is not None:
             share = percent(float(self.failure))
-        elif self.estimate is not None:
-            share = self.estimate.text()
-        else:
-            return fewest
-        said = f"\nWithout a word, robots that choose by themselves fail in {share} of all runs."
-        return f"{said}{fewest}"
+        if share:
+            line += "\nWithout a word, robots that choose by themselves "
+            line += f"fail in {share} of all runs."
+        fewest = f"\n{self.fewest.text()}" if self.fewest else ""
+        return f"{line}{fewest}\n\n{witness_text(self.witness, width)}"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -100,7 +95,7 @@ class Coordination(Presented):
 
     robots: tuple[str, ...]
     tasks: tuple[TaskCoordination, ...]
-    shown = ("tasks", "requiring")
+    shown = ("requiring", "tasks")
 
     @property
     def requiring(self) -> int:
@@ -118,18 +113,17 @@ class Coordination(Presented):
         return next((task.witness for task in self.tasks if task.witness), None)
 
     @property
-    def failure_mean(self) -> Fraction | None:
+    def failures(self) -> Failures:
         """How often robots fail without a word, over all tasks; None where it is not counted."""
-        return None if (found := self._failures()) is None else mean(found)
+        found = [task.failure for task in self.tasks if task.failure is not None]
+        if len(found) < len(self.tasks):
+            return Failures(None, None)
+        return Failures(mean(found), max(found))
 
     @property
-    def failure_worst(self) -> Fraction | None:
-        """The same in the worst task."""
-        return None if (found := self._failures()) is None else max(found)
-
-    def _failures(self) -> list[Fraction] | None:
-        found = [task.failure for task in self.tasks if task.failure is not None]
-        return found if len(found) == len(self.tasks) else None
+    def failure_mean(self) -> Fraction | None:
+        """How often robots fail without a word, over all tasks; None where it is not counted."""
+        return self.failures.mean
 
     def __bool__(self) -> bool:
         return self.required
@@ -145,8 +139,7 @@ class Coordination(Presented):
 
     def data(self) -> dict[str, Any]:
         """The answers as JSON data."""
-        overall = Failures(self.failure_mean, self.failure_worst)
-        return {"tasks": [task.data() for task in self.tasks], **overall.data()}
+        return {"tasks": [task.data() for task in self.tasks], **self.failures.data()}
 
     def __str__(self) -> str:
         return self.text()
@@ -154,18 +147,9 @@ class Coordination(Presented):
     def text(self, width: int = WIDTH) -> str:
         """The answers in lines of at most ``width`` characters, as far as atoms allow."""
         lines = [task.text(width) for task in self.tasks]
-        overall = Failures(self.failure_mean, self.failure_worst)
-        if len(lines) > 1 and self.required and overall.mean is not None:
-            lines.append(f"\nOver all tasks, without a word, robots {overall.text()}.")
+        if len(lines) > 1 and self.required and self.failures.mean is not None:
+            lines.append(f"\nOver all tasks, without a word, robots {self.failures.text()}.")
         return "\n".join(lines)
-
-    def _repr_html_(self) -> str:
-        head = ("problem", "makespan", "plans", "coordination")
-        rows = [
-            (t.problem, str(t.makespan), f"{t.plans:,}", "required" if t else "not required")
-            for t in self.tasks
-        ]
-        return html_table(head, rows)
 
 
 @public(CoordinationOptions)
@@ -173,27 +157,15 @@ def coordination(files: Arguments, options: CoordinationOptions) -> Coordination
     """Decide which tasks require coordination, and show how robots then miscoordinate.
 
     A task requires coordination (RC) if some mixture of its optimal plans is no optimal plan.
-
-    Raises
-    ------
-    ProvedImpossible
-        For a task without a plan.
+    Raises `ProvedImpossible` for a task without a plan.
     """
     read = files.read()
     loaded = read.instance()
     with options.work.opened() as workers:
         found = answers(loaded, workers)
+    slack = loaded.model.slack
     tasks = tuple(
-        TaskCoordination(
-            problem.source.name,
-            answer.makespan,
-            answer.plans,
-            answer.witness,
-            answer.failures.mean,
-            answer.failures.estimate,
-            loaded.model.slack,
-            answer.fewest,
-        )
+        extended(TaskCoordination, answer, problem.source.name, slack)
         for problem, answer in zip(read.problems, found, strict=True)
     )
     return Coordination(loaded.model.robots, tasks)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,27 +24,25 @@ from planners.system.messages import echoed, visible
 from planners.system.notebook import counted
 from planners.system.writing import copy_folders, write_texts
 
-ALL = "all"
-
 
 @public(DomainsOptions)
 def domains(_: Arguments, options: DomainsOptions) -> list[str]:
     """The names of the domains that are listed or were copied, or of the files of a map."""
     copy, shipped = options.copy, shipped_domains()
-    map_file, scen, agents, output = options.map, options.scen, options.agents, options.output
-    parts = map_file, scen, agents, output
-    if parts != (None,) * 4:
-        if copy or map_file is None or scen is None or agents is None or output is None:
-            raise UsageError(
-                "a map needs --map FILE.map, --scen FILE.scen, --agents K and -o DIR, "
-                "and no --copy",
-                remedy="Give all four of them.",
-            )
-        return _write_map(map_file, scen, agents, output)
+    if options.map is not None and options.scen is not None:
+        return _write_map(options.map, options.scen, options.agents or 0, options.output or "")
     names = domain_names(shipped)
-    if copy is not None:
-        names = _chosen(copy[0], names)
-        _copy(shipped, names, copy[1])
+    if copy is None:
+        return names
+    if copy[0] not in ("all", *names):
+        raise UsageError(
+            f"there is no domain {echoed(copy[0])}", remedy=f"There are {', '.join(names)}, or all."
+        )
+    names, target = names if copy[0] == "all" else [copy[0]], copy[1]
+    for name in names:  # nobody's changes are written over
+        _require_new(path := os.path.join(target, name) if target else "")
+        check_outputs([OutputFile("--copy", path, makes_folder=True)], [])
+    copy_folders([shipped / name for name in names], target)
     return names
 
 
@@ -73,45 +72,24 @@ def _write_map(map_file: str, scen: str, agents: int, output: str) -> list[str]:
     paths = {name: os.path.join(output, name) for name in texts}
     check_outputs([OutputFile("-o", path, True) for path in paths.values()], (map_file, scen))
     for name, path in paths.items():
-        if os.path.lexists(path) and _bytes(path) != texts[name].encode():
-            raise UsageError(
-                f"-o: {path} is there already, and says something else",
-                remedy="Remove it, or name another folder.",
-            )
+        with suppress(OSError):
+            if Path(path).read_bytes() == texts[name].encode():
+                continue
+        _require_new(path, ", and says something else")
     write_texts(output, texts)
     return sorted(texts)
 
 
-def _bytes(path: str) -> bytes | None:
-    try:
-        return Path(path).read_bytes()
-    except OSError:
-        return None
+def _require_new(path: str, what: str = "") -> None:
+    """Raise `UsageError` for what is there already: nothing is written over."""
+    if os.path.lexists(path):
+        remedy = "Remove it, or name another folder."
+        raise UsageError(f"{path} is there already{what}", remedy=remedy)
 
 
 def _data(folder: Path) -> dict[str, object]:
     problems = sorted(path.name for path in folder.glob("*.pddl") if path.name != "domain.pddl")
     return {"name": folder.name, "about": about(folder), "problems": problems}
-
-
-def _chosen(name: str, names: list[str]) -> list[str]:
-    if name != ALL and name not in names:
-        raise UsageError(
-            f"there is no domain {echoed(name)}", remedy=f"There are {', '.join(names)}, or all."
-        )
-    return names if name == ALL else [name]
-
-
-def _copy(shipped: Path, names: list[str], target: str) -> None:
-    """Copy folders, none of which is there already: nobody's changes are written over."""
-    for name in names:
-        path = os.path.join(target, name)
-        if target and os.path.lexists(path):
-            raise UsageError(
-                f"{path} is there already", remedy="Remove it, or name another folder."
-            )
-        check_outputs([OutputFile("--copy", path if target else "", makes_folder=True)], [])
-    copy_folders([shipped / name for name in names], target)
 
 
 @public(TasksOptions)
@@ -125,11 +103,8 @@ def tasks(files: Arguments, options: TasksOptions) -> Sequence[ListedTask]:
 
 def show_tasks(found: Sequence[ListedTask], options: TasksOptions) -> None:
     """Write the file, and say how many tasks there are."""
-    write(tasks_text(found), options.output)
-    starts, goals = ({getattr(task, part) for task in found} for part in ("init", "goal"))
+    starts, goals = (len({getattr(task, part) for task in found}) for part in ("init", "goal"))
+    said = f"{counted(len(found), 'task')}: {counted(starts, 'start')}, {counted(goals, 'goal')}"
     if options.as_json and options.output != "-":
-        figures = {"tasks": len(found), "starts": len(starts), "goals": len(goals)}
-        echo(json.dumps(figures))
-        return
-    line = f"{counted(len(starts), 'start')}, {counted(len(goals), 'goal')}"
-    echo(f"{counted(len(found), 'task')}: {line}", err=options.output == "-")
+        said = json.dumps({"tasks": len(found), "starts": starts, "goals": goals})
+    write(tasks_text(found), options.output, said)

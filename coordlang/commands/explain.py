@@ -38,14 +38,14 @@ from coordlang.language.tolerance import tolerance_data
 from planners.search.plan_file import json_count
 from planners.search.plans import Plans
 from planners.system.errors import OutOfMemory
-from planners.system.notebook import Presented, counted, html_table
+from planners.system.notebook import counted
 
 #: Sentences of a task that the text lists.
 SENTENCES_SHOWN = 10
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class WordsExplained(Presented):
+@dataclass(frozen=True, slots=True)
+class WordsExplained:
     """Each word as a short formula, exact in every state that the language maps.
 
     ``lifted``: formulas over features, if the words are functions of features; else None.
@@ -55,7 +55,7 @@ class WordsExplained(Presented):
     mapped: MappedStates
     covers: Mapping[str, Cover]
     descriptions: WordDescriptions
-    lifted: LiftedWords | None = None
+    lifted: LiftedWords | None
 
     @property
     def formulas(self) -> dict[str, str]:
@@ -72,72 +72,42 @@ class WordsExplained(Presented):
         """Word -> how many of the mapped states it holds."""
         return dict(zip(self.mapped.words, self.mapped.states, strict=True))
 
-    def facts(self) -> Mapping[str, object]:
-        """The words with their formulas."""
-        return self.formulas
-
     def data(self) -> dict[str, Any]:
         """Words, variables and formulas, as ``--json`` has them."""
         variables = self.mapped.valuation.variables
+        rules = [
+            {"word": word, "text": formula_text(cover) if cover else None}
+            for word, cover in self.descriptions.rules
+        ]
         return {
             "words": self.states,
             "default": self.used.language.default,
             "variables": [{"name": v.name, "values": list(v.value_texts)} for v in variables],
             "formulas": {word: cover_data(cover) for word, cover in self.covers.items()},
-            "told": {
-                "in_order": self.descriptions.in_order,
-                "rules": [
-                    {"word": word, "text": formula_text(cover) if cover else None}
-                    for word, cover in self.descriptions.rules
-                ],
-            },
+            "told": {"in_order": self.descriptions.in_order, "rules": rules},
             **({"lifted": self.lifted.data()} if self.lifted else {}),
         }
 
-    def __str__(self) -> str:
-        return f"{self.head}\n{self.formulas_text()}"
-
-    def formulas_text(self) -> str:
-        """Return the formulas as text, without what the language is."""
+    def text(self) -> str:
+        """The formulas as text, and what is proved of their lengths."""
+        default, told = self.used.language.default, self.descriptions
         lines = [self.lifted.text(), "In this problem:"] if self.lifted else []
-        if self.descriptions.in_order:
+        if told.in_order:
             lines.append("The first formula that is true in a state gives its word:")
-        lines.append(descriptions_text(self.descriptions, self.mapped))
-        default = self.used.language.default
+        lines.append(descriptions_text(told, self.mapped))
         if not self.mapped.word.size:
             return "\n".join([*lines, f"No state is mapped: the word is always {default}."])
-        meant = self.used.model.kept_plan
         lines.append(
-            f"Exact in all {counted(sum(self.mapped.states), 'mapped state')}. No {meant} of "
-            f"these tasks leaves them; elsewhere the word is {default}."
+            f"Exact in all {counted(sum(self.mapped.states), 'mapped state')}. No "
+            f"{self.used.model.kept_plan} of these tasks leaves them; elsewhere the word is "
+            f"{default}."
         )
-        return "\n".join([*lines, *self._proof()])
-
-    @property
-    def head(self) -> str:
-        """What the language is, in a line."""
-        language = self.used.language
-        number = language.provenance.tasks["count"]
-        tasks = counted(number, "task") if number else "no recorded task"
-        words, robots = counted(len(language.words), "word"), ", ".join(self.used.model.robots)
-        line = f"{words} for {tasks} of {robots}; {language.guarantee.claim}."
-        tolerance = language.tolerance
-        if tolerance is not None and tolerance.warning is not None:
-            line += f"\n{tolerance.warning[0].upper()}{tolerance.warning[1:]}."
-        return line
-
-    def _proof(self) -> list[str]:
-        """Return what is proved of the formulas' lengths, in at most one line."""
-        rules = self.descriptions.rules
-        long = [word for word, cover in rules if cover and not cover.fewest]
-        if long:
-            return [
-                f"Fewer terms may suffice for {', '.join(long)}; "
-                "for the others it is proved that they do not."
-            ]
-        if self.descriptions.length > 1:
-            return ["It is proved that no formula can do with fewer terms."]
-        return []
+        if long := [word for word, cover in told.rules if cover and not cover.fewest]:
+            rest = "for the others it is proved that they do not."
+            lines.append(f"Fewer terms may suffice for {', '.join(long)}; {rest}")
+        elif told.length > 1:
+            lines.append("It is proved that no formula can do with fewer terms.")
+        return "\n".join(lines)
 
 
 @dataclass(frozen=True, repr=False)
@@ -173,13 +143,9 @@ class Explanation(InTask):
 
     def demands(self, most: int | None = None) -> list[SentenceDemands]:
         """Return what the (first) sentences ask of each robot."""
-        used = self.used
-        return [
-            sentence_demands(
-                used.plans_with(used.words_of(sentence.words)), used.partition, self.words.covers
-            )
-            for sentence in self.sentences[:most]
-        ]
+        used, covers = self.used, self.words.covers
+        plans = [used.plans_with(used.words_of(s.words)) for s in self.sentences[:most]]
+        return [sentence_demands(found, used.partition, covers) for found in plans]
 
     @property
     def formulas(self) -> dict[str, str]:
@@ -208,30 +174,37 @@ class Explanation(InTask):
         }
 
     def __str__(self) -> str:
-        return f"{self.words.head}\n\n{self.task_text()}\n\n{self.words.formulas_text()}"
+        return f"{self.head}\n\n{self.task_text()}\n\n{self.words.text()}"
 
-    def _repr_html_(self) -> str:
-        states = self.words.states
-        rows = [(word, f"{states[word]:,}", text) for word, text in self.formulas.items()]
-        return html_table(("word", "states", "formula"), rows)
+    @property
+    def head(self) -> str:
+        """What the language is, in a line, and in another one what it tolerates."""
+        language, tolerance = self.used.language, self.used.tolerance
+        number = language.provenance.tasks["count"]
+        tasks = counted(number, "task") if number else "no recorded task"
+        words, robots = counted(len(language.words), "word"), ", ".join(self.used.model.robots)
+        line = f"{words} for {tasks} of {robots}; {language.guarantee.claim}."
+        if tolerance is not None and tolerance.warning is not None:
+            line += f"\n{tolerance.warning[0].upper()}{tolerance.warning[1:]}."
+        return line
 
     def task_text(self) -> str:
         """Return the task's sentences as text, without the words."""
         used = self.used
-        total = Plans.of(used.space, used.task).count
-        steps, _ = used.space.cost_of(used.task)
+        total, slack = Plans.of(used.space, used.task).count, used.model.slack
+        steps = counted(used.space.cost_of(used.task)[0], "step")
         plans = f"{counted(total, 'optimal plan')} of"
-        if used.model.slack:
-            plans = f"{counted(total, 'plan')} within slack {used.model.slack}, of at most"
+        if slack:
+            plans = f"{counted(total, 'plan')} within slack {slack}, of at most"
+        sentences = counted(len(self.all_sentences), "sentence")
         lines = [
             f"The task {describe(used.space, used.task)}",
-            f"has {plans} {counted(steps, 'step')} "
-            f"in {counted(len(self.all_sentences), 'sentence')}.",
+            f"has {plans} {steps} in {sentences}.",
         ]
         if self.with_demands and used.guaranteed:
             lines.append(
                 "Each robot may choose for itself: whatever the others choose, "
-                f"it is {'a' if used.model.slack else 'an'} {used.model.kept_plan}."
+                f"it is {'a' if slack else 'an'} {used.model.kept_plan}."
             )
         if self.with_demands:
             for asks in self.demands(SENTENCES_SHOWN):
@@ -240,8 +213,7 @@ class Explanation(InTask):
             for sentence in self.sentences[:SENTENCES_SHOWN]:
                 plans = counted(sentence.plans, "plan")
                 lines.append(f'  "{" ".join(sentence.words)}" leaves {plans} open.')
-        more = len(self.sentences) - SENTENCES_SHOWN
-        if more > 0:
+        if (more := len(self.sentences) - SENTENCES_SHOWN) > 0:
             lines.append(f"  .. and {counted(more, 'more sentence')}")
         return "\n".join(lines)
 
@@ -250,12 +222,8 @@ class Explanation(InTask):
 def explain(files: Arguments, options: ExplainOptions) -> Explanation:
     """Explain a language: each word as a short formula, and the sentences of a task.
 
-    Raises
-    ------
-    OutOfMemory
-        If the task has more than 100,000 sentences.
-    NoPlanFits
-        If no optimal plan has the sentence.
+    Raises `OutOfMemory` if the task has more than 100,000 sentences, and `NoPlanFits` if no optimal
+    plan has the sentence.
     """
     task = files.task()
     used, first = task.used, task.files.problems[0]
@@ -274,28 +242,24 @@ def explain(files: Arguments, options: ExplainOptions) -> Explanation:
 
 
 def show_explain(found: Explanation, options: ExplainOptions) -> int:
-    """Print the sentences of the task, and the words."""
-    if options.as_json:
-        with working("listing the sentences of the task"):
-            data = found.data()
-        echo(json.dumps(data))
-    else:
-        _show_text(found)
-    if options.task:
-        return covered_code(found.covered, found.tolerance)
-    warn_of_failures(found.tolerance)
-    return 0
+    """Print the sentences of the task, and the words.
 
-
-def _show_text(found: Explanation) -> None:
-    """What is easier to read comes first; where a task has too many sentences, the words alone."""
-    echo(found.words.head + "\n")
-    width = line_width()
-    words = fitted(found.words.formulas_text(), width)
+    What is easier to read comes first; where a task has too many sentences, the words alone.
+    """
+    width, words = line_width(), ""
+    if not options.as_json:
+        words = fitted(found.words.text(), width)
+        echo(found.head + "\n")
     try:
         with working("listing the sentences of the task"):
-            task = found.task_text()
+            is_json = options.as_json
+            text = json.dumps(found.data()) if is_json else fitted(found.task_text(), width)
     except OutOfMemory:
-        echo(words)
+        if words:
+            echo(words)
         raise
-    echo(f"{fitted(task, width)}\n\n{words}")
+    echo(f"{text}\n\n{words}" if words else text)
+    if options.task:
+        return covered_code(found)
+    warn_of_failures(found.tolerance)
+    return 0

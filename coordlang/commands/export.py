@@ -6,11 +6,11 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from os import fspath
 from typing import Any
 
-from coordlang.commands.inputs import Arguments, InTask, public
+from coordlang.commands.inputs import Arguments, InTask, extended, public
 from coordlang.commands.plans import PlanSteps
 from coordlang.commands.records import WRITTEN, ExportOptions
 from coordlang.commands.sentences import SentencePlans
@@ -18,10 +18,9 @@ from coordlang.commands.terminal import covered_code, echo, write
 from coordlang.execution.choices import choices as choices_under
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.exports.behaviour_tree import behaviour_trees
-from coordlang.exports.ltlf import export_ltlf
+from coordlang.exports.ltlf import SentenceFormula, export_ltlf
 from coordlang.exports.pddl import PddlExport, export_pddl, plan_names
 from coordlang.language.tolerance import tolerance_data
-from planners.joint.model import JointModel
 from planners.search.plan_file import json_count, only_one_plan
 from planners.system.errors import BadInput, Position, Refuted
 from planners.system.files import read_text
@@ -31,54 +30,27 @@ from planners.system.writing import write_texts
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class ExportedTask(InTask):
-    """A task under a sentence as plain PDDL, whose optimal plans are exactly the plans that fit.
-
-    ``exported`` has its actions as data.
-    """
+class ExportedTask(InTask, PddlExport):
+    """A task under a sentence as plain PDDL, whose optimal plans are exactly the plans that fit."""
 
     used: TaskLanguage
     open_plans: SentencePlans
-    exported: PddlExport
     shown = ("form", "actions", "cost")
-
-    @property
-    def domain(self) -> str:
-        """The text of the PDDL domain."""
-        return self.exported.domain
-
-    @property
-    def problem(self) -> str:
-        """The text of the PDDL problem."""
-        return self.exported.problem
-
-    @property
-    def cost(self) -> int:
-        """The total cost of its optimal plans."""
-        return self.exported.cost
 
     @property
     def form(self) -> str:
         """How joint steps are written: ``explicit`` (one action each) or robot after robot."""
-        return self.exported.classical.form
+        return self.classical.form
 
     @property
     def actions(self) -> int:
         """The number of actions."""
-        return len(self.exported.classical.actions)
-
-    @property
-    def terms(self) -> int:
-        """The number of terms that tell which word a state belongs to."""
-        return self.exported.terms
+        return len(self.classical.actions)
 
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write ``domain.pddl`` and ``problem.pddl`` into a folder, which is made if it is missing.
 
-        Raises
-        ------
-        UsageError
-            If it cannot be written to.
+        Raises `UsageError` if it cannot be written to.
         """
         texts = dict(zip(WRITTEN, (self.domain, self.problem), strict=True))
         write_texts(fspath(folder), texts)
@@ -86,19 +58,12 @@ class ExportedTask(InTask):
     def translate_plan(self, actions: Sequence[str]) -> PlanSteps:
         """Translate a plan of the exported problem, the names of its actions, into joint steps.
 
-        Raises
-        ------
-        BadInput
-            For an action that the exported problem does not have, or a plan that ends in a step.
-        Refuted
-            If it is no optimal plan of the exported problem.
+        Raises `BadInput` as `joint_plan`, and `Refuted` if it is not optimal there.
         """
-        numbers = self.exported.joint_plan(actions)
-        plan = tuple(self.exported.model.texts(step) for step in numbers)
+        plan = tuple(map(self.model.texts, self.joint_plan(actions)))
         if self.open_plans.rank(plan) is None:
-            kind = self.exported.model.kept_plan
             raise Refuted(
-                f"this is no {kind} of the exported problem",
+                f"this is no {self.model.kept_plan} of the exported problem",
                 remedy="Ask the planner for an optimal plan: the one of least total-cost.",
             )
         return plan
@@ -115,35 +80,26 @@ class ExportedTask(InTask):
 
     def data(self) -> dict[str, Any]:
         """The PDDL, and what each action stands for, as ``--json`` has them."""
-        model = self.exported.model
+        labels, robots = self.model.labels, self.model.robots
         return {
             "domain": self.domain,
             "problem": self.problem,
             "form": self.form,
-            "step_cost": self.exported.classical.step_cost,
+            "step_cost": self.classical.step_cost,
             "optimal_cost": self.cost,
-            "robots": list(model.robots),
+            "robots": list(robots),
             "actions": {
-                name: {model.robots[r]: _label_text(model, r, label) for r, label in chosen}
-                for name, chosen in self.exported.labels.items()
+                name: {robots[r]: labels[r][label] if label else None for r, label in chosen}
+                for name, chosen in self.labels.items()
             },
         }
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class ExportedFormula(InTask):
-    """A sentence as an LTLf formula over the states of a plan, the initial state first.
-
-    A plan satisfies ``formula`` exactly if it has the sentence; ``over_words`` is the same with
-    words as symbols, ``words`` has each word's formula, ``symbols`` says which atom each symbol
-    stands for.
-    """
+class ExportedFormula(InTask, SentenceFormula):
+    """A sentence as an LTLf formula over the states of a plan, the initial state first."""
 
     used: TaskLanguage
-    formula: str
-    over_words: str
-    words: dict[str, str]
-    symbols: dict[str, str]
     shown = ("over_words",)
 
     def __str__(self) -> str:
@@ -151,13 +107,8 @@ class ExportedFormula(InTask):
 
     def data(self) -> dict[str, Any]:
         """The formulas, as ``--json`` has them."""
-        return {
-            "formula": self.formula,
-            "over_words": self.over_words,
-            "words": self.words,
-            "symbols": self.symbols,
-            **tolerance_data(self.tolerance),
-        }
+        own = {f.name: getattr(self, f.name) for f in fields(SentenceFormula)}
+        return {**own, **tolerance_data(self.tolerance)}
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -190,21 +141,10 @@ class ExportedTrees(InTask):
 def export(files: Arguments, options: ExportOptions) -> Any:
     """Write a task under a sentence for other programs.
 
-    Returns
-    -------
-    ExportedTask
-        A planning problem whose optimal plans are exactly the plans that fit.
-    ExportedFormula
-        With ``to="ltlf"``: a temporal formula over plans.
-    ExportedTrees
-        With ``to="bt"``: each robot's choices as a behaviour tree.
-
-    Raises
-    ------
-    UsageError
-        For pyperplan, where STRIPS cannot say what is optimal.
-    NoPlanFits
-        If no optimal plan has the sentence.
+    The result is an `ExportedTask`, with ``to="ltlf"`` an `ExportedFormula` over plans, and with
+    ``to="bt"`` the `ExportedTrees`, each robot's choices as a behaviour tree.  Raises `UsageError`
+    for pyperplan, where STRIPS cannot say what is optimal, and `NoPlanFits` if no optimal plan has
+    the sentence.
     """
     said = files.needed("SENTENCE")
     used = files.task().used
@@ -212,17 +152,12 @@ def export(files: Arguments, options: ExportOptions) -> Any:
     if options.to == "pddl":
         strips_only = options.for_planner == "pyperplan"
         exported = export_pddl(used, words, options.max_actions, strips_only=strips_only)
-        return ExportedTask(used, SentencePlans(used, words), exported)
+        return extended(ExportedTask, exported, used, SentencePlans(used, words))
     if options.to == "bt":
         found = choices_under(used, words)
         counts = {used.model.robots[own.robot]: own.automaton.count for own in found.robots}
         return ExportedTrees(used, behaviour_trees(found), counts, found.guaranteed)
-    ltlf = export_ltlf(used, words)
-    return ExportedFormula(used, ltlf.formula, ltlf.over_words, ltlf.words, ltlf.symbols)
-
-
-def _label_text(model: JointModel, robot: int, label: int) -> str | None:
-    return model.labels[robot][label] if label else None
+    return extended(ExportedFormula, export_ltlf(used, words), used)
 
 
 def show_export(
@@ -236,11 +171,9 @@ def show_export(
         write(json.dumps(plans.data([plan])) + "\n" if as_json else plans.ipc(plan), output)
     elif as_json:
         write(json.dumps(found.data()) + "\n", output)
-    elif isinstance(found, ExportedTrees):
-        write(found.xml, output)
-    elif isinstance(found, ExportedFormula):
-        write(found.formula + "\n", output)
-        if output in (None, "-"):
+    elif not isinstance(found, ExportedTask):
+        write(f"{found}\n" if isinstance(found, ExportedFormula) else found.xml, output)
+        if isinstance(found, ExportedFormula) and output in (None, "-"):
             symbols = counted(len(found.symbols), "symbol")
             echo(f"{symbols}; --json says which atom each stands for", err=True)
     elif output is not None and options.writes_folder:
@@ -250,4 +183,4 @@ def show_export(
         echo(f"written to {visible(output)}: {', '.join(WRITTEN)}: {size}, {terms}")
     else:
         echo(found.domain + found.problem, nl=False)
-    return covered_code(found.covered, found.tolerance)
+    return covered_code(found)

@@ -6,10 +6,10 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from os import PathLike, fspath
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from coordlang.commands import options as given
 from coordlang.commands.options import Source, TasksSource
@@ -20,7 +20,7 @@ from planners.pddl.factored import read_factored
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
 from planners.search.state_variables import note_doubled
-from planners.system.errors import Position, UsageError
+from planners.system.errors import Position, UsageError, note
 from planners.system.files import names_format, read_bytes
 from planners.system.notebook import Presented
 from planners.system.options import options_of, record_from
@@ -37,24 +37,6 @@ Result = TypeVar("Result")
 
 #: Options that are fixed in a loaded domain.
 _FIXED = frozenset({"cost", "unowned", "remember_actions", "slack", "words_see_slack"})
-#: Argument of a command -> the parameter of its function, and the parameter's type.
-_PARAMETERS = {
-    "LANGUAGE": ("language", "LanguageSource"),
-    "LIFTED": ("lifted", "LanguageSource"),
-    "DOMAIN": ("domain", "DomainSource | None"),
-    "PROBLEM": ("problem", "ProblemSource | None"),
-    "PROBLEMS...": ("problems", "ProblemSource"),
-    "SENTENCE": ("sentence", "SentenceSource | None"),
-    "PLAN": ("plan", "PlanSource | None"),
-}
-
-#: Argument of a command -> what is missing without it, and what to do.
-_NEEDED = {
-    "LANGUAGE": ("a language", "Give a language file, or a language."),
-    "LIFTED": ("a language", "Give a language file, or a language."),
-    "SENTENCE": ("a sentence", 'Give its words, as in "w1 w0".'),
-    "PLAN": ("a plan", "Give a plan file or the steps of one plan."),
-}
 
 
 def public(
@@ -66,15 +48,20 @@ def public(
     ``with_record`` of the result gets the record, and arguments by the names in ``takes``.
     """
     words = [word.strip("[]") for word in (record.takes if takes is None else takes).split()]
-    # What a command can do without its function can, too.
-    is_needed = words[:1] != ["DOMAIN"] and getattr(record, "alone", None) is None
-    parameters = [_parameter(w, is_needed=is_needed and w == words[0]) for w in words]
+    word_of = {word.strip(".").lower(): word for word in words}
+    parameters, of = [], inspect.Parameter
+    for name, word in word_of.items():
+        is_many = word == "PROBLEMS..."
+        # What a command can do without its function can, too.
+        is_needed = word == words[0] != "DOMAIN" and getattr(record, "alone", None) is None
+        default = of.empty if is_needed or is_many else None
+        how = of.VAR_POSITIONAL if is_many else of.POSITIONAL_OR_KEYWORD
+        parameters.append(of(name, how, default=default))
     own = inspect.Signature(parameters)
-    word_of = {_PARAMETERS[word][0]: word for word in words}
     keyword_only = [
-        inspect.Parameter(each.name, inspect.Parameter.KEYWORD_ONLY, default=each.default)
+        of(each.name, of.KEYWORD_ONLY, default=each.default)
         for each in options_of(record)
-        if each.option.only != "cli"
+        if each.only != "cli"
     ]
 
     def decorate(function: Callable[[Arguments, Any], Result]) -> Callable[..., Result]:
@@ -94,16 +81,6 @@ def public(
         return called
 
     return decorate
-
-
-def _parameter(word: str, *, is_needed: bool) -> inspect.Parameter:
-    """The parameter of a function that stands for an argument of its command."""
-    name, kind = _PARAMETERS[word]
-    if word == "PROBLEMS...":
-        return inspect.Parameter(name, inspect.Parameter.VAR_POSITIONAL, annotation=kind)
-    default = inspect.Parameter.empty if is_needed else None
-    either = inspect.Parameter.POSITIONAL_OR_KEYWORD
-    return inspect.Parameter(name, either, default=default, annotation=kind)
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,37 +109,44 @@ class Arguments:
         """An argument that must be given; `UsageError` if it is not."""
         found = self.values.get(word)
         if found is None:
-            what, remedy = _NEEDED[word]
-            raise UsageError(f"expected {what}", remedy=remedy)
+            what = "language" if word == "LIFTED" else word.lower()
+            raise UsageError(f"expected a {what}", remedy=f"Give the argument {word}.")
         return found
 
     def read(self) -> PlanningInput:
         """Read domain and problems, or the files of ``source.factored`` in their place.
 
-        Raises
-        ------
-        UsageError
-            For too few or too many of them.
+        Raises `UsageError` for too few or too many of them.
         """
-        domain, problems = self.domain, self.problems
+        domain, problems, source = self.domain, self.problems, self.source
         is_single = "PROBLEMS..." not in self.takes
-        if self.source.factored is not None:
+        if source.factored is not None:
             if domain is not None or problems:
                 raise UsageError(
                     "--factored names all files", remedy="Leave out domain and problem."
                 )
-            factored, problem = read_factored(fspath(self.source.factored))
-            return PlanningInput(factored, [problem], self.source)
+            factored, problem = read_factored(fspath(source.factored))
+            return PlanningInput(factored, [problem], source)
         if isinstance(domain, PlanningInstance):
-            return _from_instance(domain, problems, self.source, is_single)
+            if source.given:
+                raise UsageError(
+                    "the model options of a loaded domain are fixed",
+                    remedy="Give them to coordlang.load.",
+                )
+            # A language must have been built with the same options; its robots may be named there
+            # alone.
+            fixed = _FIXED | ({"robots"} if domain.options.names else set())
+            source = Source(None, domain.options, fixed)
+            problems, domain = problems or [*domain.problems], domain.domain
         if domain is None or not problems or (is_single and len(problems) > 1):
-            wanted = "a problem" if is_single else "problems"
+            wanted = "one problem" if is_single else "problems"
             raise UsageError(
                 f"expected a domain and {wanted}, or --factored without them",
                 remedy="Give both as files or parsed objects, or factored=DIR.",
             )
         lifted = domain if isinstance(domain, Domain) else read_domain(fspath(domain))
-        return PlanningInput(lifted, [_problem(p, lifted) for p in problems], self.source)
+        found = [p if isinstance(p, Problem) else read_problem(fspath(p), lifted) for p in problems]
+        return PlanningInput(lifted, found, source)
 
     def instance(self) -> PlanningInstance:
         """Read the joint model and the task of one problem."""
@@ -220,9 +204,8 @@ class PlanningInput:
         return found
 
 
-@dataclass(frozen=True, slots=True)
-class ReadTask:
-    """The files of one problem, and a language in its task."""
+class ReadTask(NamedTuple):
+    """The files of one problem, a language in its task, and what messages call the language."""
 
     files: PlanningInput
     used: TaskLanguage
@@ -249,20 +232,19 @@ class InTask(Presented):
         return self.used.tolerance
 
 
+def extended(kind: type[Result], found: Any, *more: object, **named: object) -> Result:
+    """A result that has the fields of what was found, and after them its own."""
+    return kind(*(getattr(found, each.name) for each in fields(found)), *more, **named)
+
+
 @public(Source, "DOMAIN PROBLEMS...")
 def load(files: Arguments, options: Source) -> PlanningInstance:
     """Read a domain and problems, and build their joint model.
 
     The result stands for the domain and its problems in every other function, which then read and
     ground nothing again where they can help it.  Problems of one model have the same objects and
-    static facts.
-
-    Raises
-    ------
-    BadInput, Unsupported
-        With file, line and column.
-    UsageError
-        For options that contradict each other or the files.
+    static facts.  Raises `BadInput` or `Unsupported` with file, line and column, and `UsageError`
+    for options that contradict each other or the files.
     """
     return files.read().instance()
 
@@ -270,10 +252,7 @@ def load(files: Arguments, options: Source) -> PlanningInstance:
 def load_language(path: given.File) -> Language:
     """Read a language file (docs/formats.md).
 
-    Raises
-    ------
-    BadInput
-        For a file that is missing, cut off, no language, or of another version.
+    Raises `BadInput` for one that is missing, cut off, no language, or of another version.
     """
     from coordlang.language.file import read_language as read_language_file
 
@@ -282,26 +261,17 @@ def load_language(path: given.File) -> Language:
 
 def read_tasks(tasks: TasksSource) -> tuple[tuple[ListedTask, ...], Position]:
     """Read a task list, with what messages call it."""
-    from coordlang.language.listed import TASKS, ListedTask, read_task_file, tasks_from_data
+    from coordlang.language.listed import TASKS, read_task_file, tasks_from_data
 
     if isinstance(tasks, str | PathLike):
         return read_task_file(fspath(tasks)), Position(fspath(tasks))
+    head = {"format": TASKS.format, "version": TASKS.version}
+    data = dict(tasks) if isinstance(tasks, Mapping) else {**head, "tasks": list(tasks)}
     position = Position("the tasks")
-    if isinstance(tasks, Mapping):
-        return tasks_from_data(dict(tasks), position), position
-    entries = [
-        {"init": list(task.init), "goal": list(task.goal)}
-        if isinstance(task, ListedTask)
-        else dict(task)
-        for task in tasks
-    ]
-    data = {"format": TASKS.format, "version": TASKS.version, "tasks": entries}
     return tasks_from_data(data, position), position
 
 
-def read_language(
-    language: given.LanguageSource,
-) -> tuple[Language | LiftedLanguage, Position]:
+def read_language(language: given.LanguageSource) -> tuple[Language | LiftedLanguage, Position]:
     """Read a language or a lifted language, with what messages call it."""
     from coordlang.language.file import language_from_bytes
     from coordlang.language.words import Language
@@ -365,34 +335,9 @@ def read_coordinates_of(
     return read_coordinates(beside) if file.exists() and beside.is_file() else {}
 
 
-def say_size(candidates: Candidates, say: Callable[[str], None] | None) -> None:
+def note_size(candidates: Candidates) -> None:
     """Say how much there is to do, where a person will wait for it."""
     from planners.search.portions import estimate
 
-    found = estimate(candidates.source)
-    if say is not None and found.is_large:
-        say(str(found))
-
-
-def _from_instance(
-    loaded: PlanningInstance, problems: list[given.ProblemSource], source: Source, is_single: bool
-) -> PlanningInput:
-    """Return the files of an instance, and the options that it was loaded with."""
-    if source.given:
-        raise UsageError(
-            "the model options of a loaded domain are fixed",
-            remedy="Give them to coordlang.load.",
-        )
-    read = [_problem(p, loaded.domain) for p in problems] or list(loaded.problems)
-    if is_single and len(read) > 1:
-        raise UsageError(
-            f"expected one problem, and {len(read)} are loaded",
-            remedy="Give the problem that is meant as the second argument.",
-        )
-    # A language must have been built with the same options; its robots may be named there alone.
-    fixed = _FIXED | ({"robots"} if loaded.options.names else set())
-    return PlanningInput(loaded.domain, read, Source(None, loaded.options, fixed))
-
-
-def _problem(problem: given.ProblemSource, domain: Domain) -> Problem:
-    return problem if isinstance(problem, Problem) else read_problem(fspath(problem), domain)
+    if (found := estimate(candidates.source)).is_large:
+        note(str(found))

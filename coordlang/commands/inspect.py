@@ -6,17 +6,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from os import fspath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.layout import WIDTH, wrapped
 from coordlang.commands.records import WRITTEN, InspectOptions
-from coordlang.commands.terminal import note, note_single_robot, show_answer
+from coordlang.commands.terminal import note_single_robot, show_answer
+from planners.inspection import Inspection
+from planners.inspection import inspect as inspect_instance
+from planners.pddl.pddl_text import domain_text, problem_text
+from planners.search.reachable import count as count_reachable
 from planners.search.search_estimate import SearchEstimate
-from planners.system.notebook import Presented, counted, html_table
-
-if TYPE_CHECKING:
-    from planners.inspection import Inspection
+from planners.system.errors import note
+from planners.system.notebook import Presented, counted
+from planners.system.writing import write_texts
 
 #: The most columns of the names on the left.
 _WIDEST_NAME = 30
@@ -46,23 +49,11 @@ class Inspected(Presented):
     """
 
     inspection: Inspection
-    reachable: ReachableSize | None = None
-    shown = ("domain", "problem", "robots")
+    reachable: ReachableSize | None
 
-    @property
-    def domain(self) -> str:
-        """The name of the domain."""
-        return self.inspection.domain
-
-    @property
-    def problem(self) -> str:
-        """The name of the problem."""
-        return self.inspection.problem
-
-    @property
-    def robots(self) -> tuple[str, ...]:
-        """The robots, in the order of joint steps."""
-        return self.inspection.robots
+    def facts(self) -> dict[str, object]:
+        """What was read, and the robots."""
+        return {name: getattr(self.inspection, name) for name in ("domain", "problem", "robots")}
 
     def data(self) -> dict[str, Any]:
         """Everything as JSON data."""
@@ -82,31 +73,32 @@ class Inspected(Presented):
             for line in wrapped(text, width, f"{name:<{left}}  ", further)
         )
 
-    def _repr_html_(self) -> str:
-        return html_table((), self._lines())
-
     def _lines(self) -> list[tuple[str, str]]:
         found = self.inspection
         none_named = {"error": "not allowed (--unowned)"}
+        fluents = f"{counted(found.facts, 'fact')}: {_counts(found.fluents)}"
+        example = f", e.g. {found.example}" if found.example else ""
+        if found.interfering and not found.example:
+            example = ", none of them possible in one state near the start"
         lines = [
             ("domain", f"{found.domain}, problem {found.problem}"),
             ("read as", found.style),
-            ("objects", _counts(found.objects) or "none"),
+            ("objects", _counts(found.objects)),
             ("robots", f"{', '.join(found.robots)} (by {found.robots_by})"),
             *(self._subactions(robot) for robot in found.subactions),
-            ("shared", _counts(found.shared) or "none"),
+            ("shared", _counts(found.shared)),
             ("no robot named", none_named.get(found.unowned, f"--unowned {found.unowned}")),
-            ("step formulas", _counts(found.step_formulas) or "none"),
-            *(("", f"e.g. {example}") for example in found.formulas),
-            ("never possible", ", ".join(found.impossible) or "none"),
-            ("no effects", ", ".join(found.without_effects) or "none"),
+            ("step formulas", _counts(found.step_formulas)),
+            *(("", f"e.g. {each}") for each in found.formulas),
+            ("never possible", ", ".join(found.impossible)),
+            ("no effects", ", ".join(found.without_effects)),
             *([("left out", f"{', '.join(found.left_out)}: idling")] if found.left_out else []),
             ("action costs", found.costs),
-            ("interference", counted(found.interfering, "pair") + self._example()),
-            ("fluents", self._fluents()),
+            ("interference", counted(found.interfering, "pair") + example),
+            ("fluents", fluents if found.facts else ""),
             ("at the start", _counts(found.start) or "none is true"),
-            ("statics", _counts(found.statics) or "none"),
-            ("never true", ", ".join(found.never) or "none"),
+            ("statics", _counts(found.statics)),
+            ("never true", ", ".join(found.never)),
             ("goal", found.goal),
             *feasibility(found.estimate),
         ]
@@ -114,44 +106,27 @@ class Inspected(Presented):
             states = counted(self.reachable.states, "joint state")
             steps = counted(self.reachable.joint_steps, "joint step")
             lines.append(("reachable", f"{states}, {steps}"))
-        return lines
+        return [(name, text or "none") for name, text in lines]
 
     def _subactions(self, robot: str) -> tuple[str, str]:
-        schemas = self.inspection.subactions[robot]
+        found = self.inspection
+        schemas = found.subactions[robot]
         listed = f": {_counts(schemas)}" if schemas else ""
         number = counted(sum(schemas.values()), "subaction")
-        return f"  {robot}", f"{number}{listed}; {self.inspection.idle[robot]}"
-
-    def _fluents(self) -> str:
-        found = self.inspection
-        if not found.facts:
-            return "none"
-        return f"{counted(found.facts, 'fact')}: {_counts(found.fluents)}"
-
-    def _example(self) -> str:
-        found = self.inspection
-        if found.example:
-            return f", e.g. {found.example}"
-        return ", none of them possible in one state near the start" if found.interfering else ""
+        return f"  {robot}", f"{number}{listed}; {found.idle[robot]}"
 
 
 @public(InspectOptions)
 def inspect(files: Arguments, options: InspectOptions) -> Inspected:
     """Show what was understood of a domain and problem."""
-    from planners.inspection import inspect as inspect_instance
-    from planners.pddl.pddl_text import domain_text, problem_text
-    from planners.search.reachable import count as count_reachable
-    from planners.system.writing import write_texts
-
     loaded = files.instance()
     size = None
     if options.states:
         size = ReachableSize(*count_reachable(loaded.model, loaded.tasks[0].init[None, :]))
     found = Inspected(inspect_instance(loaded), size)
     if options.write is not None:
-        problem_pddl = problem_text(loaded.problems[0], loaded.domain)
-        texts = {"domain.pddl": domain_text(loaded.domain), "problem.pddl": problem_pddl}
-        write_texts(fspath(options.write), texts)
+        texts = domain_text(loaded.domain), problem_text(loaded.problems[0], loaded.domain)
+        write_texts(fspath(options.write), dict(zip(WRITTEN, texts, strict=True)))
     return found
 
 
@@ -159,7 +134,7 @@ def show_inspect(found: Inspected, options: InspectOptions) -> None:
     """Print what was understood."""
     if options.write is not None:
         note(f"written to {fspath(options.write)}: {', '.join(WRITTEN)}")
-    note_single_robot(found.robots)
+    note_single_robot(found.inspection.robots)
     show_answer(found, as_json=options.as_json)
 
 
@@ -169,30 +144,26 @@ def _counts(counts: dict[str, int]) -> str:
 
 def feasibility(found: SearchEstimate) -> list[tuple[str, str]]:
     """Return lines (name, text): labels, layers, bound, what these mean, what to try."""
+    each = [f"{robot} {found.choices[robot]:,} of {n:,}" for robot, n in found.labels.items()]
+    layers = f"{_sizes(found.layers)} states, and no other can be reached"
+    if found.next_steps is not None:
+        layers = (
+            f"{_sizes(found.layers)} state{'s' * (found.states > 1)}; not looked at: the next, "
+        )
+        layers += f"with at most about {counted(found.next_steps, 'joint step')} into it"
+    too_large = (found.next_steps or 0) > _MOST_STEPS or (found.expected or 0) > _MOST_STATES
     lines = [
-        ("labels", _labels(found)),
-        ("first layers", _layers(found)),
-        ("bound", _bound(found)),
-        ("this task", _this_task(found)),
+        ("labels", f"{', '.join(each)} possible at the start, idling included"),
+        ("first layers", layers),
+        ("bound", f"{found.heuristic}: {_bound(found)}"),
+        ("this task", _this_task(found, too_large)),
         ("--tasks all", _all_tasks(found)),
     ]
-    if found.solvable is None and _is_too_large(found):
-        lines.append(("try", _smaller(found)))
+    if found.solvable is None and too_large:
+        most = max(found.choices, key=lambda robot: found.choices[robot])
+        fewer = f"fewer robots ({most} has most choices), " if len(found.choices) > 1 else ""
+        lines.append(("try", f"{fewer}fewer objects, only a part of the goal"))
     return lines
-
-
-def _labels(found: SearchEstimate) -> str:
-    each = [f"{robot} {found.choices[robot]:,} of {n:,}" for robot, n in found.labels.items()]
-    return f"{', '.join(each)} possible at the start, idling included"
-
-
-def _layers(found: SearchEstimate) -> str:
-    text = _sizes(found.layers)
-    if found.next_steps is None:
-        return f"{text} states, and no other can be reached"
-    steps = counted(found.next_steps, "joint step")
-    states = f"{text} state{'s' * (found.states > 1)}"
-    return f"{states}; not looked at: the next, with at most about {steps} into it"
 
 
 def _sizes(layers: Sequence[int]) -> str:
@@ -204,8 +175,8 @@ def _sizes(layers: Sequence[int]) -> str:
 
 def _bound(found: SearchEstimate) -> str:
     if found.at_least is None:
-        return f"{found.heuristic}: no plan is possible"
-    text = f"{found.heuristic}: makespan {found.at_least:,} at least"
+        return "no plan is possible"
+    text = f"makespan {found.at_least:,} at least"
     if found.within:
         text += f", by which {_sizes(found.within)} of these states are left"
     if found.solver_after is not None and found.next_steps is not None:
@@ -213,59 +184,34 @@ def _bound(found: SearchEstimate) -> str:
     return text
 
 
-def _this_task(found: SearchEstimate) -> str:
+def _this_task(found: SearchEstimate, too_large: bool) -> str:
     if found.solvable is False:
         return "no plan: the goal cannot be reached"
     if found.makespan is not None:
         return f"makespan {found.makespan:,}: plans, coordination and build are feasible"
-    at_least = max(found.hmax or 0, found.at_least or 0)
-    least = f"makespan {at_least:,} at least"
+    least = f"makespan {max(found.hmax or 0, found.at_least or 0):,} at least"
+    ends = "plans ends in seconds to minutes if the makespan is not much more: set a --time-limit"
     if found.expected is not None:
+        large = found.expected >= 1_000_000
+        number = f"{found.expected:.1e}" if large else f"{float(f'{found.expected:.2g}'):,.0f}"
         by = f"{found.factor:.1f} times the one before"
-        least += f": about {_rounded(found.expected)} states if each layer is {by}"
-    return f"{least}; {_whether_it_ends(found)}"
-
-
-def _whether_it_ends(found: SearchEstimate) -> str:
-    if _is_too_large(found) and found.solver_after is not None:
-        return (
-            "too many to search them all; whether the bounds suffice is not known: "
-            "set a --time-limit"
-        )
-    if _is_too_large(found):
-        return "plans, and all that needs them, are not likely to end"
-    if found.expected is None:
-        return "whether plans ends is not known: set a --time-limit"
-    return "plans ends in seconds to minutes if the makespan is not much more: set a --time-limit"
-
-
-def _is_too_large(found: SearchEstimate) -> bool:
-    return (found.next_steps or 0) > _MOST_STEPS or (found.expected or 0) > _MOST_STATES
+        least += f": about {number} states if each layer is {by}"
+    else:
+        ends = "whether plans ends is not known: set a --time-limit"
+    if too_large:
+        ends = "plans, and all that needs them, are not likely to end"
+        if found.solver_after is not None:
+            ends = "too many to search them all; whether the bounds suffice is not known: "
+            ends += "set a --time-limit"
+    return f"{least}; {ends}"
 
 
 def _all_tasks(found: SearchEstimate) -> str:
+    states, other = counted(found.states, "state"), "use coordlang tasks, or list tasks"
     if found.next_steps is not None:
-        return f"more than {counted(found.states, 'state')}: use coordlang tasks, or list tasks"
-    size = (
-        f"{counted(found.states, 'state')}, "
-        f"at most {counted(found.states * (found.states - 1), 'task')}"
-    )
+        return f"more than {states}: {other}"
     if found.states <= _PROVABLE:
-        return f"{size}: every method is feasible"
-    if found.states <= _ALL_TASKS:
-        return f"{size}: greedy and separating; minimal is not likely to end with a proof"
-    return f"{size}: use coordlang tasks, or list tasks"
-
-
-def _smaller(found: SearchEstimate) -> str:
-    """What makes the search smaller; the robot with most choices is the one to leave out first."""
-    most = max(found.choices, key=lambda robot: found.choices[robot])
-    fewer = f"fewer robots ({most} has most choices)" if len(found.choices) > 1 else ""
-    return ", ".join(filter(None, (fewer, "fewer objects", "only a part of the goal")))
-
-
-def _rounded(number: float) -> str:
-    """Two digits of a number: ``1,200``, ``3.4e+09``."""
-    if number < 1_000_000:
-        return f"{float(f'{number:.2g}'):,.0f}"
-    return f"{number:.1e}"
+        other = "every method is feasible"
+    elif found.states <= _ALL_TASKS:
+        other = "greedy and separating; minimal is not likely to end with a proof"
+    return f"{states}, at most {counted(found.states * (found.states - 1), 'task')}: {other}"

@@ -11,12 +11,11 @@ from typing import Any
 
 import coordlang
 from coordlang.commands.inputs import Arguments, PlanningInput, public, read_coordinates_of
-from coordlang.commands.options import File, Jobs, ProblemSource, Progress, TasksSource
+from coordlang.commands.options import File, Jobs, ProblemSource, TasksSource
 from coordlang.commands.records import GroundOptions, LiftOptions
-from coordlang.commands.terminal import UNPROVED, echo, ended_early
+from coordlang.commands.terminal import UNPROVED, echo, ended_early, say, write
 from coordlang.language import file as language_file
-from coordlang.language.candidates import Candidates, require_solvable
-from coordlang.language.partition import Partition
+from coordlang.language.candidates import require_solvable
 from coordlang.language.provenance import Guarantee, provenance_of, world_sha256
 from coordlang.language.recorded import check_domain
 from coordlang.language.words import Language
@@ -48,6 +47,8 @@ from planners.system.errors import (
 from planners.system.limits import stop_clock
 from planners.system.notebook import Presented, counted
 
+_PRODUCER = {"program": "coordlang", "version": coordlang.__version__}
+
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Lifted(Presented):
@@ -62,6 +63,7 @@ class Lifted(Presented):
 
     def data(self) -> dict[str, Any]:
         """The figures of the learning, as ``--json`` has them."""
+        counted_by = ("problem", "states", "tasks", "words")
         return {
             "features": [
                 {
@@ -78,8 +80,7 @@ class Lifted(Presented):
             "pool": self.learned.pool,
             "rounds": self.learned.rounds,
             "verified": [
-                {"problem": v.problem, "states": v.states, "tasks": v.tasks, "words": v.words}
-                for v in self.language.verified
+                {key: getattr(known, key) for key in counted_by} for known in self.language.verified
             ],
         }
 
@@ -93,16 +94,15 @@ class Lifted(Presented):
 
     def text(self) -> str:
         """The words, their features, and the problems on which they were verified."""
-        language = self.language
-        size = counted(len(language.words), "word")
-        lines = [f"{size}, functions of {counted(len(language.features), 'feature')}:"]
-        lines += [f"  {formula(feature)}" for feature in language.features]
-        lines += ["verified by definition on:"]
-        lines += [
-            f"  {known.problem}: {counted(known.words, 'word')}, "
-            f"{counted(known.states, 'state')}, {counted(known.tasks, 'task')}"
-            for known in language.verified
+        language, size = self.language, counted(len(self.language.words), "word")
+        lines = [
+            f"{size}, functions of {counted(len(language.features), 'feature')}:",
+            *(f"  {formula(feature)}" for feature in language.features),
+            "verified by definition on:",
         ]
+        for known in language.verified:
+            words, states = counted(known.words, "word"), counted(known.states, "state")
+            lines.append(f"  {known.problem}: {words}, {states}, {counted(known.tasks, 'task')}")
         return "\n".join(lines)
 
 
@@ -110,47 +110,47 @@ class Lifted(Presented):
 def lift(files: Arguments, options: LiftOptions) -> Lifted:
     """Learn words as functions of features, for all these problems at once.
 
-    The problems need not have the same objects, but the same robots.
-
-    Raises
-    ------
-    ProvedImpossible
-        If no features up to this complexity suffice.
+    The problems need not have the same objects, but the same robots.  Raises `ProvedImpossible` if
+    no features up to this complexity suffice.
     """
-    check, seed, problems = options.check, options.seed, files.problems
+    check, problems = options.check, files.problems
     if isinstance(files.domain, PlanningInstance):
         problems = problems or [*files.domain.problems]
     given: list[Any] = [*problems, *check] if options.source.factored is None else [None]
     every = [_instance(files, problem, options) for problem in given]
     if not every:
         raise UsageError("there is no problem to learn from", remedy="Name one or more.")
-    known = len(every) - len(check)
-    for other in every[1:]:
-        _require_alike(every[0], other)
-    with Jobs(options.work.jobs).opened() as workers:
+    first = every[0].candidates
+    robots, known = first.model.robots, len(every) - len(check)
+    for other in (own.candidates for own in every):
+        if other.model.robots != robots:
+            others = ", ".join(other.model.robots)
+            raise BadInput(
+                f"the robots are {others}, those of {every[0].name} {', '.join(robots)}",
+                position=Position(other.loaded.problems[0].source.name),
+                remedy="Words are about robots by name: use the same names.",
+            )
+    with Jobs(options.jobs).opened() as workers:
         learned = learn(
             every[:known],
             every[known:],
             complexity=options.complexity,
             prefer=options.prefer,
-            seed=seed,
-            progress=options.work.progress or (lambda _: None),
+            seed=options.seed,
+            progress=say,
             workers=workers,
         )
-    words = learned.words
-    first = every[0].candidates
-    provenance = provenance_of(first, Guarantee.of("lifted", len(words), 1), {})
-    keys = ("cost", "unowned", "remember_actions")
+    provenance = provenance_of(first, Guarantee.of("lifted", len(learned.words), 1), {})
     language = LiftedLanguage(
         learned.features,
-        words,
+        learned.words,
         learned.values,
-        first.model.robots,
+        robots,
         provenance.domain,
-        {key: provenance.model[key] for key in keys},
+        {key: provenance.model[key] for key in ("cost", "unowned", "remember_actions")},
         bool(first.loaded.options.names or first.loaded.options.robot_type),
         tuple(_verified(own, sizes) for own, sizes in zip(every, learned.sizes, strict=True)),
-        {"program": "coordlang", "version": coordlang.__version__, "seed": seed},
+        _PRODUCER | {"seed": options.seed},
     )
     return Lifted(language, learned)
 
@@ -161,9 +161,8 @@ def _instance(
     """A problem; that of a factored folder where none is given."""
     given = {"DOMAIN": arguments.domain, "PROBLEM": problem}
     files = Arguments(options.source, (*given,), given).read()
-    if options.work.progress is not None:
-        options.work.progress(f"finding all optimal plans of {files.problems[0].name}")
-    points = read_coordinates_of(options.work.coordinates, files.problems[0])
+    say(f"finding all optimal plans of {files.problems[0].name}")
+    points = read_coordinates_of(options.coordinates, files.problems[0])
     try:
         candidates = files.candidates(options.tasks, files.source.model)
         require_solvable(candidates)
@@ -171,17 +170,6 @@ def _instance(
         error.position = error.position or Position(files.problems[0].source.name)
         raise
     return Instance(candidates, points)
-
-
-def _require_alike(first: Instance, other: Instance) -> None:
-    """Raise `BadInput` for problems with different robots."""
-    robots, others = first.candidates.model.robots, other.candidates.model.robots
-    if robots != others:
-        raise BadInput(
-            f"the robots are {', '.join(others)}, those of {first.name} {', '.join(robots)}",
-            position=Position(other.candidates.loaded.problems[0].source.name),
-            remedy="Words are about robots by name: use the same names.",
-        )
 
 
 def _verified(own: Instance, sizes: tuple[int, int, int]) -> Verified:
@@ -194,12 +182,8 @@ def _verified(own: Instance, sizes: tuple[int, int, int]) -> Verified:
 def show_lift(found: Lifted, options: LiftOptions) -> int:
     """Write the lifted language, and print the figures."""
     stop_clock()  # the work is done; from here on it is saved
-    to_stdout = options.output == "-"
-    if to_stdout:
-        echo(to_bytes(found.language).decode(), nl=False)
-    else:
-        found.save(options.output)
-    echo(json.dumps(found.data()) if options.as_json else found.text(), err=to_stdout)
+    said = json.dumps(found.data()) if options.as_json else found.text()
+    write(to_bytes(found.language), options.output, said)
     what = "the best words so far are written: they are verified"
     return ended_early(found.learned.stopped, what)
 
@@ -213,7 +197,6 @@ def ground_in(
     is_verified: bool,
     points: Mapping[str, Point],
     workers: Workers,
-    progress: Progress = lambda _: None,
     every_word: bool = False,
 ) -> tuple[Language, Known]:
     """The words of a problem's states, verified there unless that is not wanted or does not fit.
@@ -223,27 +206,19 @@ def ground_in(
     """
     shape = described(lifted)
     check_domain(shape, files.domain, position)
-    progress(f"finding all optimal plans of {files.problems[0].name}")
+    say(f"finding all optimal plans of {files.problems[0].name}")
     candidates = files.candidates(tasks, files.options_of(shape))
     require_solvable(candidates)
     require_robots(lifted, candidates.model.robots, position)
     states = States(World.loaded(candidates.loaded, points), candidates.rows)
     known: Known = "unknown"
     if is_verified:
-        known = _known(lifted.partition(states), candidates, workers, progress)
-    producer = {"program": "coordlang", "version": coordlang.__version__}
-    return grounded(lifted, candidates, states, known, producer, every_word=every_word), known
-
-
-def _known(
-    partition: Partition, candidates: Candidates, workers: Workers, progress: Progress
-) -> Known:
-    try:
-        verdict = verify_candidates(partition, candidates, workers, progress)
-    except OutOfMemory as error:
-        note(f"the words are not verified here: {error.what}")
-        return "unknown"
-    return "verified" if verdict.holds else "refuted"
+        try:
+            verdict = verify_candidates(lifted.partition(states), candidates, workers, say)
+            known = "verified" if verdict.holds else "refuted"
+        except OutOfMemory as error:
+            note(f"the words are not verified here: {error.what}")
+    return grounded(lifted, candidates, states, known, _PRODUCER, every_word=every_word), known
 
 
 @public(GroundOptions)
@@ -251,31 +226,24 @@ def ground(arguments: Arguments, options: GroundOptions) -> Language:
     """The language of one problem, an ordinary one, from a lifted language of its domain.
 
     If it is not verified here, or if the memory does not suffice, the language covers no task, and
-    its method says on which problems the words were verified.
-
-    Raises
-    ------
-    Refuted
-        If it is no coordination language for these tasks.
-    BadInput
-        If the lifted language belongs to another domain or other robots.
+    its method says on which problems the words were verified.  Raises `Refuted` if it is no
+    coordination language for these tasks, and `BadInput` if the lifted language belongs to another
+    domain or other robots.
     """
     lifted = arguments.needed("LIFTED")
-    if isinstance(lifted, LiftedLanguage):
-        own, position = lifted, Position("the lifted language")
-    else:
+    own, position = lifted, Position("the lifted language")
+    if not isinstance(lifted, LiftedLanguage):
         own, position = read_lifted(fspath(lifted)), Position(fspath(lifted))
-    files, work = arguments.read(), options.work
-    with Jobs(work.jobs).opened() as workers:
+    files = arguments.read()
+    with Jobs(options.jobs).opened() as workers:
         language, known = ground_in(
             own,
             files,
             position,
             tasks=None if options.tasks == "own" else options.tasks,
             is_verified=options.verified,
-            points=read_coordinates_of(work.coordinates, files.problems[0]),
+            points=read_coordinates_of(options.coordinates, files.problems[0]),
             workers=workers,
-            progress=work.progress or (lambda _: None),
         )
     if known == "refuted":
         learned_from = ", ".join(v.problem for v in own.verified)
@@ -292,10 +260,7 @@ def ground(arguments: Arguments, options: GroundOptions) -> Language:
 def show_ground(found: Language, options: GroundOptions) -> int:
     """Write the language."""
     stop_clock()  # the work is done; from here on it is saved
-    if options.output == "-":
-        echo(language_file.to_bytes(found).decode(), nl=False)
-    else:
-        found.save(options.output)
+    write(language_file.to_bytes(found), options.output)
     count = found.provenance.tasks["count"]
     tasks = f" for {counted(count, 'task')}" if count else ""
     echo(f"{counted(len(found.words), 'word')} ({found.guarantee.method}){tasks}", err=True)

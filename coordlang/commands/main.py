@@ -94,16 +94,13 @@ def cli() -> None:
 def run(arguments: list[str], interruptions: Interruptions | None = None) -> int:
     """Run one command; the exit code.  No traceback reaches a user without ``--debug``.
 
-    Parameters
-    ----------
-    interruptions
-        What looks after the signals that end the process, None if nothing does.
+    ``interruptions`` look after the signals that end the process, if anything does.
     """
     output = Output()
     try:
         return _run(arguments, output)
     except (Exception, KeyboardInterrupt) as error:
-        text, known = failure_of(error, None if interruptions is None else interruptions.first)
+        text, known = _failure(error, None if interruptions is None else interruptions.first)
         with suppress(OSError):  # the terminal may be gone
             if "--debug" in arguments and not isinstance(error, click.ClickException):
                 _show("".join(traceback.format_exception(error)))
@@ -165,7 +162,7 @@ def _show(text: str) -> None:
         print(visible(text, keep="\n"), end="", file=sys.stderr)
 
 
-def failure_of(error: BaseException, number: int | None) -> tuple[str, CoordlangError]:
+def _failure(error: BaseException, number: int | None) -> tuple[str, CoordlangError]:
     """What stderr shows of an error, and the error that it is in the one error tree.
 
     A bug is reported as one, and never hidden.  ``number`` is the signal that has arrived, None if
@@ -174,20 +171,28 @@ def failure_of(error: BaseException, number: int | None) -> tuple[str, Coordlang
     """
     if number is not None or isinstance(error, KeyboardInterrupt | click.Abort):
         by = "" if number in (None, signal.SIGINT) else f" by {signal.Signals(number).name}"
-        code = INTERRUPTED if number is None else SIGNALS + number
-        return _other(f"interrupted{by}", code, "Start it again.")
-    if isinstance(error, click.ClickException):
-        return _usage(error)
+        made = CoordlangError(f"interrupted{by}", remedy="Start it again.")
+        made.exit_code = INTERRUPTED if number is None else SIGNALS + number
+        return f"coordlang: {made.what}\n", made
+    if isinstance(error, click.ClickException):  # what click says of the arguments
+        shown, context = StringIO(), getattr(error, "ctx", None)
+        error.show(file=shown)
+        path = context.command_path if context is not None else "coordlang"
+        made = UsageError(error.format_message(), remedy=f"See `{path} --help`.")
+        return sentence(shown.getvalue(), keep="\n"), made
+    made = CoordlangError(
+        f"internal error: {type(error).__name__}: {sentence(str(error))}",
+        remedy="This is a bug; --debug shows where.",
+    )
     if isinstance(error, OSError) and error.errno in _UNWRITABLE:
         what = f"the output cannot be written: {error.strerror}"
-        return _other(what, UsageError.exit_code, "Make room, or name another file.")
-    if isinstance(error, CoordlangError):
-        return f"coordlang: {error}\n", error
-    if lacks_memory(error):
+        made = UsageError(what, remedy="Make room, or name another file.")
+    elif isinstance(error, CoordlangError):
+        made = error
+    elif lacks_memory(error):
         remedy = "Use a smaller task, or a larger --memory-limit."
-        return _other("out of memory", OutOfMemory.exit_code, remedy)
-    what = f"internal error: {type(error).__name__}: {sentence(str(error))}"
-    return _other(what, CoordlangError.exit_code, "This is a bug; --debug shows where.")
+        made = OutOfMemory("out of memory", remedy=remedy)
+    return f"coordlang: {made}\n", made
 
 
 def wants_json(arguments: Sequence[str]) -> bool:
@@ -195,21 +200,3 @@ def wants_json(arguments: Sequence[str]) -> bool:
     before = list(arguments[: arguments.index("--")] if "--" in arguments else arguments)
     is_short = not {"--json", "--format=json"}.isdisjoint(before)
     return is_short or ("--format", "json") in pairwise(before)
-
-
-def _usage(error: click.ClickException) -> tuple[str, CoordlangError]:
-    """What click says of the arguments."""
-    shown = StringIO()
-    error.show(file=shown)
-    context = getattr(error, "ctx", None)
-    path = context.command_path if context is not None else "coordlang"
-    usage = UsageError(error.format_message(), remedy=f"See `{path} --help`.")
-    return sentence(shown.getvalue(), keep="\n"), usage
-
-
-def _other(message: str, exit_code: int, remedy: str) -> tuple[str, CoordlangError]:
-    """A failure that no error of coordlang stands for."""
-    made = CoordlangError(message, remedy=remedy)
-    made.exit_code = exit_code
-    text = f"coordlang: {message}\n"
-    return text + f"  {remedy}\n" * (exit_code < SIGNALS), made

@@ -7,8 +7,7 @@ Nothing heavy is imported here: ``--help`` needs the records.
 from __future__ import annotations
 
 import re
-import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from os import PathLike, fspath
@@ -17,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Union
 import click
 
 from planners.pddl.model_options import ModelOptions
-from planners.system.errors import UsageError
+from planners.system.errors import note
 from planners.system.options import group, option
 
 if TYPE_CHECKING:
@@ -41,11 +40,6 @@ CertificateSource = Union[File, "Certificate"]
 CoordinatesSource = File | Mapping[str, tuple[float, float]]
 #: A sentence: ``"w1 w0"``, its words ``("w1", "w0")``, or one of `explain`.
 SentenceSource = str | Iterable[str]
-#: A plan file, or the steps of one plan, each with one text or None for every robot.
-PlanSource = File | Sequence[tuple[str | None, ...]]
-
-#: Called with what is being done, now and then.
-Progress = Callable[[str], None]
 
 #: What the command line has not where plans take no slack, or a language file says how much.
 NO_SLACK = ("slack", "words_see_slack")
@@ -66,41 +60,57 @@ class OutputFile(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
+class Limits:
+    """What bounds the work of a command."""
+
+    time_limit: float | None = option(
+        None, "Stop after this long (exit 23).", "SECONDS", only="cli"
+    )
+    memory_limit: str | None = option(
+        None,
+        "Stop before using more, e.g. 4G (exit 22); none: no limit.  Default: 80 % of what is "
+        "free.",
+        "SIZE",
+        only="cli",
+    )
+    debug: bool = option(False, "Show tracebacks.", only="cli")
+
+    def __post_init__(self) -> None:
+        if self.time_limit is not None and not self.time_limit > 0:
+            raise click.UsageError("--time-limit: expected a number of seconds above 0")
+
+    @property
+    def bytes(self) -> int | None:
+        """The most memory that was given, None for no limit; `click.BadParameter` for no size."""
+        text = (self.memory_limit or "none").strip().lower()
+        if text == "none":
+            return None
+        match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([kmgt]?)i?b?", text)
+        if not match:
+            raise click.BadParameter(
+                "expected a size such as 500M or 4G, or none", param_hint="'--memory-limit'"
+            )
+        return int(float(match[1]) * 1024 ** " kmgt".index(match[2] or " "))
+
+
+@dataclass(frozen=True, slots=True)
 class CommandOptions:
     """What a command can be asked for; the docstring of each record is the command's ``--help``.
 
-    Attributes
-    ----------
-    takes
-        The arguments, as the usage line shows them: ``LANGUAGE DOMAIN PROBLEM [SENTENCE]``.
-    doing
-        What a terminal shows while the function works.
-    module
-        The module of the function; None: the one of its name.
-    keeps_plans
-        Whether it searches no task again that was searched before, unless ``--no-cache`` is given.
-    alone
-        The option in whose presence there are no arguments.
-    given
-        The names of the options that were given.
+    The command ``takes`` arguments as the usage line shows them, and none where the option
+    ``alone`` is given.  A terminal shows what it is ``doing``.  Its function is in the ``module``
+    of its name, unless another one is named, and searches no task again that was searched before
+    if it ``keeps_plans``.
     """
 
     takes: ClassVar[str] = ""
-    doing: ClassVar[str] = "reading and grounding"
+    doing: ClassVar[str] = "finding all optimal plans"
     module: ClassVar[str | None] = None
     keeps_plans: ClassVar[bool] = True
     alone: ClassVar[str | None] = None
 
-    given: frozenset[str] = frozenset()
-
-    def __post_init__(self) -> None:
-        """Let ``--json`` stand for ``--format json``, where there is a format."""
-        form = getattr(self, "form", None)
-        if form is None or not getattr(self, "as_json", False):
-            return
-        if form != "json" and "form" in self.given:
-            raise click.UsageError(f"--json is short for --format json: leave out --format {form}")
-        object.__setattr__(self, "form", "json")
+    no_cache: bool = option(False, "Search anew: read no plans that were found before.", only="cli")
+    limits: Limits = group(Limits)
 
     def outputs(self) -> list[OutputFile]:
         """Files that are written, where that depends on several options."""
@@ -140,11 +150,6 @@ def coordinates_option() -> Any:
     )
 
 
-def progress_option(help: str = "Called with a line of text when a phase begins.") -> Any:
-    """The field ``progress`` of an options record."""
-    return option(None, help, only="python")
-
-
 @dataclass(frozen=True, slots=True)
 class Source:
     """How domain and problems are read.
@@ -163,6 +168,20 @@ class Source:
 
 
 @dataclass(frozen=True, slots=True)
+class PlanningOptions(CommandOptions):
+    """What a command can be asked for that reads a domain and problems."""
+
+    source: Source = group(Source, without=NO_SLACK)
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerOptions(PlanningOptions):
+    """The same, of one whose answer can be JSON."""
+
+    as_json: bool = json_option()
+
+
+@dataclass(frozen=True, slots=True)
 class Jobs:
     """Who does large work: processes here, or a cluster; and where finished parts are kept."""
 
@@ -170,7 +189,7 @@ class Jobs:
         None, "Processes for large work (default: one for each core).", "N", least=1
     )
     scheduler: str | PathLike[str] | None = option(
-        None, "Do the work on this running Dask cluster instead.", "ADDRESS|FILE"
+        None, "Do the work on this running Dask cluster instead.", "ADDRESS|FILE", without=("jobs",)
     )
     resume: str | PathLike[str] | None = option(
         None,
@@ -179,18 +198,6 @@ class Jobs:
         is_output=True,
         files=(".table",),
     )
-    note: Callable[[str], None] | None = option(
-        None, "Called with what a person should read; else it is a warning.", only="python"
-    )
-
-    def __post_init__(self) -> None:
-        if self.jobs is not None and self.scheduler is not None:
-            raise UsageError(
-                "--jobs counts processes of this machine, and --scheduler sends the work elsewhere",
-                remedy="Give one of them.",
-            )
-        if self.scheduler is not None:
-            object.__setattr__(self, "scheduler", fspath(self.scheduler))
 
     def opened(self) -> AbstractContextManager[Workers]:
         """Who does jobs, for a block."""
@@ -198,20 +205,7 @@ class Jobs:
 
         scheduler = None if self.scheduler is None else fspath(self.scheduler)
         packages = ("planners", "coordlang")  # whose code does jobs
-        return workers(self.jobs, scheduler, self.resume, packages, self.note or _warn)
-
-
-def _warn(text: str) -> None:
-    warnings.warn(text, RuntimeWarning, stacklevel=2)
-
-
-@dataclass(frozen=True, slots=True)
-class LiftedWork:
-    """How words over features are put into problems."""
-
-    coordinates: CoordinatesSource | None = coordinates_option()
-    jobs: int | None = option(None, "Processes that verify (default: the cores).", "N", least=1)
-    progress: Progress | None = progress_option("Called with a line of text now and then.")
+        return workers(self.jobs, scheduler, self.resume, packages, note)
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,7 +213,11 @@ class Listing:
     """Which plans are listed: the first ``most`` ones, or ``sample`` drawn ones."""
 
     only_count: bool = option(
-        False, "Print the exact number of plans only.", names=("--count",), only="cli"
+        False,
+        "Print the exact number of plans only.",
+        names=("--count",),
+        only="cli",
+        without=("most", "sample", "form=dot"),
     )
     most: int | None = option(
         None,
@@ -228,63 +226,17 @@ class Listing:
         names=("--max",),
         least=0,
         only="cli",
+        without=("form=dot",),
     )
     sample: int | None = option(
-        None, "Draw N plans uniformly instead of the first ones.", "N", least=1, only="cli"
-    )
-    seed: int = option(0, "Seed of --sample.", only="cli")
-    given: frozenset[str] = frozenset()
-
-    def __post_init__(self) -> None:
-        if self.only_count and (self.most is not None or self.sample is not None):
-            raise click.UsageError("--count prints a number only: leave out --max and --sample")
-        if self.most is not None and self.sample is not None:
-            raise click.UsageError("--sample N draws N plans: leave out --max")
-        if self.sample is None and "seed" in self.given:
-            raise click.UsageError("--seed belongs to --sample")
-
-    @property
-    def is_default(self) -> bool:
-        """Whether no option says which plans are listed."""
-        return not self.only_count and self.most is None and self.sample is None
-
-
-@dataclass(frozen=True, slots=True)
-class Kept:
-    """Whether plans that were found before are read from the user's cache."""
-
-    no_cache: bool = option(False, "Search anew: read no plans that were found before.")
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """What bounds the work of a command."""
-
-    time_limit: float | None = option(None, "Stop after this long (exit 23).", "SECONDS")
-    memory_limit: str | None = option(
         None,
-        "Stop before using more, e.g. 4G (exit 22); none: no limit.  Default: 80 % of what is "
-        "free.",
-        "SIZE",
+        "Draw N plans uniformly instead of the first ones.",
+        "N",
+        least=1,
+        only="cli",
+        without=("most", "form=dot"),
     )
-    debug: bool = option(False, "Show tracebacks.")
-
-    def __post_init__(self) -> None:
-        if self.time_limit is not None and not self.time_limit > 0:
-            raise click.UsageError("--time-limit: expected a number of seconds above 0")
-
-    @property
-    def bytes(self) -> int | None:
-        """The most memory that was given, None for no limit; `click.BadParameter` for no size."""
-        text = (self.memory_limit or "none").strip().lower()
-        if text == "none":
-            return None
-        match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([kmgt]?)i?b?", text)
-        if not match:
-            raise click.BadParameter(
-                "expected a size such as 500M or 4G, or none", param_hint="'--memory-limit'"
-            )
-        return int(float(match[1]) * 1024 ** " kmgt".index(match[2] or " "))
+    seed: int = option(0, "Seed of --sample.", only="cli", needs=("sample",))
 
 
 #: How words are found: a key of `coordlang.vocabulary.METHODS`.
@@ -297,10 +249,7 @@ EFFORT = 10
 
 @dataclass(frozen=True, slots=True)
 class MethodOptions:
-    """How the words of a language are found.
-
-    Raises `UsageError` for a value that the method does not support.
-    """
+    """How the words of a language are found."""
 
     method: Method = option(
         "best",
@@ -313,30 +262,17 @@ class MethodOptions:
         "best: what the search for fewer words may spend, in thousands of conflicts of its solver.",
         "N",
         least=0,
+        needs=("method", "best"),
     )
     seed: int = option(0, "Seed of all random choices.", least=0)
     alpha_only: bool = option(
-        False, "separating: part plans where they differ first, never where last."
+        False,
+        "separating: part plans where they differ first, never where last.",
+        needs=("method", "separating"),
     )
     prefer: BuildPreference | None = option(
         None,
         "Of the languages with the fewest words that were found one whose ..  "
         "flexible: sentences leave many plans open.  simple: words have short formulas.",
+        needs=("method", "best", "minimal", "exhaustive"),
     )
-
-    def __post_init__(self) -> None:
-        if self.alpha_only and self.method != "separating":
-            raise UsageError(
-                "--alpha-only belongs to --method separating",
-                remedy="Add --method separating, or leave out --alpha-only.",
-            )
-        if self.effort != EFFORT and self.method != "best":
-            raise UsageError(
-                "--effort belongs to --method best",
-                remedy="Leave out --effort, or --method.",
-            )
-        if self.prefer and self.method in ("greedy", "separating"):
-            raise UsageError(
-                f"--prefer {self.prefer} belongs to --method best, minimal or exhaustive",
-                remedy=f"Leave out --method {self.method}, or --prefer.",
-            )

@@ -16,7 +16,7 @@ from planners.search.kept_plans import search
 from planners.search.optimal_plans import search as bounded_search
 from planners.search.plan_file import Texts, texts, to_ipc, to_json, to_plansys2
 from planners.search.plans import Plan, Plans
-from planners.system.notebook import Presented, html_table
+from planners.system.notebook import Presented
 
 #: One plan: for each joint step, each robot's subaction as text, None where it idles.
 PlanSteps = tuple[Texts, ...]
@@ -92,10 +92,7 @@ class OptimalPlans(Presented):
     def ipc(self, plan: Sequence[Texts]) -> str:
         """Return a plan as an IPC plan file (docs/formats.md).
 
-        Raises
-        ------
-        ValueError
-            If it is no optimal plan of the task.
+        Raises `ValueError` if it is no optimal plan of the task.
         """
         return to_ipc(self._plans, self._known(plan))
 
@@ -107,25 +104,13 @@ class OptimalPlans(Presented):
         """Return the data of a JSON plan file with these plans in it (docs/formats.md)."""
         return to_json(self._plans, [self._known(plan) for plan in listed])
 
-    def _repr_html_(self) -> str:
-        first = next(iter(self))
-        rows = [(str(n), *(text or "" for text in step)) for n, step in enumerate(first, 1)]
-        title = f"plan 1 of {self.count:,}, {self.makespan} steps"
-        return html_table(("step", *self.robots), rows, title)
-
-    def first(self, most: int) -> list[PlanSteps]:
-        """Return the first plans of the order, at most so many."""
-        return list(islice(self, most))
-
     def _texts(self, plan: Plan) -> PlanSteps:
         return texts(self._plans.space.model, self._plans.without_rest(plan))
 
     def _numbers(self, plan: Sequence[Texts]) -> Plan | None:
-        model = self._plans.space.model
-        steps = [model.numbers(step) for step in plan]
-        if None in steps:
-            return None
-        return self._plans.padded(tuple(step for step in steps if step is not None))
+        steps = [self._plans.space.model.numbers(step) for step in plan]
+        known = tuple(step for step in steps if step is not None)
+        return self._plans.padded(known) if len(known) == len(steps) else None
 
     def _known(self, plan: Sequence[Texts]) -> Plan:
         numbers = self._numbers(plan)
@@ -138,20 +123,15 @@ class OptimalPlans(Presented):
 def plans(files: Arguments, options: PlansOptions) -> OptimalPlans:
     """Find all optimal plans of a task.
 
-    With another heuristic than ``auto`` plans that are kept are not used.
-
-    Raises
-    ------
-    ProvedImpossible
-        If there is no plan.
-    OutOfMemory
-        Before the reachable part of the joint model uses up the memory.
+    With another heuristic than ``auto`` plans that are kept are not used.  Raises
+    `ProvedImpossible` if there is no plan, and `OutOfMemory` before the reachable part of the joint
+    model uses up the memory.
     """
     loaded = files.instance()
+    model, task = loaded.model, loaded.tasks[0]
     if options.heuristic == "auto":
-        return OptimalPlans(Plans.of(search(loaded.model, loaded.tasks[0])))
-    space = bounded_search(loaded.model, loaded.tasks[0], heuristic=options.heuristic)
-    return OptimalPlans(Plans.of(space))
+        return OptimalPlans(Plans.of(search(model, task)))
+    return OptimalPlans(Plans.of(bounded_search(model, task, heuristic=options.heuristic)))
 
 
 def show_plans(found: OptimalPlans, options: PlansOptions) -> None:
@@ -168,23 +148,22 @@ def show_listed(
     output: str | None = None,
 ) -> None:
     """Write the plans that the options list, as JSON or text, or their number."""
-    listing = options.listing
+    listing, count = options.listing, found.count
     listed: list[PlanSteps] = []
     if listing.sample:
         listed = found.sample(listing.sample, listing.seed)
     elif not listing.only_count:
-        listed = found.first(DEFAULT_MAX if listing.most is None else listing.most)
+        listed = [*islice(found, DEFAULT_MAX if listing.most is None else listing.most)]
     if options.form == "json":
         data = data_of(listed)
         if listing.sample:
             data["complete"] = False
         write(json.dumps(data) + "\n", output)
-        return
-    if listing.only_count:
-        write(f"{found.count}\n", output)
-        return
-    title = "sampled plan {}" if listing.sample else f"plan {{}} of {found.count}"
-    texts = [f"; {title.format(n)}\n{found.ipc(plan)}\n" for n, plan in enumerate(listed, 1)]
-    write("".join(texts), output)
-    if not listing.sample and len(listed) < found.count:
-        echo(f"{len(listed)} of {found.count} {what} listed; --max N lists more", err=True)
+    elif listing.only_count:
+        write(f"{count}\n", output)
+    else:
+        title = "sampled plan {}" if listing.sample else f"plan {{}} of {count}"
+        texts = [f"; {title.format(n)}\n{found.ipc(plan)}\n" for n, plan in enumerate(listed, 1)]
+        write("".join(texts), output)
+        if not listing.sample and len(listed) < count:
+            echo(f"{len(listed)} of {count} {what} listed; --max N lists more", err=True)

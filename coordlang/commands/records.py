@@ -7,25 +7,24 @@ The docstring of a record is the command's ``--help``.  Nothing heavy is importe
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from coordlang.commands.options import (
-    NO_SLACK,
+    AnswerOptions,
     CertificateSource,
     CommandOptions,
     CoordinatesSource,
     File,
     Jobs,
     LanguageSource,
-    LiftedWork,
     Listing,
     MethodOptions,
     OutputFile,
+    PlanningOptions,
     ProblemSource,
-    Progress,
     SentenceSource,
     Source,
     TasksSource,
@@ -33,7 +32,6 @@ from coordlang.commands.options import (
     form_option,
     json_option,
     output_option,
-    progress_option,
 )
 from planners.search import HeuristicName, SearchHeuristic
 from planners.system.errors import UsageError
@@ -55,13 +53,14 @@ LiftPreference = Literal["features", "words"]
 
 
 @dataclass(frozen=True, slots=True)
-class InspectOptions(CommandOptions):
+class InspectOptions(AnswerOptions):
     """Show what was understood of DOMAIN and PROBLEM: a domain that was misread shows it here.
 
     With --factored and --write: the files of all robots as one domain and one problem.
     """
 
     takes = "DOMAIN PROBLEM"
+    doing = "reading and grounding"
     keeps_plans = False
 
     states: bool = option(False, "Also count the reachable joint states and steps.")
@@ -73,12 +72,10 @@ class InspectOptions(CommandOptions):
         is_output=True,
         files=WRITTEN,
     )
-    as_json: bool = json_option()
-    source: Source = group(Source, without=NO_SLACK)
 
 
 @dataclass(frozen=True, slots=True)
-class PlansOptions(CommandOptions):
+class PlansOptions(PlanningOptions):
     """Count, list or sample all optimal plans of a task.
 
     A plan is a sequence of joint actions; plans are listed in a stable order.  With --slack B those
@@ -86,7 +83,6 @@ class PlansOptions(CommandOptions):
     """
 
     takes = "DOMAIN PROBLEM"
-    doing = "finding all optimal plans"
 
     heuristic: SearchHeuristic = option(
         "auto", "What the search is bounded by; the plans are the same."
@@ -98,7 +94,7 @@ class PlansOptions(CommandOptions):
 
 
 @dataclass(frozen=True, slots=True)
-class CheckOptions(CommandOptions):
+class CheckOptions(AnswerOptions):
     """Compare our optimal cost with Fast Downward's.
 
     Exit 0: equal.  1: they differ.  11: both prove that there is no plan.
@@ -108,12 +104,9 @@ class CheckOptions(CommandOptions):
     doing = "solving the task twice"
     keeps_plans = False
 
-    as_json: bool = json_option()
-    source: Source = group(Source, without=NO_SLACK)
-
 
 @dataclass(frozen=True, slots=True)
-class CoordinationOptions(CommandOptions):
+class CoordinationOptions(AnswerOptions):
     """Decide which tasks require coordination.
 
     Show how robots that follow different optimal plans miscoordinate; with --slack B plans that
@@ -121,15 +114,13 @@ class CoordinationOptions(CommandOptions):
     """
 
     takes = "DOMAIN PROBLEMS..."
-    doing = "finding all optimal plans"
 
-    as_json: bool = json_option()
     work: Jobs = group(Jobs)
     source: Source = group(Source, without=("words_see_slack",))
 
 
 @dataclass(frozen=True, slots=True)
-class TasksOptions(CommandOptions):
+class TasksOptions(PlanningOptions):
     """Write a task file: the tasks of PROBLEM with other starts and other goals.
 
     In a PATTERN ? stands for any one name.
@@ -137,6 +128,7 @@ class TasksOptions(CommandOptions):
 
     takes = "DOMAIN PROBLEM"
     module = "domains"
+    doing = "reading and grounding"
     keeps_plans = False
 
     start: tuple[str, ...] = option(
@@ -147,11 +139,10 @@ class TasksOptions(CommandOptions):
     )
     output: str = output_option("The task file, - for stdout.", required=True)
     as_json: bool = json_option("Print the figures as one JSON object.")
-    source: Source = group(Source, without=NO_SLACK)
 
 
 @dataclass(frozen=True, slots=True)
-class BuildOptions(CommandOptions):
+class BuildOptions(PlanningOptions):
     """Build a coordination language and verify it before it is written.
 
     With --words K: words that may be too few for that, and how often robots then fail.
@@ -161,7 +152,6 @@ class BuildOptions(CommandOptions):
     """
 
     takes = "DOMAIN PROBLEMS..."
-    doing = "finding all optimal plans"
 
     tasks: TasksSource | None = option(
         None,
@@ -176,15 +166,19 @@ class BuildOptions(CommandOptions):
         "fail least often.  1: silence.",
         "K",
         least=1,
+        without=("method", "alpha_only", "prefer", "certificate", "start"),
     )
     worst: bool = option(
-        False, "With --words: minimise how often they fail in the worst task, not on average."
+        False,
+        "With --words: minimise how often they fail in the worst task, not on average.",
+        needs=("words",),
     )
     start: LanguageSource | None = option(
         None,
         "Repair this language in place of building one: as few states as possible change their "
         "word.",
         "LANGUAGE",
+        without=("method", "alpha_only", "prefer"),
     )
     unsolvable: Literal["fail", "skip"] = option(
         "fail",
@@ -202,34 +196,12 @@ class BuildOptions(CommandOptions):
         is_output=True,
     )
     as_json: bool = json_option("Print the figures as one JSON object.")
-    reserve: float = option(
-        0.0,
-        "The share of a time limit's rest that a search, once there is a language, leaves for its "
-        "certificate.",
-        only="python",
-    )
-    progress: Progress | None = progress_option()
     work: Jobs = group(Jobs)
     source: Source = group(Source)
 
-    def __post_init__(self) -> None:
-        if self.words is None and self.worst:
-            raise UsageError("--worst belongs to --words", remedy="Add --words K.")
-        ways = self.given & {"method", "alpha_only", "prefer"}
-        if self.words is not None and (ways or self.certificate or self.start is not None):
-            raise UsageError(
-                "--words finds the words in its own way: without --method or --certificate",
-                remedy="Leave out --method, --alpha-only, --prefer, --start and --certificate.",
-            )
-        if self.start is not None and ways:
-            raise UsageError(
-                "--start changes the words of a language, and no method makes new ones",
-                remedy="Leave out --method, --alpha-only and --prefer, or --start.",
-            )
-
 
 @dataclass(frozen=True, slots=True)
-class VerifyOptions(CommandOptions):
+class VerifyOptions(AnswerOptions):
     """Check by definition that LANGUAGE is a coordination language.
 
     All plans of one sentence then mix freely.
@@ -253,19 +225,13 @@ class VerifyOptions(CommandOptions):
         "FILE",
         only="cli",
         is_output=True,
+        needs=("certificate",),
     )
-    as_json: bool = json_option()
-    progress: Progress | None = progress_option()
     work: Jobs = group(Jobs)
-    source: Source = group(Source, without=NO_SLACK)
-
-    def __post_init__(self) -> None:
-        if self.dimacs is not None and self.certificate is None:
-            raise UsageError("--dimacs belongs to --certificate", remedy="Add --certificate FILE.")
 
 
 @dataclass(frozen=True, slots=True)
-class LiftOptions(CommandOptions):
+class LiftOptions(PlanningOptions):
     """Learn words as functions of features of states, for all PROBLEMS at once.
 
     The problems have the same robots, and may have other objects: maps of other sizes.  The words
@@ -276,7 +242,6 @@ class LiftOptions(CommandOptions):
     """
 
     takes = "DOMAIN PROBLEMS..."
-    doing = "finding all optimal plans"
 
     tasks: Literal["all"] | None = option(
         None,
@@ -287,6 +252,7 @@ class LiftOptions(CommandOptions):
         (),
         "Verify on this problem, too; learn from it if it refutes what was learned.",
         "PROBLEM",
+        without=("factored",),
     )
     complexity: int = option(8, "Leave out features that are more complex.", least=1)
     prefer: LiftPreference | None = option(
@@ -294,13 +260,13 @@ class LiftOptions(CommandOptions):
         "Few words, where states with different features may share one: for the simplest "
         "features, or for those that do with fewest words (default: a word for each combination).",
     )
-    work: LiftedWork = group(LiftedWork)
+    coordinates: CoordinatesSource | None = coordinates_option()
+    jobs: int | None = option(None, "Processes that verify (default: the cores).", "N", least=1)
     output: str = output_option(
         "The lifted file; .json or .json.gz, - for stdout.", "LIFTED", required=True
     )
     seed: int = option(0, "Seed of all random choices.", least=0)
     as_json: bool = json_option("Print the figures as one JSON object.")
-    source: Source = group(Source, without=NO_SLACK)
 
     def __post_init__(self) -> None:
         if self.source.model.slack:
@@ -308,16 +274,10 @@ class LiftOptions(CommandOptions):
                 "--slack: words over features are learned from optimal plans",
                 remedy="Build a language of this problem: `coordlang build --slack`.",
             )
-        if self.source.factored is not None and self.check:
-            raise UsageError(
-                "--check and --factored: a folder of factored files holds one problem",
-                remedy="Leave out --check, or make a file of each folder: "
-                "`coordlang inspect --write`.",
-            )
 
 
 @dataclass(frozen=True, slots=True)
-class GroundOptions(CommandOptions):
+class GroundOptions(PlanningOptions):
     """Write the language of one problem, an ordinary language file, from LIFTED.
 
     Exit 0: written, and verified by definition unless --unverified.  1: refuted for this problem;
@@ -326,7 +286,6 @@ class GroundOptions(CommandOptions):
 
     takes = "LIFTED DOMAIN PROBLEM"
     module = "lift"
-    doing = "finding all optimal plans"
 
     tasks: TasksSource | None = option(
         "all",
@@ -336,15 +295,15 @@ class GroundOptions(CommandOptions):
     verified: bool = option(
         True, "Do not verify it here; the file says so.", names=("--unverified",)
     )
-    work: LiftedWork = group(LiftedWork)
+    coordinates: CoordinatesSource | None = coordinates_option()
+    jobs: int | None = option(None, "Processes that verify (default: the cores).", "N", least=1)
     output: str = output_option(
         "The language file; .json or .json.gz, - for stdout.", "LANGUAGE", required=True
     )
-    source: Source = group(Source, without=NO_SLACK)
 
 
 @dataclass(frozen=True, slots=True)
-class SayOptions(CommandOptions):
+class SayOptions(AnswerOptions):
     """Print the sentence of an optimal plan, the words on one line.
 
     PLAN is a plan file, IPC text or JSON, or - for stdin; a JSON file with several plans gives one
@@ -353,14 +312,10 @@ class SayOptions(CommandOptions):
 
     takes = "LANGUAGE DOMAIN PROBLEM PLAN"
     module = "sentences"
-    doing = "finding all optimal plans"
-
-    as_json: bool = json_option()
-    source: Source = group(Source, without=NO_SLACK)
 
 
 @dataclass(frozen=True, slots=True)
-class UnderstandOptions(CommandOptions):
+class UnderstandOptions(PlanningOptions):
     """Understand a sentence ("w1 w0").
 
     The optimal plans that it leaves open are counted, listed, sampled or drawn.
@@ -384,26 +339,14 @@ class UnderstandOptions(CommandOptions):
         "N",
         least=1,
         only="cli",
+        needs=("form", "dot", "json"),
+        without=("only_count",),
     )
     output: str | None = output_option()
-    source: Source = group(Source, without=NO_SLACK)
-
-    def __post_init__(self) -> None:
-        CommandOptions.__post_init__(self)
-        if self.form == "dot" and not self.listing.is_default:
-            raise UsageError(
-                "--format dot draws the DAG of all plans",
-                remedy="Leave out --count, --max and --sample.",
-            )
-        if self.nodes is not None and (self.form == "ipc" or self.listing.only_count):
-            raise UsageError(
-                "--nodes cuts the DAG: it belongs to --format dot or json, without --count",
-                remedy="Leave out --nodes.",
-            )
 
 
 @dataclass(frozen=True, slots=True)
-class PlanOptions(CommandOptions):
+class PlanOptions(PlanningOptions):
     """Find one optimal plan that has SENTENCE ("w1 w0"), by A* that prunes what does not fit.
 
     With --prefer the best sentence of the task is found first.  The nodes expanded with and without
@@ -423,16 +366,14 @@ class PlanOptions(CommandOptions):
     heuristic: HeuristicName = option("relaxed", "The lower bound of A*.")
     form: Literal["ipc", "json", "plansys2"] = form_option("ipc", "How the plan is written.")
     as_json: bool = json_option("Short for --format json.")
-    source: Source = group(Source, without=NO_SLACK)
 
     def __post_init__(self) -> None:
-        CommandOptions.__post_init__(self)
         if isinstance(self.prefer, str):
             object.__setattr__(self, "prefer", (self.prefer,))
 
 
 @dataclass(frozen=True, slots=True)
-class ChoicesOptions(CommandOptions):
+class ChoicesOptions(PlanningOptions):
     """Show which subplans each robot may follow under SENTENCE ("w1 w0").
 
     Whatever the others choose from theirs, together they follow an optimal plan.
@@ -464,11 +405,10 @@ class ChoicesOptions(CommandOptions):
     form: Literal["text", "json", "dot"] = form_option("text", "How they are shown.")
     as_json: bool = json_option("Short for --format json.")
     output: str | None = output_option()
-    source: Source = group(Source, without=NO_SLACK)
 
 
 @dataclass(frozen=True, slots=True)
-class SimulateOptions(CommandOptions):
+class SimulateOptions(PlanningOptions):
     """Let robots with wheels do the task of PROBLEM in a simulator.
 
     Each robot draws its own choices under a sentence of LANGUAGE.  What comes of it is counted:
@@ -483,8 +423,11 @@ class SimulateOptions(CommandOptions):
         None,
         'What the robots have agreed on, "w1 w0" (default: what leaves most plans open).',
         "SENTENCE",
+        without=("without", "plan"),
     )
-    without: bool = option(False, "Without a sentence: each follows an optimal plan of its own.")
+    without: bool = option(
+        False, "Without a sentence: each follows an optimal plan of its own.", without=("plan",)
+    )
     plan: bool = option(False, "In place of a sentence all follow one whole plan.")
     runs: int = option(1, "How many runs.", "N", least=1)
     seed: int = option(0, "Of the first run; the next ones follow.", least=0)
@@ -497,9 +440,7 @@ class SimulateOptions(CommandOptions):
         None, "The radius of a robot (default: a fifth of --cell).", "METRES"
     )
     noise: float = option(
-        0.1,
-        "The standard deviation of what wheels do, as a share of what they are told.",
-        "SHARE",
+        0.1, "The standard deviation of what wheels do, as a share of what they are told.", "SHARE"
     )
     lidar: bool = option(
         True, "Robots do not stop before what is ahead of them.", names=("--no-lidar",)
@@ -515,9 +456,6 @@ class SimulateOptions(CommandOptions):
         "ROBOT:STEP:PLACE",
     )
     coordinates: CoordinatesSource | None = coordinates_option()
-    progress: Callable[[int, int], None] | None = progress_option(
-        "Called with the number of runs done, and of all."
-    )
     output: tuple[str, ...] = option(
         (),
         "Write the record (.json), or a recording of one run (.gif, .mp4, a sheet as .png).",
@@ -536,22 +474,16 @@ class SimulateOptions(CommandOptions):
         only="cli",
     )
     as_json: bool = json_option("Print the record as one JSON object.")
-    source: Source = group(Source, without=NO_SLACK)
 
     def __post_init__(self) -> None:
         from coordlang.commands.simulate import kind_of
 
-        if (self.sentence is not None) + self.without + self.plan > 1:
-            raise UsageError(
-                "--sentence, --without and --plan exclude each other",
-                remedy="Say what the robots have agreed on: a sentence, nothing, or a whole plan.",
-            )
         for path in self.output:
             kind_of(path)
 
 
 @dataclass(frozen=True, slots=True)
-class ExportOptions(CommandOptions):
+class ExportOptions(AnswerOptions):
     """Write the task under SENTENCE ("w1 w0") for other programs.
 
     The optimal plans of the exported PDDL are exactly the plans that fit, one to one; a plan
@@ -581,30 +513,21 @@ class ExportOptions(CommandOptions):
         "Beyond N joint actions robots choose one after another in the PDDL.",
         "N",
         least=0,
+        needs=("to", "pddl"),
     )
     for_planner: Reader = option(
         "fd",
         "Who reads the PDDL: fd (Fast Downward) and kstar the same, pyperplan STRIPS only.",
         names=("--for",),
+        needs=("to", "pddl"),
     )
     translate_plan: str | None = option(
         None,
         "Do not export: translate a plan of the exported problem into a plan file (FILE).",
         "FILE",
         only="cli",
+        needs=("to", "pddl"),
     )
-    as_json: bool = json_option()
-    source: Source = group(Source, without=NO_SLACK)
-
-    def __post_init__(self) -> None:
-        pddl_only = {"max_actions": "--max-actions", "for_planner": "--for"}
-        pddl_only["translate_plan"] = "--translate-plan"
-        for name, spelling in pddl_only.items():
-            if self.to != "pddl" and name in self.given:
-                raise UsageError(
-                    f"{spelling} belongs to --to pddl",
-                    remedy=f"Leave out {spelling}, or --to {self.to}.",
-                )
 
     @property
     def writes_folder(self) -> bool:
@@ -622,7 +545,7 @@ class ExportOptions(CommandOptions):
 
 
 @dataclass(frozen=True, slots=True)
-class ExplainOptions(CommandOptions):
+class ExplainOptions(AnswerOptions):
     """Show what the sentences of a task leave open, and each word as a short formula.
 
     With --task also show what the sentences demand of each robot.
@@ -633,21 +556,15 @@ class ExplainOptions(CommandOptions):
 
     task: bool = option(False, "What each sentence of PROBLEM's task asks of each robot.")
     sentence: SentenceSource | None = option(
-        None, 'With --task: this sentence only, as in "w1 w0".', "WORDS"
+        None, 'With --task: this sentence only, as in "w1 w0".', "WORDS", needs=("task",)
     )
     formula_per_word: bool = option(
         False, "A formula of its own for every word, also where less would say the same."
     )
-    as_json: bool = json_option()
-    source: Source = group(Source, without=NO_SLACK)
-
-    def __post_init__(self) -> None:
-        if self.sentence is not None and not self.task:
-            raise UsageError("--sentence: only with --task", remedy="Add --task.")
 
 
 @dataclass(frozen=True, slots=True)
-class ReportOptions(CommandOptions):
+class ReportOptions(PlanningOptions):
     """Write a self-contained HTML page that shows LANGUAGE.
 
     It has the words, and the sentences and plans in the tasks of PROBLEM.. and in some of the
@@ -669,10 +586,11 @@ class ReportOptions(CommandOptions):
         None, "Also play these runs of `coordlang simulate -o RUN.json`.", "RUN.json"
     )
     planviz: bool = option(
-        False, "Also write a plan of the first task for PlanViz, and its map, beside PAGE."
+        False,
+        "Also write a plan of the first task for PlanViz, and its map, beside PAGE.",
+        without=("output=-",),
     )
     seed: int = option(0, "Draws the tasks.")
-    source: Source = group(Source, without=NO_SLACK)
 
     def __post_init__(self) -> None:
         if self.tasks_shown > 500:
@@ -680,8 +598,6 @@ class ReportOptions(CommandOptions):
                 f"--tasks-shown {self.tasks_shown}: a page shows at most 500 tasks",
                 remedy="Make a page for each of several problems.",
             )
-        if self.planviz and self.output == "-":
-            raise UsageError("--planviz writes files beside PAGE", remedy="Give -o a file.")
 
     def outputs(self) -> list[OutputFile]:
         """Beside the page and under its name: a plan for PlanViz, and its map."""
@@ -701,14 +617,20 @@ class DomainsOptions(CommandOptions):
         None,
         "Copy this domain, or all of them, with problems and README into DIR/NAME.",
         "NAME|all DIR",
+        without=("map",),
     )
     map: str | None = option(
-        None, "A map of movingai.com, to be written as a problem of the grid domain.", "FILE.map"
+        None,
+        "A map of movingai.com, to be written as a problem of the grid domain.",
+        "FILE.map",
+        needs=("scen",),
     )
-    scen: str | None = option(None, "The scenario: where robots start and go.", "FILE.scen")
-    agents: int | None = option(None, "The first K robots of the scenario.", "K")
+    scen: str | None = option(
+        None, "The scenario: where robots start and go.", "FILE.scen", needs=("agents",)
+    )
+    agents: int | None = option(None, "The first K robots of the scenario.", "K", needs=("output",))
     output: str | None = option(
-        None, "The folder for a map's domain and problem.", "DIR", names=("-o",)
+        None, "The folder for a map's domain and problem.", "DIR", names=("-o",), needs=("map",)
     )
     as_json: bool = json_option()
 

@@ -3,15 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import count
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coordlang.commands.building import Making
-from coordlang.commands.built import Built
 from coordlang.commands.layout import WIDTH, wrapped
 from coordlang.commands.options import MethodOptions
 from coordlang.commands.witness import witness_data, witness_text
@@ -24,8 +22,10 @@ from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.repair import Repair, repair
 from planners.joint.model import NO_FACT
 from planners.joint.tables import Ints, Rows, find_rows
-from planners.parallel.workers import Workers
 from planners.system.notebook import counted
+
+if TYPE_CHECKING:
+    from coordlang.commands.building import Built, Making
 
 #: What a language file names as the method of a repaired language.
 METHOD = "repair"
@@ -46,23 +46,11 @@ class ChangedState:
 class Repaired:
     """What became of a language.
 
-    Attributes
-    ----------
-    witness
-        Plans of one sentence of the old language that miscoordinate; None: it still holds, and no
-        word was changed.
-    changed
-        The states that have another word than before, by their keys.
-    changes_bound
-        Every language for the tasks changes the word of so many states at least.
-    new_words
-        The words that are new.
-    new_words_bound
-        Every language that changes so few states has at least so many new words.
-    new_states
-        States on plans of the tasks that the old language does not list.
-    gone
-        States of the old language that the problem cannot have any more.
+    ``witness`` has plans of one sentence of the old language that miscoordinate; None: it still
+    holds, and no word was changed.  Other words have the states ``changed``; every language for the
+    tasks changes ``changes_bound`` states at least, and one that changes so few has at least
+    ``new_words_bound`` of ``new_words``.  ``new_states`` on plans of the tasks are not listed in
+    the old language, and ``gone`` of its states the problem cannot have any more.
     """
 
     witness: Miscoordination | None
@@ -132,27 +120,17 @@ def _proof(number: int, bound: int) -> str:
     return f", at least {bound} are needed" if bound else ", not proved the fewest"
 
 
-def repair_language(
-    candidates: Candidates,
-    start: Language,
-    *,
-    seed: int = 0,
-    progress: Callable[[str], None] = lambda _: None,
-    workers: Workers | None = None,
-) -> Built:
+def repair_language(making: Making, start: Language, options: MethodOptions) -> Built:
     """Change the words of as few states as makes a language serve candidate tasks.
 
     The result is verified by definition.  States that are on no plan of the candidate tasks keep
-    their words; of ``start`` those that the tasks' problem cannot have are left out.  ``seed`` is
-    recorded; arguments and errors are else as in `coordlang.commands.building.build_language`.
+    their words.
     """
-    making = Making(candidates, workers, progress)
-    found = making.differences()
+    job = making.job(MethodOptions(seed=options.seed))
     making.note("coordination")
-    job = making.job(found, MethodOptions(seed=seed))
-    old = _Old.of(start, candidates)
+    old = _Old.of(start, making.candidates)
     words = old.words_of(job.states)
-    progress("verifying the old language")
+    making.progress("verifying the old language")
     partition = old.partition
     verdict = making.verdict(partition)
     making.note("verify")

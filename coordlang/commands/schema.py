@@ -63,13 +63,8 @@ def error_json(error: CoordlangError) -> str:
     if place is not None:
         line, column = (place.line, place.column) if place.line else (None, None)
         position = ErrorPosition(sentence(place.file), line, column)
-    entry = ErrorEntry(
-        sentence(error.what),
-        position,
-        None if remedy is None else sentence(remedy, keep="\n"),
-        error.exit_code,
-        None if reached is None else sentence(reached),
-    )
+    remedy, reached = remedy and sentence(remedy, keep="\n"), reached and sentence(reached)
+    entry = ErrorEntry(sentence(error.what), position, remedy, error.exit_code, reached)
     return msgspec.json.format(msgspec.json.encode(ErrorObject(entry)), indent=0).decode()
 
 

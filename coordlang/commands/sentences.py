@@ -11,10 +11,9 @@ from os import PathLike, fspath
 from typing import Any
 
 from coordlang.commands.inputs import Arguments, InTask, public
-from coordlang.commands.options import PlanSource
 from coordlang.commands.plans import OptimalPlans, PlanSteps, show_listed
 from coordlang.commands.records import NODES_DRAWN, PlanOptions, SayOptions, UnderstandOptions
-from coordlang.commands.terminal import covered_code, echo, note, write
+from coordlang.commands.terminal import covered_code, echo, write
 from coordlang.execution.best_sentence import BestSentence, best_sentence
 from coordlang.execution.drawing import cut_note, plans_dot
 from coordlang.execution.guided_search import ExpandedStates, GuidedPlan, plan_under_sentence
@@ -26,7 +25,7 @@ from coordlang.language.tolerance import tolerance_data
 from planners.search import HeuristicName
 from planners.search.plan_file import Texts, json_count
 from planners.search.plans import Plans
-from planners.system.errors import CoordlangError, UsageError
+from planners.system.errors import CoordlangError, UsageError, note
 from planners.system.notebook import counted
 
 
@@ -64,16 +63,18 @@ class Said(InTask):
 def say(files: Arguments, options: SayOptions) -> Said:
     """Say optimal plans: the sentence of a plan is the sequence of words that it passes through.
 
-    ``plan`` is a plan file (which may hold several plans), or the steps of one plan.
-
-    Raises
-    ------
-    NotAPlan, NotOptimal
-        With the first step that breaks: only optimal plans have a sentence.
+    ``plan`` is a plan file (which may hold several plans), or the steps of one plan.  Raises
+    `NotAPlan` or `NotOptimal` with the first step that breaks: only optimal plans have a sentence.
     """
     plan = files.needed("PLAN")
     used = files.task().used
-    plans = _plans(plan, used)
+    if isinstance(plan, Mapping):
+        raise UsageError(
+            "expected a plan file or the steps of one plan",
+            remedy="A step has one text for each robot, None where it idles.",
+        )
+    is_file = isinstance(plan, str | PathLike)
+    plans = read_plan_file(fspath(plan), used.model) if is_file else [plan]
     sentences = []
     for number, steps in enumerate(plans, 1):
         try:
@@ -85,21 +86,10 @@ def say(files: Arguments, options: SayOptions) -> Said:
     return Said(used, tuple(sentences))
 
 
-def _plans(plan: PlanSource, used: TaskLanguage) -> Sequence[Sequence[Texts]]:
-    if isinstance(plan, str | PathLike):
-        return read_plan_file(fspath(plan), used.model)
-    if isinstance(plan, Mapping):
-        raise UsageError(
-            "expected a plan file or the steps of one plan",
-            remedy="A step has one text for each robot, None where it idles.",
-        )
-    return [plan]
-
-
 def show_say(found: Said, options: SayOptions) -> int:
     """Print the sentences."""
     echo(json.dumps(found.data()) if options.as_json else found)
-    return covered_code(found.covered, found.tolerance)
+    return covered_code(found)
 
 
 class SentencePlans(OptimalPlans, InTask):
@@ -125,10 +115,6 @@ class SentencePlans(OptimalPlans, InTask):
         """Return the DAG in the language of Graphviz."""
         return plans_dot(self.dag(nodes))
 
-    def cut_note(self, nodes: int = NODES_DRAWN) -> str | None:
-        """Return what a picture with so many nodes leaves out, or None."""
-        return cut_note(self.dag(nodes)) or None
-
     def data_with(self, listed: Sequence[Sequence[Texts]], graph: PlanDag | None) -> dict[str, Any]:
         """Return a JSON plan file with sentence and guarantee, and with the DAG if one is given."""
         numbers = [self._known(plan) for plan in listed]
@@ -139,12 +125,8 @@ class SentencePlans(OptimalPlans, InTask):
 def understand(files: Arguments, options: UnderstandOptions) -> SentencePlans:
     """Understand a sentence: the optimal plans of the task that have it.
 
-    Raises
-    ------
-    NoPlanFits
-        If no optimal plan has the sentence; it says where it first breaks.
-    BadInput
-        For a word that the language does not have, or one said twice in a row.
+    Raises `NoPlanFits` if no optimal plan has the sentence; it says where it first breaks, and
+    `BadInput` for a word that the language does not have, or one said twice in a row.
     """
     said = files.needed("SENTENCE")
     used = files.task().used
@@ -156,14 +138,14 @@ def show_understand(found: SentencePlans, options: UnderstandOptions) -> int:
     if options.form == "dot":
         nodes = options.nodes or NODES_DRAWN
         write(found.dot(nodes), options.output)
-        if cut := found.cut_note(nodes):
+        if cut := cut_note(found.dag(nodes)):
             note(f"{cut}; --nodes N draws more")
     else:
         is_drawn = options.form == "json" and not options.listing.only_count
         dag = found.dag(options.nodes) if is_drawn else None
         data = partial(found.data_with, graph=dag)
         show_listed(found, options, data, "plans", options.output)
-    return covered_code(found.covered, found.tolerance)
+    return covered_code(found)
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,25 +165,22 @@ class Fulfilled:
 
     def data(self) -> dict[str, Any]:
         """An entry of ``wishes`` in the JSON plan file."""
+        plans = {"worst_plan": self.worst_plan, "best_plan": self.best_plan}
+        own: dict[str, Any] = {"granted": self.is_granted, **plans}
         if self.value is not None:
-            return {"wish": self.preference, "value": json_count(self.value)}
-        return {
-            "wish": self.preference,
-            "granted": self.is_granted,
-            "worst_plan": self.worst_plan,
-            "best_plan": self.best_plan,
-        }
+            own = {"value": json_count(self.value)}
+        return {"wish": self.preference, **own}
 
     def text(self) -> str:
         """How the sentence meets the preference, in a line or two."""
-        if self.preference == "shortest":
-            return f"{self.preference}: {counted(self.value or 0, 'word')}"
+        lines = [f"at worst {self.worst_plan}", f"at best {self.best_plan}"]
         if self.value is not None:
-            return f"{self.preference}: leaves {counted(self.value, 'plan')} open"
-        if self.worst_plan == self.best_plan:
-            return f"{self.preference}: in every plan {self.worst_plan}"
-        worst = f"{self.preference}: at worst {self.worst_plan}"
-        return f"{worst}\n{self.preference}: at best {self.best_plan}"
+            size = counted(self.value, "word")
+            is_size = self.preference == "shortest"
+            lines = [size if is_size else f"leaves {counted(self.value, 'plan')} open"]
+        elif self.worst_plan == self.best_plan:
+            lines = [f"in every plan {self.worst_plan}"]
+        return "\n".join(f"{self.preference}: {line}" for line in lines)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -220,6 +199,7 @@ class PlanUnderSentence(InTask):
     without_sentence: GuidedPlan
     fulfilled: tuple[Fulfilled, ...]
     open_plans: SentencePlans
+    shown = ("sentence", "cost", "expanded", "covered")
 
     @property
     def cost(self) -> tuple[int, int]:
@@ -237,32 +217,14 @@ class PlanUnderSentence(InTask):
     def __len__(self) -> int:
         return len(self.steps)
 
-    def facts(self) -> Mapping[str, object]:
-        """The sentence, and how much work the plan was with and without it."""
-        return {
-            "sentence": self.sentence,
-            "makespan": self.cost[0],
-            "expanded": self.expanded,
-            "without_sentence": self.without_sentence.expanded,
-            "covered": self.covered,
-        }
-
-    def ipc(self) -> str:
-        """Return the plan as an IPC plan file, with its sentence in a comment."""
-        return f"{self.open_plans.ipc(self.steps)}; sentence = {self.sentence}\n"
-
-    def plansys2(self) -> str:
-        """Return the plan as PlanSys2 reads it."""
-        return self.open_plans.plansys2(self.steps)
-
     def data(self) -> dict[str, Any]:
         """A JSON plan file (docs/formats.md) with the search and the preferences."""
         data = self.open_plans.data_with([self.steps], None)
-        data["search"] = {
-            "heuristic": self.heuristic,
-            **_work(self.search),
-            "without_sentence": _work(self.without_sentence),
-        }
+        work = [
+            {"expanded": own.expanded, "generated": own.generated, "states": own.states}
+            for own in (self.search, self.without_sentence)
+        ]
+        data["search"] = {"heuristic": self.heuristic, **work[0], "without_sentence": work[1]}
         if self.fulfilled:
             data["wishes"] = [entry.data() for entry in self.fulfilled]
         return data
@@ -272,12 +234,8 @@ class PlanUnderSentence(InTask):
 def plan(files: Arguments, options: PlanOptions) -> PlanUnderSentence:
     """Find one optimal plan that has a sentence, by A* that prunes what does not fit.
 
-    Raises
-    ------
-    NoPlanFits
-        If no optimal plan has the sentence.
-    UsageError
-        For an unknown preference, and for both or neither of sentence and ``prefer``.
+    Raises `NoPlanFits` if no optimal plan has the sentence, and `UsageError` for an unknown
+    preference, and for both or neither of sentence and ``prefer``.
     """
     sentence = files.values.get("SENTENCE")
     if (sentence is None) == (not options.prefer):
@@ -314,19 +272,19 @@ def _fulfilled(preferences: Sequence[Preference], best: BestSentence) -> Iterato
             yield Fulfilled(preference.text, None, value[0] == 0, worst, well)
 
 
-def _work(search: GuidedPlan) -> dict[str, int]:
-    return {"expanded": search.expanded, "generated": search.generated, "states": search.states}
-
-
 def show_plan(found: PlanUnderSentence, options: PlanOptions) -> int:
     """Print the plan, and the work of the search."""
     if options.form == "json":
         echo(json.dumps(found.data()))
-        return covered_code(found.covered, found.tolerance)
-    echo(found.plansys2() if options.form == "plansys2" else found.ipc(), nl=False)
+        return covered_code(found)
+    if options.form == "plansys2":
+        text = found.open_plans.plansys2(found.steps)
+    else:
+        text = f"{found.open_plans.ipc(found.steps)}; sentence = {found.sentence}\n"
+    echo(text, nl=False)
     for entry in found.fulfilled:
         echo(entry.text(), err=True)
     expanded = counted(found.expanded, "node")
     without = f"without the sentence {found.without_sentence.expanded:,}"
     echo(f"A* ({found.heuristic}) expanded {expanded}; {without}", err=True)
-    return covered_code(found.covered, found.tolerance)
+    return covered_code(found)

@@ -15,7 +15,7 @@ import msgspec
 from coordlang.commands.inputs import Arguments, public, read_coordinates_of
 from coordlang.commands.options import File
 from coordlang.commands.records import SimulateOptions
-from coordlang.commands.terminal import covered_code, echo, ended_early, note, working
+from coordlang.commands.terminal import covered_code, echo, ended_early, working
 from coordlang.execution.best_sentence import best_sentence
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.tolerance import Tolerance
@@ -31,7 +31,7 @@ from coordlang.simulation.recording import KINDS, recorded
 from coordlang.simulation.run import record_of, runs_of
 from coordlang.simulation.simulator import Settings, require_simulator
 from coordlang.simulation.team import Agreement, Mission, mission
-from planners.system.errors import UsageError
+from planners.system.errors import UsageError, note
 from planners.system.limits import reaching, run_until_stopped
 from planners.system.messages import echoed
 from planners.system.notebook import Presented, counted
@@ -76,32 +76,27 @@ class Simulated(Presented):
         """What was agreed on, and the `counts`."""
         return {"sentence": self.record.sentence, "step": self.record.step, **self.counts}
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> Any:
         """The record (docs/formats.md)."""
-        found: dict[str, Any] = msgspec.to_builtins(self.record)
-        return found
-
-    def summary(self) -> str:
-        """The `counts` in a line."""
-        counts = self.counts
-        return (
-            f"{counted(counts['runs'], 'run')}: all arrived in {counts['arrived']}, "
-            f"collisions in {counts['collisions']}, deadlock in {counts['deadlocks']}, "
-            f"late in {counts['late']}; {counted(counts['messages'], 'message')}"
-        )
+        return msgspec.to_builtins(self.record)
 
     def save(self, path: File, seed: int | None = None) -> None:
         """Write the record (``.json``), or one run as a film or a sheet of frames.
 
         The name's ending says which: ``.gif``, ``.mp4`` or ``.png``; ``seed`` is that of the run,
-        by default of the first one.
-
-        Raises
-        ------
-        UsageError
-            For another ending, and where there is no such run.
+        by default of the first one.  Raises `UsageError` for another ending, and where there is no
+        such run.
         """
-        write_atomically(fspath(path), written(self.record, fspath(path), seed))
+        kind = kind_of(fspath(path))
+        found = [run for run in self.runs if seed is None or run.seed == seed]
+        if kind != ".json" and not found:
+            raise UsageError(
+                f"there is no run with seed {seed}",
+                remedy=f"There are {', '.join(str(run.seed) for run in self.runs[:8])}.",
+            )
+        is_record = kind == ".json"
+        data = to_bytes(self.record) if is_record else recorded(self.record, found[0], kind)
+        write_atomically(fspath(path), data)
 
 
 def kind_of(path: str) -> str:
@@ -115,40 +110,21 @@ def kind_of(path: str) -> str:
     return kind
 
 
-def written(record: SimulationRecord, path: str, seed: int | None = None) -> bytes:
-    """Return what a file of this name holds: the record, or a recording of a run."""
-    kind = kind_of(path)
-    if kind == ".json":
-        return to_bytes(record)
-    found = [run for run in record.runs if seed is None or run.seed == seed]
-    if not found:
-        raise UsageError(
-            f"there is no run with seed {seed}",
-            remedy=f"There are {', '.join(str(run.seed) for run in record.runs[:8])}.",
-        )
-    return recorded(record, found[0], kind)
-
-
 @public(SimulateOptions)
 def simulate(files: Arguments, options: SimulateOptions) -> Simulated:
     """Let simulated robots with wheels do a task, each by its own logic.
 
     Every robot knows the task, the language, the sentence, and so its own choices, and draws one of
-    its own subplans.
-
-    Raises
-    ------
-    UsageError
-        If ir-sim is not installed (``pip install 'coordlang[sim]'``), or options contradict.
-    BadInput
-        If it is not known where the places lie, or where the robots are.
-    NoPlanFits
-        If no optimal plan has the sentence.
+    its own subplans.  Raises `UsageError` if ir-sim is not installed (``pip install
+    'coordlang[sim]'``), or options contradict, `BadInput` if it is not known where the places lie,
+    or where the robots are, and `NoPlanFits` if no optimal plan has the sentence.
     """
     if options.replay is not None:
         return Simulated(read_simulation(options.replay))
     files.needed("LANGUAGE")
-    settings, runs = _settings(options), options.runs
+    given = {name: getattr(options, name) for name in ("step", "cell", "noise", "lidar", "human")}
+    radius = options.cell / 5 if options.radius is None else options.radius
+    settings, runs = Settings(radius=radius, **given), options.runs
     require_simulator()
     task = files.task(options.coordinates)
     prepared = _prepared(task.used, options)
@@ -160,9 +136,7 @@ def simulate(files: Arguments, options: SimulateOptions) -> Simulated:
     def work() -> None:
         with reaching(lambda: f"{len(done)} of {counted(runs, 'run')}", "fewer runs"):
             for finished in runs_of(prepared, floor, settings, runs, options.seed, wishes):
-                done.append(finished)
-                if options.progress is not None:
-                    options.progress(len(done), runs)
+                done.append(finished)  # noqa: PERF402 - one after the other: it may be stopped
 
     stopped = run_until_stopped(work)
     if stopped is not None and not done:
@@ -192,24 +166,24 @@ def _prepared(used: TaskLanguage, options: SimulateOptions) -> Mission:
     return mission(used, agreement, words)
 
 
-def _settings(options: SimulateOptions) -> Settings:
-    """How robots are built and keep step; `UsageError` for what they cannot be built with."""
-    given = {name: getattr(options, name) for name in ("step", "cell", "noise", "lidar", "human")}
-    radius = options.cell / 5 if options.radius is None else options.radius
-    return Settings(radius=radius, **given)
-
-
 def show_simulate(found: Simulated, options: SimulateOptions) -> int:
     """Write the recordings, and print what came of the runs."""
     with working("drawing") as say:
         for path in options.output:
             say(f"writing {path}")
             found.save(path, options.shown)
-    as_json = options.as_json
-    echo(to_bytes(found.record).decode() if as_json else found.summary(), nl=not as_json)
+    if options.as_json:
+        echo(to_bytes(found.record).decode(), nl=False)
+    else:
+        counts = found.counts
+        arrived, late = f"all arrived in {counts['arrived']}", f"late in {counts['late']}"
+        echo(
+            f"{counted(counts['runs'], 'run')}: {arrived}, collisions in {counts['collisions']}, "
+            f"deadlock in {counts['deadlocks']}, {late}; {counted(counts['messages'], 'message')}"
+        )
     if options.replay is not None:
         note("this is what the record says; nothing of it is checked")
         return 0
-    code = covered_code(found.covered, found.tolerance)
+    code = covered_code(found)
     done = f"{counted(len(found.runs), 'run')} of {options.runs} done"
     return ended_early(found.stopped, done) if found.stopped else code

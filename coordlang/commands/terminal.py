@@ -12,12 +12,14 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from time import monotonic
 from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
 from coordlang.commands.layout import WIDTH
+from planners.system.errors import note
 from planners.system.limits import underway
 from planners.system.messages import visible
 from planners.system.signals import Interrupted
@@ -40,6 +42,8 @@ INTERRUPTED = 130
 #: As a shell reports a process whose reader has gone: the answer did not arrive.
 BROKEN_PIPE = 141
 
+#: Where the context of a command has what shows its progress.
+SAYING = "coordlang.saying"
 #: Seconds of work before progress is shown: short commands neither flicker nor load rich.
 _DELAY = 0.4
 #: Seconds between two looks at how far the work got.
@@ -68,14 +72,19 @@ def echo(text: object, *, err: bool = False, nl: bool = True) -> None:
     click.echo(visible(str(text), keep="\n\t"), err=err, nl=nl)
 
 
-def write(text: str, output: str | None) -> None:
-    """Write to a file, or to stdout without one (or for ``-``)."""
-    from planners.system.writing import write_atomically
+def write(data: str | bytes, output: str | None, said: str | None = None) -> None:
+    """Write to a file (gzip for ``.gz``), or to stdout without one or for ``-``.
+
+    What is ``said`` of it goes to the other stream: to stderr where the data go to stdout.
+    """
+    from planners.system.writing import write_compressed
 
     if output is None or output == "-":
-        echo(text, nl=False)
+        echo(data if isinstance(data, str) else data.decode(), nl=False)
     else:
-        write_atomically(output, text.encode())
+        write_compressed(output, data.encode() if isinstance(data, str) else data, level=6)
+    if said is not None:
+        echo(said, err=output in (None, "-"))
 
 
 def show_answer(found: Any, *, as_json: bool) -> None:
@@ -83,9 +92,9 @@ def show_answer(found: Any, *, as_json: bool) -> None:
     echo(json.dumps(found.data()) if as_json else found.text(line_width()))
 
 
-def note(text: str) -> None:
-    """Write what a person should read to stderr."""
-    echo(f"coordlang: note: {text}", err=True)
+def tell(text: str) -> None:
+    """Write a line about the work to stderr."""
+    echo(f"coordlang: {text}", err=True)
 
 
 def note_single_robot(robots: tuple[str, ...]) -> None:
@@ -97,19 +106,18 @@ def note_single_robot(robots: tuple[str, ...]) -> None:
 def warn_of_failures(tolerance: Tolerance | None) -> None:
     """Write a warning where words are in use under which robots may miscoordinate."""
     if tolerance is not None and tolerance.warning is not None:
-        echo(f"coordlang: warning: {tolerance.warning}", err=True)
+        tell(f"warning: {tolerance.warning}")
 
 
-def covered_code(is_covered: bool, tolerance: Tolerance | None) -> int:
+def covered_code(found: Any) -> int:
     """Return the exit code of an answer: 1, with a warning, for a task that is not covered.
 
     What the language tolerates is a warning, too.
     """
-    warn_of_failures(tolerance)
-    if is_covered:
+    warn_of_failures(found.tolerance)
+    if found.covered:
         return 0
-    what = "the language does not cover this task: it guarantees nothing here"
-    echo(f"coordlang: warning: {what}", err=True)
+    tell("warning: the language does not cover this task: it guarantees nothing here")
     return REFUTED
 
 
@@ -132,7 +140,7 @@ def ended_early(stopped: BaseException | None, what: str) -> int:
     """
     if stopped is None:
         return 0
-    echo(f"coordlang: {why_stopped(stopped)}; {what}", err=True)
+    tell(f"{why_stopped(stopped)}; {what}")
     return code_of_interrupt(stopped) if isinstance(stopped, KeyboardInterrupt) else UNPROVED
 
 
@@ -144,6 +152,13 @@ def line_width(*, err: bool = False) -> int:
     return max(_LEAST_WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
 
 
+def say(text: str) -> None:
+    """Tell whoever waits for a command what is being done; outside of one nobody waits."""
+    context = click.get_current_context(silent=True)
+    if context is not None and SAYING in context.meta:
+        context.meta[SAYING](text)
+
+
 @contextmanager
 def working(message: str) -> Iterator[Callable[[str], None]]:
     """Show on a terminal what is being done, until the block ends.
@@ -153,46 +168,34 @@ def working(message: str) -> Iterator[Callable[[str], None]]:
     if sys.stderr is None or not sys.stderr.isatty():
         yield lambda _: None
         return
-    spinner = _Spinner(message)
+    shown, ended = [message], threading.Event()
+    spinner = threading.Thread(target=_spin, args=(shown, ended), daemon=True)
     spinner.start()
     try:
-        yield spinner.say
+        yield partial(shown.__setitem__, 0)
     finally:
-        spinner.ended.set()
+        ended.set()
         spinner.join()
 
 
-class _Spinner(threading.Thread):
-    """A spinner with a message and how far the work got, which appears after a while."""
+def _spin(shown: list[str], ended: threading.Event) -> None:
+    """Show a spinner with a message and how far the work got, after a while."""
+    begin = monotonic()
+    if ended.wait(_DELAY):
+        return
+    from rich.console import Console
+    from rich.text import Text
 
-    def __init__(self, message: str) -> None:
-        super().__init__(daemon=True)
-        self.ended = threading.Event()
-        self.message = message
-
-    def say(self, message: str) -> None:
-        self.message = message
-
-    def run(self) -> None:
-        begin = monotonic()
-        if self.ended.wait(_DELAY):
-            return
-        from rich.console import Console
-        from rich.text import Text
-
-        with Console(stderr=True).status("") as status:
-            wait = 0.0
-            while not self.ended.wait(wait):
-                seconds, wait = monotonic() - begin, _INTERVAL
-                status.update(Text(f"{visible(self._text())} .. {seconds:.0f} s"))
-
-    def _text(self) -> str:
-        how_far = underway()
-        # The work goes on while it is asked: what cannot be read just now is left out.
-        with suppress(ValueError, IndexError, KeyError, RuntimeError, StopIteration):
-            if how_far is not None and (so_far := how_far()) not in self.message:
-                return f"{self.message}: {so_far}"
-        return self.message
+    with Console(stderr=True).status("") as status:
+        wait = 0.0
+        while not ended.wait(wait):
+            (text,), how_far = shown, underway()
+            # The work goes on while it is asked: what cannot be read just now is left out.
+            with suppress(ValueError, IndexError, KeyError, RuntimeError, StopIteration):
+                if how_far is not None and (so_far := how_far()) not in text:
+                    text = f"{text}: {so_far}"
+            seconds, wait = monotonic() - begin, _INTERVAL
+            status.update(Text(f"{visible(text)} .. {seconds:.0f} s"))
 
 
 def whatever_stderr() -> TextIO:

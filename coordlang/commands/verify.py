@@ -3,32 +3,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import Any
 
-from coordlang.commands.inputs import Arguments, language_for, public, say_size
+from coordlang.commands.inputs import Arguments, extended, language_for, note_size, public
 from coordlang.commands.records import VerifyOptions
-from coordlang.commands.terminal import REFUTED, echo, show_answer
+from coordlang.commands.terminal import REFUTED, echo, say, show_answer, write
 from coordlang.commands.witness import witness_data, witness_text
 from coordlang.language.candidates import require_solvable
 from coordlang.language.recorded import check_source, recorded_candidates
 from coordlang.language.tolerance import Tolerance, tolerance_data
 from coordlang.required.failure import NONE, Failures, TooManyToCount, failures_under
-from coordlang.required.miscoordination import Miscoordination
-from coordlang.verification.by_definition import verify_candidates
+from coordlang.verification.by_definition import Verdict, verify_candidates
 from coordlang.verification.certificate_file import read_certificate
 from coordlang.verification.check_certificate import Checked
 from coordlang.verification.check_certificate import check as check_certificate
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import Refuted
 from planners.system.notebook import Presented, counted
-from planners.system.writing import write_atomically
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Verification(Presented):
+class Verification(Presented, Verdict):
     """Whether a language is a coordination language for its tasks; true iff it is.
 
     Or iff it is none and robots fail no more often than it claims (``tolerance``; ``failures`` says
@@ -39,17 +36,14 @@ class Verification(Presented):
     ``options`` are those of the model, which the file chooses, ``language`` what messages call it.
     """
 
-    holds: bool
     words: int
-    tasks: int
-    nodes: int
-    witness: Miscoordination | None
-    certificate: Checked | None
     claimed: int
+    certificate: Checked | None
     options: ModelOptions
-    failures: Failures = NONE
-    tolerance: Tolerance | None = None
-    language: str = "the language"
+    failures: Failures
+    tolerance: Tolerance | None
+    language: str
+    shown = ("holds", "words", "tasks", "lower_bound")
 
     def __bool__(self) -> bool:
         return (self.holds or self.is_tolerated) and self.proves_claim
@@ -60,11 +54,9 @@ class Verification(Presented):
         found, claimed = self.failures.tolerance, self.tolerance
         if self.holds or found is None or claimed is None:
             return False
-        pairs = (
-            (found.failure_mean, claimed.failure_mean),
-            (found.failure_worst, claimed.failure_worst),
-        )
-        return all(own is not None and said is not None and own <= said for own, said in pairs)
+        names = ("failure_mean", "failure_worst")
+        pairs = [(getattr(found, name), getattr(claimed, name)) for name in names]
+        return all(said is not None and own <= said for own, said in pairs)
 
     @property
     def unchecked(self) -> str | None:
@@ -84,15 +76,11 @@ class Verification(Presented):
     @property
     def proves_claim(self) -> bool:
         """Whether the certificate, if any, proves the lower bound that the language claims."""
-        return self.certificate is None or self.certificate.lower_bound >= self.claimed
-
-    @property
-    def proved_minimal(self) -> bool | None:
-        """Whether the certificate proves that fewer words do not suffice, None without one."""
-        return None if self.lower_bound is None else self.lower_bound == self.words
+        return self.lower_bound is None or self.lower_bound >= self.claimed
 
     def data(self) -> dict[str, Any]:
         """The answer, as ``--json`` has it."""
+        bound = self.lower_bound
         return {
             "holds": self.holds,
             "tasks": self.tasks,
@@ -101,22 +89,12 @@ class Verification(Presented):
             "model": self.options.data(),
             "unchecked": self.unchecked,
             "miscoordination": witness_data(self.witness),
-            "lower_bound": self.lower_bound,
+            "lower_bound": bound,
             "reasons": self.certificate.reasons if self.certificate else None,
-            "proved_minimal": self.proved_minimal,
+            "proved_minimal": None if bound is None else bound == self.words,
             **self.failures.data(),
             **tolerance_data(self.tolerance),
         }
-
-    def facts(self) -> Mapping[str, object]:
-        """The answer, and what the certificate or the witness shows."""
-        found: dict[str, object] = {"holds": self.holds, "words": self.words, "tasks": self.tasks}
-        if self.certificate:
-            found["lower_bound"] = self.lower_bound
-        if self.witness:
-            found["sentence"] = " ".join(self.witness.sentence or ())
-            found["reason"] = self.witness.reason
-        return found
 
     def text(self, width: int) -> str:
         """The answer for people, in lines of at most ``width`` characters."""
@@ -146,19 +124,11 @@ def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
     """Check by definition that a language is a coordination language.
 
     All plans of one sentence then mix freely.  A lifted language is checked for ``tasks``, or the
-    problems' own.
-
-    Raises
-    ------
-    BadInput
-        If the language belongs to another domain or world.
-    ProvedImpossible
-        If there is no candidate task.
-    Refuted
-        If a reason of the certificate is none.
+    problems' own.  Raises `BadInput` if the language belongs to another domain or world,
+    `ProvedImpossible` if there is no candidate task, and `Refuted` if a reason of the certificate
+    is none.
     """
-    tasks, progress = options.tasks, options.progress or (lambda _: None)
-    proof = options.certificate
+    tasks, proof = options.tasks, options.certificate
     if isinstance(proof, str | PathLike):
         proof = read_certificate(fspath(proof))
     files = arguments.read()
@@ -171,12 +141,12 @@ def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
         candidates = files.candidates(tasks, model)
     require_solvable(candidates)
     partition = read.partition(candidates.model)
-    say_size(candidates, options.work.note or options.progress)
+    note_size(candidates)
     with options.work.opened() as workers:
-        verdict = verify_candidates(partition, candidates, workers, progress)
+        verdict = verify_candidates(partition, candidates, workers, say)
         found = NONE
         if not verdict.holds:
-            progress("counting how often robots fail")
+            say("counting how often robots fail")
             claims = read.tolerance is not None and read.tolerance.may_fail
             found = failures_under(partition, candidates, is_claimed=claims)
             if claims and found.mean is None:
@@ -186,25 +156,15 @@ def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
                 )
     checked = None
     if proof and verdict.holds:
-        checked = check_certificate(proof, candidates, progress)
+        checked = check_certificate(proof, candidates, say)
         if checked.lower_bound > len(read.words):
             raise AssertionError(
                 f"a language of {len(read.words)} words is verified, and a certificate that "
                 f"{checked.lower_bound} are needed: one of the two is wrong"
             )
-    return Verification(
-        verdict.holds,
-        len(read.words),
-        verdict.tasks,
-        verdict.nodes,
-        verdict.witness,
-        checked,
-        read.guarantee.lower_bound,
-        model,
-        found,
-        read.tolerance,
-        str(position),
-    )
+    words, claimed = len(read.words), read.guarantee.lower_bound
+    more = (words, claimed, checked, model, found, read.tolerance, str(position))
+    return extended(Verification, verdict, *more)
 
 
 def show_verify(found: Verification, options: VerifyOptions) -> int:
@@ -223,7 +183,7 @@ def _show_bound(found: Verification, checked: Checked, options: VerifyOptions) -
     """Show what the certificate proves; `Refuted` if that is less than the language claims."""
     bound = checked.lower_bound
     if options.dimacs:
-        write_atomically(options.dimacs, checked.dimacs().encode())
+        write(checked.dimacs(), options.dimacs)
     if not found.proves_claim:
         raise Refuted(
             f"{found.language} claims that {counted(found.claimed, 'word')} are needed; "
@@ -239,6 +199,6 @@ def _show_bound(found: Verification, checked: Checked, options: VerifyOptions) -
             f"they contradict each other ({counted(len(checked.cnf.clauses), 'clause')})"
         )
     echo(f"lower bound {bound}: {why}")
-    if not found.proved_minimal:
+    if bound != found.words:
         least = f"at least {bound:,} and at most {found.words:,}"
         echo(f"not proved minimal: the least number of words is {least}")

@@ -167,7 +167,7 @@ def read_task_file(path: str | Path) -> tuple[ListedTask, ...]:
 
 def tasks_from_data(data: Any, position: Position) -> tuple[ListedTask, ...]:
     """Read the data of a task file.  Raises `BadInput` for anything else."""
-    return _plain(TASKS.convert(data, position), position)
+    return _plain(TASKS.decode(msgspec.json.encode(data, enc_hook=str), position), position)
 
 
 def task_data(tasks: Sequence[ListedTask]) -> list[dict[str, list[str]]]:

@@ -7,6 +7,7 @@ or a failure.
 
 from __future__ import annotations
 
+import copyreg
 import warnings
 from dataclasses import dataclass
 from typing import Any
@@ -30,17 +31,8 @@ class Position:
 class CoordlangError(Exception):
     """Base of all errors that a user may cause: what was wrong, where, and what to do about it.
 
-    Parameters
-    ----------
-    what
-        One sentence: what is wrong.
-    position
-        The file position it was found at, where there is one.
-    remedy
-        One sentence: what the user can do.
-
+    ``what`` and ``remedy`` are one sentence each, ``position`` is where in a file it was found, and
     ``reached`` says how far the work got that a limit ended (`planners.system.limits.reaching`).
-
     The text of an error may be shown as it is, whatever it quotes: characters that steer a terminal
     are escaped, and what is very long is cut (`planners.system.messages`).
     """
@@ -59,22 +51,14 @@ class CoordlangError(Exception):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Errors of jobs are sent from one process to another, whatever they need."""
-        return _rebuilt, (type(self), self.args, self.__dict__)
+        made = copyreg.__newobj__  # type: ignore[attr-defined]
+        return made, (type(self), *self.args), self.__dict__
 
     def __str__(self) -> str:
         what = sentence(self.what)
         lines = [f"{self.position}: {what}" if self.position else what]
         lines += [sentence(line, keep="\n") for line in (self.reached, self.remedy) if line]
         return "\n  ".join(lines)
-
-
-def _rebuilt(
-    kind: type[CoordlangError], args: tuple[Any, ...], fields: dict[str, Any]
-) -> CoordlangError:
-    """An error as it was pickled."""
-    error = kind.__new__(kind, *args)
-    error.__dict__.update(fields)
-    return error
 
 
 class Note(UserWarning):

@@ -42,18 +42,10 @@ class _Head(msgspec.Struct):
 class FileFormat(Generic[T]):
     """A JSON file format.
 
-    Attributes
-    ----------
-    name
-        Its name for ``coordlang schema``, "tasks".
-    title
-        What messages call such a file, "task file".
-    record
-        A msgspec struct: the keys and their types.  Keys that it does not have are ignored.
-    format
-        The value of the key ``format``, None for files without that key.
-    version
-        The value of the key ``version``: another one is refused.
+    ``name`` is that for ``coordlang schema`` ("tasks"), ``title`` what messages call such a file
+    ("task file").  The ``record``, a msgspec struct, has the keys and their types; other keys are
+    ignored.  ``format`` and ``version`` are the values of the keys of these names, others are
+    refused; None for files without the key ``format``.
     """
 
     name: str
@@ -65,62 +57,36 @@ class FileFormat(Generic[T]):
     def decode(self, data: bytes, position: Position) -> T:
         """Read the text of a file.
 
-        Raises
-        ------
-        BadInput
-            For a text that is no JSON, of another format or version, or that does not fit the
-            record.
+        Raises `BadInput` for a text that is no JSON, of another format or version (it need not fit
+        the record), or that does not fit the record.
         """
         check_utf8(data, position)
         data = data.removeprefix(_BYTE_ORDER_MARK)
+        see = f"`coordlang schema {self.name}` prints what a {self.title} holds."
         try:
-            if self.format is not None:
-                self.check_head(data, position)
+            head = msgspec.json.decode(data, type=_Head)
+            if self.format is not None and head.format != self.format:
+                what = f"format {echoed(head.format)}, expected {self.format!r}"
+                raise BadInput(what, position=position, remedy=see)
+            is_known = head.version == self.version and not isinstance(head.version, bool)
+            if self.format is not None and not is_known:
+                raise BadInput(
+                    f"{self.title} version {echoed(head.version)}; "
+                    f"this program reads version {self.version}",
+                    position=position,
+                    remedy="Use the version of coordlang that wrote it, or write it again "
+                    "with this one.",
+                )
             return msgspec.json.decode(data, type=self.record)
         except msgspec.ValidationError as error:
-            raise self._refused(error, position) from None
+            what = f"this is no {self.title}: {error}"
+            raise BadInput(what, position=position, remedy=see) from None
         except (msgspec.DecodeError, RecursionError) as error:
             raise BadInput(
                 f"this is no JSON, or it is cut off: {error}",
                 position=position,
                 remedy="Write or copy the file again; an editor that checks JSON shows the place.",
             ) from None
-
-    def convert(self, data: Any, position: Position) -> T:
-        """Read what a JSON reader made of such a file.  Raises `BadInput` as `decode` does."""
-        try:
-            if self.format is not None:
-                self._check_format(msgspec.convert(data, _Head), position)
-            return msgspec.convert(data, self.record)
-        except (msgspec.ValidationError, RecursionError) as error:
-            raise self._refused(error, position) from None
-
-    def check_head(self, data: bytes, position: Position) -> None:
-        """Raise `BadInput` for another format or version: such a file need not fit the record."""
-        self._check_format(msgspec.json.decode(data, type=_Head), position)
-
-    def _check_format(self, head: _Head, position: Position) -> None:
-        if head.format != self.format:
-            raise BadInput(
-                f"format {echoed(head.format)}, expected {self.format!r}",
-                position=position,
-                remedy=f"`coordlang schema {self.name}` prints what a {self.title} holds.",
-            )
-        if head.version != self.version or isinstance(head.version, bool):
-            raise BadInput(
-                f"{self.title} version {echoed(head.version)}; "
-                f"this program reads version {self.version}",
-                position=position,
-                remedy="Use the version of coordlang that wrote it, or write it again "
-                "with this one.",
-            )
-
-    def _refused(self, error: Exception, position: Position) -> BadInput:
-        return BadInput(
-            f"this is no {self.title}: {error}",
-            position=position,
-            remedy=f"`coordlang schema {self.name}` prints what a {self.title} holds.",
-        )
 
     def json_schema(self) -> dict[str, Any]:
         """The JSON Schema (draft 2020-12) of such files."""
@@ -144,12 +110,8 @@ class FileFormat(Generic[T]):
 def read_bytes(path: str | Path, *, most: int = MAX_TEXT) -> bytes:
     """Read a file, or standard input for ``-``; what gzip compressed is decompressed.
 
-    Raises
-    ------
-    BadInput
-        A file that is missing, cannot be read, or holds more than ``most`` bytes.
-    OutOfMemory
-        A file that would take more memory than is left.
+    Raises `BadInput` for a file that is missing, cannot be read, or holds more than ``most``
+    bytes, and `OutOfMemory` for one that would take more memory than is left.
     """
     data = read_stored_bytes(path, most=most)
     if data[:2] != b"\x1f\x8b":
@@ -209,10 +171,8 @@ def names_format(data: bytes, name: str) -> bool:
 def read_text(path: str | Path) -> str:
     """Read a text in UTF-8, or standard input for ``-``.
 
-    Raises
-    ------
-    BadInput
-        A file that is missing or cannot be read, or that is not UTF-8, with the byte that is not.
+    Raises `BadInput` for a file that is missing or cannot be read, or that is not UTF-8, with the
+    byte that is not.
     """
     data = read_bytes(path)
     check_utf8(data, Position(str(path)))

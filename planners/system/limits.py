@@ -105,22 +105,16 @@ def start_clock(seconds: float) -> None:
         signal.setitimer(signal.ITIMER_REAL, max(_SOON, seconds), _AGAIN)
 
 
-def run_until_stopped(
-    work: Callable[[], object],
-    *,
-    keep_time_after: type[BaseException] | tuple[type[BaseException], ...] = (),
-) -> BaseException | None:
+def run_until_stopped(work: Callable[[], object]) -> BaseException | None:
     """Do anytime work; return the error that ended it early (one of `STOPPING`), or None.
 
-    The clock is then stopped, so that what the work has left can be saved, except after errors of
-    the types ``keep_time_after``.  The error comes without its traceback, which would hold on to
-    all that the work had in memory.
+    The clock is then stopped, so that what the work has left can be saved.  The error comes without
+    its traceback, which would hold on to all that the work had in memory.
     """
     try:
         work()
     except STOPPING as error:
-        if not isinstance(error, keep_time_after):
-            stop_clock()
+        stop_clock()
         return error.with_traceback(None)
     return None
 

@@ -53,4 +53,6 @@ def _row(cell: str, texts: Sequence[str]) -> str:
 
 
 def _plain(value: object) -> str:
+    if isinstance(value, Mapping):
+        return "; ".join(f"{name}: {each}" for name, each in value.items())
     return ", ".join(map(str, value)) if isinstance(value, tuple | list) else str(value)

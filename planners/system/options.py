@@ -9,10 +9,11 @@ of docs/cli.md come from it.
 from __future__ import annotations
 
 import difflib
+import inspect
 import sys
 import types
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import Field, dataclass, field, fields, replace
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
 from planners.system.errors import UsageError
@@ -22,26 +23,14 @@ Record = TypeVar("Record")
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """How a field of an options record is given.
+    """An option of a record.  One whose default is ``()`` may be repeated on the command line.
 
-    Attributes
-    ----------
-    help
-        One sentence for ``--help`` and docs/cli.md.
-    metavar
-        What stands for the value there; None: the kind of the value says it.
-    names
-        Its spellings on the command line; without any: ``--`` and the field's name.
-    least
-        The smallest number, for an option that takes one.
-    only
-        ``"cli"`` or ``"python"``: where it can be given; None: in both.
-    is_output
-        Whether it names a file that the command writes, or a folder.
-    files
-        What is written in that folder.
-    required
-        Whether the command line must have it.
+    ``help`` is a sentence for ``--help`` and docs/cli.md, ``metavar`` stands for the value there,
+    ``names`` are its spellings (none: ``--`` and the field's name), ``least`` is the smallest
+    number.  It can be given in one place ``only``.  It ``is_output`` where it names a file that is
+    written, or a folder, in which ``files`` are.  It ``needs`` another option, or one with one of
+    some values, and excludes those ``without`` which it must be given, or one value of them
+    (``name=value``).
     """
 
     help: str
@@ -52,19 +41,11 @@ class Option:
     is_output: bool = False
     files: tuple[str, ...] = ()
     required: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Given:
-    """An option of a record: its name, default and kind beside what `Option` says.
-
-    One whose default is ``()`` may be repeated on the command line.
-    """
-
-    name: str
-    default: object
-    kind: object
-    option: Option
+    needs: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+    name: str = ""
+    default: object = None
+    kind: object = None
     takes_none: bool = False
 
     @property
@@ -75,7 +56,7 @@ class Given:
     @property
     def spellings(self) -> tuple[str, ...]:
         """All spellings on the command line."""
-        return self.option.names or (f"--{self.name.replace('_', '-')}",)
+        return self.names or (f"--{self.name.replace('_', '-')}",)
 
     @property
     def values(self) -> tuple[str, ...]:
@@ -83,21 +64,9 @@ class Given:
         return get_args(self.kind) if get_origin(self.kind) is Literal else ()
 
 
-def option(
-    default: object,
-    help: str,
-    metavar: str | None = None,
-    *,
-    names: tuple[str, ...] = (),
-    least: int | None = None,
-    only: Literal["cli", "python"] | None = None,
-    is_output: bool = False,
-    files: tuple[str, ...] = (),
-    required: bool = False,
-) -> Any:
-    """A field of an options record; the arguments are those of `Option`."""
-    described = Option(help, metavar, names, least, only, is_output, files, required)
-    return field(default=default, metadata={"option": described})
+def option(default: object, help: str, metavar: str | None = None, **more: Any) -> Any:
+    """A field of an options record; ``more`` are attributes of `Option`."""
+    return field(default=default, metadata={"option": Option(help, metavar, **more)})
 
 
 def group(record: type[object], without: tuple[str, ...] = ()) -> Any:
@@ -108,22 +77,31 @@ def group(record: type[object], without: tuple[str, ...] = ()) -> Any:
     return field(default_factory=record, metadata={"group": record, "without": without})
 
 
-def options_of(record: type[object]) -> Iterator[Given]:
-    """All options of a record, those of its groups among them, in the order of the fields."""
-    names = vars(sys.modules[record.__module__])
-    for each in fields(record):  # type: ignore[arg-type]
+def options_of(record: type[object]) -> Iterator[Option]:
+    """All options of a record, those of its groups among them; inherited ones come last."""
+    for each, kind in _fields(record):
         if "group" in each.metadata:
             for inner in options_of(each.metadata["group"]):
-                if inner.name in each.metadata["without"]:
-                    inner = replace(inner, option=replace(inner.option, only="python"))
-                yield inner
+                hidden = inner.name in each.metadata["without"]
+                yield replace(inner, only="python") if hidden else inner
         elif "option" in each.metadata:
             # Annotations are texts; what a Union names in quotes need not be imported.
-            kind = eval(each.type, names) if isinstance(each.type, str) else each.type
-            described = each.metadata["option"]
-            yield Given(
-                each.name, each.default, _not_none(kind), described, _not_none(kind) != kind
-            )
+            names = vars(sys.modules[kind.__module__])
+            read = eval(each.type, names) if isinstance(each.type, str) else each.type
+            given, described = _not_none(read), each.metadata["option"]
+            more: dict[str, Any] = {"kind": given, "takes_none": given != read}
+            yield replace(described, name=each.name, default=each.default, **more)
+
+
+def _fields(record: type[Any]) -> list[tuple[Field[Any], type[object]]]:
+    """The fields, each with the class that says it: own ones first, and options before groups."""
+    classes = record.__mro__
+    said = [
+        (next(n for n, c in enumerate(classes) if f.name in inspect.get_annotations(c)), f)
+        for f in fields(record)
+    ]
+    said.sort(key=lambda found: (found[0], "group" in found[1].metadata))
+    return [(f, classes[n]) for n, f in said]
 
 
 def record_from(
@@ -132,17 +110,12 @@ def record_from(
     """The record in which the options have the values given.
 
     None is not given, but for an option that takes it and has another default.  A field ``given``
-    of a record gets the names of its options that were.  Options that only the command line has
-    are refused elsewhere.
-
-    Raises
-    ------
-    TypeError
-        For a name that is no option, as Python does; it suggests one that is alike.
-    UsageError
-        For a value that the option does not have.
+    of a record gets the names of its options that were.  Options that only the command line has are
+    refused elsewhere.  Raises `TypeError` for a name that is no option, as Python does; it suggests
+    one that is alike, and `UsageError` for a value that the option does not have, and options that
+    contradict each other.
     """
-    known = {o.name: o for o in options_of(record) if on_cli or o.option.only != "cli"}
+    known = {o.name: o for o in options_of(record) if on_cli or o.only != "cli"}
     for name in given:
         if name not in known:
             alike = difflib.get_close_matches(name, known, 1)
@@ -156,6 +129,7 @@ def record_from(
     for name, value in values.items():
         if value is not None:
             _check(known[name], value)
+    _refuse_contradictions(known, values)
     made: Record = _made(record, values)
     return made
 
@@ -173,13 +147,47 @@ def _made(record: type[Any], values: Mapping[str, object]) -> Any:
     return record(**own)
 
 
-def _check(given: Given, value: object) -> None:
+def _refuse_contradictions(known: Mapping[str, Option], values: Mapping[str, object]) -> None:
+    """Raise `UsageError` for an option beside one that it excludes, or without what it needs."""
+    given = [known[n] for n, value in values.items() if value is not False and value != ()]
+    for each in given:
+        for other in given:
+            exact = f"{other.name}={values[other.name]}"
+            if other.name in each.without or exact in each.without:
+                of = f" {values[other.name]}" if exact in each.without else ""
+                raise UsageError(
+                    f"{each.spelling} and {other.spelling}{of} exclude each other",
+                    remedy="Give one of them.",
+                )
+        if not each.needs:
+            continue
+        needed, accepted = known[each.needs[0]], each.needs[1:]
+        value = values.get(needed.name, needed.default)
+        if value in accepted if accepted else needed in given:
+            continue
+        said = f"{each.spelling} {values[each.name]}" if each.values else each.spelling
+        remedy = f"Leave out {said}, or {needed.spelling} {value}."
+        if needed not in given:
+            added = (needed.spelling, *(accepted[:1] or [needed.metavar]))
+            remedy = f"Add {' '.join(filter(None, added))}."
+        belongs = f"{said} belongs to {needed.spelling}"
+        if accepted:
+            belongs += f" {_either(accepted)}"
+        raise UsageError(belongs, remedy=remedy)
+
+
+def _either(values: Sequence[str]) -> str:
+    """Values as text: ``a, b or c``."""
+    *others, last = values
+    return f"{', '.join(others)} or {last}" if others else last
+
+
+def _check(given: Option, value: object) -> None:
     """Raise `UsageError` for a value of another kind, or a number below the least."""
     if given.values and value not in given.values:
-        *others, last = given.values
         raise UsageError(
             f"{given.spelling} {value}: there is no such value",
-            remedy=f"Say {', '.join(others)} or {last}." if others else f"Say {last}.",
+            remedy=f"Say {_either(given.values)}.",
         )
     if given.kind is bool and not isinstance(value, bool):
         raise UsageError(
@@ -188,7 +196,7 @@ def _check(given: Given, value: object) -> None:
         )
     if given.kind is not int:
         return
-    least = given.option.least
+    least = given.least
     if (
         isinstance(value, bool)
         or not isinstance(value, int)

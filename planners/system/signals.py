@@ -18,13 +18,7 @@ _SOON = 0.01
 
 
 class Interrupted(KeyboardInterrupt):
-    """A signal ends the work, wherever it is.
-
-    Parameters
-    ----------
-    number
-        The signal, one of `ENDING`.
-    """
+    """A signal ends the work, wherever it is: the ``number`` of one of `ENDING`."""
 
     def __init__(self, number: int) -> None:
         super().__init__(signal.Signals(number).name)
@@ -35,13 +29,8 @@ class Interruptions:
     """Raises `Interrupted` for the signals `ENDING` from now on (main thread only).
 
     A signal that the process was started to ignore stays ignored (``nohup``, jobs in the
-    background of a shell).
-
-    Attributes
-    ----------
-    first
-        The first signal that has arrived, None so far.  The exception may be lost: libraries in C
-        turn it into errors of their own.
+    background of a shell).  ``first`` is the first one that has arrived, or None: the exception may
+    be lost, for libraries in C turn it into errors of their own.
     """
 
     def __init__(self) -> None:

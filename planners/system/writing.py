@@ -7,6 +7,7 @@ import errno
 import gzip
 import os
 import secrets
+import shutil
 import stat
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,12 +25,7 @@ _REPEATED = 16
 def why_unwritable(path: str | Path, *, makes_folder: bool = False) -> str | None:
     """Why no file can be written there, as far as that is known without writing; None if it can.
 
-    Parameters
-    ----------
-    path
-        The file.  A device or a pipe is one that is written to and never replaced.
-    makes_folder
-        Whether its folder is made where it is missing.
+    ``makes_folder``: its folder is made where it is missing.
     """
     text = os.fspath(path)
     if not text:
@@ -60,22 +56,10 @@ def remove_file(path: str | Path | None) -> None:
 def write_atomically(path: str | Path, data: bytes, *, outdated: str | Path | None = None) -> None:
     """Write beside, flush to the disk, then rename: a file is whole or as it was before.
 
-    Signals wait until that is done; devices and pipes apart, which may block.
-
-    Parameters
-    ----------
-    path, data
-        The file and all that it shall hold.
-    outdated
-        A file that belongs to what ``path`` held before.  It is removed just before ``path`` is
-        replaced, so that it never stands beside the new one, and kept if the writing fails.
-
-    Raises
-    ------
-    UsageError
-        A file that cannot be written.
-    BrokenPipeError
-        A pipe whose reader has gone.
+    Signals wait until that is done; devices and pipes apart, which may block.  ``outdated`` is a
+    file that belongs to what ``path`` held before.  It is removed just before ``path`` is replaced,
+    so that it never stands beside the new one, and kept if the writing fails.  Raises `UsageError`
+    for a file that cannot be written, and `BrokenPipeError` for a pipe whose reader has gone.
     """
     try:
         if reason := why_unwritable(path):
@@ -106,10 +90,7 @@ def write_compressed(
 def write_texts(folder: str | Path, texts: Mapping[str, str]) -> None:
     """Write text files, by their names, into a folder, which is made if it is missing.
 
-    Raises
-    ------
-    UsageError
-        A folder that cannot be made, or a file that cannot be written.
+    Raises `UsageError` for a folder that cannot be made, or a file that cannot be written.
     """
     try:
         Path(folder).mkdir(parents=True, exist_ok=True)
@@ -126,12 +107,7 @@ def copy_folders(folders: Sequence[str | Path], target: str | Path) -> None:
     """Copy folders with all files in them into one, which is made if it is missing.
 
     They are copied beside, and then renamed: all of them are there, and whole, or none.  Signals
-    wait until that is done.
-
-    Raises
-    ------
-    UsageError
-        If one cannot be written, or is there already.
+    wait until that is done.  Raises `UsageError` if one cannot be written, or is there already.
     """
     into = Path(target)
     try:
@@ -139,7 +115,7 @@ def copy_folders(folders: Sequence[str | Path], target: str | Path) -> None:
             into.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryDirectory(prefix=".coordlang.", dir=into) as beside:
                 for folder in map(Path, folders):
-                    _copy_folder(folder, Path(beside, folder.name))
+                    shutil.copytree(folder, Path(beside, folder.name), copy_function=_copy_file)
                 done: list[Path] = []
                 try:
                     for copy in sorted(Path(beside).iterdir()):
@@ -149,21 +125,18 @@ def copy_folders(folders: Sequence[str | Path], target: str | Path) -> None:
                     for copy in done:
                         os.rename(into / copy.name, copy)
                     raise
+    except shutil.Error as error:  # of many files; the first says why
+        raise _cannot(into, error.args[0][0][2]) from None
     except OSError as error:
         raise _cannot(into, error.strerror or str(error)) from None
 
 
-def _copy_folder(source: Path, copy: Path) -> None:
-    """Write a folder and its files again, to the disk."""
-    copy.mkdir()
-    for path in sorted(source.iterdir()):
-        if path.is_dir():
-            _copy_folder(path, copy / path.name)
-            continue
-        with open(copy / path.name, "wb") as file:
-            file.write(path.read_bytes())
-            file.flush()
-            os.fsync(file.fileno())
+def _copy_file(source: str, copy: str) -> None:
+    """Write a file again, to the disk."""
+    with open(copy, "wb") as file:
+        file.write(Path(source).read_bytes())
+        file.flush()
+        os.fsync(file.fileno())
 
 
 @contextmanager

@@ -93,7 +93,7 @@ def test_a_certificate_with_too_few_reasons_is_not_written(
         whole = certify(*arguments)
         return msgspec.structs.replace(whole, reasons=whole.reasons[:1])
 
-    monkeypatch.setattr("coordlang.commands.built.certify", too_few)
+    monkeypatch.setattr("coordlang.commands.building.certify", too_few)
     outputs = ("-o", tmp_path / "language.json", "--certificate", tmp_path / "proof.json")
     ended = coordlang(
         "build", *files(_WORLDS[0]), "--tasks", "all", "--method", "minimal", *outputs

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from coordlang.commands.built import Built
+from coordlang.commands.building import Built
 from coordlang.language.file import read_language
 from coordlang.verification.certificate_file import read_certificate
 from coordlang.vocabulary.loop import Budget

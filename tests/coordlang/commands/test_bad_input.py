@@ -223,7 +223,7 @@ PLANS, UNDERSTAND, CHOICES, BUILD = (
     "choices l d p w0",
     "build d p",
 )
-SAMPLE = "--sample N draws N plans: leave out --max"
+SAMPLE = "--sample and --max exclude each other"
 
 
 @pytest.mark.parametrize(
@@ -242,8 +242,8 @@ SAMPLE = "--sample N draws N plans: leave out --max"
         (f"{PLANS} --format ipc --json", "leave out --format ipc"),
         (f"{UNDERSTAND} --format dot --json", "leave out --format dot"),
         (f"{CHOICES} --format dot --json", "leave out --format dot"),
-        (f"{UNDERSTAND} --nodes 3", "--nodes cuts the DAG"),
-        (f"{UNDERSTAND} --nodes 3 --json --count", "--nodes cuts the DAG"),
+        (f"{UNDERSTAND} --nodes 3", "--nodes belongs to --format dot or json"),
+        (f"{UNDERSTAND} --nodes 3 --json --count", "--nodes and --count exclude each other"),
         ("export l d p w0 --to ltlf --max-actions 2000", "--max-actions belongs to --to pddl"),
         (f"{PLANS} --robots r1 --robot-type robot", "give one of them"),
         (f"{BUILD} -o l --prefer flexible --method greedy", "--prefer flexible belongs to --metho"),

@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 
 from coordlang.commands.building import build_language
-from coordlang.commands.repairing import repair_language
 from coordlang.language.words import Language
 from planners.system.errors import OutOfTime
 from tests.coordlang.commands.conftest import FILES, Shell
@@ -120,8 +119,8 @@ def test_a_changed_map(shell: Shell) -> None:
     ("line", "code", "said"),
     [
         ("T-MAP", 31, "this language belongs to another domain"),
-        ("CELLS --method minimal", 2, "--start changes the words of a language"),
-        ("CELLS --alpha-only --method separating", 2, "--start changes the words of a language"),
+        ("CELLS --method minimal", 2, "--start and --"),
+        ("CELLS --alpha-only --method separating", 2, "--start and --"),
         ("CELLS --cost makespan+actions", 2, "--cost makespan+actions contradicts"),
         ("CELLS", 31, "this language serves all pairs of states, and others cannot be added"),
     ],
@@ -177,7 +176,7 @@ def test_states_on_no_plan_keep_their_words() -> None:
     on_plans = {keys(task.rows[s]) for s in build_language(task, "greedy").job.states}
     words = {keys(row): "go" if keys(row) in on_plans else "away" for row in candidates.rows}
     old = Language(("away", "go"), words, "away")
-    built = repair_language(task, old)
+    built = build_language(task, start=old)
     repaired = built.repaired
     assert repaired is not None
     assert repaired.changed
@@ -196,6 +195,6 @@ def test_a_false_bound_is_not_carried_over() -> None:
     candidates = all_tasks("three-cells")
     false = replace(found, provenance=replace(found.provenance, guarantee=guarantee))
     for start, bound in ((false, 2), (found, 2)):
-        built = repair_language(candidates, start)
+        built = build_language(candidates, start=start)
         assert built.language.guarantee.lower_bound == bound
         assert built.verdict.holds

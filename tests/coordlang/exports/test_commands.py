@@ -86,7 +86,7 @@ def test_out_to_a_planner_and_back(
     assert form in done.out
     assert (folder / "domain.pddl").read_text() == exported.domain
     assert (folder / "problem.pddl").read_text() == exported.problem
-    classical = exported.exported.classical
+    classical = exported.classical
     names = [action_names(classical)[n] for n in next(iter(optimal_plans(classical)))]
     plan.write_text("".join(f"({name} )\n" for name in names) + "; cost = 4 (general cost)\n")
     back = ask(SENTENCE, "--max-actions", limit, "--translate-plan", plan)
@@ -137,7 +137,7 @@ def test_names_that_xml_would_misread(
         ((SENTENCE, "--to", "ltlf", "--translate-plan", "empty"), 2, "belongs to --to pddl"),
         ((SENTENCE, "--to", "bt", "--translate-plan", "empty"), 2, "or --to bt"),
         ((SENTENCE, "--to", "bt", "--max-actions", "3"), 2, "--max-actions"),
-        ((SENTENCE, "--to", "ltlf", "--for", "fd"), 2, "--for belongs to --to pddl"),
+        ((SENTENCE, "--to", "ltlf", "--for", "fd"), 2, "--for fd belongs to --to pddl"),
         ((SENTENCE, "-o", "other"), 2, "the folder other cannot be made"),
         ((SENTENCE, "-o", "missing/x", "--to", "ltlf"), 2, "cannot be written"),
         (("w0 w1 w0",), 1, "no optimal plan has the sentence"),
@@ -211,9 +211,9 @@ def test_what_each_planner_reads(name: str) -> None:
     listed = []
     for reader in ("fd", "kstar", "pyperplan"):
         found = export(name, for_planner=reader)
-        classical = found.exported.classical
+        classical = found.classical
         names, plans = action_names(classical), optimal_plans(classical)
-        listed.append(sorted(found.exported.joint_plan([names[n] for n in p]) for p in plans))
+        listed.append(sorted(found.joint_plan([names[n] for n in p]) for p in plans))
         assert len(listed[-1]) == built(name)[3]
         assert "(not (" not in found.problem
     assert listed[0] == listed[1] == listed[2]
@@ -273,4 +273,4 @@ def test_kstar_and_fast_downward(name: str, tmp_path: Path) -> None:
         timeout=100,
     )
     assert len(found["plans"]) == built(name)[3]
-    assert total_cost(exported.exported.classical) == exported.exported.cost
+    assert total_cost(exported.classical) == exported.cost

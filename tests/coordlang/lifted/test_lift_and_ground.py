@@ -110,7 +110,7 @@ def test_a_lifted_language_is_used_as_it_is(rings: Lifted, plan: Path) -> None:
     assert found.monitor("r1").allowed()
     explained = api.explain(lifted, GRID, LARGER)
     assert "w3: column(at(r1)) >= 1 and row(at(r1)) >= 1" in str(explained)
-    assert explained.words.head.startswith("4 words for 1 task of r1, r2; lifted; verified here")
+    assert explained.head.startswith("4 words for 1 task of r1, r2; lifted; verified here")
 
 
 # What a sceptical user tries

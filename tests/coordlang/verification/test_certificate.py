@@ -15,8 +15,8 @@ from typing import Any
 import msgspec
 import pytest
 
-from coordlang.commands.building import build_language
-from coordlang.commands.built import Built
+from coordlang.commands.building import Built, build_language
+from coordlang.commands.verify import verify
 from coordlang.language.file import read_language
 from coordlang.verification.certificate_clauses import encode
 from coordlang.verification.certificate_file import (

@@ -192,15 +192,14 @@ def test_a_function_gives_words_too() -> None:
 
 def test_a_limit_before_a_language_is_found_and_none_after() -> None:
     """A time limit that comes early leaves words that fail; one that comes late finds it ended."""
-    problem = DOMAINS / "grid" / "gw2-2x3.pddl"
-    ends = []
+    candidates, ends = all_tasks("grid", "gw2-2x3"), []
     for word in ("merging", "annealing"):
 
         def limited(text: str, word: str = word) -> None:
             if text.startswith(word):
                 raise OutOfTime("the time limit of the test is over")
 
-        built = library.build(SQUARE[0], problem, tasks="all", words=5, progress=limited)
+        built = build_language(candidates, words=5, progress=limited)
         assert built.verdict.holds == (built.stopped is None)
         ends.append(built.verdict.holds)
     assert ends == [False, True]
