@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from itertools import accumulate
 from random import Random
 
@@ -14,9 +14,9 @@ import pytest
 from coordlang.execution.best_sentence import best_sentence
 from coordlang.execution.preferences import PlanPreference, read_preference
 from coordlang.execution.task_language import TaskLanguage
-from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
 from planners.system.errors import OutOfMemory, UsageError
+from tests.support.layered_spaces import layered_space
 from tests.support.naive import plans_by_sentence, sentence
 from tests.support.task_languages import SHIPPED, random_task_languages, shipped
 
@@ -111,29 +111,6 @@ def test_random_models() -> None:
     kinds += [f"first {value}" for value in ((0, 0), (1, 1), (2, 2))]
     assert min(seen[kind] for kind in kinds) > 2, seen
     assert sum(seen[kind] for kind in ("first (2, 0)", "first (2, 1)", "first (1, 0)")) > 2, seen
-
-
-def layered_space(sizes: Sequence[int], edges: Sequence[Sequence[tuple[int, int]]]) -> PlanSpace:
-    """A plan space of one robot and one task.
-
-    ``sizes`` are the numbers of nodes of the layers, the goal's first; ``edges`` has for each node
-    its pairs (label, next node), sorted; plans start at the last node.  A node's state has its number.
-    """
-    flat = [edge for own in edges for edge in own]
-    return PlanSpace(
-        model=None,  # type: ignore[arg-type]
-        rows=np.zeros((0, 1), np.uint64),
-        state=np.arange(len(edges)),
-        goal=np.zeros(len(edges), np.int64),
-        layer=np.repeat(np.arange(len(sizes)), sizes),
-        first=np.cumsum([0, *map(len, edges)]),
-        target=np.array([to for _, to in flat], np.int64),
-        labels=np.array([[label] for label, _ in flat], np.int32).reshape(-1, 1),
-        cost=np.zeros(len(flat), np.int64),
-        goals=(None,),  # type: ignore[arg-type]
-        starts=np.array([len(edges) - 1]),
-        second=np.zeros(1, np.int64),
-    )
 
 
 def random_graph(random: Random) -> TaskLanguage:

@@ -16,7 +16,6 @@ import msgspec
 import pytest
 
 from coordlang.commands.building import Built, build_language
-from coordlang.commands.verify import verify
 from coordlang.language.file import read_language
 from coordlang.verification.certificate_clauses import encode
 from coordlang.verification.certificate_file import (
