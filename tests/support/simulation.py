@@ -9,7 +9,7 @@ from coordlang.commands.building import build_language
 from coordlang.execution.best_sentence import best_sentence
 from coordlang.execution.task_language import TaskLanguage, language_in_task
 from coordlang.simulation.floor import Floor, floor_of
-from coordlang.simulation.record import SimulationRecord
+from coordlang.simulation.record import RunRecord, SimulationRecord, WishRecord
 from coordlang.simulation.run import record_of, runs_of
 from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Agreement, Mission, mission
@@ -44,3 +44,18 @@ def recorded(
     of = mission_of(folder, agreement=agreement)
     floor = floor_for(of, settings)
     return record_of(of, floor, settings, list(runs_of(of, floor, settings, number)))
+
+
+def runs(
+    folder: str,
+    agreement: Agreement,
+    settings: Settings,
+    number: int,
+    *wishes: WishRecord,
+    stem: str = "problem",
+    first: int = 0,
+) -> list[RunRecord]:
+    """Runs in a shipped problem, of seeds one after the other."""
+    of = mission_of(folder, stem, agreement)
+    floor = floor_for(of, settings)
+    return list(runs_of(of, floor, settings, number, first, wishes))

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import shlex
 from dataclasses import replace
@@ -290,7 +291,17 @@ def test_a_wrong_value_is_an_error_and_never_another_answer(
 def test_wrong_uses() -> None:
     with pytest.raises(door.UsageError):
         door.plans(T_MAP[0])
-    with pytest.raises(TypeError, match="costs"):
+    for unknown in ("costs", "as_json"):  # the second is the command line's alone
+        with pytest.raises(TypeError, match=rf"plans\(\) got an .* '{unknown}'"):
+            door.plans(*T_MAP, **{unknown: "makespan"})
+    with pytest.raises(TypeError, match="did you mean 'cost'"):
         door.plans(*T_MAP, costs="makespan")
     with pytest.raises(door.BadInput, match="no such file"):
         door.plans("none.pddl", "none.pddl")
+
+
+def test_a_signature_names_what_python_takes() -> None:
+    names = [*inspect.signature(door.build).parameters]
+    assert names[:2] == ["domain", "problems"]
+    assert {"factored", "cost", "robots", "method", "slack"} <= {*names}
+    assert "as_json" not in names

@@ -8,58 +8,29 @@ from pathlib import Path
 
 import pytest
 
+import coordlang as door
 from coordlang.commands import terminal
 from coordlang.commands.layout import WIDTH, columns, fitted, wrapped
 from coordlang.commands.witness import witness_text
-from coordlang.required.miscoordination import Miscoordination, Step
 from planners.joint.states import split_atoms
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
 
-ROBOTS = tuple(f"robot{n}" for n in range(1, 8))
 
-
-def step(**acts: str) -> Step:
-    return tuple(acts.get(robot) for robot in ROBOTS)
-
-
-def seven() -> Miscoordination:
-    """Six of seven robots follow one plan; states of several lines."""
-    first = (step(robot1="(load a)", robot2="(load b)"), step(robot3="(carry a)"))
-    second = (step(robot1="(load a)"), step(robot2="(load b)", robot7="(carry a)"))
-    facts = [f"(lies parcel{n} depot{n})" for n in range(12)]
-    start, end = " ".join(facts), " ".join([*facts[1:], "(carried parcel0)"])
-    states = (start, end, end)
-    return Miscoordination(
-        task=f"{start} -> (carried parcel0)",
-        robots=ROBOTS,
-        plans=(*[first] * 6, second),
-        states=(states,) * 7,
-        mixture=(step(robot1="(load a)", robot2="(load b)"), step(robot3="(carry a)")),
-        mixed_states=(start, end),
-        step=1,
-        reason="(carry a) forbids it",
-    )
-
-
-def test_equal_plans_are_shown_once() -> None:
-    text = witness_text(seven())
-    lines = text.split("\n")
-    assert "  robot1, robot2, robot3, robot4, robot5 and robot6 follow this optimal plan:" in lines
-    assert "  robot7 follows this optimal plan:" in lines
-    assert "      1  robot1: (load a)   robot2: (load b)" in lines
-    assert "      2  robot3: (carry a)  <-- breaks here" in lines
-    assert "         reaches the same state" in lines
-    assert "    now (carried parcel0), no longer (lies parcel0 depot0)" in lines
-    assert len(lines) < 30
-
-
-@pytest.mark.parametrize("width", [60, 80, WIDTH, 200])
-def test_lines_fit(width: int) -> None:
-    text = witness_text(seven(), width)
-    assert max(map(len, text.split("\n"))) <= width
-    for atom in split_atoms(seven().states[0][0]):
-        assert atom in text.replace("\n", "")
+def test_equal_plans_are_shown_once_and_lines_fit(coordlang: Command) -> None:
+    files = DOMAINS / "vans" / "domain.pddl", DOMAINS / "vans" / "two-each.pddl"
+    lines = coordlang("coordination", *files).out.split("\n")
+    assert "  d1, v1 and v2 follow this optimal plan:" in lines
+    assert "  d2 follows this optimal plan:" in lines
+    assert "      1  d1: (board d1 v1 depot)       d2: (board d2 v2 depot)" in lines
+    assert any(line.endswith("<-- breaks here") for line in lines)
+    witness = door.coordination(*files).witness
+    assert witness is not None
+    for width in (60, WIDTH, 200):
+        text = witness_text(witness, width)
+        assert max(map(len, text.split("\n"))) <= width
+        for atom in split_atoms(witness.states[0][0]):
+            assert atom in text.replace("\n", "")
 
 
 def test_atoms_are_not_broken() -> None:

@@ -3,19 +3,16 @@
 
 from __future__ import annotations
 
+import json
 import resource
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
-from coordlang.commands.command import command_of
-from coordlang.commands.inputs import Arguments, public
-from coordlang.commands.options import CommandOptions
 from planners.search import portions
 from planners.search.portions import estimate, require_room
-from planners.system.errors import OutOfMemory
+from planners.system.errors import BadInput, OutOfMemory
 from planners.system.limits import address_space, default_memory_limit, limited_memory, more_memory
 from tests.support.cluster import needs_distributed
 from tests.support.command import Command
@@ -24,34 +21,28 @@ from tests.support.domains import all_tasks
 FREE = resource.RLIM_INFINITY
 
 
-@dataclass(frozen=True, slots=True)
-class Nothing(CommandOptions):
-    """No options."""
+@pytest.fixture
+def limit_of(
+    coordlang: Command, t_map: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., int]:
+    """The soft limit of the memory while a command reads its files."""
+    found: list[int] = []
 
-    keeps_plans = False
+    def reads(*_: object) -> None:
+        found.append(resource.getrlimit(resource.RLIMIT_AS)[0])
+        raise BadInput("enough")
 
+    def call(*arguments: str) -> int:
+        assert coordlang("plans", *t_map, *arguments).code == 31
+        return found.pop()
 
-class Probe:
-    """A command that prints the soft limit."""
-
-    @staticmethod
-    @public(Nothing)
-    def probe(_: Arguments, __: Nothing) -> int:
-        return resource.getrlimit(resource.RLIMIT_AS)[0]
-
-    @staticmethod
-    def show_probe(found: int, _: Nothing) -> None:
-        print(found)
-
-
-def limit_of(*arguments: str) -> int:
-    probe = command_of("probe", Nothing, lambda _: Probe)
-    done = CliRunner().invoke(probe, arguments, standalone_mode=False)
-    assert done.exception is None, done.exception
-    return int(done.output)
+    monkeypatch.setattr("coordlang.commands.inputs.read_domain", reads)
+    return call
 
 
-def test_the_memory_limit_has_a_default_that_can_be_switched_off() -> None:
+def test_the_memory_limit_has_a_default_that_can_be_switched_off(
+    limit_of: Callable[..., int],
+) -> None:
     import psutil
 
     before = resource.getrlimit(resource.RLIMIT_AS)
@@ -102,7 +93,6 @@ def test_the_size_is_said_before_the_work(monkeypatch: pytest.MonkeyPatch) -> No
     ("arguments", "message"),
     [
         (("--jobs", "0"), "--jobs"),
-        (("--jobs", "2", "--scheduler", "tcp://127.0.0.1:9"), "Give one of them"),
         pytest.param(
             ("--scheduler", "none.json"), "dask scheduler --scheduler-file", marks=needs_distributed
         ),
@@ -119,28 +109,22 @@ def test_what_cannot_be_done_is_said_at_once(
     assert message in outcome.err
 
 
-def test_pieces_on_the_command_line(
-    coordlang: Command, t_map: tuple[Path, Path], tmp_path: Path
-) -> None:
-    outcomes = {
-        coordlang("coordination", *t_map, "--json", *arguments)
-        for arguments in ((), ("--jobs", 1), ("--jobs", 2), ("--resume", tmp_path / "kept"))
-    }
-    assert len(outcomes) == 1
-    assert len(list((tmp_path / "kept").iterdir())) == 1
-
-
-def test_every_command_hands_on_who_does_the_pieces(
+def test_who_does_the_pieces_changes_nothing(
     coordlang: Command, t_map: tuple[Path, Path], tmp_path: Path
 ) -> None:
     language = tmp_path / "l.json"
     assert coordlang("build", *t_map, "--method", "greedy", "-o", language).code == 0
     for command in (
-        ("coordination", *t_map),
-        ("build", *t_map, "-o", language),
-        ("verify", language, *t_map),
+        ("coordination", *t_map, "--json"),
+        ("build", *t_map, "--method", "greedy", "-o", "-"),
+        ("verify", language, *t_map, "--json"),
     ):
+        kept = tmp_path / "kept" / command[0]
+        given = ((), ("--jobs", 1), ("--jobs", 2), ("--resume", kept))
+        answers = [json.loads(coordlang(*command, *arguments).out) for arguments in given]
+        for answer in answers:
+            answer.pop("producer", None)
+        assert answers == answers[:1] * 4
+        assert kept.is_dir()
         outcome = coordlang(*command, "--jobs", "2", "--scheduler", "tcp://127.0.0.1:9")
         assert (outcome.code, "Give one of them" in outcome.err) == (2, True)
-        coordlang(*command, "--resume", tmp_path / "kept" / command[0])
-        assert (tmp_path / "kept" / command[0]).is_dir()

@@ -15,7 +15,7 @@ import pytest
 import coordlang
 from tests.support.domains import ROOT
 
-FUNCTIONS = {
+FUNCTIONS = [
     "load",
     "inspect",
     "plans",
@@ -33,7 +33,7 @@ FUNCTIONS = {
     "lift",
     "ground",
     "simulate",
-}
+]
 
 
 def python(*arguments: str, cwd: Path = ROOT) -> tuple[int, str, str]:

@@ -17,7 +17,7 @@ import coordlang as library
 from planners.system.errors import UsageError
 from tests.coordlang.commands.conftest import FILES, Shell
 
-CELLS, SQUARE, T_MAP = FILES["CELLS"], FILES["SQUARE"], FILES["T-MAP"]
+CELLS, SQUARE = FILES["CELLS"], FILES["SQUARE"]
 KEPT = "within 1 step of the optimum"
 
 
@@ -134,36 +134,26 @@ def test_coordination_and_few_words_within_slack(shell: Shell) -> None:
         shell("verify l.json CELLS")
 
 
-@pytest.fixture(scope="module")
-def spoken(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """A language for plans within slack 1, and the sentence of the first of them."""
-    path = tmp_path_factory.mktemp("slack") / "language.json"
-    built = library.build(*T_MAP, slack=1, words_see_slack=True, method="minimal")
-    built.language.save(path)
-    (plan,) = library.plans(*T_MAP, slack=1).sample(1, 0)
-    return path, library.say(path, *T_MAP, plan=plan).sentence
-
-
 @pytest.mark.parametrize(
     ("line", "code", "is_named"),
     [
-        ("coordination T-MAP --slack 1", 0, True),
-        ("build T-MAP --slack 1 --words 1 -o -", 0, True),
-        ("plans T-MAP --slack 1", 0, False),
-        ("understand LANGUAGE T-MAP SENTENCE", 0, False),
-        ("understand LANGUAGE T-MAP 'w0 w1 w0 w1 w0 w1 w0'", 1, True),
-        ("plan LANGUAGE T-MAP SENTENCE", 0, False),
-        ("choices LANGUAGE T-MAP SENTENCE --check", 0, True),
-        ("explain LANGUAGE T-MAP", 0, True),
-        ("explain LANGUAGE T-MAP --task", 0, True),
-        ("verify LANGUAGE T-MAP", 0, False),
-        ("export LANGUAGE T-MAP SENTENCE --to bt", 0, True),
+        ("coordination SQUARE --slack 1", 0, True),
+        ("build SQUARE --slack 1 --words 1 -o -", 0, True),
+        ("plans SQUARE --slack 1", 0, False),
+        ("understand LANGUAGE SQUARE SENTENCE", 0, False),
+        ("understand LANGUAGE SQUARE 'w0 w1 w0 w1 w0 w1 w0'", 1, True),
+        ("plan LANGUAGE SQUARE SENTENCE", 0, False),
+        ("choices LANGUAGE SQUARE SENTENCE --check", 0, True),
+        ("explain LANGUAGE SQUARE", 0, True),
+        ("explain LANGUAGE SQUARE --task", 0, True),
+        ("verify LANGUAGE SQUARE", 0, False),
+        ("export LANGUAGE SQUARE SENTENCE --to bt", 0, True),
     ],
 )
 def test_no_answer_says_optimal(
-    line: str, code: int, is_named: bool, spoken: tuple[Path, str], shell: Shell
+    line: str, code: int, is_named: bool, made: Path, sentence: str, shell: Shell
 ) -> None:
-    line = line.replace("LANGUAGE", str(spoken[0])).replace("SENTENCE", f"'{spoken[1]}'")
+    line = line.replace("LANGUAGE", str(made)).replace("SENTENCE", f"'{sentence}'")
     outcome = shell(line, code)
     text = " ".join((outcome.out + outcome.err).split())
     assert "optimal" not in text

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import subprocess
 import sys
@@ -23,7 +22,7 @@ from planners.classical.fast_downward import total_cost
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
 from planners.system.errors import UsageError
-from tests.support.command import Command, Outcome, own_process
+from tests.support.command import Command, Outcome
 from tests.support.domains import DOMAINS
 from tests.support.naive_classical import optimal_plans
 from tests.support.task_languages import SHIPPED
@@ -59,15 +58,6 @@ def ask(coordlang: Command, languages: tuple[Path, Path]) -> Ask:
 @pytest.fixture
 def of_cells(coordlang: Command, languages: tuple[Path, Path]) -> Ask:
     return lambda *arguments: coordlang("export", languages[1], *CELLS, *arguments)
-
-
-def test_the_export_does_not_depend_on_hashes(languages: tuple[Path, Path], tmp_path: Path) -> None:
-    asked = ["export", languages[0], *T_MAP, SENTENCE, "--max-actions", "0", "-o"]
-    for seed in "02":
-        own = {**os.environ, "PYTHONHASHSEED": seed}
-        subprocess.run(own_process(*asked, tmp_path / seed), env=own, check=True)
-    for name in ("domain.pddl", "problem.pddl"):
-        assert (tmp_path / "0" / name).read_text() == (tmp_path / "2" / name).read_text()
 
 
 @pytest.mark.parametrize(("limit", "form"), [(2000, "explicit"), (0, "select-then-apply")])

@@ -18,7 +18,7 @@ import pytest
 
 from coordlang.commands.build import build
 from coordlang.commands.explain import explain
-from coordlang.execution.task_language import NoPlanFits, TaskLanguage, languages_in_tasks
+from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
 from coordlang.explanation.words import Conjunction
 from coordlang.exports.ltlf import export_ltlf, symbols_of
 from coordlang.exports.membership import exclusive_terms, short_terms
@@ -220,14 +220,6 @@ def test_symbols_are_readable_and_stay_apart() -> None:
     assert found[:3] == ["at_r1_c0_1", "at_r1_c0_1__2", "p_last_r1_none"]
     assert len(set(found)) == 6
     assert all(re.fullmatch(r"(?!true|end|last)[a-z][a-z0-9_]*", symbol) for symbol in found)
-
-
-def test_a_sentence_that_no_plan_has() -> None:
-    task_language = rich()
-    longest = max(by_sentence(task_language), key=len)
-    for export in (export_pddl, export_ltlf):
-        with pytest.raises(NoPlanFits):
-            export(task_language, (*longest, longest[-2]))
 
 
 def test_plan_files_of_other_planners() -> None:

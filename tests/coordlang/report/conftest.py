@@ -14,14 +14,12 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from coordlang.commands.building import build_language
-from coordlang.language.candidates import all_pairs, from_listed, from_problems
+from coordlang.language.candidates import from_listed
 from coordlang.language.listed import read_task_file
 from coordlang.language.words import Language
 from coordlang.report.page import Report, make_report
-from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Domain, Problem
-from planners.pddl.model_options import ModelOptions
-from tests.support.domains import DOMAINS
+from tests.support.domains import DOMAINS, all_tasks, own_task, read
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -61,32 +59,46 @@ def data_of(html: bytes) -> dict[str, Any]:
     return data
 
 
+def listed_plans(task: dict[str, Any]) -> list[tuple[list[int], list[int]]]:
+    """All ways through the graph of the page: (edges, nodes)."""
+    found = []
+    todo: list[tuple[list[int], list[int]]] = [([], [0])]
+    while todo:
+        edges, nodes = todo.pop()
+        if len(edges) == task["steps"]:
+            found.append((edges, nodes))
+        first = task["first"]
+        todo += [
+            ([*edges, e], [*nodes, task["target"][e]])
+            for e in range(first[nodes[-1]], first[nodes[-1] + 1])
+        ]
+    return found
+
+
 @cache
 def make_language(
     domain: str,
     problem: str,
     tasks: str | None = "all",
     method: str = "greedy",
-    options: ModelOptions | None = None,
 ) -> tuple[Language, Domain, Problem]:
-    lifted = read_domain(DOMAINS / domain / "domain.pddl")
-    read = read_problem(DOMAINS / domain / f"{problem}.pddl", lifted)
-    if tasks is None:
-        candidates = from_problems(lifted, [read], options)
-    elif tasks == "all":
-        candidates = all_pairs(lifted, [read], options)
+    lifted, read_problem = read(domain, problem)
+    if tasks in (None, "all"):
+        candidates = (all_tasks if tasks else own_task)(domain, problem)
     else:
-        candidates = from_listed(lifted, [read], read_task_file(DOMAINS / domain / tasks), options)
+        listed = read_task_file(DOMAINS / domain / tasks)
+        candidates = from_listed(lifted, [read_problem], listed)
     built = build_language(candidates, method)
-    return built.language, lifted, read
+    return built.language, lifted, read_problem
 
 
 @cache
 def make_world(
     domain: str, problem: str, tasks: str | None = "all", method: str = "greedy", shown: int = 6
 ) -> World:
-    language, lifted, read = make_language(domain, problem, tasks, method)
-    return World(language, lifted, read, make_report(language, lifted, [read], tasks_shown=shown))
+    language, lifted, asked = make_language(domain, problem, tasks, method)
+    report = make_report(language, lifted, [asked], tasks_shown=shown)
+    return World(language, lifted, asked, report)
 
 
 def refuted(language: Language) -> Language:

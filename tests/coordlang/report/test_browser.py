@@ -5,21 +5,26 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
+from typing import TYPE_CHECKING
 
 import pytest
 
 from coordlang.execution.task_language import language_in_task
+from coordlang.language.sentences import sentence
 from coordlang.report.page import LARGEST, make_report
 from planners.pddl.lifted import And
 from planners.search.plans import Plans
 from tests.coordlang.report.conftest import (
-    Opened,
     Opener,
     World,
+    listed_plans,
     make_language,
     make_world,
     refuted,
 )
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
 
 WORLDS = [
     ("t-map", "problem", "all"),
@@ -38,13 +43,26 @@ def at(key: str, predicate: str = "at") -> dict[str, str]:
     return {atom[1]: atom[2] for atom in atoms if atom[0] == predicate}
 
 
+#: Languages of many states.
+LARGE = [
+    ("corridor", "problem", "all"),
+    ("grid", "gwb7-3x5", "gwb7-3x5.tasks.json"),
+    ("grid", "corners-10x10", None),
+]
+
+
 @pytest.mark.parametrize(
     ("domain", "problem", "tasks"),
-    [WORLDS[0], *(pytest.param(*world, marks=pytest.mark.thorough) for world in WORLDS[1:])],
+    [
+        WORLDS[0],
+        *(pytest.param(*world, marks=pytest.mark.thorough) for world in WORLDS[1:]),
+        *(pytest.param(*world, marks=pytest.mark.slow) for world in LARGE),
+    ],
 )
 def test_every_page_plays(open_page: Opener, domain: str, problem: str, tasks: str | None) -> None:
     """Every task of the page, at its end and in each robot's place; in the end nothing was logged."""
     world = make_world(domain, problem, tasks)
+    assert len(world.report.html) <= LARGEST
     opened = open_page(world.report.html)
     seen = opened.page.evaluate(
         """() => DATA.tasks.map((task, number) => {
@@ -66,31 +84,6 @@ def test_every_page_plays(open_page: Opener, domain: str, problem: str, tasks: s
         assert without == task["requires"]
         assert len(ends) == 1 + len(world.data["robots"])
         assert all("goal is reached" in end for end in ends)
-
-
-@pytest.mark.thorough
-def test_plans_are_those_of_the_planner(open_page: Opener) -> None:
-    """Each sentence, each of its plans, each step: every robot is where the planner says."""
-    world = make_world("grid", "three-robots-3x3", None)
-    spoken = language_in_task(world.language, world.domain, world.problem)
-    opened = open_page(world.report.html)
-    checked = 0
-    for number, entry in list(enumerate(world.data["tasks"][0]["sentences"]))[::6]:
-        fits = spoken.plans_with(entry["words"])
-        plans = Plans.of(fits)
-        assert entry["plans"] == str(plans.count)
-        opened.page.click(f"[data-sentence='{number}']")
-        for rank in range(plans.count):
-            if rank:
-                opened.page.dispatch_event("#plan-next", "click")
-            assert f"Plan {rank + 1} of {plans.count}" in opened.page.inner_text("#transport")
-            opened.page.press("#player", "Home")
-            for step, state in enumerate(plans.states(plans.unrank(rank))):
-                if step:
-                    opened.forward()
-                assert opened.things() == at(spoken.model.codec.key(fits.rows[state]))
-                checked += 1
-    assert checked > 100
 
 
 @pytest.mark.thorough
@@ -150,45 +143,36 @@ def test_a_robots_options_are_its_own_subplans(open_page: Opener) -> None:
 
 @pytest.mark.thorough
 def test_choosing_for_a_robot(open_page: Opener) -> None:
-    world = make_world("grid", "three-robots-3x3", None)
-    opened = open_page(world.report.html)
-    page = opened.page
-    page.click("[data-mode='0']")
-    words = page.evaluate("taskView.sentence")
-    assert words >= 0  # being a robot needs a sentence: one was chosen
-    for step in range(4):
-        buttons = page.query_selector_all("#choices button")
-        labels = [button.get_attribute("title") for button in buttons]
-        page.keyboard.press(str(len(buttons)))  # keys choose, too
-        assert page.evaluate(f"DATA.labels[0][taskView.steps[{step}][0]].text") == labels[-1]
-    assert "on an optimal plan" in page.inner_text("#now")
-    # Every mixture of the robots' choices is optimal: over and over with other choices of the
-    # others.
-    for _ in range(25):
-        page.dispatch_event("#transport .plan-nav button", "click")
-        opened.forward(4)
-        assert "on an optimal plan" in page.inner_text("#now")
-
-
-@pytest.mark.thorough
-def test_without_a_sentence_it_goes_wrong(open_page: Opener) -> None:
-    """In the place of a robot, with all optimal plans open (a language of one word), some mixture
-    breaks, and it is said.
+    """Every mixture of the robots' choices is optimal: over and over with other choices of the
+    others.  With all optimal plans open (a language of one word) some mixture breaks.
     """
+    page = open_page(make_world("grid", "three-robots-3x3", None).report.html).page
+    page.click("[data-mode='0']")
+    assert page.evaluate("taskView.sentence") >= 0  # being a robot needs a sentence: one was chosen
+    for step in range(4):
+        labels = [b.get_attribute("title") for b in page.query_selector_all("#choices button")]
+        page.keyboard.press(str(len(labels)))  # keys choose, too
+        assert page.evaluate(f"DATA.labels[0][taskView.steps[{step}][0]].text") == labels[-1]
+    assert all("on an optimal plan" in text for text in endings(page, 25))
     language, domain, problem = make_language("t-map", "problem")
-    opened = open_page(make_report(refuted(language), domain, [problem], tasks_shown=1).html)
-    page = opened.page
+    page = open_page(make_report(refuted(language), domain, [problem], tasks_shown=1).html).page
     assert "no coordination language" in page.inner_text("#task-warning")
     assert "do not mix" in page.inner_text("#without-note")
     page.click("[data-mode='0']")
-    said = set()
-    for _ in range(12):
-        page.dispatch_event("#transport .plan-nav button", "click")
-        for _ in range(4):
-            opened.forward()
-        said.add(page.inner_text("#now").rsplit(". ", 1)[-1])
+    said = endings(page, 12)
     assert any("not part of any optimal plan" in text for text in said)
     assert any("on an optimal plan" in text for text in said)
+
+
+def endings(page: Page, number: int) -> set[str]:
+    """What is said in the end if the others choose again and again."""
+    said = set()
+    for _ in range(number):
+        page.dispatch_event("#transport .plan-nav button", "click")
+        for _ in range(4):
+            page.dispatch_event("#transport .forward", "click")
+        said.add(page.inner_text("#now").rsplit(". ", 1)[-1])
+    return said
 
 
 @pytest.mark.thorough
@@ -240,16 +224,11 @@ def test_a_sentence_highlights_what_remains(open_page: Opener) -> None:
 def remaining(world: World, number: int) -> set[int]:
     """Nodes of the page's graph on plans with a sentence: all ways listed."""
     data, task = world.data, world.data["tasks"][0]
-    words = None if number < 0 else task["sentences"][number]["words"]
     found: set[int] = set()
-    ways = [[0]]
-    for nodes in ways:  # which grows meanwhile
-        after = task["target"][task["first"][nodes[-1]] : task["first"][nodes[-1] + 1]]
-        ways += [[*nodes, node] for node in {*after}]
-        if not after:
-            said = [data["state_words"][task["nodes"]["state"][n]] for n in nodes]
-            if words in (None, [w for k, w in enumerate(said) if not k or said[k - 1] != w]):
-                found.update(nodes)
+    for _, nodes in listed_plans(task):
+        said = sentence(data["state_words"][task["nodes"]["state"][n]] for n in nodes)
+        if number < 0 or said == tuple(task["sentences"][number]["words"]):
+            found.update(nodes)
     return found
 
 
@@ -330,27 +309,20 @@ def test_narrow_and_wide(open_page: Opener, width: int, scheme: str) -> None:
         assert small == []
 
 
-def contrast(opened: Opened, text: str, ground: str) -> float:
-    """The contrast of two colours, WCAG 2.1."""
-    ratio: float = opened.page.evaluate(
-        """([text, ground]) => { const of = name => { const e = document.createElement('i'); e.style.color = `var(${name})`;
-            document.body.append(e); const c = getComputedStyle(e).color.match(/[0-9.]+/g).map(Number); e.remove();
-            const [r, g, b] = c.slice(0, 3).map(v => v / 255).map(v => v <= .03928 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4);
-            return .2126 * r + .7152 * g + .0722 * b; };
-          const [a, b] = [of(text), of(ground)].sort((x, y) => y - x); return (a + .05) / (b + .05); }""",
-        [text, ground],
-    )
-    return ratio
+#: The contrast of two colours, WCAG 2.1.
+CONTRAST = """([text, ground]) => { const of = name => { const e = document.createElement('i'); e.style.color = `var(${name})`;
+    document.body.append(e); const c = getComputedStyle(e).color.match(/[0-9.]+/g).map(Number); e.remove();
+    const [r, g, b] = c.slice(0, 3).map(v => v / 255).map(v => v <= .03928 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4);
+    return .2126 * r + .7152 * g + .0722 * b; };
+  const [a, b] = [of(text), of(ground)].sort((x, y) => y - x); return (a + .05) / (b + .05); }"""
 
 
 @pytest.mark.thorough
-def test_text_can_be_read(open_page: Opener) -> None:
-    for scheme in ("light", "dark"):
-        opened = open_page(make_world("t-map", "problem").report.html, color_scheme=scheme)
-        for text, ground in product(
-            ("--ink", "--soft", "--accent", "--bad"), ("--paper", "--panel")
-        ):
-            assert contrast(opened, text, ground) >= 4.5, (scheme, text, ground)
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_can_be_read(open_page: Opener, scheme: str) -> None:
+    opened = open_page(make_world("t-map", "problem").report.html, color_scheme=scheme)
+    for colours in product(("--ink", "--soft", "--accent", "--bad"), ("--paper", "--panel")):
+        assert opened.page.evaluate(CONTRAST, [*colours]) >= 4.5, colours
 
 
 def test_odd_names_stay_text(open_page: Opener) -> None:
@@ -384,24 +356,3 @@ def test_odd_languages_and_tasks(open_page: Opener) -> None:
             opened.forward(5)
             assert opened.page.inner_text("#timeline")
         assert opened.page.is_visible("#facts li") == (asked is problem)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("domain", "problem", "tasks"),
-    [
-        ("corridor", "problem", "all"),
-        ("grid", "gwb7-3x5", "gwb7-3x5.tasks.json"),
-        ("grid", "corners-10x10", None),
-    ],
-)
-def test_large_languages(open_page: Opener, domain: str, problem: str, tasks: str | None) -> None:
-    world = make_world(domain, problem, tasks, shown=30)
-    assert len(world.report.html) <= LARGEST
-    opened = open_page(world.report.html)
-    note = opened.page.inner_text("#tasks-note")
-    if tasks is not None:
-        assert "drawn at random" in note
-    for number in range(0, world.report.tasks, 5):
-        opened.page.evaluate(f"openTask({number})")
-        opened.forward(2)

@@ -3,14 +3,12 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 from pathlib import Path
 
 import pytest
 
 from tests.coordlang.report.conftest import data_of
-from tests.support.command import Command, own_process
+from tests.support.command import Command
 from tests.support.domains import DOMAINS
 
 FILES = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
@@ -26,25 +24,6 @@ def test_a_page_is_written(coordlang: Command, language: Path, tmp_path: Path) -
     to_stdout = coordlang("report", language, *FILES, "-o", "-", "--tasks-shown", "4")
     assert to_stdout.out == page.read_text()
     assert "written to stdout" in to_stdout.err
-
-
-@pytest.mark.thorough
-def test_the_same_input_gives_the_same_bytes_in_other_processes(
-    language: Path, tmp_path: Path
-) -> None:
-    pages = []
-    for seed in ("1", "2"):
-        page = tmp_path / f"{seed}.html"
-        done = subprocess.run(
-            own_process("report", language, *FILES, "-o", page),
-            env={**os.environ, "PYTHONHASHSEED": seed},
-            check=False,
-            capture_output=True,
-            text=True,
-        )
-        assert done.returncode == 0, done.stderr
-        pages.append(page.read_bytes())
-    assert pages[0] == pages[1]
 
 
 def test_coordinates(coordlang: Command, language: Path, tmp_path: Path) -> None:

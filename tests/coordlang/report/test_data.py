@@ -22,7 +22,13 @@ from coordlang.report.shown import select_tasks
 from coordlang.required.miscoordination import Inseparable
 from planners.search.plans import Plans
 from planners.system.errors import ProvedImpossible, UsageError
-from tests.coordlang.report.conftest import data_of, make_language, make_world, refuted
+from tests.coordlang.report.conftest import (
+    data_of,
+    listed_plans,
+    make_language,
+    make_world,
+    refuted,
+)
 from tests.support.domains import DOMAINS
 from tests.support.random_models import random_model
 
@@ -35,22 +41,6 @@ MORE = [
     pytest.param("lock", "both-in", "all", marks=pytest.mark.thorough),
     pytest.param("elevator", "two-calls", "all", marks=pytest.mark.thorough),
 ]
-
-
-def listed_plans(task: dict[str, Any]) -> list[tuple[list[int], list[int]]]:
-    """All ways through the graph of the page: (edges, nodes)."""
-    found = []
-    todo: list[tuple[list[int], list[int]]] = [([], [0])]
-    while todo:
-        edges, nodes = todo.pop()
-        if len(edges) == task["steps"]:
-            found.append((edges, nodes))
-        first = task["first"]
-        todo += [
-            ([*edges, e], [*nodes, task["target"][e]])
-            for e in range(first[nodes[-1]], first[nodes[-1] + 1])
-        ]
-    return found
 
 
 @pytest.mark.parametrize(("domain", "problem", "tasks"), [*WORLDS, *MORE])
@@ -107,7 +97,7 @@ def key_of(data: dict[str, Any], state: int) -> str:
 def test_random_models() -> None:
     """Models that nobody wrote for a page: it is made, and its numbers add up."""
     made = requiring = unmapped = 0
-    for seed in range(20):
+    for seed in range(12):
         random = Random(seed)
         domain, problem, options = random_model(seed, random.choice([2, 2, 3]))
         try:
@@ -131,9 +121,9 @@ def test_random_models() -> None:
                 requiring += 1
                 assert task["witness"]["breaks"] <= task["steps"]
                 assert not task["witness"]["reaches"] or options.cost != "makespan"
-    assert made >= 6
-    assert requiring >= 3
-    assert unmapped >= 2
+    assert made >= 4
+    assert requiring >= 2
+    assert unmapped >= 1
 
 
 def test_large_tasks_are_drawn() -> None:
@@ -157,12 +147,12 @@ def test_large_tasks_are_drawn() -> None:
 
 
 def test_selection() -> None:
-    language, domain, problem = make_language("t-map", "problem")
+    language, domain, problem = make_language("three-cells", "problem")
     every = select_tasks(language, domain, [problem], 200, 0)
     assert every.complete
-    # The problem's own task is the pair of its start and the only state with its goal.
-    assert len(every.tasks) in (132, 133)
-    assert sum(task.witness is not None for task in every.tasks) in (12, 13)
+    assert len(every.tasks) == 30
+    assert sum(task.witness is not None for task in every.tasks) == 6
+    language, domain, problem = make_language("t-map", "problem")
 
     def some(seed: int) -> tuple[list[int], ...]:
         found = select_tasks(language, domain, [problem], 10, seed)
@@ -190,14 +180,6 @@ def test_a_page_is_the_same_each_time_opens_offline_and_shows_fewer_tasks_if_too
     assert not data_of(less.html)["candidates"]["complete"]
 
 
-def test_without_a_map() -> None:
-    language, domain, problem = make_language("t-map", "problem")
-    shown = data_of(make_report(language, domain, [problem], tasks_shown=1, most_places=3).html)
-    assert shown["places"] == []
-    assert {fact["role"][0] for fact in shown["facts"]} == {"other"}
-    assert all(label["moves"] == [] for own in shown["labels"] for label in own)
-
-
 def test_a_language_that_is_none_is_said_to_be_none() -> None:
     language, domain, problem = make_language("t-map", "problem")
     for shown, holds in ((language, True), (refuted(language), False)):
@@ -210,7 +192,7 @@ def test_plans_within_slack_are_called_so() -> None:
     """The page says "optimal plan" of no other plans."""
     folder = DOMAINS / "three-cells"
     files = folder / "domain.pddl", folder / "problem.pddl"
-    built = door.build(*files, slack=2, words_see_slack=True)
+    built = door.build(*files, slack=2, words_see_slack=True, method="separating")
     _, domain, problem = make_language("three-cells", "problem", None)
     html = make_report(built.language, domain, [problem], tasks_shown=1).html
     kept = data_of(html)["kept"]

@@ -53,18 +53,6 @@ def test_where_robots_are_not_on_a_grid() -> None:
         planviz(used)
 
 
-def test_a_plan_without_steps_has_one_in_which_nobody_moves(tmp_path: Path) -> None:
-    domain = DOMAINS / "grid" / "domain.pddl"
-    text = (DOMAINS / "grid" / "corners-3x3.pddl").read_text()
-    goal = text[text.index("(:goal") :]
-    start = "(:goal (and (at r1 c0-0) (at r2 c2-2))))"
-    problem = tmp_path / "p.pddl"
-    problem.write_text(text.replace(goal, start))
-    built = door.build(domain, problem, method="greedy")
-    used = door.explain(built.language, domain, problem).words.used
-    assert json.loads(planviz(used).plan)["actualPaths"] == ["W", "W"]
-
-
 def test_command(coordlang: Command, language: Path, tmp_path: Path) -> None:
     files = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
     page = tmp_path / "page.html"

@@ -15,7 +15,7 @@ from coordlang.report.page import Report, make_report
 from coordlang.report.simulated import simulated_data, summary
 from coordlang.simulation.record import SimulationRecord, to_bytes
 from coordlang.simulation.simulator import Settings
-from tests.coordlang.report.conftest import Opened, Opener, data_of, make_language
+from tests.coordlang.report.conftest import Opened, Opener, make_language
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
 from tests.support.simulation import recorded
@@ -82,12 +82,6 @@ def test_what_happened_is_listed_and_leads_to_when_it_did(open_page: Opener) -> 
     assert opened.page.locator("#floor-events .ahead").count() == 0
 
 
-def test_a_page_without_runs_has_no_player_of_them() -> None:
-    html = page_of(None).html
-    assert b'id="floor"' not in html
-    assert "simulated" not in data_of(html)
-
-
 def test_a_page_holds_some_runs_of_many(monkeypatch: pytest.MonkeyPatch) -> None:
     record = recorded("t-map", "nothing", Settings(), 2)
     one = sum(map(len, record.runs[0].poses.values()))
@@ -106,6 +100,7 @@ def test_runs_of_another_domain_and_no_runs_are_refused(
     path, page = tmp_path / "run.json", tmp_path / "page.html"
     shown = ("report", language, *FILES, "-o", page, "--run", path, "--tasks-shown", "1")
     path.write_bytes(to_bytes(record))
+    assert b'id="floor"' not in page_of(None).html
     assert coordlang(*shown).code == 0
     assert b'id="floor"' in page.read_bytes()
     for wrong, said in (

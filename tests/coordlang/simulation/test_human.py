@@ -10,24 +10,9 @@ import pytest
 
 from coordlang.simulation.floor import Human
 from coordlang.simulation.record import EventRecord, RunRecord, WishRecord
-from coordlang.simulation.run import runs_of
 from coordlang.simulation.simulator import Settings
-from coordlang.simulation.team import Agreement
 from planners.system.errors import UsageError
-from tests.support.simulation import floor_for, mission_of
-
-
-def runs(
-    folder: str,
-    agreement: Agreement,
-    settings: Settings,
-    *wishes: WishRecord,
-    stem: str,
-    number: int = 2,
-) -> list[RunRecord]:
-    mission = mission_of(folder, stem, agreement)
-    floor = floor_for(mission)
-    return list(runs_of(mission, floor, settings, number, wishes=wishes))
+from tests.support.simulation import floor_for, mission_of, runs
 
 
 def detours(found: RunRecord) -> list[EventRecord]:
@@ -37,7 +22,7 @@ def detours(found: RunRecord) -> list[EventRecord]:
 def test_who_has_a_choice_goes_round_the_human() -> None:
     """Corners of an open grid: under the sentence robots may keep out of the middle."""
     settings = Settings(step="barrier", human="c1-1")
-    for found in runs("grid", "sentence", settings, stem="corners-3x3"):
+    for found in runs("grid", "sentence", settings, 2, stem="corners-3x3"):
         assert found.arrived
         assert found.collisions == 0
         assert all(event.granted for event in detours(found))
@@ -45,7 +30,7 @@ def test_who_has_a_choice_goes_round_the_human() -> None:
 
 
 def test_who_has_none_stops_before_the_human() -> None:
-    for found in runs("t-map", "plan", Settings(human="c1-1"), stem="problem"):
+    for found in runs("t-map", "plan", Settings(human="c1-1"), 2):
         assert found.deadlock
         assert found.collisions == 0
         assert not any(event.granted for event in detours(found))
@@ -55,7 +40,7 @@ def test_who_has_none_stops_before_the_human() -> None:
 
 def test_a_detour_that_own_choices_allow_is_made() -> None:
     wish = WishRecord("r2", 2, "(at r2 c0-4)")
-    for found in runs("corridor", "sentence", Settings(), wish, stem="problem"):
+    for found in runs("corridor", "sentence", Settings(), 2, wish):
         (event,) = detours(found)
         assert (event.visit, event.steps["r2"]) == ("(at r2 c0-4)", 2)
         places = {step.place for step in found.steps if step.robot == "r2"}
@@ -67,7 +52,7 @@ def test_a_detour_that_own_choices_allow_is_made() -> None:
 def test_under_a_whole_plan_a_detour_can_be_had_only_if_it_is_on_it() -> None:
     wish = WishRecord("r2", 2, "(at r2 c0-4)")
     granted = set()
-    for found in runs("corridor", "plan", Settings(), wish, stem="problem", number=4):
+    for found in runs("corridor", "plan", Settings(), 4, wish):
         (event,) = detours(found)
         granted.add(event.granted)
         assert event.granted == ("(move r2 c1-4 c0-4)" in found.subplans["r2"])

