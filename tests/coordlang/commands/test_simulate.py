@@ -8,10 +8,12 @@ import os
 import signal
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from coordlang.simulation.record import read_simulation
+from coordlang.simulation.simulator import Simulator
 from tests.coordlang.commands.conftest import FILES, Shell
 from tests.support.command import Outcome
 
@@ -84,33 +86,43 @@ def test_usage(line: str, message: str, shell: Shell) -> None:
     shell(f"simulate {line}", 2, message)
 
 
-@pytest.mark.parametrize(
-    ("number", "given", "code", "said"),
-    [
-        (signal.SIGALRM, "--time-limit 600", 3, "2 runs of 9 done"),
-        (signal.SIGINT, "", 130, "interrupted; 2 runs of 9 done"),
-    ],
-)
-def test_the_runs_that_are_done_are_kept(
-    number: int, given: str, code: int, said: str, simulate: Shell, monkeypatch: pytest.MonkeyPatch
+def test_a_time_limit_keeps_the_runs_that_are_done(simulate: Shell) -> None:
+    simulate("")  # everything is loaded
+    outcome = simulate("--runs 1000 --time-limit 2 --json", 3, "of 1000 done")
+    assert 0 < len(json.loads(outcome.out)["runs"]) < 1000
+
+
+def test_a_limit_while_the_world_is_made_is_no_line_on_stdout(
+    simulate: Shell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    simulate("")  # ir-sim is loaded as the command does it
     from irsim.env import env_base
 
     class Ringing(env_base.EnvConfig):  # type: ignore[misc]
-        """The signal comes while the file is read, where ir-sim prints what is raised."""
+        """The alarm rings while the file is read, where ir-sim prints what is raised."""
 
         worlds = 0
 
         def __init__(self, *arguments: object, **keywords: object) -> None:
             Ringing.worlds += 1
             if Ringing.worlds == 3:
-                os.kill(os.getpid(), number)
+                os.kill(os.getpid(), signal.SIGALRM)
             super().__init__(*arguments, **keywords)
 
     monkeypatch.setattr(env_base, "EnvConfig", Ringing)
-    outcome = simulate(f"--runs 9 --json -o runs.json {given}", code, said)
+    outcome = simulate("--runs 9 --time-limit 600 --json", 3)
     assert len(json.loads(outcome.out)["runs"]) == 2
+
+
+def test_an_interrupt_keeps_the_runs_that_are_done(
+    simulate: Shell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*arguments: Any) -> object:
+        if arguments[3] == 2:
+            raise KeyboardInterrupt
+        return Simulator(*arguments)
+
+    monkeypatch.setattr("coordlang.simulation.run.Simulator", interrupted)
+    simulate("--runs 9 -o runs.json", 130, "interrupted; 2 runs of 9 done")
     assert [one.seed for one in read_simulation("runs.json").runs] == [0, 1]
 
 
