@@ -95,6 +95,7 @@ def test_a_time_limit_keeps_the_runs_that_are_done(simulate: Shell) -> None:
 def test_a_limit_while_the_world_is_made_is_no_line_on_stdout(
     simulate: Shell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    simulate("")  # ir-sim is loaded as the command does it
     from irsim.env import env_base
 
     class Ringing(env_base.EnvConfig):  # type: ignore[misc]
