@@ -12,7 +12,6 @@ from typing import Any
 import pytest
 
 from coordlang.commands.building import build_language
-from coordlang.commands.repairing import repair_language
 from planners.system.errors import OutOfTime
 from tests.coordlang.commands.conftest import FILES, Shell
 from tests.support.domains import all_tasks, own_task
