@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,6 @@ from planners.grounding import GroundAction
 from planners.joint.model import FullState, JointModel, PlanningTask
 from planners.parallel.batch import Store, Table, code_hash, digest
 from planners.pddl.formula_tree import formula_text, label
-from planners.pddl.lifted import And, Formula, Or
 from planners.search import optimal_plans
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import CoordlangError, note
@@ -124,11 +122,8 @@ def _plan_space(table: Table, model: JointModel, task: PlanningTask) -> PlanSpac
 
 def model_digest(model: JointModel) -> str:
     """A hash of all that a search reads of a joint model, whatever files it was made from."""
-    found = sha256()
-    for text in _texts(model.actions):
-        found.update(f"{text}\n".encode())
     return digest(
-        found.hexdigest(),
+        tuple(_texts(model.actions)),
         model.robots,
         model.labels,
         model.idling_costs,
@@ -150,21 +145,12 @@ def key_of(model: str, task: PlanningTask) -> str:
 
 
 def _texts(actions: Iterable[GroundAction]) -> Iterator[str]:
-    """All that a search reads of ground actions; formulas that many share are written once."""
-    known: dict[int, str] = {}  # by identity; the actions keep their formulas alive
-
-    def part(formula: Formula) -> str:
-        if id(formula) not in known:
-            known[id(formula)] = formula_text(formula)
-        return known[id(formula)]
-
-    def whole(formula: Formula) -> str:
-        if isinstance(formula, And | Or):
-            return f"({type(formula).__name__} {' '.join(map(part, formula.parts))})"
-        return part(formula)
-
+    """All that a search reads of ground actions."""
     for action in actions:
-        effects = [(e.adds, part(e.atom), whole(e.condition)) for e in action.effects]
+        effects = [
+            (effect.adds, formula_text(effect.atom), formula_text(effect.condition))
+            for effect in action.effects
+        ]
         links = sorted(label(link.action, link.args) for link in action.links)
         rest = (action.owners, action.parts, action.cost, links, effects)
-        yield f"{action.label} {whole(action.precondition)} {rest}"
+        yield f"{action.label} {formula_text(action.precondition)} {rest}"

@@ -52,8 +52,8 @@ class FixedPlans:
 
     def _take(self, clauses: Ints) -> None:
         """Let this be the formula, in a solver of its own."""
-        labels = self.first[-1:, -1:].sum() + self._sizes[-1] - 1
-        self.variables = max(int(np.abs(clauses).max(initial=0)), int(labels))
+        last = int((self.first + np.array(self._sizes) - 1).max(initial=0))
+        self.variables = max(int(np.abs(clauses).max(initial=0)), last)
         #: All clauses, each followed by 0.
         self.clauses = array("i", np.asarray(clauses, np.intc).tobytes())
         self._solver = sat_solver(SOLVER, split_clauses(clauses))
