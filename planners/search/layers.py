@@ -8,7 +8,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from planners.joint.tables import Bools, Ints, Numbers, Rows, unique_rows
+from planners.joint.tables import Bools, Ints, Numbers, Rows, unique_codes
+
+_MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)
 
 
 class StateTable:
@@ -27,17 +29,32 @@ class StateTable:
 
     def add(self, rows: Rows) -> Ints:
         """The numbers of states; those that are new get the next ones."""
-        different, number = unique_rows(rows)
+        some, number = _different(rows)
         table, before = self._numbers, len(self._numbers)
-        keys = np.ascontiguousarray(different).view(f"V{8 * rows.shape[1]}").ravel().tolist()
+        keys = np.ascontiguousarray(rows[some]).view(f"V{8 * rows.shape[1]}").ravel().tolist()
         found = np.fromiter((table.setdefault(key, len(table)) for key in keys), np.int64)
         if len(table) > len(self._rows):
             more = np.zeros((max(len(table), 2 * len(self._rows)), rows.shape[1]), np.uint64)
             more[:before] = self._rows[:before]
             self._rows = more
         new = found >= before
-        self._rows[found[new]] = different[new]
+        self._rows[found[new]] = rows[some[new]]
         return found[number]
+
+
+def _different(rows: Rows) -> tuple[Ints, Ints]:
+    """Some of the rows, among which all different ones are, and for each row its number there.
+
+    Few of them are equal: those alone whose hash is that of another row, too.
+    """
+    code = np.zeros(len(rows), np.uint64)
+    for column in rows.T:
+        code = (code ^ column) * _MULTIPLIER
+        code ^= code >> np.uint64(29)
+    first, number = unique_codes(code.view(np.int64))
+    met = np.flatnonzero((rows[first[number]] != rows).any(axis=1))
+    number[met] = len(first) + np.arange(len(met))
+    return np.concatenate((first, met)), number
 
 
 def grown(values: Ints, size: int, empty: int) -> Ints:
