@@ -35,27 +35,16 @@ class Views:
     robot i the same moves, each to the same view.  Plans are mixed by their robots' labels and
     compared by their words, so no walk can tell such nodes apart.
 
-    ``of`` (nodes) is the number of each node's view; per view ``word``, and ``first`` delimits its
+    ``of`` (nodes) is the number of each node's view; ``first`` delimits each view's
     moves in ``label``, ``child`` (a view) and ``said`` (the child's word, -1 where it is the view's
-    own).  ``by_word`` are the moves again, of each view by what is said, silent ones first, and
-    ``codes`` what they are sorted by.
+    own).
     """
 
     of: Ints
-    word: Ints
     first: Ints
     label: Ints
     child: Ints
     said: Ints
-    by_word: Ints
-    codes: Ints
-    radix: int
-
-    def moves_saying(self, view: Ints, word: Ints) -> tuple[Ints, Ints]:
-        """The moves of each view that say a word (-1: none), in ``by_word``: from, how many."""
-        wanted = view * self.radix + word + 1
-        start = np.searchsorted(self.codes, wanted)
-        return start, np.searchsorted(self.codes, wanted, side="right") - start
 
 
 def views_of_robot(space: PlanSpace, robot: int, word: Ints) -> Views:
@@ -83,10 +72,7 @@ def views_of_robot(space: PlanSpace, robot: int, word: Ints) -> Views:
     label, child = np.concatenate(moves).T
     view = np.repeat(np.arange(number), np.diff(first))
     said = np.where(view_word[child] != view_word[view], view_word[child], -1)
-    radix = int(word.max(initial=0)) + 2
-    codes = view * radix + said + 1
-    by_word = np.argsort(codes, kind="stable")
-    return Views(of, view_word, first, label, child, said, by_word, codes[by_word], radix)
+    return Views(of, first, label, child, said)
 
 
 def numbered(own: Ints, pairs: Ints, bounds: list[int]) -> tuple[Ints, Ints]:
@@ -113,11 +99,6 @@ def numbered(own: Ints, pairs: Ints, bounds: list[int]) -> tuple[Ints, Ints]:
 
 # ---- by which words the sentence of one plan is ahead of that of another
 
-#: The other plan may say any word.
-ANY = -1
-#: The sentences differ for good.
-NEVER = -2
-
 
 class Leads:
     """Leads as numbers.  A lead is (who is ahead, the words ahead); number 0 is the empty lead.
@@ -131,19 +112,11 @@ class Leads:
         self._leads: list[tuple[bool, tuple[int, ...]]] = [(True, ())]
         self._numbers = {self._leads[0]: 0}
         self._after: dict[int, int] = {}
-        self._wanted: dict[int, int] = {}
 
     def after(self, lead: Ints, first: Ints, other: Ints) -> Ints:
         """Leads after plan 1 said ``first`` and the other plan said ``other``; -1: they differ."""
         codes = (lead * self._radix + first + 1) * self._radix + other + 1
         return _each(codes, self._after, self._compute_after)
-
-    def wanted(self, lead: Ints, first: Ints) -> Ints:
-        """What the other plan may say now, but nothing, after plan 1 said ``first``.
-
-        One word, `ANY` word, or `NEVER`: whatever it says, the sentences differ.
-        """
-        return _each(lead * self._radix + first + 1, self._wanted, self._compute_wanted)
 
     def _compute_after(self, code: int) -> int:
         rest, other = divmod(code, self._radix)
@@ -157,13 +130,6 @@ class Leads:
             self._numbers[ahead] = len(self._leads)
             self._leads.append(ahead)
         return self._numbers[ahead]
-
-    def _compute_wanted(self, code: int) -> int:
-        mine, theirs = self._said(code)
-        common = min(len(mine), len(theirs))
-        if mine[:common] != theirs[:common]:
-            return NEVER
-        return mine[common] if len(mine) > common else ANY
 
     def _said(self, code: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """The words of both plans that are not common, after plan 1 said its next word."""
@@ -320,24 +286,16 @@ class Walk:
         views = self._views[robot]
         at = table[moves.row, robot]
         first, count = views.first[at], views.first[at + 1] - views.first[at]
+        kept, own = np.repeat(np.arange(len(at)), count), ranges(first, count)
         if robot == 0:
-            kept, own = np.repeat(np.arange(len(at)), count), ranges(first, count)
             longer = moves.take(kept)
             said, leads = views.said[own], longer.leads
         else:
-            lead = table[moves.row, self.robots + robot]
-            wanted = self._leads.wanted(lead, moves.said)
-            free, one = np.flatnonzero(wanted == ANY), np.flatnonzero(wanted > NEVER)
-            one = one[wanted[one] != ANY]
-            which, found = [np.repeat(free, count[free])], [ranges(first[free], count[free])]
-            for words in (np.full(len(one), -1), wanted[one]):  # it says nothing, or that word
-                start, number = views.moves_saying(at[one], words)
-                which.append(np.repeat(one, number))
-                found.append(views.by_word[ranges(start, number)])
-            kept, own = np.concatenate(which), np.concatenate(found)
-            longer = moves.take(kept)
-            said = longer.said
-            leads = (*longer.leads, self._leads.after(lead[kept], said, views.said[own]))
+            lead = table[moves.row[kept], self.robots + robot]
+            after = self._leads.after(lead, moves.said[kept], views.said[own])
+            fits = np.flatnonzero(after >= 0)
+            own, longer = own[fits], moves.take(kept[fits])
+            said, leads = longer.said, (*longer.leads, after[fits])
         prefix = self._index.follow(robot, longer.prefix, views.label[own])
         return _Moves(longer.row, (*longer.own, own), leads, said, prefix)
 
