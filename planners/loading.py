@@ -4,31 +4,41 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 from planners.grounding import (
     FEWER,
+    GroundAction,
     ground_actions,
     ground_goal,
     idling_costs,
     impossible_actions,
 )
 from planners.grounding.networks import apply_network
-from planners.joint.assembly import SLACK_LEFT, assemble
-from planners.joint.model import JointModel, PlanningTask, show
+from planners.joint.composition import ComposingStepper
+from planners.joint.conditions import Evaluator
+from planners.joint.joint_actions import JointActionStepper
+from planners.joint.model import IDLE, SLACK_LEFT, JointModel, PlanningTask, Stepper, show
+from planners.joint.states import FactTable, StateCodec
 from planners.pddl import read_domain, read_problem
-from planners.pddl.lifted import Atom, Domain, Problem
+from planners.pddl.lifted import Atom, Domain, Problem, StepAtom
 from planners.pddl.model_options import ModelOptions
 from planners.pddl.robots import (
     Team,
     find_team,
+    fluent_predicates,
+    natural,
     static_atoms,
     without_idle_environment,
 )
 from planners.system.errors import BadInput, Position, UsageError
 from planners.system.limits import reaching
 from planners.system.messages import echoed
+
+#: The texts of a robot's labels, idling first.
+Labels = tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,30 +90,96 @@ def build(
         _check_same_world(domain, first, other)
     team = find_team(domain, first, options)
     starts = [*(problem.init for problem in problems), *inits]
-    extra = {atom for start in starts for atom in start}
     with_costs = options.cost == "makespan+cost"
-    actions = ground_actions(domain, first, team, also=extra, costs=with_costs)
+    actions = ground_actions(domain, first, team, also={*chain(*starts)}, costs=with_costs)
     with reaching(
         lambda: f"comparing {len(actions):,} ground actions of {len(team.robots)} robots", FEWER
     ):
         actions = apply_network(domain, first, actions)
         team = without_idle_environment(team, (i for action in actions for i in action.owners))
-        model = assemble(
-            domain,
-            problems[0],
-            team,
-            actions,
-            starts,
-            cost=options.cost,
-            remember_actions=options.remember_actions,
-            idling_costs=idling_costs(domain, first, team, costs=with_costs),
-            slack=options.slack,
-            words_see_slack=options.words_see_slack,
-        )
-        never = impossible_actions(domain, first, team, actions, extra)
-        model = replace(model, impossible=never)
+        model = _joint_model(domain, first, team, actions, starts, options)
     tasks = tuple(task_of(model, domain, problem) for problem in problems)
     return PlanningInstance(domain, tuple(problems), model, tasks, options, team)
+
+
+def _joint_model(
+    domain: Domain,
+    problem: Problem,
+    team: Team,
+    actions: tuple[GroundAction, ...],
+    starts: Sequence[frozenset[Atom]],
+    options: ModelOptions,
+) -> JointModel:
+    """The joint model of a team's ground actions: its facts, labels and stepper.
+
+    ``starts`` are the true atoms of all initial states: what can ever be true depends on them.
+    """
+    robots, slack = team.robots, options.slack
+    subactions = [[a for a in actions if robot in a.owners] for robot in range(len(robots))]
+    labels = _labels_of_parts(actions, robots) if domain.is_joint_action else _labels(subactions)
+    seen = options.words_see_slack
+    left = [Atom(SLACK_LEFT, (str(k),)) for k in range(slack + 1)] if seen else []
+    facts = FactTable.of({*_facts(domain, actions, starts), *left})
+    codec = StateCodec(facts, robots, labels if options.remember_actions else None)
+    evaluator = Evaluator(codec.facts, {} if domain.is_joint_action else _step_atoms(subactions))
+    costs = options.cost == "makespan+cost"
+    idling = idling_costs(domain, problem, team, costs=costs)
+    stepper: Stepper
+    if domain.is_joint_action:
+        positions = {s.name: domain.source.position(s.offset) for s in domain.schemas}
+        stepper = JointActionStepper(
+            codec, evaluator, robots, labels, actions, options.cost, positions
+        )
+    else:
+        stepper = ComposingStepper(codec, evaluator, robots, subactions, options.cost, idling)
+    return JointModel(
+        name=domain.name,
+        robots=robots,
+        labels=labels,
+        actions=actions,
+        codec=codec,
+        stepper=stepper,
+        evaluator=evaluator,
+        cost=options.cost,
+        idling_costs=idling,
+        statics=static_atoms(domain, problem),
+        is_joint_action=domain.is_joint_action,
+        slack=slack,
+        slack_facts=tuple(facts.index[atom] for atom in left),
+        impossible=impossible_actions(domain, problem, team, actions, {*chain(*starts)}),
+    )
+
+
+def _facts(
+    domain: Domain, actions: Sequence[GroundAction], starts: Sequence[frozenset[Atom]]
+) -> set[Atom]:
+    """The fluent atoms that some initial state has or some action adds."""
+    fluents = fluent_predicates(domain)
+    possible = {atom for start in starts for atom in start if atom.predicate in fluents}
+    return possible | {e.atom for a in actions for e in a.effects if e.adds}
+
+
+def _labels(subactions: Sequence[Sequence[GroundAction]]) -> tuple[Labels, ...]:
+    return tuple((IDLE, *(action.label for action in own)) for own in subactions)
+
+
+def _labels_of_parts(actions: Sequence[GroundAction], robots: Sequence[str]) -> tuple[Labels, ...]:
+    """The labels of joint-action PDDL: what the robots' parts are called, in natural order."""
+    parts = [{action.parts[robot] for action in actions} for robot in range(len(robots))]
+    return tuple((IDLE, *sorted((p for p in own if p), key=_natural_label)) for own in parts)
+
+
+def _natural_label(text: str) -> tuple[object, ...]:
+    return tuple(natural(name) for name in text.strip("()").split())
+
+
+def _step_atoms(subactions: Sequence[Sequence[GroundAction]]) -> dict[StepAtom, tuple[int, int]]:
+    """The robot and label that a step atom speaks of: a shared subaction's first owner."""
+    return {
+        StepAtom(action.schema, action.args): (robot, number + 1)
+        for robot, own in reversed([*enumerate(subactions)])
+        for number, action in enumerate(own)
+    }
 
 
 def task_of(model: JointModel, domain: Domain, problem: Problem) -> PlanningTask:

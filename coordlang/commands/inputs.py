@@ -282,7 +282,7 @@ def read_language(language: given.LanguageSource) -> tuple[Language | LiftedLang
         return language, Position("the lifted language")
     data, position = read_bytes(fspath(language)), Position(fspath(language))
     if names_format(data, "coordlang/lifted"):
-        from coordlang.lifted.file import lifted_from_bytes
+        from coordlang.lifted.language import lifted_from_bytes
 
         return lifted_from_bytes(data, position), position
     return language_from_bytes(data, position), position

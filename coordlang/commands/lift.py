@@ -19,14 +19,16 @@ from coordlang.language.candidates import require_solvable
 from coordlang.language.provenance import Guarantee, provenance_of, world_sha256
 from coordlang.language.recorded import check_domain
 from coordlang.language.words import Language
-from coordlang.lifted.file import read_lifted, to_bytes, write_lifted
 from coordlang.lifted.language import (
     Known,
     LiftedLanguage,
     Verified,
     described,
     grounded,
+    read_lifted,
     require_robots,
+    to_bytes,
+    write_lifted,
 )
 from coordlang.lifted.learning import Instance, Learned, learn
 from coordlang.lifted.notation import english, formula

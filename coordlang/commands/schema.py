@@ -21,7 +21,7 @@ SCHEMAS = {
     "language": "coordlang.language.file",
     "tasks": "coordlang.language.listed",
     "certificate": "coordlang.verification.certificate_file",
-    "lifted": "coordlang.lifted.file",
+    "lifted": "coordlang.lifted.language",
     "choices": "coordlang.execution.choices",
     "simulation": "coordlang.simulation.record",
     "plans": "planners.search.plan_file",

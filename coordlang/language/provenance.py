@@ -12,8 +12,7 @@ from coordlang.language.candidates import Candidates
 from coordlang.language.keys import keys_of
 from coordlang.language.listed import task_data
 from coordlang.language.tolerance import Tolerance
-from planners.joint.assembly import SLACK_LEFT
-from planners.joint.model import show
+from planners.joint.model import SLACK_LEFT, show
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.pddl_text import domain_text
 from planners.pddl.robots import fluent_predicates, static_atoms

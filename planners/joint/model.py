@@ -25,6 +25,8 @@ from planners.system.errors import Position
 
 #: The text of label 0.
 IDLE = "idle"
+#: The predicate of the facts that say how many joint steps of the slack are left.
+SLACK_LEFT = "slack-left"
 #: A state in which nothing is true, for people; its key is empty.
 NO_FACT = "(no fact holds)"
 

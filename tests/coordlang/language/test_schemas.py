@@ -23,8 +23,8 @@ from coordlang.language.file import read_language
 from coordlang.language.file import to_bytes as language_bytes
 from coordlang.language.listed import ListedTask, read_task_file, tasks_text
 from coordlang.language.sentences import task_sentences
-from coordlang.lifted.file import read_lifted
-from coordlang.lifted.file import to_bytes as lifted_bytes
+from coordlang.lifted.language import read_lifted
+from coordlang.lifted.language import to_bytes as lifted_bytes
 from coordlang.simulation.record import read_simulation
 from coordlang.simulation.record import to_bytes as simulated_bytes
 from coordlang.sites.coordinates import read_coordinates

@@ -15,8 +15,7 @@ import pytest
 import coordlang as api
 from coordlang.commands.inputs import read_coordinates_of
 from coordlang.commands.lift import Lifted
-from coordlang.lifted.file import lifted_from_bytes, read_lifted, to_bytes
-from coordlang.lifted.language import LiftedLanguage
+from coordlang.lifted.language import LiftedLanguage, lifted_from_bytes, read_lifted, to_bytes
 from coordlang.required.miscoordination import Inseparable
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.sexpr import Source
