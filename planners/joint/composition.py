@@ -211,7 +211,7 @@ class ComposingStepper(Stepper):
         if not possible.all():
             row, label = row[possible], label[possible]
             first = np.searchsorted(row, np.arange(len(rows) + 1))
-            waiting = {stage: open_.only(possible) for stage, open_ in waiting.items()}
+            waiting = waiting.only(possible)
         return _Options(first, label, waiting)
 
     def _compose(self, rows: Rows, options: Sequence[_Options], span: slice) -> tuple[Ints, Labels]:
@@ -239,13 +239,11 @@ class ComposingStepper(Stepper):
             for i in range(j):
                 if (i, j) in self._apart:
                     keep(self.tables[i, j][chosen[i], chosen[j]])
-            for i, others in enumerate(options[: j + 1]):
-                if j in others.waiting:
-                    clauses = self._robot[i].clauses
-                    keep(~clauses.unmet(others.waiting[j], option[i], chosen))
         labels = np.stack(chosen, axis=1, dtype=np.int32, casting="same_kind")
         fits = np.ones(len(source), np.bool_)
         for i, robot in enumerate(self._robot):
+            if len(options[i].waiting.clause):
+                fits &= ~robot.clauses.unmet(options[i].waiting, option[i], labels)
             robot.drop_unmet(fits, i, rows, source, labels)
         return (source, labels) if fits.all() else (source[fits], labels[fits])
 
@@ -279,13 +277,12 @@ class ComposingStepper(Stepper):
 class _Options:
     """One robot's labels in a table of states, CSR.
 
-    ``waiting`` are the clauses for which they wait, by the robot after whose choice these are
-    decided.
+    ``waiting`` are the clauses about the step that each still has to meet.
     """
 
     first: Ints
     label: Ints
-    waiting: dict[int, Waiting]
+    waiting: Waiting
 
 
 class _Subactions:
@@ -315,7 +312,7 @@ class _Subactions:
                     self._formulas.setdefault(label, []).append(formula)
                 else:
                     of_label.setdefault(label, []).extend(found)
-        self.clauses = StepClauses(robot, of_label, len(actions))
+        self.clauses = StepClauses(of_label, len(actions))
         self._has_formula = np.zeros(len(actions), np.bool_)
         self._has_formula[list(self._formulas)] = True
 

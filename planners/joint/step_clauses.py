@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Formulas about the joint step as clauses, checked as soon as the robots that they name chose.
+"""Formulas about the joint step as clauses, of which a state leaves few open.
 
 A precondition may speak of the other robots' subactions: "whoever stands there leaves it in this
 step".  Ground, it is a conjunction of clauses, each over facts and subactions.  In most states the
-facts alone satisfy most clauses; the others wait for the choices of the robots they name.
+facts alone satisfy most clauses; the others are checked on what all robots choose.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planners.joint.conditions import Evaluator
 from planners.joint.states import test_bits
@@ -112,32 +113,24 @@ class StepClauses:
 
     Parameters
     ----------
-    robot
-        Whose labels they are.
     of_label
         The clauses of each label that has some.
     labels
         How many labels this robot has.
     """
 
-    def __init__(self, robot: int, of_label: Mapping[int, Sequence[Clause]], labels: int) -> None:
+    def __init__(self, of_label: Mapping[int, Sequence[Clause]], labels: int) -> None:
         numbered = [(label, clause) for label in sorted(of_label) for clause in of_label[label]]
         owners = np.array([label for label, _ in numbered], np.int64)
         self._first = np.searchsorted(owners, np.arange(labels + 1))
         split = [_parted(clause) for _, clause in numbered]
         self._facts = _table([facts for facts, _ in split], 2)
         self._steps = _table([steps for _, steps in split], 3)
-        #: Per clause the robot after whose choice it is decided; -1 where the state decides.
-        self._stage = np.array(
-            [max([robot, *(o for o, _, _ in steps)]) if steps else -1 for _, steps in split],
-            np.int64,
-        )
+        #: Whether each clause names a subaction; if none, the state decides.
+        self._names_step = np.array([bool(steps) for _, steps in split], np.bool_)
 
-    def waiting(self, rows: Rows, row: Ints, labels: Ints) -> tuple[Bools, dict[int, Waiting]]:
-        """Which of the options (row, label) are possible, and what the others must still do.
-
-        The clauses that they wait for come by the robot after whose choice these are decided.
-        """
+    def waiting(self, rows: Rows, row: Ints, labels: Ints) -> tuple[Bools, Waiting]:
+        """Which of the options (row, label) are possible, and the clauses that are open then."""
         possible = np.ones(len(row), np.bool_)
         counts = self._first[labels + 1] - self._first[labels]
         clause = ranges(self._first[labels], counts)
@@ -147,19 +140,15 @@ class StepClauses:
         fact, value = self._facts.columns[0][literal], self._facts.columns[1][literal]
         met[pair[test_bits(rows, row[option[pair]], fact) == value]] = True
         option, clause = option[~met], clause[~met]
-        stage = self._stage[clause]
-        possible[option[stage < 0]] = False
-        found = {}
-        for later in np.flatnonzero(np.bincount(stage[stage >= 0])).tolist():
-            here = stage == later
-            first = np.searchsorted(option[here], np.arange(len(row) + 1))
-            found[later] = Waiting(first, clause[here])
-        return possible, found
+        possible[option[~self._names_step[clause]]] = False
+        here = self._names_step[clause]
+        first = np.searchsorted(option[here], np.arange(len(row) + 1))
+        return possible, Waiting(first, clause[here])
 
-    def unmet(self, waiting: Waiting, option: Ints, chosen: Sequence[Ints] | Ints) -> Bools:
-        """For each item whether a clause of its ``option`` is not met by the labels chosen.
+    def unmet(self, waiting: Waiting, option: Ints, labels: NDArray[np.int32]) -> Bools:
+        """For each item whether a clause of its ``option`` is not met by what all robots do.
 
-        ``chosen`` (robots, items); robots that have not chosen yet are not looked at.
+        ``labels`` (items, robots) are their labels.
         """
         counts = waiting.first[option + 1] - waiting.first[option]
         clause = waiting.clause[ranges(waiting.first[option], counts)]
@@ -167,11 +156,7 @@ class StepClauses:
         literal, pair = self._steps.of(clause)
         robot, label, value = (column[literal] for column in self._steps.columns)
         met = np.zeros(len(clause), np.bool_)
-        said = np.empty(len(pair), np.int64)
-        for number, own in enumerate(chosen):
-            there = np.flatnonzero(robot == number)
-            said[there] = own[item[pair[there]]]
-        met[pair[(said == label) == value]] = True
+        met[pair[(labels[item[pair], robot] == label) == value]] = True
         unmet = np.zeros(len(option), np.bool_)
         unmet[item[~met]] = True
         return unmet
