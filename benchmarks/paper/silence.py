@@ -18,8 +18,8 @@ from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Set
 from benchmarks.paper.suite import CORRIDOR, OTHERS, ROWS, World
 from coordlang.commands.building import Making, build_language, job_for_few_words
 from coordlang.language.candidates import Candidates
+from coordlang.language.provenance import percent
 from coordlang.language.sentences import sentence_counts
-from coordlang.language.tolerance import percent
 from coordlang.required.divergences import required_nodes
 from coordlang.required.miscoordination import Inseparable
 from coordlang.vocabulary.annealing import AnnealingSettings

@@ -25,7 +25,7 @@ from coordlang.execution.drawing import choices_dot, distinguishing
 from coordlang.execution.monitor import Answer, Monitor, MonitorError, NotAllowed
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import describe
-from coordlang.language.tolerance import percent
+from coordlang.language.provenance import percent
 from coordlang.required.failure import TooManyToCount, failure_of_sentence
 from coordlang.required.miscoordination import Miscoordination
 from planners.pddl.model_options import names_in

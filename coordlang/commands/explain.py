@@ -15,7 +15,6 @@ from coordlang.commands.records import ExplainOptions
 from coordlang.commands.terminal import covered_code, echo, line_width, warn_of_failures, working
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import SentenceDemands, sentence_demands
-from coordlang.explanation.lifted_words import LiftedWords, lifted_words
 from coordlang.explanation.text import (
     cover_data,
     demands_data,
@@ -26,15 +25,17 @@ from coordlang.explanation.text import (
 from coordlang.explanation.text import shown as formula_text
 from coordlang.explanation.words import (
     Cover,
+    LiftedWords,
     MappedStates,
     WordDescriptions,
     all_covers,
     describe_words,
+    lifted_words,
     mapped_states,
 )
 from coordlang.language.candidates import describe
+from coordlang.language.provenance import tolerance_data
 from coordlang.language.sentences import TaskSentence, task_sentences
-from coordlang.language.tolerance import tolerance_data
 from planners.search.plan_file import json_count
 from planners.search.plans import Plans
 from planners.system.errors import OutOfMemory

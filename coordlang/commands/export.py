@@ -20,7 +20,8 @@ from coordlang.execution.task_language import TaskLanguage
 from coordlang.exports.behaviour_tree import behaviour_trees
 from coordlang.exports.ltlf import SentenceFormula, export_ltlf
 from coordlang.exports.pddl import PddlExport, export_pddl, plan_names
-from coordlang.language.tolerance import tolerance_data
+from coordlang.language.provenance import tolerance_data
+from planners.joint.model import JointModel
 from planners.search.plan_file import json_count, only_one_plan
 from planners.system.errors import BadInput, Position, Refuted
 from planners.system.files import read_text

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from coordlang.execution.task_language import TaskLanguage
     from coordlang.language.candidates import Candidates
     from coordlang.language.listed import ListedTask
-    from coordlang.language.tolerance import Tolerance
+    from coordlang.language.provenance import Tolerance
     from coordlang.language.words import Language
     from coordlang.lifted.language import LiftedLanguage
 

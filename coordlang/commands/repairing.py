@@ -14,8 +14,7 @@ from coordlang.commands.layout import WIDTH, wrapped
 from coordlang.commands.options import MethodOptions
 from coordlang.commands.witness import witness_data, witness_text
 from coordlang.language.candidates import Candidates
-from coordlang.language.keys import keys_of, read_keys
-from coordlang.language.partition import Partition
+from coordlang.language.partition import Partition, keys_of, read_keys
 from coordlang.language.words import Language
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.vocabulary.job import Assignment

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from coordlang.commands.inputs import Arguments, language_for, public, read_coordinates_of
 from coordlang.commands.records import ReportOptions
-from coordlang.commands.terminal import warn_of_failures, write
+from coordlang.commands.terminal import echo, warn_of_failures
+from coordlang.language.provenance import Tolerance
 from coordlang.language.recorded import check_source
-from coordlang.language.tolerance import Tolerance
 from coordlang.report.page import Report, make_report
 from coordlang.report.planviz import planviz
 from coordlang.report.simulated import require_of

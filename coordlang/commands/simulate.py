@@ -18,7 +18,7 @@ from coordlang.commands.records import SimulateOptions
 from coordlang.commands.terminal import covered_code, echo, ended_early, working
 from coordlang.execution.best_sentence import best_sentence
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.language.tolerance import Tolerance
+from coordlang.language.provenance import Tolerance
 from coordlang.simulation.floor import floor_of
 from coordlang.simulation.record import (
     RunRecord,

@@ -25,7 +25,7 @@ from planners.system.messages import visible
 from planners.system.signals import Interrupted
 
 if TYPE_CHECKING:
-    from coordlang.language.tolerance import Tolerance
+    from coordlang.language.provenance import Tolerance
 
 # Exit codes that are of no error of the one error tree (docs/cli.md, exit codes).
 

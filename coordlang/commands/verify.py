@@ -12,8 +12,8 @@ from coordlang.commands.records import VerifyOptions
 from coordlang.commands.terminal import REFUTED, echo, say, show_answer, write
 from coordlang.commands.witness import witness_data, witness_text
 from coordlang.language.candidates import require_solvable
+from coordlang.language.provenance import Tolerance, tolerance_data
 from coordlang.language.recorded import check_source, recorded_candidates
-from coordlang.language.tolerance import Tolerance, tolerance_data
 from coordlang.required.failure import NONE, Failures, TooManyToCount, failures_under
 from coordlang.verification.by_definition import Verdict, verify_candidates
 from coordlang.verification.certificate_file import read_certificate

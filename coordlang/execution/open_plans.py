@@ -11,7 +11,7 @@ from typing import Any
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import words_passed
 from coordlang.language.candidates import describe
-from coordlang.language.tolerance import tolerance_data
+from coordlang.language.provenance import tolerance_data
 from planners.search.plan_file import json_count, to_json
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, counts

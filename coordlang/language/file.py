@@ -15,8 +15,7 @@ from msgspec import UNSET, Meta, UnsetType
 
 from coordlang.language.candidates import Kind
 from coordlang.language.listed import ListedTask
-from coordlang.language.provenance import Guarantee, Provenance
-from coordlang.language.tolerance import Tolerance
+from coordlang.language.provenance import Guarantee, Provenance, Tolerance
 from coordlang.language.words import Language
 from planners.pddl.model_options import MOST_SLACK, Cost, Unowned
 from planners.system.errors import BadInput, Position

@@ -12,10 +12,8 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from coordlang.language.keys import keys_of, read_keys
-from coordlang.language.partition import Partition
-from coordlang.language.provenance import Guarantee, Provenance
-from coordlang.language.tolerance import Tolerance
+from coordlang.language.partition import Partition, keys_of, read_keys
+from coordlang.language.provenance import Guarantee, Provenance, Tolerance
 from planners.joint.model import JointModel
 from planners.system.errors import BadInput
 from planners.system.messages import echoed

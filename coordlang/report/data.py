@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.explanation.lifted_words import LiftedWords
 from coordlang.explanation.text import term_text
 from coordlang.explanation.words import Cover, all_covers, describe_words, mapped_states
 from coordlang.language.words import Language

@@ -11,9 +11,8 @@ from importlib.resources import files
 from typing import Any
 
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.explanation.lifted_words import lifted_words
-from coordlang.language.provenance import domain_sha256
-from coordlang.language.tolerance import percent
+from coordlang.explanation.words import lifted_words
+from coordlang.language.provenance import domain_sha256, percent
 from coordlang.language.words import Language
 from coordlang.report.data import MOST_PLACES, page_data, word_rows
 from coordlang.report.shown import select_tasks

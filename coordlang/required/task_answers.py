@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from coordlang.language.tolerance import percent
+from coordlang.language.provenance import percent
 from coordlang.required.choices import Choices, LabelSets
 from coordlang.required.failure import NONE, Failures, failures
 from coordlang.required.miscoordination import Miscoordination, miscoordination

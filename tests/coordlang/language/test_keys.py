@@ -8,7 +8,7 @@ from random import Random
 
 import numpy as np
 
-from coordlang.language.keys import keys_of, read_keys
+from coordlang.language.partition import keys_of, read_keys
 from planners.joint.states import FactTable, StateCodec
 from planners.joint.tables import Rows
 from planners.pddl.lifted import Atom

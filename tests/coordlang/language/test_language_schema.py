@@ -23,7 +23,7 @@ from coordlang.language.file import (
     to_bytes,
     write_language,
 )
-from coordlang.language.tolerance import Tolerance
+from coordlang.language.provenance import Tolerance
 from planners.system.errors import BadInput, Position
 from tests.support.command import Command
 from tests.support.domains import DOMAINS, all_tasks

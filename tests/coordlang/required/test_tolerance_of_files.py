@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import coordlang as library
-from coordlang.language.tolerance import percent
+from coordlang.language.provenance import percent
 from coordlang.required.failure import failures_under
 from tests.support.command import Command
 from tests.support.domains import DOMAINS

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from coordlang.language.candidates import Candidates
-from coordlang.language.keys import keys_of
+from coordlang.language.partition import keys_of
 from coordlang.symmetry.group import symmetry_group
 from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
 from planners.joint.tables import Ints
