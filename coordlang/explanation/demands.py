@@ -78,17 +78,9 @@ def sentence_demands(
 ) -> SentenceDemands:
     """What a sentence demands of the robots.
 
-    Parameters
-    ----------
-    space
-        The plans with the sentence (one task, one sentence).
-    partition
-        The language as a partition of the states.
-    formulas
-        The words' formulas.  Where several groups of robots of one size decide a change of word,
-        robots that the formula of the next word names come first.
-    few
-        Up to so many subplans of a robot are listed.
+    ``space`` holds the plans with the sentence, of one task.  Where several groups of robots of
+    one size decide a change of word, robots that the formula of the next word names come first.
+    Up to ``few`` subplans of a robot are listed.
     """
     word = partition.word_of(space.rows)[space.state]
     passed = words_passed(space, word)

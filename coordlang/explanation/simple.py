@@ -40,24 +40,9 @@ def simple(job: Job, found: Outcome, conflicts: int = _CONFLICTS) -> Outcome:
     """A language with as many words as ``found`` has, with formulas that are as short or shorter.
 
     Anytime: out of time or memory, or interrupted, the best verified language so far is returned,
-    with the error in ``stopped``.
-
-    Parameters
-    ----------
-    job
-        What the language is for.
-    found
-        A language with the least number of words.
-    conflicts
-        Of the solver for one question; after so many the search gives up.
-
-    Returns
-    -------
-    Outcome
-        With the bound on the number of words that ``found`` has.  ``figures`` also hold ``terms``
-        and ``limits`` of the formulas, ``terms_before`` and ``limits_before`` of those of
-        ``found``, ``terms_lower_bound`` and ``limits_lower_bound``, the latter for languages with
-        so few terms.  Where bounds are met, no language with so many words has shorter formulas.
+    with the error in ``stopped``; after ``conflicts`` of the solver for one question, too.  Its
+    ``figures`` also hold ``terms`` and ``limits`` of the formulas, as ``.._before`` those of
+    ``found``, and ``.._lower_bound``, that of limits for languages with so few terms.
     """
     with closing(_Search(job, found, conflicts)) as search:
         stopped = run_until_stopped(search.run)

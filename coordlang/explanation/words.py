@@ -166,21 +166,8 @@ def word_formulas(
 
     In every mapped state exactly one of the formulas is true, that of its word.  States that the
     language does not map are on no optimal plan of a candidate task; there the formulas are
-    arbitrary, unless the states are given as ``also``, for tasks that are no candidates.
-
-    Parameters
-    ----------
-    language
-        The language.
-    model
-        The joint model that its states are of.
-    also
-        Further states, (states, blocks).
-
-    Raises
-    ------
-    BadInput
-        For a language of another model.
+    arbitrary, unless the states (states, blocks) are given as ``also``, for tasks that are no
+    candidates.  Raises `BadInput` for a language of another model.
     """
     return all_covers(mapped_states(language, model, also))
 

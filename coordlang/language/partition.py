@@ -17,14 +17,9 @@ _BLOCK = 50_000
 
 
 def read_keys(codec: StateCodec, keys: Collection[str]) -> tuple[Rows, Ints]:
-    """Read keys into rows.
+    """Read keys into rows (keys, blocks), and list the positions of what is no key of a state.
 
-    Returns
-    -------
-    rows : (keys, blocks)
-        The states; those of what is no key mean nothing.
-    wrong : (wrong keys)
-        The positions of what is no key of a state of the model.
+    The rows of these mean nothing.
     """
     atoms = {text[1:-1]: (n, *own) for n, (text, *own) in enumerate(sorted(_atoms(codec)))}
     facts: list[bytes] = []

@@ -273,15 +273,7 @@ class SentenceSets(SequenceSets):
 
 
 class SetWalk:
-    """The walk of one plan space under one assignment of words to its nodes.
-
-    Parameters
-    ----------
-    space
-        The plan space.
-    word
-        (nodes) the word of each node.
-    """
+    """The walk of one plan space under one assignment of words to its nodes (``word``, nodes)."""
 
     def __init__(self, space: PlanSpace, word: Ints) -> None:
         self._space, self._word = space, word.tolist()

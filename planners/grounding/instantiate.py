@@ -230,19 +230,9 @@ def ground_actions(
 ) -> tuple[GroundAction, ...]:
     """All ground actions that may ever be applied; those that are idling are left out.
 
-    Sorted by schema (in domain order) and arguments.
-
-    Parameters
-    ----------
-    also
-        Fluent atoms of further initial states (other problems, task files).
-    costs
-        Whether PDDL action costs are wanted; else every cost is 1.
-
-    Raises
-    ------
-    BadInput
-        An action that no robot owns (``--unowned error``), or a missing cost value.
+    Sorted by schema (in domain order) and arguments.  ``also`` are fluent atoms of further initial
+    states; without ``costs`` every cost is 1.  Raises `BadInput` for an action that no robot owns
+    (``--unowned error``), or a missing cost value.
     """
     idling = idling_schemas(domain)
     domain = replace(domain, schemas=tuple(s for s in domain.schemas if s.name not in idling))

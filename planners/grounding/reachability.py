@@ -44,28 +44,11 @@ def reachable_arguments(
 ) -> dict[str, list[Arguments]]:
     """Find the argument tuples of a superset of each schema's applicable instances, sorted.
 
-    Parameters
-    ----------
-    domain
-        The domain whose schemas are instantiated.
-    objects
-        Object -> its types.
-    init
-        All atoms (static and fluent) that hold in some initial state.
+    They come by the schema's name, in the natural order of the objects' names.  ``objects`` have
+    their types, ``init`` are all atoms that hold in some initial state.
 
-    Returns
-    -------
-    dict
-        Schema name -> argument tuples, in the natural order of the objects' names.
-
-    Raises
-    ------
-    OutOfMemory
-        If the instances of a schema without conditions alone would not fit.
-    MemoryError
-        If clingo meets the memory limit.
-    CoordlangError
-        If clingo does not ground the program.
+    Raises `OutOfMemory` if the instances of a schema without conditions alone would not fit,
+    `MemoryError` if clingo meets the memory limit, `CoordlangError` if it grounds nothing.
     """
     from tarski.reachability import create_reachability_lp
 

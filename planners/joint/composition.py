@@ -27,24 +27,11 @@ from planners.system.limits import memory_left, more_memory
 class ComposingStepper(Stepper):
     """The `Stepper` of PDDL with one action per robot: every robot picks one subaction or idles.
 
-    ``tables[i, j]`` (i < j) says which labels of two robots may share a step
-    (`planners.joint.interference`).
-
-    Parameters
-    ----------
-    subactions
-        For each robot its ground actions, shared ones in the lists of all their owners.
-    idling_costs
-        For each robot what idling adds to the second cost.
-
-    Attributes
-    ----------
-    labelled
-        For each robot its labels' ground actions, None first (idling).
-    piece
-        Joint steps composed at a time, before compatibility is looked up; it changes no result.
-    memory_left
-        Bytes that are left; combinations that need more are not made.
+    ``subactions`` are each robot's ground actions, shared ones in the lists of all their owners;
+    ``labelled`` the same with None first (idling).  ``tables[i, j]`` (i < j) says which labels of
+    two robots may share a step (`planners.joint.interference`).  ``piece`` joint steps are composed
+    at a time, before that is looked up; combinations that need more than ``memory_left`` bytes are
+    not made.
     """
 
     piece = 1_000_000

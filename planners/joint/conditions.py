@@ -93,12 +93,8 @@ def split_condition(
 class Matcher:
     """Finds operators by the rarest fact that they require, and tests the others one by one.
 
-    Parameters
-    ----------
-    required
-        For each operator the numbers of the facts that it requires to be true.
-    forbidden
-        For each operator the mask of facts that it requires to be false (operators x blocks).
+    For each operator ``required`` are the numbers of the facts that must be true, ``forbidden`` is
+    the mask of those that must be false (operators x blocks).
     """
 
     def __init__(self, required: Sequence[frozenset[int]], forbidden: Rows) -> None:

@@ -122,12 +122,8 @@ def _show(atoms: frozenset[Atom]) -> str:
 class Choices:
     """What one robot can choose, as the interference rule reads it: looked up once for all pairs.
 
-    Where no condition of an effect names another action, an action alone decides what can fire.
-
-    Parameters
-    ----------
-    actions
-        The ground action of each label; None is idling.
+    ``actions`` are the ground actions of its labels; None is idling.  Where no condition of an
+    effect names another action, an action alone decides what can fire.
     """
 
     def __init__(self, actions: Sequence[GroundAction | None]) -> None:

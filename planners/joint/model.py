@@ -47,18 +47,9 @@ Goal = Formula | FullState
 
 @dataclass(frozen=True, slots=True)
 class PlanningTask:
-    """A task ``(I, G)`` of a joint model.
+    """A task ``(I, G)`` of a joint model: a row (blocks), and what must hold at the end.
 
-    Attributes
-    ----------
-    name
-        What messages call it.
-    init
-        The initial state, a row (blocks).
-    goal
-        What must hold at the end.
-    position
-        The file that it is from.
+    ``name`` is what messages call it, ``position`` the file that it is from.
     """
 
     name: str

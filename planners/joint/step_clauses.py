@@ -109,15 +109,7 @@ class Waiting:
 
 
 class StepClauses:
-    """The clauses of one robot's labels, in tables.
-
-    Parameters
-    ----------
-    of_label
-        The clauses of each label that has some.
-    labels
-        How many labels this robot has.
-    """
+    """The clauses of one robot's ``labels``, in tables; ``of_label`` are those of each."""
 
     def __init__(self, of_label: Mapping[int, Sequence[Clause]], labels: int) -> None:
         numbered = [(label, clause) for label in sorted(of_label) for clause in of_label[label]]

@@ -36,17 +36,10 @@ T = TypeVar("T")
 def fold(
     formula: Formula, leaf: Callable[[Leaf], T], compound: Callable[[Compound, Iterator[T]], T]
 ) -> T:
-    """Compute a value of a formula from the values of its parts, leaves first.
+    """Compute a value of a formula, lifted or ground, from the values of its parts, leaves first.
 
-    Parameters
-    ----------
-    formula
-        Lifted or ground.
-    leaf
-        The value of a leaf.
-    compound
-        The value of a compound formula, given those of its parts from left to right (one for
-        ``not``, ``forall`` and ``exists``).  A part is looked at when its value is taken.
+    ``compound`` is given the values of the parts from left to right (one for ``not``, ``forall``
+    and ``exists``).  A part is looked at when its value is taken.
     """
     match formula:
         case Not(part) | Forall(_, part) | Exists(_, part):
