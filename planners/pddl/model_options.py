@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal, cast, get_args
+from typing import Literal, cast
 
 from planners.system.errors import UsageError
 from planners.system.messages import echoed
@@ -25,10 +25,8 @@ class ModelOptions:
     ``robots`` may be given as one text, ``"r1,r2"``; the record holds the names.  ``recorded``: a
     language file said who the robots are, not the user.
 
-    Raises
-    ------
-    UsageError
-        For a value that there is not, and for options that contradict each other.
+    Raises `UsageError` for options that contradict each other; what kind of a value each takes is
+    checked where it is given (`planners.system.options`).
     """
 
     robots: str | Sequence[str] = option((), "The robots, where the domain does not say.", "R1,R2")
@@ -57,8 +55,6 @@ class ModelOptions:
                 "--robots and --robot-type both say who the robots are: give one of them",
                 remedy="--robots names them one by one.",
             )
-        for name, values in (("cost", get_args(Cost)), ("unowned", get_args(Unowned))):
-            _require_one_of(name, getattr(self, name), values)
         self._check_slack()
 
     @property
@@ -84,11 +80,6 @@ class ModelOptions:
         )
 
     def _check_slack(self) -> None:
-        if isinstance(self.slack, bool) or not isinstance(self.slack, int) or self.slack < 0:
-            raise UsageError(
-                f"--slack {echoed(str(self.slack))}: expected a number of joint steps, 0 or more",
-                remedy="Say --slack 1.",
-            )
         if self.slack > MOST_SLACK:
             raise UsageError(
                 f"--slack {echoed(str(self.slack))}: more than {MOST_SLACK:,} joint steps",
@@ -119,11 +110,3 @@ def names_in(spelling: str, given: str | Sequence[str]) -> tuple[str, ...]:
     if not names and given != ():
         raise UsageError(f"{spelling}: expected names", remedy=f"As in {spelling} r1,r2.")
     return tuple(names)
-
-
-def _require_one_of(name: str, value: str, values: Sequence[str]) -> None:
-    if value not in values:
-        raise UsageError(
-            f"{echoed(value)} is no value of the option {name}",
-            remedy=f"It is {' or '.join(values)}.",
-        )
