@@ -16,10 +16,9 @@ from planners.grounding import (
     idling_costs,
     impossible_actions,
 )
-from planners.grounding.networks import apply_network
-from planners.joint.composition import ComposingStepper
+from planners.grounding.actions import apply_network
+from planners.joint.composition import ComposingStepper, JointActionStepper
 from planners.joint.conditions import Evaluator
-from planners.joint.joint_actions import JointActionStepper
 from planners.joint.model import IDLE, SLACK_LEFT, JointModel, PlanningTask, Stepper, show
 from planners.joint.states import FactTable, StateCodec
 from planners.pddl import read_domain, read_problem

@@ -15,8 +15,7 @@ from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.options import OutputFile
 from coordlang.commands.records import DomainsOptions, TasksOptions
 from coordlang.commands.terminal import echo, write
-from coordlang.language.listed import ListedTask, tasks_text
-from coordlang.language.patterns import varied_tasks
+from coordlang.language.listed import ListedTask, tasks_text, varied_tasks
 from coordlang.sites.movingai import planning_files
 from coordlang.sites.shipped import about, domain_names, shipped_domains
 from planners.system.errors import UsageError

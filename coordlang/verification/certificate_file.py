@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Certificate files: JSON in and out (docs/formats.md)."""
+"""Certificate files (docs/formats.md), and what they say as a plain CNF."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations, islice
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,8 +13,12 @@ import msgspec
 from msgspec import Meta
 
 from coordlang.language.file import refuse_duplicates
-from planners.system.errors import Position
+from coordlang.language.warping import Clause, Pair
+from coordlang.vocabulary.clauses import most_constrained_first
+from planners.search.sat import SolverName, sat_solver, solve_slice
+from planners.system.errors import OutOfMemory, Position
 from planners.system.files import FileFormat, read_bytes
+from planners.system.limits import memory_left, more_memory
 from planners.system.writing import write_compressed
 
 FORMAT = "coordlang/certificate"
@@ -94,3 +101,150 @@ def read_certificate(path: str | Path) -> Certificate:
     certificate = CERTIFICATE.decode(data, position)
     refuse_duplicates(data, position)
     return certificate
+
+
+#: Conflicts after which the checking solver comes back.
+_SLICE = 10_000
+#: Bytes that a clause and each of its literals take, here and in a solver.
+_CLAUSE, _LITERAL = 120, 48
+
+
+@dataclass(frozen=True, slots=True)
+class Cnf:
+    """A CNF: "the states can be given ``size`` words so that every clause holds".
+
+    The last of ``clauses`` are the necessary ones, in their order; those before say what words are.
+    ``word[state]`` are the variables "the state has word 0, 1, ..", ``separated[pair]`` "the two
+    have different words", and ``so_far[n]`` "one of the first n + 2 states has word 0, 1, ..".
+    ``kinds`` says of the clauses, in their order, what they say and how many do.
+    """
+
+    size: int
+    variables: int
+    clauses: tuple[tuple[int, ...], ...]
+    word: dict[int, tuple[int, ...]]
+    separated: dict[Pair, int]
+    so_far: tuple[tuple[int, ...], ...]
+    kinds: tuple[tuple[str, int], ...]
+
+    def dimacs(self, names: Mapping[int, str]) -> str:
+        """DIMACS text.  ``names`` are the states' keys, for the comments."""
+        return "\n".join(
+            [
+                f"c Unsatisfiable iff no {self.size} words satisfy the reasons of a coordlang "
+                "certificate.",
+                *self._variables_explained(names),
+                *self._clauses_explained(),
+                f"p cnf {self.variables} {len(self.clauses)}",
+                *(" ".join(map(str, (*clause, 0))) for clause in self.clauses),
+                "",
+            ]
+        )
+
+    def _variables_explained(self, names: Mapping[int, str]) -> Iterator[str]:
+        """A comment for each variable."""
+        for state, variables in self.word.items():
+            for n, v in enumerate(variables):
+                yield f"c {v}: word {n} holds {names[state]}"
+        for (a, b), v in self.separated.items():
+            yield f"c {v}: {names[a]} and {names[b]} have different words"
+        for states, variables in enumerate(self.so_far, 2):
+            for n, v in enumerate(variables):
+                yield f"c {v}: word {n} holds one of the first {states} states"
+
+    def _clauses_explained(self) -> Iterator[str]:
+        """A comment for each kind of clauses, and for each reason."""
+        first = 1
+        for kind, count in self.kinds:
+            if count:
+                yield f"c clauses {first} to {first + count - 1}: {kind}"
+            first += count
+        for reason, clause in enumerate(range(first, len(self.clauses) + 1), 1):
+            yield f"c clause {clause}: reason {reason}"
+
+    def refuted(self, solver: SolverName = "maplesat") -> bool:
+        """Whether the formula is unsatisfiable.
+
+        Decided by a solver and a loop that the builders do not use.
+        """
+        with sat_solver(solver, self.clauses) as sat:
+            answer = None
+            while answer is None:
+                answer = solve_slice(sat, _SLICE)
+            return answer is False
+
+
+def encode(clauses: Sequence[Clause], size: int) -> Cnf:
+    """The CNF of necessary clauses for ``size`` words.
+
+    Words are interchangeable: a state may have word w only if a state before it, in the order of
+    ``word``, has word w - 1. Any partition can be named like that, so the formula stays satisfiable
+    if it was.
+
+    Raises `OutOfMemory` for a formula that would not fit into what is left, before it is made.
+    """
+    states, pairs = states_of(clauses), sorted(set().union(*clauses))
+    _require_memory(len(states), len(pairs), clauses, size)
+    counter = iter(range(1, 2**62))
+    word = {state: tuple(islice(counter, size)) for state in states}
+    separated = dict(zip(pairs, counter, strict=False))
+    one_word = [clause for own in word.values() for clause in _exactly_one(own)]
+    apart = [
+        (-variable, -x, -y)
+        for (a, b), variable in separated.items()
+        for x, y in zip(word[a], word[b], strict=True)
+    ]
+    so_far, in_order = _words_in_order(list(word.values()), size, counter)
+    reasons = [tuple(separated[p] for p in sorted(clause)) for clause in clauses]
+    kinds = (
+        ("every state has exactly one word", len(one_word)),
+        ("states with different words share none", len(apart)),
+        ("words are named in the order of the states", len(in_order)),
+    )
+    cnf = (*one_word, *apart, *in_order, *reasons)
+    return Cnf(size, next(counter) - 1, cnf, word, separated, tuple(so_far), kinds)
+
+
+def _require_memory(states: int, pairs: int, clauses: Sequence[Clause], size: int) -> None:
+    """Raise `OutOfMemory` before a formula is made that would not fit."""
+    count = states * (size * (size - 1) // 2 + 4 * size) + pairs * size + len(clauses)
+    literals = states * (size * size + 9 * size) + 3 * pairs * size + sum(map(len, clauses))
+    needed = _CLAUSE * count + _LITERAL * literals
+    if needed > (left := memory_left()):
+        raise OutOfMemory(
+            f"the formula about {size:,} words for {states:,} states has {count:,} clauses: they "
+            f"take {needed / 2**20:,.0f} MiB, {left / 2**20:,.0f} MiB are left",
+            remedy=f"Use {more_memory()}, or a certificate about fewer words.",
+        )
+
+
+def states_of(clauses: Sequence[Clause]) -> list[int]:
+    """The states that clauses speak of, the most constrained first."""
+    states = {state for clause in clauses for two in clause for state in two}
+    return list(most_constrained_first(sorted(states), clauses))
+
+
+def _exactly_one(variables: Sequence[int]) -> list[tuple[int, ...]]:
+    return [tuple(variables), *((-a, -b) for a, b in combinations(variables, 2))]
+
+
+def _words_in_order(
+    words: Sequence[tuple[int, ...]], size: int, counter: Iterable[int]
+) -> tuple[list[tuple[int, ...]], list[tuple[int, ...]]]:
+    """For each state but the first the variables "some state so far has word w"; their clauses."""
+    fresh = iter(counter)
+    so_far: list[tuple[int, ...]] = []
+    cnf: list[tuple[int, ...]] = []
+    used: tuple[int, ...] | None = None
+    for own in words:
+        if used is None:
+            cnf += [(-v,) for v in own[1:]]
+            used = own
+            continue
+        cnf += [(-own[w], used[w - 1]) for w in range(1, size)]
+        after = tuple(islice(fresh, size))
+        for w in range(size):
+            cnf += [(-after[w], used[w], own[w]), (after[w], -used[w]), (after[w], -own[w])]
+        so_far.append(after)
+        used = after
+    return so_far, cnf

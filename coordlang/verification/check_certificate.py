@@ -16,8 +16,15 @@ from itertools import pairwise
 from coordlang.language.candidates import Candidates
 from coordlang.language.listed import goal_text
 from coordlang.language.warping import Clause, Pair, pair
-from coordlang.verification.certificate_clauses import Cnf, encode, states_of
-from coordlang.verification.certificate_file import Certificate, PlanTexts, Reason, WarpingPath
+from coordlang.verification.certificate_file import (
+    Certificate,
+    Cnf,
+    PlanTexts,
+    Reason,
+    WarpingPath,
+    encode,
+    states_of,
+)
 from planners.joint.model import JointModel
 from planners.joint.states import split_atoms
 from planners.joint.tables import find_rows

@@ -11,8 +11,13 @@ import numpy as np
 from coordlang.language.candidates import Candidates
 from coordlang.language.listed import goal_text
 from coordlang.language.warping import Clause, pair, warping_path
-from coordlang.verification.certificate_clauses import encode, states_of
-from coordlang.verification.certificate_file import Certificate, Reason, WarpingPath
+from coordlang.verification.certificate_file import (
+    Certificate,
+    Reason,
+    WarpingPath,
+    encode,
+    states_of,
+)
 from coordlang.vocabulary.clauses import without_implied
 from coordlang.vocabulary.job import Evidence
 from coordlang.vocabulary.sat import PartitionProblem, Undecided, satisfiable

@@ -12,7 +12,7 @@ robots' labels): cases and formulas are decided in one order, so that nothing ca
 ways.
 
 This is the cross-check of `planners.joint.composition`, `planners.joint.interference` and
-`planners.joint.joint_actions`, so it shares their input and nothing else: interference, formulas
+`planners.joint.composition`, so it shares their input and nothing else: interference, formulas
 about the joint step and conditional effects are worked out anew here.
 """
 

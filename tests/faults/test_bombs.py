@@ -14,8 +14,7 @@ import msgspec
 import pytest
 
 from coordlang.commands.building import build_language
-from coordlang.verification.certificate_clauses import encode
-from coordlang.verification.certificate_file import read_certificate
+from coordlang.verification.certificate_file import encode, read_certificate
 from coordlang.verification.check_certificate import check
 from planners.pddl import parse_domain
 from planners.pddl.sexpr import Source
@@ -133,7 +132,7 @@ def test_a_false_claim_is_refuted_before_it_takes_memory() -> None:
 def test_a_formula_that_would_not_fit_is_not_made(monkeypatch: pytest.MonkeyPatch) -> None:
     """The estimate has room for the solver, and is of the right size."""
     left = 60 * MIB
-    monkeypatch.setattr("coordlang.verification.certificate_clauses.memory_left", lambda: left)
+    monkeypatch.setattr("coordlang.verification.certificate_file.memory_left", lambda: left)
     clauses = [frozenset({two}) for two in combinations(range(80), 2)]
     with at_most(32):
         with pytest.raises(OutOfMemory, match=r"79 words for 80 states has [\d,]+ clauses"):

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from coordlang.language.candidates import from_listed
-from coordlang.language.listed import ListedTask, read_task_file
-from coordlang.language.patterns import varied_tasks
+from coordlang.language.listed import ListedTask, read_task_file, varied_tasks
 from planners.loading import PlanningInstance, load
 from planners.system.errors import UsageError
 from tests.support.command import Command

@@ -17,11 +17,11 @@ import pytest
 
 from coordlang.commands.building import Built, build_language
 from coordlang.language.file import read_language
-from coordlang.verification.certificate_clauses import encode
 from coordlang.verification.certificate_file import (
     Certificate,
     Reason,
     WarpingPath,
+    encode,
     read_certificate,
     write_certificate,
 )
