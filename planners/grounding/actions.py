@@ -2,8 +2,8 @@
 """The nouns of grounding: ground actions, and actions that a robot can never do; networks.
 
 A concurrency network becomes formulas about the joint step, in the preconditions of the ground
-actions that it binds.  Actions that are never possible are told from what is reachable when deletes and all but the required atoms are left out;
-so what is said of them is true of every reachable state.
+actions that it binds.  Actions that are never possible are told from what is reachable when deletes
+and all but the required atoms are left out; so what is said of them is true of every state.
 """
 
 from __future__ import annotations
