@@ -17,7 +17,7 @@ from coordlang.language.candidates import Kind
 from coordlang.language.listed import ListedTask
 from coordlang.language.provenance import Guarantee, Provenance, Tolerance
 from coordlang.language.words import Language
-from planners.pddl.model_options import MOST_SLACK, Cost, Unowned
+from planners.pddl.model_options import Cost, Unowned
 from planners.system.errors import BadInput, Position
 from planners.system.files import FileFormat, read_bytes, require_seen
 from planners.system.messages import echoed
@@ -26,7 +26,6 @@ from planners.system.writing import write_compressed
 # What JSON Schema can say and the reader checks with messages of its own.
 _SOME = {"minItems": 1, "uniqueItems": True}
 _WORD = {"pattern": r"^\S+$"}
-_SIZE = {"minimum": 1}
 
 
 class DomainRecord(msgspec.Struct):
@@ -101,49 +100,6 @@ class TasksRecord(msgspec.Struct):
     tasks: Annotated[list[ListedTask] | None, Meta(description="The tasks; not for 'all'.")] = None
 
 
-class GuaranteeRecord(msgspec.Struct):
-    """What is known of the language's size."""
-
-    method: Annotated[str, Meta(description="How it was made.")]
-    size: Annotated[int, Meta(description="The number of words.", extra_json_schema=_SIZE)]
-    lower_bound: Annotated[
-        int,
-        Meta(
-            description="A proved lower bound on the words of any language for these tasks that "
-            "gives each state one word.",
-            extra_json_schema=_SIZE,
-        ),
-    ]
-    proved_minimal: Annotated[bool, Meta(description="Whether the size equals that bound.")]
-    coordination_language: Annotated[
-        bool,
-        Meta(
-            description="Whether all plans of a task with one sentence mix freely; false where "
-            "'tolerance' says how often they do not."
-        ),
-    ] = True
-
-
-class ToleranceRecord(msgspec.Struct):
-    """What is claimed in place of a coordination language for optimal plans."""
-
-    failure_mean: Annotated[
-        Annotated[float, Meta(ge=0, le=1)] | None,
-        Meta(
-            description="How often robots that choose by themselves under a sentence "
-            "miscoordinate: the probability for a task drawn uniformly."
-        ),
-    ] = None
-    failure_worst: Annotated[
-        Annotated[float, Meta(ge=0, le=1)] | None,
-        Meta(description="The same for the task in which it is highest."),
-    ] = None
-    slack: Annotated[
-        Annotated[int, Meta(ge=0, le=MOST_SLACK)] | None,
-        Meta(description="The joint steps by which plans may be longer than the least makespan."),
-    ] = None
-
-
 class LiftedFromRecord(msgspec.Struct):
     """The lifted language whose words these are, in one problem."""
 
@@ -188,7 +144,7 @@ class LanguageRecord(msgspec.Struct):
     domain: DomainRecord | UnsetType = UNSET
     model: ModelRecord = msgspec.field(default_factory=ModelRecord)
     tasks: TasksRecord | UnsetType = UNSET
-    guarantee: GuaranteeRecord | UnsetType = UNSET
+    guarantee: Guarantee | UnsetType = UNSET
     producer: Annotated[
         dict[str, Any],
         Meta(
@@ -197,7 +153,7 @@ class LanguageRecord(msgspec.Struct):
         ),
     ] = {}
     tolerance: Annotated[
-        ToleranceRecord | UnsetType,
+        Tolerance | UnsetType,
         Meta(
             description="What may go wrong, or be longer, under these words; without it they are a "
             "coordination language for optimal plans."
@@ -313,10 +269,10 @@ def language_from_bytes(data: bytes, position: Position) -> Language:
         model=present(record.model),
         tasks=present(TasksRecord("problems", 0) if record.tasks is UNSET else record.tasks),
         producer=record.producer,
-        guarantee=None if record.guarantee is UNSET else Guarantee(**_plain(record.guarantee)),
+        guarantee=None if record.guarantee is UNSET else record.guarantee,
         domain={} if record.domain is UNSET else present(record.domain),
         lifted={} if record.lifted is UNSET else _plain(record.lifted),
-        tolerance=None if record.tolerance is UNSET else Tolerance(**_plain(record.tolerance)),
+        tolerance=None if record.tolerance is UNSET else record.tolerance,
     )
     return Language(tuple(record.words), record.states, record.default, provenance)
 
@@ -357,7 +313,7 @@ def _faults(record: LanguageRecord) -> Iterator[Fault]:
     yield from faults_of_robots(record.model, record.robots, _BUILD_AGAIN)
     if record.guarantee is not UNSET:
         yield from _faults_of_guarantee(record.guarantee, len(record.words))
-    claimed = ToleranceRecord() if record.tolerance is UNSET else record.tolerance
+    claimed = Tolerance() if record.tolerance is UNSET else record.tolerance
     for what in _faults_of_tolerance(record, claimed):
         remedy = "Correct 'tolerance' and 'guarantee', or build the language again."
         yield f"{what} ('tolerance')", remedy
@@ -379,7 +335,7 @@ def _faults_of_words(record: LanguageRecord) -> Iterator[Fault]:
         )
 
 
-def _faults_of_guarantee(g: GuaranteeRecord, size: int) -> Iterator[Fault]:
+def _faults_of_guarantee(g: Guarantee, size: int) -> Iterator[Fault]:
     most = g.size if g.coordination_language else max(g.size, g.lower_bound)
     if g.size != size or not 1 <= g.lower_bound <= most:
         yield (
@@ -395,7 +351,7 @@ def _faults_of_guarantee(g: GuaranteeRecord, size: int) -> Iterator[Fault]:
         )
 
 
-def _faults_of_tolerance(record: LanguageRecord, claimed: ToleranceRecord) -> Iterator[str]:
+def _faults_of_tolerance(record: LanguageRecord, claimed: Tolerance) -> Iterator[str]:
     mean, worst = claimed.failure_mean, claimed.failure_worst
     if (mean is None) != (worst is None):
         yield "'failure_mean' and 'failure_worst' belong together"

@@ -6,18 +6,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from hashlib import sha256
-from typing import Any
+from typing import Annotated, Any
+
+from msgspec import Meta
 
 from coordlang.language.candidates import Candidates
 from coordlang.language.listed import task_data
 from coordlang.language.partition import keys_of
 from planners.joint.model import SLACK_LEFT, show
 from planners.pddl.lifted import Domain, Problem
+from planners.pddl.model_options import MOST_SLACK
 from planners.pddl.pddl_text import domain_text
 from planners.pddl.robots import fluent_predicates, static_atoms
 from planners.pddl.sexpr import JoinedSource, Source
 from planners.system.notebook import counted
 
+_SIZE = {"minimum": 1}
 _UNKNOWN = (
     "this is no coordination language: robots that choose by themselves under its sentences may "
     "fail, and its file does not say how often"
@@ -26,19 +30,23 @@ _UNKNOWN = (
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """What a language file claims in place of a coordination language for optimal plans.
+    """What is claimed in place of a coordination language for optimal plans."""
 
-    ``failure_mean`` and ``failure_worst`` are how often robots miscoordinate that are told a
-    sentence and then choose by themselves (`coordlang.required.failure`): over the tasks, and in
-    the worst of them; None: nothing is claimed, because it is a coordination language.  ``slack``
-    are the joint steps by which plans may be longer than the least makespan; None: by none.
-    ``fails_unknown``: it is no coordination language, and nothing says how often robots fail.
-    """
-
-    failure_mean: float | None = None
-    failure_worst: float | None = None
-    slack: int | None = None
-    fails_unknown: bool = False
+    failure_mean: Annotated[
+        Annotated[float, Meta(ge=0, le=1)] | None,
+        Meta(
+            description="How often robots that choose by themselves under a sentence "
+            "miscoordinate: the probability for a task drawn uniformly."
+        ),
+    ] = None
+    failure_worst: Annotated[
+        Annotated[float, Meta(ge=0, le=1)] | None,
+        Meta(description="The same for the task in which it is highest."),
+    ] = None
+    slack: Annotated[
+        Annotated[int, Meta(ge=0, le=MOST_SLACK)] | None,
+        Meta(description="The joint steps by which plans may be longer than the least makespan."),
+    ] = None
 
     @property
     def may_fail(self) -> bool:
@@ -49,7 +57,7 @@ class Tolerance:
     def warning(self) -> str | None:
         """What a user has to know before relying on the words, None if there is nothing."""
         if self.failure_mean is None or self.failure_worst is None:
-            return _UNKNOWN if self.fails_unknown else None
+            return None
         return (
             "this is no coordination language: its file says that robots that choose by themselves "
             f"under its sentences fail in {percent(self.failure_mean)} of all runs, and in "
@@ -58,9 +66,16 @@ class Tolerance:
 
     def data(self) -> dict[str, Any]:
         """Return what is claimed, as a language file holds it."""
-        claims = asdict(self)
-        del claims["fails_unknown"]
-        return {key: value for key, value in claims.items() if value is not None}
+        return {key: value for key, value in asdict(self).items() if value is not None}
+
+
+class UnknownFailures(Tolerance):
+    """What is known of words that are no coordination language: only that robots may fail."""
+
+    @property
+    def warning(self) -> str:
+        """See `Tolerance`."""
+        return _UNKNOWN
 
 
 def tolerance_data(tolerance: Tolerance | None) -> dict[str, Any]:
@@ -80,19 +95,26 @@ def percent(share: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Guarantee:
-    """What is known of a language's number of words; of one that was read, what its file claims.
+    """What is known of the language's size; of one that was read, what its file claims."""
 
-    ``method`` is how the language was made, ``size`` its number of words, ``lower_bound`` a proved
-    bound on the number of words of any partition that is a language for its tasks;
-    ``proved_minimal``: the two are equal; ``coordination_language``: all plans of a task with one
-    sentence mix freely.
-    """
-
-    method: str
-    size: int
-    lower_bound: int
-    proved_minimal: bool
-    coordination_language: bool = True
+    method: Annotated[str, Meta(description="How it was made.")]
+    size: Annotated[int, Meta(description="The number of words.", extra_json_schema=_SIZE)]
+    lower_bound: Annotated[
+        int,
+        Meta(
+            description="A proved lower bound on the words of any language for these tasks that "
+            "gives each state one word.",
+            extra_json_schema=_SIZE,
+        ),
+    ]
+    proved_minimal: Annotated[bool, Meta(description="Whether the size equals that bound.")]
+    coordination_language: Annotated[
+        bool,
+        Meta(
+            description="Whether all plans of a task with one sentence mix freely; false where "
+            "'tolerance' says how often they do not."
+        ),
+    ] = True
 
     @classmethod
     def of(cls, method: str, size: int, lower_bound: int, holds: bool = True) -> Guarantee:

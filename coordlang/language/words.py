@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import islice
 from os import PathLike, fspath
 from typing import Any, NoReturn
@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from coordlang.language.partition import Partition, keys_of, read_keys
-from coordlang.language.provenance import Guarantee, Provenance, Tolerance
+from coordlang.language.provenance import Guarantee, Provenance, Tolerance, UnknownFailures
 from planners.joint.model import JointModel
 from planners.system.errors import BadInput
 from planners.system.messages import echoed
@@ -60,7 +60,7 @@ class Language:
         known = self.provenance.tolerance
         if self.guarantee.coordination_language or (known is not None and known.may_fail):
             return known
-        return replace(known or Tolerance(), fails_unknown=True)
+        return UnknownFailures(slack=known.slack if known else None)
 
     @property
     def may_fail(self) -> bool:

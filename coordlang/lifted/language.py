@@ -59,19 +59,16 @@ def vectors(features: Sequence[Feature], states: States) -> Ints:
 
 @dataclass(frozen=True, slots=True)
 class Verified:
-    """A problem on which a lifted language was verified by definition.
+    """A problem on which the language was verified by definition."""
 
-    ``kind`` says which candidate tasks these were (`coordlang.language.candidates.Candidates`),
-    ``states`` and ``tasks`` count them and the states on their plans, ``words`` the words that
-    these states have.
-    """
-
-    problem: str
-    sha256: str
-    kind: Kind
-    states: int
-    tasks: int
-    words: int
+    problem: Annotated[str, Meta(description="The problem's name.")]
+    sha256: Annotated[str, Meta(description="The SHA-256 of its objects and static facts.")]
+    kind: Annotated[
+        Kind, Meta(description="All pairs of states, those of problems, or those of a task file.")
+    ]
+    states: Annotated[int, Meta(description="How many states there are on its plans.", ge=0)]
+    tasks: Annotated[int, Meta(description="How many candidate tasks it has.", ge=0)]
+    words: Annotated[int, Meta(description="How many words its states have.", ge=0)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,19 +209,6 @@ class FeatureRecord(msgspec.Struct):
     complexity: Annotated[int, Meta(description="How much there is to say.")]
 
 
-class VerifiedRecord(msgspec.Struct):
-    """A problem on which the language was verified by definition."""
-
-    problem: Annotated[str, Meta(description="The problem's name.")]
-    sha256: Annotated[str, Meta(description="The SHA-256 of its objects and static facts.")]
-    kind: Annotated[
-        Kind, Meta(description="All pairs of states, those of problems, or those of a task file.")
-    ]
-    states: Annotated[int, Meta(description="How many states there are on its plans.", ge=0)]
-    tasks: Annotated[int, Meta(description="How many candidate tasks it has.", ge=0)]
-    words: Annotated[int, Meta(description="How many words its states have.", ge=0)]
-
-
 class LiftedRecord(msgspec.Struct):
     """A lifted file, version 1.  Keys that are not listed here are ignored by readers."""
 
@@ -242,7 +226,7 @@ class LiftedRecord(msgspec.Struct):
         ),
     ]
     verified: Annotated[
-        list[VerifiedRecord],
+        list[Verified],
         Meta(description="The problems on which this was verified; of others nothing is claimed."),
     ]
     model: ModelRecord = msgspec.field(default_factory=ModelRecord)
@@ -316,7 +300,7 @@ def lifted_from_bytes(data: bytes, position: Position) -> LiftedLanguage:
         present(record.domain),
         present(record.model),
         record.names_robots,
-        tuple(Verified(**msgspec.to_builtins(known)) for known in record.verified),
+        tuple(record.verified),
         record.producer,
     )
 
