@@ -115,51 +115,26 @@ class ComposingStepper(Stepper):
 
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
         """The first rule that these labels break in a state."""
-        chosen = [self.labelled[i][label] for i, label in enumerate(labels)]
-        return (
-            self._unmet_in_state(row, chosen)
-            or self._unshared(chosen)
-            or self._interfering(labels, chosen)
-            or self._unmet_in_step(row, labels, chosen)
-            or "this is a joint step"
-        )
+        return next(self._broken_rules(row, labels), "this is a joint step")
 
-    def _unmet_in_state(self, row: Rows, chosen: Sequence[GroundAction | None]) -> str | None:
-        rows, here = row[None, :], np.zeros(1, np.int64)
-        for robot, action in zip(self._robots, chosen, strict=True):
-            for part in conjuncts(action.precondition) if action else ():
-                if not speaks_of_step(part) and not self._evaluator.holds(part, rows, here)[0]:
-                    assert action is not None
-                    return f"{robot} cannot {action.label} here: it needs {_text(part)}"
-        return None
-
-    def _unshared(self, chosen: Sequence[GroundAction | None]) -> str | None:
-        for action in filter(None, chosen):
-            for owner in action.owners:
-                if chosen[owner] != action:
-                    return f"{action.label} needs {self._robots[owner]} to choose it too"
-        return None
-
-    def _interfering(
-        self, labels: Sequence[int], chosen: Sequence[GroundAction | None]
-    ) -> str | None:
-        pairs = sorted(combinations(range(len(chosen)), 2), key=lambda pair: pair[::-1])
-        for i, j in pairs:
-            first, second = chosen[i], chosen[j]
-            if first and second and not self.tables[i, j][labels[i], labels[j]]:
-                return conflict(first, second) or f"{first.label} and {second.label} interfere"
-        return None
-
-    def _unmet_in_step(
-        self, row: Rows, labels: Sequence[int], chosen: Sequence[GroundAction | None]
-    ) -> str | None:
+    def _broken_rules(self, row: Rows, labels: Sequence[int]) -> Iterator[str]:
         rows, here, together = row[None, :], np.zeros(1, np.int64), np.array([labels], np.int32)
-        for action in chosen:
-            if action and not self._evaluator.holds(action.precondition, rows, here, together)[0]:
-                return (
-                    f"{action.label} needs another subaction in the same step, which is not chosen"
-                )
-        return None
+        chosen = [self.labelled[i][label] for i, label in enumerate(labels)]
+        acting = [(i, action) for i, action in enumerate(chosen) if action]
+        for i, action in acting:
+            for part in conjuncts(action.precondition):
+                if not speaks_of_step(part) and not self._evaluator.holds(part, rows, here)[0]:
+                    yield f"{self._robots[i]} cannot {action.label} here: it needs {_text(part)}"
+        for _, action in acting:
+            for owner in (own for own in action.owners if chosen[own] != action):
+                yield f"{action.label} needs {self._robots[owner]} to choose it too"
+        for (j, second), (i, first) in product(acting, repeat=2):
+            if i < j and not self.tables[i, j][labels[i], labels[j]]:
+                yield conflict(first, second) or f"{first.label} and {second.label} interfere"
+        for _, action in acting:
+            if not self._evaluator.holds(action.precondition, rows, here, together)[0]:
+                what = "needs another subaction in the same step, which is not chosen"
+                yield f"{action.label} {what}"
 
     def interfering_pairs(self) -> int:
         """See `Stepper`."""

@@ -253,9 +253,7 @@ class JointModel:
 
     def texts(self, labels: Sequence[int]) -> tuple[str | None, ...]:
         """Label numbers as text; None is idling."""
-        return tuple(
-            own[number] if number else None for own, number in zip(self.labels, labels, strict=True)
-        )
+        return tuple(self.label_text(robot, label) for robot, label in enumerate(labels))
 
     def numbers(self, texts: Sequence[str | None]) -> tuple[int, ...] | None:
         """Text as label numbers, or None if some robot has no such subaction."""
