@@ -95,7 +95,7 @@ def percent(share: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Guarantee:
-    """What is known of the language's size; of one that was read, what its file claims."""
+    """What is known of the language's size."""
 
     method: Annotated[str, Meta(description="How it was made.")]
     size: Annotated[int, Meta(description="The number of words.", extra_json_schema=_SIZE)]
