@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 from importlib import import_module
-from typing import Annotated, Any
+from typing import Annotated
 
 import click
 import msgspec
@@ -16,7 +16,7 @@ from planners.system.errors import CoordlangError
 from planners.system.files import FileFormat
 from planners.system.messages import sentence
 
-#: The modules whose ``json_schema`` describes a file format.
+#: The modules that have a file format, under its name in capitals.
 SCHEMAS = {
     "language": "coordlang.language.file",
     "tasks": "coordlang.language.listed",
@@ -68,13 +68,11 @@ def error_json(error: CoordlangError) -> str:
     return msgspec.json.format(msgspec.json.encode(ErrorObject(entry)), indent=0).decode()
 
 
-def json_schema() -> dict[str, Any]:
-    """The JSON Schema of error objects."""
-    return FileFormat("error", "JSON error object", ErrorObject).json_schema()
+ERROR = FileFormat("error", "JSON error object", ErrorObject)
 
 
 @click.command(name="schema")
 @click.argument("name", type=click.Choice(list(SCHEMAS)), default="language")
 def command(name: str) -> None:
     """Print the JSON Schema of a file format: language files unless NAME is another one."""
-    echo(json.dumps(import_module(SCHEMAS[name]).json_schema(), indent=2))
+    echo(json.dumps(getattr(import_module(SCHEMAS[name]), name.upper()).json_schema(), indent=2))

@@ -165,16 +165,8 @@ class LanguageRecord(msgspec.Struct):
     ] = UNSET
 
 
+#: What a schema cannot say, readers check besides: `_faults`, and that no key occurs twice.
 LANGUAGE = FileFormat("language", "language file", LanguageRecord, "coordlang/language")
-
-
-def json_schema() -> dict[str, Any]:
-    """The JSON Schema of language files.
-
-    What it cannot say, readers check besides: words of ``states`` and ``default`` are among
-    ``words``, the guarantee fits their number, and no key occurs twice.
-    """
-    return LANGUAGE.json_schema()
 
 
 def refuse_duplicates(data: bytes, position: Position) -> None:

@@ -160,11 +160,6 @@ class TaskFile(msgspec.Struct, frozen=True):
 TASKS = FileFormat("tasks", "task file", TaskFile, "coordlang/tasks")
 
 
-def json_schema() -> dict[str, Any]:
-    """The JSON Schema of task files."""
-    return TASKS.json_schema()
-
-
 def read_task_file(path: str | Path) -> tuple[ListedTask, ...]:
     """Read a task file (docs/formats.md).  Raises `BadInput` for anything else."""
     position = Position(str(path))

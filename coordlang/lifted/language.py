@@ -241,11 +241,6 @@ class LiftedRecord(msgspec.Struct):
 LIFTED = FileFormat("lifted", "lifted file", LiftedRecord, "coordlang/lifted")
 
 
-def json_schema() -> dict[str, Any]:
-    """The JSON Schema of lifted files."""
-    return LIFTED.json_schema()
-
-
 def to_bytes(lifted: LiftedLanguage) -> bytes:
     """The text of a lifted file: the same language gives the same bytes."""
     data = {

@@ -81,11 +81,6 @@ class Certificate(msgspec.Struct, frozen=True):
 CERTIFICATE = FileFormat("certificate", "certificate", Certificate, FORMAT, VERSION)
 
 
-def json_schema() -> dict[str, Any]:
-    """The JSON Schema of certificate files."""
-    return CERTIFICATE.json_schema()
-
-
 def write_certificate(certificate: Certificate, path: str | Path) -> None:
     """Write a certificate file (gzip for ``.gz``), completely or not at all."""
     write_compressed(path, msgspec.json.encode(certificate) + b"\n")

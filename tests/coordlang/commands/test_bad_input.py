@@ -15,7 +15,7 @@ import jsonschema
 import pytest
 
 from coordlang.commands.main import wants_json
-from coordlang.commands.schema import json_schema
+from coordlang.commands.schema import ERROR
 from planners.system.errors import OutOfTime
 from tests.coordlang.commands.conftest import FILES, Shell
 from tests.support.command import Outcome
@@ -304,7 +304,7 @@ def error(outcome: Outcome) -> dict[str, Any]:
     """What stands on stdout in place of an answer."""
     assert outcome.out.count("\n") == 1
     data = json.loads(outcome.out)
-    jsonschema.validate(data, json_schema())
+    jsonschema.validate(data, ERROR.json_schema())
     found: dict[str, Any] = data["error"]
     assert found["exit_code"] == outcome.code
     return found

@@ -17,7 +17,7 @@ import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.language.file import (
-    json_schema,
+    LANGUAGE,
     language_from_bytes,
     read_language,
     to_bytes,
@@ -41,7 +41,7 @@ def written() -> dict[str, Any]:
 
 
 def valid(data: object) -> bool:
-    return bool(jsonschema.Draft202012Validator(json_schema()).is_valid(data))
+    return bool(jsonschema.Draft202012Validator(LANGUAGE.json_schema()).is_valid(data))
 
 
 def readable(data: object) -> bool:
