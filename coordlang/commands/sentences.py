@@ -21,7 +21,7 @@ from coordlang.execution.open_plans import PlanDag, open_plans_data, plan_dag
 from coordlang.execution.plan_sentence import read_plan_file, sentence_of_plan
 from coordlang.execution.preferences import Preference, read_preference
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.language.tolerance import tolerance_data
+from coordlang.language.provenance import tolerance_data
 from planners.search import HeuristicName
 from planners.search.plan_file import Texts, json_count
 from planners.search.plans import Plans

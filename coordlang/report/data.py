@@ -16,7 +16,13 @@ import numpy as np
 
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.text import term_text
-from coordlang.explanation.words import Cover, all_covers, describe_words, mapped_states
+from coordlang.explanation.words import (
+    Cover,
+    LiftedWords,
+    all_covers,
+    describe_words,
+    mapped_states,
+)
 from coordlang.language.words import Language
 from coordlang.report.layout import graph_layout, place_layout, spread
 from coordlang.report.shown import Selection
