@@ -14,7 +14,7 @@ import pytest
 from coordlang.commands.building import build_language
 from coordlang.commands.main import run
 from coordlang.language.candidates import Candidates, from_listed
-from coordlang.language.patterns import varied_tasks
+from coordlang.language.listed import varied_tasks
 from coordlang.required.miscoordination import Inseparable
 from planners.classical.fast_downward import optimal_cost
 from planners.loading import PlanningInstance
