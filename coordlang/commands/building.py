@@ -16,6 +16,7 @@ from coordlang.explanation.simple import simple
 from coordlang.language.candidates import Candidates, require_solvable
 from coordlang.language.partition import Partition
 from coordlang.language.provenance import Guarantee, Tolerance, provenance_of
+from coordlang.language.warping import Clause
 from coordlang.language.words import Language
 from coordlang.required.divergences import (
     FirstDifferences,

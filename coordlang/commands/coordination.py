@@ -14,7 +14,7 @@ from coordlang.commands.records import CoordinationOptions
 from coordlang.commands.terminal import note_single_robot, show_answer
 from coordlang.commands.witness import witness_data, witness_text
 from coordlang.language.provenance import percent
-from coordlang.required.failure import FailureEstimate, Failures, mean
+from coordlang.required.failure import Failures, mean
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.required.task_answers import TaskAnswer, answers
 from planners.search.plan_file import json_count

@@ -21,7 +21,6 @@ from coordlang.exports.behaviour_tree import behaviour_trees
 from coordlang.exports.ltlf import SentenceFormula, export_ltlf
 from coordlang.exports.pddl import PddlExport, export_pddl, plan_names
 from coordlang.language.provenance import tolerance_data
-from planners.joint.model import JointModel
 from planners.search.plan_file import json_count, only_one_plan
 from planners.system.errors import BadInput, Position, Refuted
 from planners.system.files import read_text

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from coordlang.commands.inputs import Arguments, language_for, public, read_coordinates_of
 from coordlang.commands.records import ReportOptions
-from coordlang.commands.terminal import echo, warn_of_failures
+from coordlang.commands.terminal import warn_of_failures, write
 from coordlang.language.provenance import Tolerance
 from coordlang.language.recorded import check_source
 from coordlang.report.page import Report, make_report
