@@ -16,17 +16,17 @@ from planners.system.errors import CoordlangError
 from planners.system.files import FileFormat
 from planners.system.messages import sentence
 
-#: The modules that have a file format, under its name in capitals.
+#: Where the formats of files are.
 SCHEMAS = {
-    "language": "coordlang.language.file",
-    "tasks": "coordlang.language.listed",
-    "certificate": "coordlang.verification.certificate_file",
-    "lifted": "coordlang.lifted.language",
-    "choices": "coordlang.execution.choices",
-    "simulation": "coordlang.simulation.record",
-    "plans": "planners.search.plan_file",
-    "coordinates": "coordlang.sites.coordinates",
-    "error": "coordlang.commands.schema",
+    "language": ("coordlang.language.file", "LANGUAGE"),
+    "tasks": ("coordlang.language.listed", "TASKS"),
+    "certificate": ("coordlang.verification.certificate_file", "CERTIFICATE"),
+    "lifted": ("coordlang.lifted.file", "LIFTED"),
+    "choices": ("coordlang.execution.choices", "CHOICES"),
+    "simulation": ("coordlang.simulation.record", "SIMULATION"),
+    "plans": ("planners.search.plan_file", "PLANS"),
+    "coordinates": ("coordlang.sites.coordinates", "COORDINATES"),
+    "error": ("coordlang.commands.schema", "ERROR"),
 }
 
 
@@ -56,6 +56,9 @@ class ErrorObject(msgspec.Struct, frozen=True):
     error: ErrorEntry
 
 
+ERROR = FileFormat("error", "JSON error object", ErrorObject)
+
+
 def error_json(error: CoordlangError) -> str:
     """The object that ``--json`` gives in place of an answer (docs/formats.md)."""
     place, remedy, reached = error.position, error.remedy, error.reached
@@ -68,11 +71,9 @@ def error_json(error: CoordlangError) -> str:
     return msgspec.json.format(msgspec.json.encode(ErrorObject(entry)), indent=0).decode()
 
 
-ERROR = FileFormat("error", "JSON error object", ErrorObject)
-
-
 @click.command(name="schema")
 @click.argument("name", type=click.Choice(list(SCHEMAS)), default="language")
 def command(name: str) -> None:
     """Print the JSON Schema of a file format: language files unless NAME is another one."""
-    echo(json.dumps(getattr(import_module(SCHEMAS[name]), name.upper()).json_schema(), indent=2))
+    module, file_format = SCHEMAS[name]
+    echo(json.dumps(getattr(import_module(module), file_format).json_schema(), indent=2))

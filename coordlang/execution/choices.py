@@ -249,11 +249,6 @@ class ChoicesFile(msgspec.Struct, frozen=True):
 CHOICES = FileFormat("choices", "choices file", ChoicesFile, FORMAT, VERSION)
 
 
-def json_schema() -> dict[str, Any]:
-    """The JSON Schema of choices files."""
-    return CHOICES.json_schema()
-
-
 def to_record(choices: SentenceChoices, robots: Sequence[int] | None = None) -> ChoicesFile:
     """The content of a choices file, of all robots or of those with these numbers."""
     task_language = choices.task_language

@@ -150,10 +150,8 @@ def _check(
         needed > SMALL and needed > memory_left()
     ):
         smaller = model.smaller("a smaller task")
-        states = " x ".join(f"{len(own.layers[step]):,}" for own in automata)
         raise OutOfMemory(
-            f"step {step + 1} has {moves:,.0f} combinations of what the robots may do ({states} "
-            "states of their "
-            f"automata): about {needed / 2**30:,.1f} GiB",
+            f"step {step + 1} has {moves:,.0f} combinations of what the robots may do: "
+            f"about {needed / 2**30:,.1f} GiB",
             remedy=f"Leave out --check, use {smaller} or {more_memory()}.",
         )

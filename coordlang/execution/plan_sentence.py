@@ -15,6 +15,7 @@ from planners.pddl.formula_tree import conjuncts, formula_text
 from planners.search.plan_file import NoSuchAction, Texts, read_plans
 from planners.search.plans import Plan, Plans
 from planners.system.errors import BadInput, Position, Refuted
+from planners.system.notebook import counted
 
 
 class NotAPlan(Refuted):
@@ -114,7 +115,7 @@ def _executed(task_language: TaskLanguage, plan: Sequence[Texts]) -> tuple[Plan,
     if not model.holds(goal, rows[-1][None, :])[0]:
         raise NotAPlan(
             len(plan),
-            f"after {_steps(len(plan))} {_unmet(model, goal, rows[-1])}",
+            f"after {counted(len(plan), 'step')} {_unmet(model, goal, rows[-1])}",
             remedy="Give the whole plan: it ends where the goal holds.",
         )
     return tuple(numbers), rows, second
@@ -187,11 +188,12 @@ def _not_optimal(
         if model.slack:
             least = space.least_makespan(task_language.task)
             enough = f"with slack {model.slack} {makespan} are allowed, as {least} are enough"
-        wrong = f"it takes {_steps(len(plan))}, and {enough}"
+        wrong = f"it takes {counted(len(plan), 'step')}, and {enough}"
     else:
         what = "subactions" if model.cost == "makespan+actions" else "action costs of"
         few = "are as few as can be" if not model.slack else "are within the slack"
-        wrong = f"its {_steps(len(plan))} {few}, but with {cost} {what} where {second} are enough"
+        steps = counted(len(plan), "step")
+        wrong = f"its {steps} {few}, but with {cost} {what} where {second} are enough"
     if step == makespan:
         reason = f"{wrong}: the goal holds before step {step + 1} already"
     else:
@@ -203,7 +205,3 @@ def _not_optimal(
         kept = "plans within it" if model.slack else "optimal plans"
         reason = f"{wrong}; with step {step + 1} ({doing}) it leaves all {kept}, at {state}"
     return NotOptimal(step, excess, reason, model.slack)
-
-
-def _steps(number: int) -> str:
-    return f"{number} step{'s' * (number != 1)}"

@@ -8,8 +8,9 @@ start and moves, in the form of the League of Robot Runners with the action mode
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.report.layout import place_layout
@@ -48,22 +49,28 @@ def planviz(task_language: TaskLanguage, known: Mapping[str, Point] | None = Non
     cells = _cells(world, known)
     robots = space.model.robots
     paths = [
-        [cells.get(world.located(state).get(robot, "")) for state in states] for robot in robots
+        [cell for state in states if (cell := cells.get(world.located(state).get(robot, "")))]
+        for robot in robots
     ]
-    found = [_moves(path) for path in paths]
-    starts = [path[0] for path in paths if path[0] is not None]
-    if not cells or any(moves is None for moves in found):
+    letters = [
+        [_MOVES.get((row - r, column - c), "") for (r, c), (row, column) in pairwise(path)]
+        for path in paths
+    ]
+    lost = any(
+        len(path) < len(states) or not all(own) for path, own in zip(paths, letters, strict=True)
+    )
+    if not cells or lost:
         raise UsageError(
             "--planviz: the robots do not move from cell to cell of a grid",
             remedy="Leave it out, or give --coordinates whole numbers as [column, row].",
         )
-    moves = [",".join(own) for own in found if own is not None]
+    moves = [",".join(own or ["W"]) for own in letters]
     steps = len(states) - 1
     data = {
         "actionModel": "MAPF",
         "AllValid": "Yes",
         "teamSize": len(robots),
-        "start": [[row, column, "N/A"] for row, column in starts],
+        "start": [[*path[0], "N/A"] for path in paths],
         "numTaskFinished": len(robots),
         "sumOfCost": steps * len(robots),
         "makespan": steps,
@@ -74,7 +81,7 @@ def planviz(task_language: TaskLanguage, known: Mapping[str, Point] | None = Non
         "events": [
             [[robot, 0, "assigned"], [robot, steps, "finished"]] for robot in range(len(robots))
         ],
-        "tasks": [[robot, *path[-1]] for robot, path in enumerate(paths) if path[-1] is not None],
+        "tasks": [[robot, *path[-1]] for robot, path in enumerate(paths)],
     }
     return PlanVizFiles(json.dumps(data) + "\n", _map_text(set(cells.values())))
 
@@ -89,16 +96,6 @@ def _cells(world: World, known: Mapping[str, Point] | None) -> dict[str, Cell]:
     left = min(x for x, _ in layout.points.values())
     top = min(y for _, y in layout.points.values())
     return {place: (int(y - top), int(x - left)) for place, (x, y) in layout.points.items()}
-
-
-def _moves(path: Sequence[Cell | None]) -> list[str] | None:
-    """A robot's moves as letters; None if it is nowhere, or moves farther than to a neighbour."""
-    letters = []
-    for before, after in zip(path, [*path[1:], path[-1]], strict=True):
-        if before is None or after is None:
-            return None
-        letters.append(_MOVES.get((after[0] - before[0], after[1] - before[1]), ""))
-    return letters[:-1] or ["W"] if all(letters) else None
 
 
 def _map_text(cells: set[Cell]) -> str:

@@ -44,16 +44,19 @@ class Floor:
     links: tuple[tuple[str, str], ...]
 
     @property
+    def lengths(self) -> list[float]:
+        """The lengths of the links, in metres."""
+        return [math.dist(self.points[a], self.points[b]) for a, b in self.links]
+
+    @property
     def longest(self) -> float:
         """The length of the longest link, in metres."""
-        return max((math.dist(self.points[a], self.points[b]) for a, b in self.links), default=0.0)
+        return max(self.lengths, default=0.0)
 
     @property
     def shortest(self) -> float:
         """The length of the shortest link, in metres; infinite without links."""
-        return min(
-            (math.dist(self.points[a], self.points[b]) for a, b in self.links), default=math.inf
-        )
+        return min(self.lengths, default=math.inf)
 
 
 def floor_of(world: World, known: Mapping[str, Point], cell: float) -> Floor:

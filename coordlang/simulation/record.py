@@ -182,11 +182,6 @@ class SimulationRecord(msgspec.Struct, frozen=True):
 SIMULATION = FileFormat("simulation", "record of runs", SimulationRecord, FORMAT, VERSION)
 
 
-def json_schema() -> dict[str, Any]:
-    """The JSON Schema of records of simulated runs."""
-    return SIMULATION.json_schema()
-
-
 def to_bytes(record: SimulationRecord) -> bytes:
     """The text of a record: equal runs give equal bytes."""
     return msgspec.json.encode(record) + b"\n"

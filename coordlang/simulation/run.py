@@ -31,6 +31,8 @@ from coordlang.sites.coordinates import Point
 _PATIENCE = 4
 #: And with somebody walking about for so many.
 _WITH_WALKER = 12
+#: The settings that the record has.
+_RECORDED = ("step", "cell", "radius", "noise", "lidar", "human")
 #: Seconds between two poses of the record.
 _INTERVAL = 0.2
 
@@ -76,15 +78,10 @@ def record_of(
         agreement=mission.agreement,
         sentence=used.text(mission.sentence) if mission.agreement == "sentence" else None,
         covered=used.covered,
-        step=settings.step,  # type: ignore[arg-type]
         makespan=mission.steps,
         period=settings.period(floor.longest),
         interval=_ticks_of_interval(settings) * settings.tick,
-        cell=settings.cell,
-        radius=settings.radius,
-        noise=settings.noise,
-        lidar=settings.lidar,
-        human=settings.human,
+        **{name: getattr(settings, name) for name in _RECORDED},
         wishes=list(wishes),
         places={name: (round(x, 6), round(y, 6)) for name, (x, y) in sorted(floor.points.items())},
         walls=list(floor.walls),

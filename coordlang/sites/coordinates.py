@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 from msgspec import Meta
@@ -39,11 +39,6 @@ class CoordinatesFile(msgspec.Struct):
 COORDINATES = FileFormat("coordinates", "file of coordinates", CoordinatesFile)
 
 
-def json_schema() -> dict[str, Any]:
-    """The JSON Schema of files of coordinates."""
-    return COORDINATES.json_schema()
-
-
 def read_coordinates(path: str | Path) -> dict[str, Point]:
     """Read a file of coordinates, ``{"coordinates": {"depot": [0, 0], "town": [1, 0]}}``.
 
@@ -69,17 +64,12 @@ def checked(entries: Mapping[str, Point], position: Position) -> dict[str, Point
             )
     points = {name.lower(): point for name, point in entries.items()}
     if len(points) < len(entries):
-        raise BadInput(
-            "a place occurs twice, in upper and in lower case",
-            position=position,
-            remedy="PDDL does not distinguish them: of two entries one would be lost.",
-        )
+        what = "a place occurs twice, in upper and in lower case"
+        remedy = "PDDL does not distinguish them: of two entries one would be lost."
+        raise BadInput(what, position=position, remedy=remedy)
     if len(set(points.values())) < len(points):
-        raise BadInput(
-            "two places have the same coordinates",
-            position=position,
-            remedy="Give each place coordinates of its own.",
-        )
+        what, remedy = "two places have the same coordinates", "Give each one of its own."
+        raise BadInput(what, position=position, remedy=remedy)
     return points
 
 

@@ -17,7 +17,6 @@ from typing import Any
 
 from unified_planning.engines import (
     AnytimeGuarantee,
-    Credits,
     Engine,
     LogLevel,
     LogMessage,
@@ -133,11 +132,6 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         """Optimal plans one after another are ensured, improving plans are not."""
         return bool(anytime_guarantee == AnytimeGuarantee.OPTIMAL_PLANS)
 
-    @staticmethod
-    def get_credits(**kwargs: Any) -> Credits | None:
-        """None: nothing is printed."""
-        return None
-
     # Planning.
 
     def _solve(
@@ -170,13 +164,22 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
                 raise
             yield self._none(status, in_parameters(error) or "out of memory")
             return
-        plans = Plans.of(space)
+        plans, model = Plans.of(space), space.model
+        whole = model.is_joint_action or len(model.robots) == 1
+        kind = PlanKind.SEQUENTIAL_PLAN if whole else PlanKind.PARTIAL_ORDER_PLAN
+        kind = self._options.plan_kind or kind
+        makespan, second = space.cost_of(0)
+        metrics = {"makespan": str(makespan), "plans": str(plans.count)}
+        if model.cost != "makespan":
+            metrics["second cost"] = str(second)
+        messages += [_warning(f"{metric} is ignored") for metric in _other_metrics(problem)]
         for number in range(plans.count):
             if time.monotonic() > end:
                 yield self._none(Status.TIMEOUT, f"{number} of {plans.count} plans in time")
                 return
             status = _done(problem) if number == plans.count - 1 else Status.INTERMEDIATE
-            yield self._result(status, found, plans, number, messages, problem)
+            plan = to_up(found, plans, plans.unrank(number), kind, problem.environment)
+            yield PlanGenerationResult(status, plan, self.name, {**metrics}, [*messages])
 
     def _search(self, problem: Any) -> tuple[Translated, PlanSpace, list[LogMessage]]:
         """The optimal plans, under the sentence if one is given."""
@@ -228,27 +231,6 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
             found.problem,
             self._options.model_options(found),
         )
-
-    def _result(
-        self,
-        status: Status,
-        found: Translated,
-        plans: Plans,
-        number: int,
-        messages: Sequence[LogMessage],
-        problem: Any,
-    ) -> PlanGenerationResult:
-        model = plans.space.model
-        whole = model.is_joint_action or len(model.robots) == 1
-        default = PlanKind.SEQUENTIAL_PLAN if whole else PlanKind.PARTIAL_ORDER_PLAN
-        kind = self._options.plan_kind or default
-        makespan, second = plans.space.cost_of(0)
-        metrics = {"makespan": str(makespan), "plans": str(plans.count)}
-        if model.cost != "makespan":
-            metrics["second cost"] = str(second)
-        ignored = [_warning(f"{metric} is ignored") for metric in _other_metrics(problem)]
-        plan = to_up(found, plans, plans.unrank(number), kind, problem.environment)
-        return PlanGenerationResult(status, plan, self.name, metrics, [*messages, *ignored])
 
     def _none(self, status: Status, why: str) -> PlanGenerationResult:
         messages = [LogMessage(LogLevel.INFO, why)]

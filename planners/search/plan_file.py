@@ -66,11 +66,6 @@ class PlansFile(msgspec.Struct, frozen=True):
 PLANS = FileFormat("plans", "JSON plan file", PlansFile)
 
 
-def json_schema() -> dict[str, Any]:
-    """The JSON Schema of plan files in JSON."""
-    return PLANS.json_schema()
-
-
 def json_count(number: int) -> int | str:
     """A count as it stands in JSON: a string above 2^53."""
     return number if number <= _EXACT else str(number)
