@@ -504,56 +504,50 @@ def _entry(data: Any, robot: str | None) -> Mapping[str, Any]:
     return next(iter(entries.values()))
 
 
-def _check_moves(states: Sequence[Any]) -> None:
-    """Raise unless there are states and every one leads to states of the next step.
-
-    From state 0 in step 0, from which every state can be reached.  So there are no cycles.
-    """
-    steps = [_get(state, "step", int, f"state {number}") for number, state in enumerate(states)]
-    if not states or steps[0] != 0:
-        raise MonitorError("the automaton has no state 0 in step 0")
-    reached = bytearray(len(states))
-    reached[0] = True
-    for number, state in enumerate(states):
-        if not reached[number]:
-            raise MonitorError(f"state {number} cannot be reached from state 0")
-        for to in _get(state, "next", dict, f"state {number}").values():
-            is_state = _is_number(to) and number < to < len(states)
-            if not is_state or steps[to] != steps[number] + 1:
-                raise MonitorError(
-                    f"state {number} does not lead to a state of step {steps[number] + 1}"
-                )
-            reached[to] = True
+def _moves(
+    states: Sequence[Any], number: int, steps: Sequence[int], texts: set[str]
+) -> dict[str | None, int]:
+    """What the robot may do in a state, idling first; ``texts`` are known to be well written."""
+    following = _get(states[number], "next", dict, f"state {number}")
+    for text, to in following.items():
+        if text not in texts:
+            _check_plain(text, f"state {number}: 'next'")
+            texts.add(text)
+        if not (_is_number(to) and number < to < len(states) and steps[to] == steps[number] + 1):
+            raise MonitorError(
+                f"state {number} does not lead to a state of step {steps[number] + 1}"
+            )
+    ways = ((None if text == IDLE else text, to) for text, to in following.items())
+    return dict(sorted(ways, key=lambda move: move[0] or ""))
 
 
 def _read_subplans(entry: Mapping[str, Any], states: Sequence[Any]) -> Subplans:
     """The subplans of the states of a file.
 
-    Raises `MonitorError` unless the states are an automaton of subplans of one length, and the
-    counts of subplans agree.  States are looked at backwards: the counts never take much more
+    Raises `MonitorError` unless every state can be reached from state 0 in step 0 and leads to
+    later states of the next step, so that there are no cycles, all subplans have one length, and
+    the counts of subplans agree.  States are looked at backwards: the counts never take much more
     memory than those in the file.
     """
-    _check_moves(states)
-    texts: set[str] = set()
+    steps = [_get(state, "step", int, f"state {number}") for number, state in enumerate(states)]
+    if not states or steps[0] != 0:
+        raise MonitorError("the automaton has no state 0 in step 0")
+    texts, reached = {IDLE}, {0}
     moves: list[dict[str | None, int]] = []
-    for number, state in enumerate(states):
-        for text in state["next"].keys() - texts:
-            if text != IDLE:
-                _check_plain(text, f"state {number}: 'next'")
-            texts.add(text)
-        following = ((None if text == IDLE else text, to) for text, to in state["next"].items())
-        moves.append(dict(sorted(following, key=lambda move: move[0] or "")))
-    left = [1] * len(states)
+    for number in range(len(states)):
+        if number not in reached:
+            raise MonitorError(f"state {number} cannot be reached from state 0")
+        moves.append(_moves(states, number, steps, texts))
+        reached.update(moves[-1].values())
+    left, last = [1] * len(states), max(steps)
     for number in reversed(range(len(states))):
         if moves[number]:
             left[number] = sum(left[to] for to in moves[number].values())
+        elif steps[number] != last:
+            raise MonitorError(f"state {number} ends after {steps[number]} of {last} steps")
         _check_count(states[number], "left", left[number], f"state {number}")
-    steps = max(state["step"] for state in states)
-    for number, state in enumerate(states):
-        if not state["next"] and state["step"] != steps:
-            raise MonitorError(f"state {number} ends after {state['step']} of {steps} steps")
-    if "steps" in entry and _get(entry, "steps", int, "a robot's choices") != steps:
-        raise MonitorError(f"'steps' is {_shown(entry['steps'])}, but the states have {steps}")
+    if "steps" in entry and _get(entry, "steps", int, "a robot's choices") != last:
+        raise MonitorError(f"'steps' is {_shown(entry['steps'])}, but the states have {last}")
     if "subplans" in entry:
         _check_count(entry, "subplans", left[0], "a robot's choices")
     return Subplans(moves, range(len(states)), left)
@@ -596,19 +590,10 @@ def _matches(pattern: str, text: str | None) -> bool:
     """Whether a text is the pattern, in which every * stands for any text."""
     if pattern == IDLE or text is None:
         return pattern == IDLE and text is None
-    head, *pieces = pattern.split("*")
-    if not pieces:
-        return text == head
-    *between, tail = pieces
-    if len(text) < len(head) + len(tail) or not (text.startswith(head) and text.endswith(tail)):
-        return False
-    at, end = len(head), len(text) - len(tail)
-    for piece in between:
-        at = text.find(piece, at, end)
-        if at < 0:
-            return False
-        at += len(piece)
-    return True
+    head, *pieces = map(re.escape, pattern.split("*"))
+    # Each piece but the last where it stands first: what is tried is linear in the text.
+    between = "".join(f"(?>.*?{piece})" for piece in pieces[:-1])
+    return bool(re.fullmatch(head + between + "".join(f".*{tail}" for tail in pieces[-1:]), text))
 
 
 def _shown(value: object) -> str:

@@ -152,20 +152,18 @@ def read_plan_file(path: str | Path, model: JointModel) -> list[tuple[Texts, ...
 
 
 def _label_numbers(model: JointModel, step: Texts, number: int) -> tuple[int, ...]:
-    found = model.numbers(step)
-    if found is not None:
-        return found
-    robot, text = next(
-        (name, text)
-        for robot, (name, text) in enumerate(zip(model.robots, step, strict=True))
-        if model.label_number(robot, text) is None
-    )
-    raise NotAPlan(
-        number,
-        f"in step {number + 1}, {robot} has no subaction {text}",
-        remedy="It is misspelt, belongs to another robot, can never be applied in this problem, or "
-        "is idling, which is left out (`coordlang inspect DOMAIN PROBLEM`).",
-    )
+    found = []
+    for robot, (name, text) in enumerate(zip(model.robots, step, strict=True)):
+        label = model.label_number(robot, text)
+        if label is None:
+            raise NotAPlan(
+                number,
+                f"in step {number + 1}, {name} has no subaction {text}",
+                remedy="It is misspelt, belongs to another robot, can never be applied in this "
+                "problem, or is idling, which is left out (`coordlang inspect DOMAIN PROBLEM`).",
+            )
+        found.append(label)
+    return tuple(found)
 
 
 def _unmet(model: JointModel, goal: Goal, row: Rows) -> str:

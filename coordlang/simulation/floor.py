@@ -9,9 +9,10 @@ there are no walls.
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import count
 from random import Random
 
 from coordlang.sites.coordinates import Point, from_names
@@ -73,7 +74,7 @@ def floor_of(world: World, known: Mapping[str, Point], cell: float) -> Floor:
     left = min((x for x, _ in points.values()), default=0.0)
     metres = {name: ((x - left) * cell, (top - y) * cell) for name, (x, y) in points.items()}
     moves = tuple(link.ends for link in world.links if link.moves)
-    return Floor(metres, _walls(points, metres, links, cell), moves)
+    return Floor(metres, _walls(points, links, cell), moves)
 
 
 def require_room(floor: Floor, radius: float) -> None:
@@ -125,10 +126,7 @@ def _points(
 
 
 def _walls(
-    points: Mapping[str, Point],
-    metres: Mapping[str, Point],
-    links: Sequence[tuple[str, str]],
-    cell: float,
+    points: Mapping[str, Point], links: Sequence[tuple[str, str]], cell: float
 ) -> tuple[Wall, ...]:
     """The sides of the cells of a grid that no link crosses; none where places are no cells."""
     cells = {point: name for name, point in points.items()}
@@ -137,40 +135,24 @@ def _walls(
     if any(math.dist(points[a], points[b]) != 1 for a, b in links):
         return ()
     open_sides = {frozenset(ends) for ends in links}
-    level: set[tuple[float, float]] = set()  # (y, x of the left end) in half cells, y up
-    upright: set[tuple[float, float]] = set()
+    left, top = min(x for x, _ in cells), max(y for _, y in cells)
+    # In half cells, y up: whether they are upright, and on which line -> where sides begin.
+    sides: dict[tuple[bool, float], set[float]] = defaultdict(set)
     for (column, row), name in cells.items():
-        x, y = metres[name]
+        x, y = 2 * (column - left), 2 * (top - row)
         for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
             other = cells.get((column + dx, row - dy))
-            if other is not None and frozenset((name, other)) in open_sides:
-                continue
-            if dx:
-                upright.add((_round(x + dx * cell / 2), _round(y - cell / 2)))
-            else:
-                level.add((_round(y + dy * cell / 2), _round(x - cell / 2)))
-    found = [(start, y, end, y) for y, start, end in _runs(level, cell)]
-    found += [(x, start, x, end) for x, start, end in _runs(upright, cell)]
-    return tuple(sorted(found))
-
-
-def _runs(sides: Iterable[tuple[float, float]], cell: float) -> list[tuple[float, float, float]]:
-    """Sides on one line put together: (the line, the beginning, the end)."""
+            if other is None or frozenset((name, other)) not in open_sides:
+                side, begin = ((True, x + dx), y - 1) if dx else ((False, y + dy), x - 1)
+                sides[side].add(begin)
     found = []
-    for line, group in groupby(sorted(sides), key=lambda side: side[0]):
-        starts = [start for _, start in group]
-        begin = starts[0]
-        for start, following in zip(starts, [*starts[1:], None], strict=True):
-            end = _round(start + cell)
-            if following is None or abs(following - end) > cell / 100:
-                found.append((line, begin, end))
-                begin = following if following is not None else end
-    return found
-
-
-def _round(metres: float) -> float:
-    """Whole micrometres, so that equal lengths are equal numbers."""
-    return round(metres, 6)
+    for (is_upright, line), begins in sides.items():
+        for begin in begins - {start + 2 for start in begins}:
+            end = next(end for end in count(begin, 2) if end not in begins)
+            # Whole micrometres, so that equal lengths are equal numbers.
+            at, low, high = (round(half * cell / 2, 6) for half in (line, begin, end))
+            found.append((at, low, at, high) if is_upright else (low, at, high, at))
+    return tuple(sorted(found))
 
 
 @dataclass(slots=True)

@@ -10,8 +10,10 @@ monitor only, and numbers and texts are all that goes in and out.
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from random import Random
 
 from coordlang.execution.monitor import IDLE, Monitor
@@ -308,9 +310,4 @@ def drawn(monitor: Monitor, random: Random) -> str | None:
         after = monitor.copy()
         after.did(subaction)
         left.append(after.remaining)
-    rank = random.randrange(sum(left))
-    for subaction, number in zip(allowed, left, strict=True):
-        if rank < number:
-            return subaction
-        rank -= number
-    raise AssertionError("a rank is below the number of subplans")
+    return allowed[bisect_right([*accumulate(left)], random.randrange(sum(left)))]

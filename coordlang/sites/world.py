@@ -7,8 +7,8 @@ It is found from the actions and the static atoms of the model alone, see `_loca
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass
-from itertools import combinations, product
+from dataclasses import dataclass, field
+from itertools import combinations, permutations
 
 from planners.grounding import GroundAction
 from planners.joint.model import JointModel, show
@@ -75,8 +75,8 @@ def find_world(model: JointModel, states: Sequence[Sequence[str]]) -> World:
     ``states`` are known ones, as the texts of their true atoms: what puts a thing into two places
     in one of them does not say where it is.
     """
-    predicates, known = _locations(model)
-    roles = _without_ambiguous(_location_roles(model, predicates, known), states)
+    locations, known = _locations(model)
+    roles = _without_ambiguous(_location_roles(model, locations, known), states)
     located = {role[1] for _, role in roles.values()}
     places = frozenset(role[2] for _, role in roles.values())
     for atom in model.codec.facts.atoms:
@@ -88,38 +88,34 @@ def find_world(model: JointModel, states: Sequence[Sequence[str]]) -> World:
     return World(
         things=(*model.robots, *others),
         places=tuple(sorted(places, key=natural)),
-        links=tuple(_links(model, predicates, places)),
+        links=tuple(_links(model, locations, places)),
         roles={text: role for text, (_, role) in roles.items()},
     )
 
 
 def _location_roles(
-    model: JointModel, predicates: Sequence[_Location], places: Set[str]
+    model: JointModel, locations: Sequence[_Reading], places: Set[str]
 ) -> dict[str, tuple[Atom, Role]]:
     """The atoms that say where a thing is, by their texts, with their roles.
 
-    The first predicate that reads an atom says it.
+    The first location predicate that has an atom says it.
     """
-    names = {p: _owner(p, model) for p in predicates if p.thing is None}
     roles: dict[str, tuple[Atom, Role]] = {}
-    for atom in model.codec.facts.atoms:
-        for predicate in predicates:
-            thing, place = predicate.read(atom) or (None, "")
+    for reading in locations:
+        for atom, thing, place in reading.atoms:
             if place in places and thing not in places:
-                owner = names[predicate] if thing is None else thing
-                roles[show(atom)] = atom, ("at", owner, place)
-                break
+                owner = _owner(reading, model) if thing is None else thing
+                roles.setdefault(show(atom), (atom, ("at", owner, place)))
     return roles
 
 
-def _owner(predicate: _Location, model: JointModel) -> str:
+def _owner(reading: _Reading, model: JointModel) -> str:
     """Name what moves without a name: the only robot that moves it, else a thing of its own."""
-    owners = {action.owners for action in model.actions if any(predicate.changes(action))}
-    if len(owners) == 1 and not model.is_joint_action:
-        (team,) = owners
+    if len(reading.owners) == 1 and not model.is_joint_action:
+        (team,) = reading.owners
         if len(team) == 1:
             return model.robots[team[0]]
-    return predicate.predicate.removesuffix("-at").removeprefix("at-")
+    return reading.predicate.removesuffix("-at").removeprefix("at-")
 
 
 def _without_ambiguous(
@@ -164,16 +160,11 @@ def _other_role(atom: Atom, places: frozenset[str], things: set[str]) -> Role:
 
 
 def _links(
-    model: JointModel, predicates: Sequence[_Location], places: frozenset[str]
+    model: JointModel, locations: Sequence[_Reading], places: frozenset[str]
 ) -> Iterator[Link]:
     """What moves join, and what static atoms relate."""
-    moved = {
-        tuple(sorted(pair))
-        for predicate in predicates
-        for action in model.actions
-        for pair in predicate.changes(action)
-        if places.issuperset(pair)
-    }
+    moves = {pair for reading in locations for pair in reading.moves if places.issuperset(pair)}
+    moved = {tuple(sorted(pair)) for pair in moves}
     related = {
         tuple(sorted(pair))
         for atom in model.statics
@@ -184,105 +175,81 @@ def _links(
         yield Link((first, second), (first, second) in moved)
 
 
-@dataclass(frozen=True, slots=True)
-class _Location:
-    """A predicate read as "a thing is in a place".
+@dataclass(eq=False, slots=True)
+class _Reading:
+    """A predicate read as "a thing is in a place", and what atoms and actions say then.
 
     ``place`` is the argument that is the place, ``thing`` the one that is the thing; None if it has
-    none, as ``(stops floor)``.
+    none, as ``(stops floor)``.  ``atoms`` come with their thing and place, ``moves`` are the pairs
+    of places between which actions of ``owners`` move a thing, ``signs`` say whether actions make
+    it true, and false.
     """
 
     predicate: str
-    arity: int
     place: int
     thing: int | None
+    atoms: list[tuple[Atom, str | None, str]] = field(default_factory=list)
+    moves: set[tuple[str, str]] = field(default_factory=set)
+    owners: set[tuple[int, ...]] = field(default_factory=set)
+    signs: set[bool] = field(default_factory=set)
 
     def read(self, atom: Atom) -> tuple[str | None, str] | None:
         """Return an atom's thing and place, None for another predicate."""
-        if atom.predicate != self.predicate or len(atom.args) != self.arity:
+        if atom.predicate != self.predicate or len(atom.args) != 1 + (self.thing is not None):
             return None
-        thing = None if self.thing is None else atom.args[self.thing]
-        return thing, atom.args[self.place]
+        return None if self.thing is None else atom.args[self.thing], atom.args[self.place]
 
-    def read_all(self, atoms: Iterable[Atom]) -> list[tuple[str | None, str]]:
-        """Return the things and places of all atoms of this predicate."""
-        return [found for found in map(self.read, atoms) if found is not None]
-
-    def changes(self, action: GroundAction) -> Iterator[tuple[str, str]]:
-        """Yield the pairs of places between which an action moves a thing."""
-        left: list[tuple[str | None, str]] = []
-        entered: list[tuple[str | None, str]] = []
-        for effect in action.effects:
-            found = self.read(effect.atom)
-            if found is not None:
-                (entered if effect.adds else left).append(found)
-        for (thing, source), (other, target) in product(left, entered):
-            if thing == other and source != target:
-                yield source, target
+    def take_in(self, action: GroundAction) -> None:
+        """Take in what an action changes."""
+        read = ((effect.adds, self.read(effect.atom)) for effect in action.effects)
+        changes = [(adds, *found) for adds, found in read if found is not None]
+        self.signs |= {adds for adds, _, _ in changes}
+        for (adds, thing, source), (enters, other, target) in permutations(changes, 2):
+            if enters and not adds and thing == other and source != target:
+                self.moves.add((source, target))
+                self.owners.add(action.owners)
 
 
-def _locations(model: JointModel) -> tuple[list[_Location], set[str]]:
+def _readings(model: JointModel) -> list[_Reading]:
+    """Every reading of every predicate with one or two arguments."""
+    ways: dict[int, Sequence[tuple[int, int | None]]] = {1: [(0, None)], 2: [(1, 0), (0, 1)]}
+    found: dict[tuple[str, int, int | None], _Reading] = {}
+    for atom in model.codec.facts.atoms:
+        for way in ways.get(len(atom.args), ()):
+            reading = found.setdefault((atom.predicate, *way), _Reading(atom.predicate, *way))
+            thing = None if reading.thing is None else atom.args[reading.thing]
+            reading.atoms.append((atom, thing, atom.args[reading.place]))
+    for reading in found.values():
+        for action in model.actions:
+            reading.take_in(action)
+    return sorted(found.values(), key=lambda p: (p.thing is None, p.predicate, -p.place))
+
+
+def _locations(model: JointModel) -> tuple[list[_Reading], set[str]]:
     """The location predicates of a model, and the places.
 
     Places are what some action moves a thing from and to: it makes ``(at r1 a)`` false and
-    ``(at r1 b)`` true.  Predicates whose places are all known and that actions make true and false
-    (``(lies box a)``, which is picked up here and dropped there) are location predicates, too.
+    ``(at r1 b)`` true.  They are neither robots nor things: parcels are handed over between robots,
+    and blocks stand on blocks.  What moves without a name (``(stops floor)``) moves among the
+    places of others, if there are any.  Predicates whose places are all known and that actions make
+    true and false (``(lies box a)``, which is picked up here and dropped there) are location
+    predicates, too.
     """
-    atoms = model.codec.facts.atoms
-    candidates = _candidates(atoms)
-    moving = [p for p in candidates if any(any(p.changes(action)) for action in model.actions)]
-    kept, places = _consistent(moving, atoms, model.robots)
+    readings, kept, places = _readings(model), list[_Reading](), set[str]()
+    for reading in readings:
+        own = {place for _, _, place in reading.atoms}
+        things = {thing for _, thing, _ in reading.atoms if thing}
+        contradicts = own & {*things, *model.robots} or things & places
+        elsewhere = reading.thing is None and places and not own <= places
+        if reading.moves and not contradicts and not elsewhere:
+            kept.append(reading)
+            places |= own
     further = [
-        p
-        for p in candidates
-        if p not in kept
-        and p.thing is not None
-        and all(place in places and thing not in places for thing, place in p.read_all(atoms))
-        and _comes_and_goes(p, model.actions)
+        r
+        for r in readings
+        if r not in kept
+        and r.thing is not None
+        and r.signs == {True, False}
+        and all(place in places and thing not in places for _, thing, place in r.atoms)
     ]
     return [*kept, *further], places
-
-
-def _candidates(atoms: Iterable[Atom]) -> list[_Location]:
-    """Every reading of every predicate with one or two arguments."""
-    found = set()
-    for atom in atoms:
-        if len(atom.args) == 1:
-            found.add(_Location(atom.predicate, 1, 0, None))
-        elif len(atom.args) == 2:
-            found.add(_Location(atom.predicate, 2, 1, 0))
-            found.add(_Location(atom.predicate, 2, 0, 1))
-    return sorted(found, key=lambda p: (p.thing is None, p.predicate, -p.place))
-
-
-def _consistent(
-    moving: Sequence[_Location], atoms: Sequence[Atom], robots: Sequence[str]
-) -> tuple[list[_Location], set[str]]:
-    """Keep the predicates whose places are neither robots nor things, and collect their places.
-
-    Parcels are handed over between robots, and blocks stand on blocks: these are no places.  What
-    moves without a name (``(stops floor)``) moves among the places of others, if there are any.
-    """
-    places: set[str] = set()
-    kept = []
-    for predicate in moving:
-        read = predicate.read_all(atoms)
-        own = {place for _, place in read}
-        things = {thing for thing, _ in read if thing}
-        contradicts = bool(own & {*things, *robots} or things & places)
-        elsewhere = predicate.thing is None and bool(places) and not own <= places
-        if not contradicts and not elsewhere:
-            kept.append(predicate)
-            places |= own
-    return kept, places
-
-
-def _comes_and_goes(predicate: _Location, actions: Iterable[GroundAction]) -> bool:
-    """Say whether actions make it true and false."""
-    signs = {
-        effect.adds
-        for action in actions
-        for effect in action.effects
-        if predicate.read(effect.atom) is not None
-    }
-    return signs == {True, False}
