@@ -28,8 +28,7 @@ from coordlang.execution.mixtures import Mixtures, walk_mixtures
 from coordlang.execution.monitor import FORMAT, IDLE, VERSION, Monitor
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import describe
-from coordlang.language.provenance import tolerance_data
-from planners.grounding import GroundAction
+from coordlang.language.tolerance import tolerance_data
 from planners.joint.model import JointModel
 from planners.pddl.lifted import TRUE
 from planners.search.plan_file import Count, json_count
@@ -83,9 +82,7 @@ class SentenceChoices:
 
 
 def choices(
-    task_language: TaskLanguage,
-    words: Sequence[int],
-    most: int | None = MOST,
+    task_language: TaskLanguage, words: Sequence[int], most: int | None = MOST
 ) -> SentenceChoices:
     """The choices of every robot under a sentence, given by its word numbers.
 
@@ -95,34 +92,27 @@ def choices(
     own subactions alone change.  Raises `NoPlanFits`, and `OutOfMemory` if the automata, or with
     ``most=None`` the combinations, do not fit into the memory.
     """
-    fits = task_language.plans_with(words)
-    subplans = [determinise(fits, robot) for robot in range(len(task_language.model.robots))]
+    fits, model = task_language.plans_with(words), task_language.model
+    subplans = [determinise(fits, robot) for robot in range(len(model.robots))]
     try:
         mixtures = walk_mixtures(task_language, fits, subplans, words, most)
     except OutOfMemory:
         if most is None:
             raise
         mixtures = None
-    robots = tuple(
-        _with_knowledge(task_language, fits, robot, mixtures, most)
-        for robot in range(len(subplans))
-    )
-    return SentenceChoices(task_language, tuple(words), fits, robots, mixtures)
-
-
-def _with_knowledge(
-    task_language: TaskLanguage,
-    fits: PlanSpace,
-    robot: int,
-    mixtures: Mixtures | None,
-    most: int | None,
-) -> RobotChoices:
-    """A robot's subplans with what it knows on the way."""
-    if mixtures is not None and mixtures.space is not None:
+    space = mixtures.space if mixtures is not None else None
+    truth = [] if space is None else facts_at_nodes(space)
+    robots = []
+    for robot in range(len(model.robots)):
+        exact = None
         with suppress(OutOfMemory):  # the combinations are checked all the same
-            exact = determinise(mixtures.space, robot, facts_at_nodes(mixtures.space), most)
-            return RobotChoices(robot, exact, "exact")
-    return knowing(fits, robot, own_facts(task_language.model, robot))
+            exact = space and determinise(space, robot, truth, most)
+        robots.append(
+            RobotChoices(robot, exact, "exact")
+            if exact
+            else knowing(fits, robot, own_facts(model, robot))
+        )
+    return SentenceChoices(task_language, tuple(words), fits, tuple(robots), mixtures)
 
 
 def knowing(fits: PlanSpace, robot: int, facts: int) -> RobotChoices:
@@ -153,29 +143,19 @@ def own_facts(model: JointModel, robot: int) -> int:
     others = {*model.slack_facts}  # they change by themselves
     of_part: dict[str | None, dict[int, bool]] = {}
     for action in model.actions:
-        certain, uncertain = _changes(model, action)
-        others |= uncertain
-        if robot not in action.owners:
-            others |= certain.keys()
-            continue
-        first = of_part.setdefault(action.part_of(robot), certain)
-        others |= {f for f in first.keys() | certain.keys() if first.get(f) != certain.get(f)}
+        certain: dict[int, bool] = {}
+        for effect in action.effects:
+            fact = model.codec.facts.index.get(effect.atom)
+            if fact is None:
+                continue
+            if effect.condition != TRUE or robot not in action.owners:
+                others.add(fact)
+            elif effect.adds or fact not in certain:  # of an atom deleted and added, the latter
+                certain[fact] = effect.adds
+        if robot in action.owners:
+            first = of_part.setdefault(action.part_of(robot), certain)
+            others |= {f for f in first.keys() | certain.keys() if first.get(f) != certain.get(f)}
     return sum(1 << fact for fact in range(len(model.codec.facts)) if fact not in others)
-
-
-def _changes(model: JointModel, action: GroundAction) -> tuple[dict[int, bool], set[int]]:
-    """The facts that an action certainly adds (True) or deletes, and those under a condition."""
-    certain: dict[int, bool] = {}
-    uncertain = set()
-    for effect in action.effects:
-        fact = model.codec.facts.index.get(effect.atom)
-        if fact is None:
-            continue
-        if effect.condition != TRUE:
-            uncertain.add(fact)
-        elif effect.adds or fact not in certain:  # what is both deleted and added counts as added
-            certain[fact] = effect.adds
-    return certain, uncertain
 
 
 # ---- the file

@@ -90,7 +90,7 @@ def plan_under_sentence(
     """Find an optimal plan of the task with a sentence (word numbers); any optimal plan for None.
 
     ``name`` is one of `planners.search.heuristics.HEURISTICS`; ``states`` are what earlier searches
-    with the same language and model have expanded; for ``count_words`` see `a_star`.  Of plans
+    with the same language and model have expanded; for ``count_words`` see `AStar`.  Of plans
     within slack the earliest is read off the plan space, without a search.  Raises `NoPlanFits`.
     """
     space = task_language.space
@@ -100,7 +100,7 @@ def plan_under_sentence(
     goal = space.goals[space.goal[task_language.start]]
     init = space.rows[space.state[task_language.start]]
     bound = heuristic(name, task_language.model, goal, init)
-    found = a_star(states, init, goal, bound, words, count_words=count_words)
+    found = AStar(states, goal, bound, words, count_words).run(init)
     if found is None or found.cost != space.cost_of(task_language.task):
         task_language.plans_with(words or ())  # raises: says where the sentence first breaks
         raise AssertionError("A* missed an optimal plan")
@@ -134,16 +134,8 @@ def _earliest(task_language: TaskLanguage, words: Sequence[int] | None) -> Guide
     return GuidedPlan(found, sentence_of_plan(task_language, texts), (len(found), second), 0, 0, 0)
 
 
-def a_star(
-    states: ExpandedStates,
-    init: Rows,
-    goal: Goal,
-    bound: Values,
-    words: Sequence[int] | None = None,
-    *,
-    count_words: bool = True,
-) -> GuidedPlan | None:
-    """Find an optimal plan with a sentence; for other sentences a longer plan or none.
+class AStar:
+    """A search for an optimal plan with a sentence; for other sentences a longer plan or none.
 
     With a sentence a node is a state and the *index* of its word in the sentence.  What does not
     fit is pruned: a step stays in its word or goes on to the next one, and a goal state counts at
@@ -156,15 +148,6 @@ def a_star(
     bound on the steps left.  The next node is one with least (steps + bound, second component),
     then least bound, then the largest index, then the one whose predecessor was expanded last, then
     the one with the smallest labels.
-    """
-    [start] = states.numbers(init[None, :])
-    if words is not None and (not words or states.word[start] != words[0]):
-        return None
-    return _AStar(states, goal, bound, words, count_words).run(start)
-
-
-class _AStar:
-    """The queue of a search, and what is known of each state met.
 
     Sets of indices in the sentence are bits of a number.
     """
@@ -174,12 +157,12 @@ class _AStar:
         states: ExpandedStates,
         goal: Goal,
         bound: Values,
-        words: Sequence[int] | None,
-        count_words: bool,
+        words: Sequence[int] | None = None,
+        count_words: bool = True,
     ) -> None:
         self.states, self.goal, self.bound = states, goal, bound
         self.count_words = count_words
-        self.guided = words is not None
+        self.words, self.guided = words, words is not None
         self.last = len(words) - 1 if words else 0
         self.indices: dict[int, int] = {}  # word -> its indices in the sentence
         for index, word in enumerate(words or ()):
@@ -193,8 +176,11 @@ class _AStar:
         self.queue: list[tuple[Cost, int, int, int, int, int]] = []
         self.expanded = self.generated = 0
 
-    def run(self, start: int) -> GuidedPlan | None:
+    def run(self, init: Rows) -> GuidedPlan | None:
         """Search from a state to the nearest goal state whose word is the sentence's last."""
+        [start] = self.states.numbers(init[None, :])
+        if self.guided and (not self.words or self.states.word[start] != self.words[0]):
+            return None
         self._meet([start])
         self.best[start] = (0, 0)
         self.met[start] = 0

@@ -136,7 +136,7 @@ def export_pddl(
     plain = compile_classical(model, task, limit, longest=max(1, steps or makespan))
     labels = [_labels(model, plain, action) for action in plain.actions]
     tests = exclusive_terms(task_language)
-    named = named_by_words(task_language, words, plain, labels, tests, steps)
+    named = _Naming(task_language, words, plain, tests, steps).task(labels)
     labels += [()] * (len(named.actions) - len(labels))
     if strips_only:
         _require_steps_counted(plain, model)
@@ -236,36 +236,12 @@ def _of_texts(model: JointModel, texts: Sequence[str | None]) -> tuple[RobotLabe
     return tuple(enumerate(numbers))
 
 
-def named_by_words(
-    task_language: TaskLanguage,
-    words: Sequence[int],
-    plain: ClassicalTask,
-    labels: Sequence[Sequence[RobotLabel]],
-    tests: Terms,
-    steps: int | None = None,
-) -> ClassicalTask:
+class _Naming:
     """The plain task in which states are named by their words and the sentence is followed.
 
-    The actions of ``plain`` in their order, then those that name and follow.  ``labels`` are for
-    each action of ``plain`` those that robots take in it, ``tests`` say which states belong to
-    which word, and ``steps`` is the most joint steps; None: any number.
+    ``tests`` say which states belong to which word, ``steps`` is the most joint steps; None: any
+    number.  Facts are numbers, as in `ClassicalTask`.
     """
-    facts = _NamingFacts(task_language, words, plain, tests, steps)
-    within = [
-        facts.within(action, chosen) for action, chosen in zip(plain.actions, labels, strict=True)
-    ]
-    return replace(
-        plain,
-        name=f'under "{task_language.text(words)}"',
-        facts=tuple(facts.texts),
-        init=plain.init | facts.init,
-        actions=(*within, *facts.naming_actions(tests), *facts.following_actions()),
-        goal=facts.goal(plain),
-    )
-
-
-class _NamingFacts:
-    """The new facts (by number, as in `ClassicalTask`), and what they do to actions and goal."""
 
     def __init__(
         self,
@@ -275,15 +251,14 @@ class _NamingFacts:
         tests: Terms,
         steps: int | None,
     ) -> None:
-        self.model, self.words = task_language.model, words
-        self.names = task_language.partition.words
-        self.texts, self.init = list(plain.facts), set[int]()
+        self.model, self.words, self.plain, self.tests = task_language.model, words, plain, tests
+        self.sentence, self.names = task_language.text(words), task_language.partition.words
+        self.texts, self.init = list(plain.facts), {*plain.init}
         self.number: dict[Atom, int] = dict(self.model.codec.facts.index)
         self.remembered = _remembered(task_language, tests)
         for atom, true in self.remembered.items():
             self.number[atom] = self.add(show(atom))
-            if true:
-                self.init.add(self.number[atom])
+            self.init |= {self.number[atom]} if true else set()
         self.first_new = len(self.model.codec.facts)  # from here on, facts of the compilation
         self.explicit = plain.between is None
         #: Between two joint steps: select-then-apply has a fact for this already.
@@ -295,6 +270,22 @@ class _NamingFacts:
         #: The joint steps that were taken, where they are counted.
         self.taken = [self.add(f"(taken {n})") for n in range(steps + 1)] if steps else []
         self.init |= {*self.taken[:1]}
+
+    def task(self, labels: Sequence[Sequence[RobotLabel]]) -> ClassicalTask:
+        """The task; ``labels`` are for each action of the plain one those that robots take in it.
+
+        Its actions in their order, then those that name and follow.
+        """
+        taken = zip(self.plain.actions, labels, strict=True)
+        within = [self.within(action, chosen) for action, chosen in taken]
+        return replace(
+            self.plain,
+            name=f'under "{self.sentence}"',
+            facts=tuple(self.texts),
+            init=frozenset(self.init),
+            actions=(*within, *self.naming_actions(), *self.following_actions()),
+            goal=self.goal(),
+        )
 
     def add(self, text: str) -> int:
         """Add a fact."""
@@ -327,7 +318,7 @@ class _NamingFacts:
             deletes=tuple(sorted(deletes - adds)),
         )
 
-    def naming_actions(self, tests: Terms) -> list[ClassicalAction]:
+    def naming_actions(self) -> list[ClassicalAction]:
         """Actions that name a state by its word, one for each term of the word."""
         return [
             _free(
@@ -337,7 +328,7 @@ class _NamingFacts:
                 (self.naming,),
             )
             for word, named in self.named.items()
-            for number, term in enumerate(tests[word], 1)
+            for number, term in enumerate(self.tests[word], 1)
         ]
 
     def following_actions(self) -> list[ClassicalAction]:
@@ -373,13 +364,13 @@ class _NamingFacts:
             for number, (before, after) in enumerate(pairwise(self.taken), 1)
         ]
 
-    def goal(self, plain: ClassicalTask) -> tuple[Condition, ...]:
+    def goal(self) -> tuple[Condition, ...]:
         """The whole sentence is passed, and the last state is named.
 
         ``reach the goal`` consumes the time to act.
         """
-        conditions = {*plain.goal, (self.said[-1], True)}
-        old = (number < self.first_new or number == self.between for number, _ in plain.goal)
+        conditions = {*self.plain.goal, (self.said[-1], True)}
+        old = (number < self.first_new or number == self.between for number, _ in self.plain.goal)
         if all(old):
             conditions.add((self.between, True))
         return tuple(sorted(conditions))
