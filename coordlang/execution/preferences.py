@@ -77,35 +77,18 @@ def goes_first(model: JointModel, robot: str) -> PlanPreference:
         f"no robot goes before {robot}",
         f"another robot goes before {robot}",
     )
-    order = _Order(own)
-    return PlanPreference(f"first:{robot}", lambda _: others, order.step, order.grade, grades)
+    late = (-1,)  # in place of the robots of which it is open: one has acted before this one
 
+    def step(memory: Memory, labels: tuple[int, ...], _state: int) -> Memory:
+        acts = labels[own] != 0
+        if memory == late or (not acts and any(labels[other] for other in memory)):
+            return late
+        return tuple(other for other in memory if (labels[other] != 0) == acts)
 
-@dataclass(frozen=True, slots=True)
-class _Order:
-    """Who acts before robot number ``robot``; the memory are the robots of which it is still open.
+    def grade(memory: Memory) -> int:
+        return 2 if memory == late else int(bool(memory))
 
-    ``_LATE`` is the memory once one of them has acted before it.
-    """
-
-    robot: int
-
-    def step(self, memory: Memory, labels: tuple[int, ...], _state: int) -> Memory:
-        if memory == _LATE:
-            return memory
-        acts = labels[self.robot] != 0
-        others = {other: labels[other] != 0 for other in memory}
-        if not acts and any(others.values()):
-            return _LATE
-        return tuple(other for other in memory if others[other] == acts)
-
-    def grade(self, memory: Memory) -> int:
-        if memory == _LATE:
-            return 2
-        return 1 if memory else 0
-
-
-_LATE = (-1,)
+    return PlanPreference(f"first:{robot}", lambda _: others, step, grade, grades)
 
 
 def avoids(task_language: TaskLanguage, atoms: str) -> PlanPreference:

@@ -63,7 +63,12 @@ def page_data(
     first = selection.tasks[0].language
     model = first.model
     tables = Tables(model, first.partition)
-    listed = _listed_states(language, tables)
+    listed = sorted(language.states)  # as the first states, unless they are too many
+    atoms = len(split_atoms(listed[0])) * len(listed) if listed else 0
+    if len(listed) > _STATES_LISTED or atoms > _ATOMS_LISTED:
+        listed = []
+    for key in listed:
+        tables.state(key)
     tasks = [task_data(shown, tables, seed) for shown in selection.tasks]
     states = [model.codec.decode(row) for row in tables.rows]
     world = _drawn_world(model, states, most_places)
@@ -89,7 +94,7 @@ def page_data(
         ],
         "states": [[number[fact] for fact in state] for state in states],
         "state_words": tables.words,
-        "mapped": listed,
+        "mapped": len(listed),
         "state_graph": _state_graph(first) if 1 < len(language.states) <= _STATES_DRAWN else None,
         "tasks": tasks,
         "candidates": {
@@ -107,20 +112,6 @@ def _drawn_world(model: JointModel, states: Sequence[Sequence[str]], most_places
     if 1 < len(world.places) <= most_places:
         return world
     return replace(world, places=(), links=(), roles={})
-
-
-def _listed_states(language: Language, tables: Tables) -> int:
-    """Enter the states of the language as the first ones, unless they are too many.
-
-    Returns how many were entered.
-    """
-    keys = sorted(language.states)
-    atoms = len(split_atoms(keys[0])) * len(keys) if keys else 0
-    if len(keys) > _STATES_LISTED or atoms > _ATOMS_LISTED:
-        return 0
-    for key in keys:
-        tables.state(key)
-    return len(keys)
 
 
 def word_rows(

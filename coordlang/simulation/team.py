@@ -96,13 +96,9 @@ class Mission:
 
     def mixes(self, subplans: Mapping[str, Sequence[str | None]]) -> bool:
         """Say whether subplans of all robots, done in step, are an optimal plan of the task."""
-        model = self.task_language.model
-        numbers = [
-            [model.label_number(robot, text) for text in subplans[name]]
-            for robot, name in enumerate(self.robots)
-        ]
-        steps = [tuple(step) for step in zip(*numbers, strict=True)]
-        found = [step for step in steps if None not in step]
+        own = [subplans[name] for name in self.robots]
+        steps = [self.task_language.model.numbers(step) for step in zip(*own, strict=True)]
+        found = [step for step in steps if step is not None]
         return len(found) == self.steps and (
             self._plans.space.path_with(self._plans.start, found) is not None
         )

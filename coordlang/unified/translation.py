@@ -123,27 +123,23 @@ def translate(
 def _check_parameters(problem: Any, subactions: Subactions, concurrency: Concurrency) -> None:
     """Raise `UsageError` for subactions and formulas that no action of the problem can have."""
     agents = getattr(problem, "agents", ())
-    if subactions and agents:
+    if subactions if agents else concurrency:
+        given = "subactions, with" if agents else "concurrency, without"
         raise UsageError(
-            "subactions are given for a problem with agents: its actions are the agents' own",
-            remedy="Leave out subactions.",
-        )
-    if concurrency and not agents:
-        raise UsageError(
-            "concurrency is given for a problem without agents",
-            remedy="Write a MultiAgentProblem: its actions can speak of other agents' actions.",
+            f"a problem is given {given} agents",
+            remedy="Give concurrency where actions are agents' own, and subactions elsewhere.",
         )
     names = sorted({action.name for owner in agents or (problem,) for action in owner.actions})
     parameter = "concurrency" if agents else "subactions"
     example = '"(forall (?o - agent) (not (take ?o)))"' if agents else '{"r1": "(move ?a ?b)"}'
     for name, value in {**subactions, **concurrency}.items():
         if name not in names:
-            raise UsageError(
-                f"{parameter}: there is no action {name!r}",
-                remedy=f"The actions are {', '.join(names)}.",
-            )
-        if not isinstance(value, str if agents else Mapping):
-            raise UsageError(f"{parameter}: {value!r} for {name!r}", remedy=f"Write {example}.")
+            what, remedy = f"there is no action {name!r}", f"The actions are {', '.join(names)}."
+        elif not isinstance(value, str if agents else Mapping):
+            what, remedy = f"{value!r} for {name!r}", f"Write {example}."
+        else:
+            continue
+        raise UsageError(f"{parameter}: {what}", remedy=remedy)
 
 
 @dataclass(frozen=True, slots=True)
