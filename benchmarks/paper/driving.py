@@ -14,7 +14,7 @@ from coordlang.simulation.floor import floor_of
 from coordlang.simulation.record import RunRecord, WishRecord
 from coordlang.simulation.run import runs_of
 from coordlang.simulation.simulator import Settings
-from coordlang.simulation.team import Agreement, Mission, mission
+from coordlang.simulation.team import Agreement, Mission
 from coordlang.sites.coordinates import Point
 from planners.search.plans import Plan
 
@@ -29,7 +29,7 @@ class Said:
 
     def mission(self, agreement: Agreement) -> Mission:
         """Return the mission of robots that have agreed on the sentence, a plan, or nothing."""
-        return mission(self.used, agreement, self.words if agreement == "sentence" else ())
+        return Mission(self.used, agreement, self.words if agreement == "sentence" else ())
 
 
 def said_of(used: TaskLanguage, plan: Plan) -> Said:

@@ -18,9 +18,10 @@ from coordlang.commands.terminal import covered_code, echo, write
 from coordlang.execution.choices import choices as choices_under
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.exports.behaviour_tree import behaviour_trees
-from coordlang.exports.ltlf import SentenceFormula, export_ltlf
-from coordlang.exports.pddl import PddlExport, export_pddl, plan_names
-from coordlang.language.provenance import tolerance_data
+from coordlang.exports.ltlf import export_ltlf
+from coordlang.exports.pddl import PddlExport, plan_names
+from coordlang.language.tolerance import tolerance_data
+from planners.joint.model import JointModel
 from planners.search.plan_file import json_count, only_one_plan
 from planners.system.errors import BadInput, Position, Refuted
 from planners.system.files import read_text
@@ -151,8 +152,8 @@ def export(files: Arguments, options: ExportOptions) -> Any:
     words = used.words_of(said)
     if options.to == "pddl":
         strips_only = options.for_planner == "pyperplan"
-        exported = export_pddl(used, words, options.max_actions, strips_only=strips_only)
-        return extended(ExportedTask, exported, used, SentencePlans(used, words))
+        exported = PddlExport(used, words, options.max_actions, strips_only=strips_only)
+        return ExportedTask(used, SentencePlans(used, words), exported)
     if options.to == "bt":
         found = choices_under(used, words)
         counts = {used.model.robots[own.robot]: own.automaton.count for own in found.robots}

@@ -30,8 +30,8 @@ from coordlang.simulation.record import (
 from coordlang.simulation.recording import KINDS, recorded
 from coordlang.simulation.run import record_of, runs_of
 from coordlang.simulation.simulator import Settings, require_simulator
-from coordlang.simulation.team import Agreement, Mission, mission
-from planners.system.errors import UsageError, note
+from coordlang.simulation.team import Agreement, Mission
+from planners.system.errors import UsageError
 from planners.system.limits import reaching, run_until_stopped
 from planners.system.messages import echoed
 from planners.system.notebook import Presented, counted
@@ -163,7 +163,7 @@ def _prepared(used: TaskLanguage, options: SimulateOptions) -> Mission:
         words = used.words_of(options.sentence)
     elif agreement == "sentence":
         words = best_sentence(used, ["most-plans"]).words
-    return mission(used, agreement, words)
+    return Mission(used, agreement, words)
 
 
 def show_simulate(found: Simulated, options: SimulateOptions) -> int:

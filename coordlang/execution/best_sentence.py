@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
 
-from coordlang.execution.preferences import Memory, PlanPreference, Preference
+from coordlang.execution.preferences import PlanPreference, Preference
 from coordlang.execution.task_language import TaskLanguage
 from planners.system.errors import OutOfMemory
 from planners.system.limits import memory_left, more_memory
@@ -53,7 +54,7 @@ def best_sentence(
     Pedersen 2002 on hidden Markov models).  Raises `OutOfMemory` when the prefixes have more than
     ``most`` entries, or more than the memory holds.
     """
-    graph = _Graph.of(task_language, preferences)
+    graph = _Graph(task_language, preferences)
     start = _Prefix((graph.word[0],), {0: 1})
     queue = [(graph.bound(start), start.words, 0, start)]
     seen: set[object] = set()
@@ -97,7 +98,6 @@ class _Prefix:
     grades: tuple[tuple[int, int], ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
 class _Graph:
     """The task's plans as paths of *points*.
 
@@ -109,48 +109,50 @@ class _Graph:
     many plans from p can have one sentence with it, at most.
     """
 
-    preferences: tuple[Preference, ...]
-    following: list[list[tuple[int, int]]]
-    node: list[int]
-    word: list[int]
-    more: list[int]
-    grades: list[tuple[int, ...]]
-    open: list[dict[int, int]]
-
-    @classmethod
-    def of(cls, task_language: TaskLanguage, preferences: Sequence[Preference]) -> _Graph:
+    def __init__(self, task_language: TaskLanguage, preferences: Sequence[Preference]) -> None:
+        self.preferences = tuple(preferences)
         automata = [one for one in preferences if isinstance(one, PlanPreference)]
-        following, node, memories = _points(task_language, automata)
-        word = [int(task_language.word[n]) for n in node]
-        size = len(node)
-        graph = cls(tuple(preferences), following, node, word, [0] * size, [()] * size, [])
-        if "most-plans" in preferences:
-            graph.open.extend({} for _ in node)
-        for point in reversed(range(size)):
-            if following[point]:
-                graph._bound_by_followers(point)
+        space, first = task_language.space, task_language.start
+        points = [(first, tuple(one.start(int(space.state[first])) for one in automata))]
+        number = {points[0]: 0}
+        self.following: list[list[tuple[int, int]]] = []
+        for node, memories in points:  # grows while it is walked
+            after = Counter[int]()
+            for edge in space.out_edges(node):
+                target = space.target_of(edge)
+                labels, state = space.labels_of(edge) if automata else (), int(space.state[target])
+                steps = zip(automata, memories, strict=True)
+                there = target, tuple(one.step(memory, labels, state) for one, memory in steps)
+                if there not in number:
+                    number[there] = len(points)
+                    points.append(there)
+                after[number[there]] += 1
+            self.following.append(sorted(after.items()))
+        self.node = [node for node, _ in points]
+        self.word = [int(task_language.word[node]) for node in self.node]
+        self.more = [0] * len(points)
+        self.grades: list[tuple[int, ...]] = [()] * len(points)
+        self.open = [Counter[int]() for _ in points] if "most-plans" in preferences else []
+        for point in reversed(range(len(points))):
+            if self.following[point]:
+                self._bound_by_followers(point)
                 continue
-            graded = zip(automata, memories[point], strict=True)
-            graph.grades[point] = tuple(one.grade(memory) for one, memory in graded)
-            if graph.open:
-                graph.open[point][_END] = 1
-        return graph
+            graded = zip(automata, points[point][1], strict=True)
+            self.grades[point] = tuple(one.grade(memory) for one, memory in graded)
+            if self.open:
+                self.open[point][_END] = 1
 
     def _bound_by_followers(self, point: int) -> None:
         """The bounds at a point, from those of the points after it."""
         here, after = self.word[point], self.following[point]
         self.more[point] = min(self.more[q] + (self.word[q] != here) for q, _ in after)
         self.grades[point] = tuple(map(min, zip(*(self.grades[q] for q, _ in after), strict=True)))
-        if not self.open:
-            return
-        plans = self.open[point]
-        for q, number in after:
+        for q, number in after if self.open else ():
             if self.word[q] == here:
                 for word, count in self.open[q].items():
-                    plans[word] = plans.get(word, 0) + number * count
+                    self.open[point][word] += number * count
             else:
-                most = max(self.open[q].values())
-                plans[self.word[q]] = plans.get(self.word[q], 0) + number * most
+                self.open[point][self.word[q]] += number * max(self.open[q].values())
 
     def continuation(self, prefix: _Prefix) -> object:
         """What the continuations of a prefix and their values depend on."""
@@ -160,8 +162,8 @@ class _Graph:
     def extensions(self, prefix: _Prefix) -> list[_Prefix]:
         """The prefixes with one word more, and the whole sentence if some plan ends here."""
         word = prefix.words[-1]
-        inside, todo = dict(prefix.counts), list(prefix.counts)
-        further: dict[int, dict[int, int]] = {}
+        inside, todo = Counter(prefix.counts), list(prefix.counts)
+        further: dict[int, Counter[int]] = defaultdict(Counter)
         ended: dict[int, int] = {}
         heapify(todo)
         while todo:
@@ -171,8 +173,8 @@ class _Graph:
             for q, number in self.following[point]:
                 if self.word[q] == word and q not in inside:
                     heappush(todo, q)
-                counts = inside if self.word[q] == word else further.setdefault(self.word[q], {})
-                counts[q] = counts.get(q, 0) + inside[point] * number
+                counts = inside if self.word[q] == word else further[self.word[q]]
+                counts[q] += inside[point] * number
         found = [_Prefix((*prefix.words, w), counts) for w, counts in further.items()]
         if ended:
             columns = zip(*(self.grades[p] for p in ended), strict=True)
@@ -193,16 +195,13 @@ class _Graph:
         length, plans, grades = len(prefix.words), prefix.plans, prefix.grades
         if plans is None:
             length += min(self.more[p] for p in prefix.counts)
-            plans = self._most_plans(prefix) if self.open else 0
+            most = Counter[int]()
+            for point, count in prefix.counts.items() if self.open else ():
+                for word, number in self.open[point].items():
+                    most[word] += count * number
+            plans = max(most.values(), default=0)
             grades = self._best_grades(prefix)
         return (*self.values(length, plans, grades), length)
-
-    def _most_plans(self, prefix: _Prefix) -> int:
-        total: dict[int, int] = {}
-        for point, count in prefix.counts.items():
-            for word, plans in self.open[point].items():
-                total[word] = total.get(word, 0) + count * plans
-        return max(total.values())
 
     def _best_grades(self, prefix: _Prefix) -> tuple[tuple[int, int], ...]:
         """The (worst, best) grades at least.
@@ -216,29 +215,3 @@ class _Graph:
         of_node = [tuple(map(max, zip(*grades, strict=True))) for grades in by_node.values()]
         worst = map(min, zip(*of_node, strict=True))
         return tuple(zip(worst, best, strict=True))
-
-
-def _points(
-    task_language: TaskLanguage, automata: Sequence[PlanPreference]
-) -> tuple[list[list[tuple[int, int]]], list[int], list[tuple[Memory, ...]]]:
-    """The points that plans pass, layer by layer.
-
-    What follows each of them, its node, its memories.
-    """
-    space, node = task_language.space, task_language.start
-    start = node, tuple(one.start(int(space.state[node])) for one in automata)
-    number = {start: 0}
-    points, following = [start], []
-    for node, memories in points:  # grows while it is walked
-        after: dict[int, int] = {}
-        for edge in space.out_edges(node):
-            target = space.target_of(edge)
-            labels, state = space.labels_of(edge) if automata else (), int(space.state[target])
-            steps = zip(automata, memories, strict=True)
-            there = target, tuple(one.step(memory, labels, state) for one, memory in steps)
-            if there not in number:
-                number[there] = len(points)
-                points.append(there)
-            after[number[there]] = after.get(number[there], 0) + 1
-        following.append(sorted(after.items()))
-    return following, [node for node, _ in points], [memories for _, memories in points]

@@ -31,7 +31,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 from coordlang.execution.guided_search import plan_under_sentence
@@ -58,23 +58,56 @@ from planners.system.messages import echoed
 RobotLabel = tuple[int, int]
 
 
-@dataclass(frozen=True, slots=True)
 class PddlExport:
-    """A task under a sentence for other planners.
+    """A task under a sentence as PDDL; its optimal plans are exactly those of the sentence.
 
     ``classical`` is the task as data, ``domain`` and ``problem`` the same as PDDL text, ``cost``
-    the total cost of an optimal plan.  ``labels`` are for each action, by its name in the PDDL, the
+    the total cost of an optimal plan; ``classical.cost`` of it is that of the joint plan,
+    (makespan, second component).  ``labels`` are for each action, by its name in the PDDL, the
     labels that robots take in it: all robots (explicit form), one, or none (bookkeeping).  So many
     ``terms`` tell which word a state belongs to.
+
+    Up to ``limit`` plain actions every joint action is written as one; beyond, robots choose one
+    after another (see `planners.classical.compile_classical`).  With ``strips_only`` there are
+    neither negative conditions nor costs: then the plans with the fewest actions are those of the
+    sentence.
+
+    Raises `NoPlanFits`, and `UsageError` under ``strips_only`` where actions without costs do not
+    count joint steps; with slack, for words that see it, and where more than joint steps counts.
     """
 
-    model: JointModel
-    classical: ClassicalTask
-    domain: str
-    problem: str
-    labels: dict[str, tuple[RobotLabel, ...]]
-    cost: int
-    terms: int
+    def __init__(
+        self,
+        task_language: TaskLanguage,
+        words: Sequence[int],
+        limit: int = 2000,
+        *,
+        strips_only: bool = False,
+    ) -> None:
+        _require_slack_told(task_language.model)
+        space, model = task_language.plans_with(words), task_language.model
+        self.model = model
+        makespan, second = space.cost_of(0)
+        steps = makespan if model.slack else None
+        if model.slack:
+            makespan, second = plan_under_sentence(task_language, words).cost
+        start = space.starts[0]
+        task = PlanningTask("task", space.rows[space.state[start]], space.goals[space.goal[start]])
+        plain = compile_classical(model, task, limit, longest=max(1, steps or makespan))
+        labels = [_labels(model, plain, action) for action in plain.actions]
+        tests = exclusive_terms(task_language)
+        named = _Naming(task_language, words, plain, tests, steps).task(labels)
+        labels += [()] * (len(named.actions) - len(labels))
+        if strips_only:
+            _require_steps_counted(plain, model)
+            named = with_positive_conditions(named)
+        else:
+            named = with_positive_goal(named)
+        self.domain, self.problem = to_pddl(named, costs=not strips_only)
+        self.classical = named
+        self.labels = dict(zip(action_names(named), labels, strict=True))
+        self.cost = plain.step_cost * makespan + second
+        self.terms = sum(map(len, tests))
 
     def joint_plan(self, names: Sequence[str]) -> Plan:
         """The joint plan that a plan of the exported problem stands for, given by its actions.
@@ -105,54 +138,6 @@ class PddlExport:
                         remedy="Give the whole plan that the planner wrote.",
                     )
         return tuple(tuple(step[robot] for robot in robots) for step in plan)
-
-
-def export_pddl(
-    task_language: TaskLanguage,
-    words: Sequence[int],
-    limit: int = 2000,
-    *,
-    strips_only: bool = False,
-) -> PddlExport:
-    """Write the task under a sentence as PDDL; its optimal plans are exactly those of the sentence.
-
-    ``classical.cost`` of a plan's total cost is that of the joint plan, (makespan, second
-    component). Up to ``limit`` plain actions every joint action is written as one; beyond, robots
-    choose one after another (see `planners.classical.compile_classical`).  With ``strips_only``
-    there are neither negative conditions nor costs: then the plans with the fewest actions are
-    those of the sentence.
-
-    Raises `NoPlanFits`, and `UsageError` under ``strips_only`` where actions without costs do not
-    count joint steps; with slack, for words that see it, and where more than joint steps counts.
-    """
-    _require_slack_told(task_language.model)
-    space, model = task_language.plans_with(words), task_language.model
-    makespan, second = space.cost_of(0)
-    steps = makespan if model.slack else None
-    if model.slack:
-        makespan, second = plan_under_sentence(task_language, words).cost
-    start = space.starts[0]
-    task = PlanningTask("task", space.rows[space.state[start]], space.goals[space.goal[start]])
-    plain = compile_classical(model, task, limit, longest=max(1, steps or makespan))
-    labels = [_labels(model, plain, action) for action in plain.actions]
-    tests = exclusive_terms(task_language)
-    named = _Naming(task_language, words, plain, tests, steps).task(labels)
-    labels += [()] * (len(named.actions) - len(labels))
-    if strips_only:
-        _require_steps_counted(plain, model)
-        named = with_positive_conditions(named)
-    else:
-        named = with_positive_goal(named)
-    domain, problem = to_pddl(named, costs=not strips_only)
-    return PddlExport(
-        model=model,
-        classical=named,
-        domain=domain,
-        problem=problem,
-        labels=dict(zip(action_names(named), labels, strict=True)),
-        cost=plain.step_cost * makespan + second,
-        terms=sum(map(len, tests)),
-    )
 
 
 def _require_slack_told(model: JointModel) -> None:

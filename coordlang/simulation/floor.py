@@ -155,32 +155,22 @@ def _walls(
     return tuple(sorted(found))
 
 
-@dataclass(slots=True)
 class Human:
-    """A human in a place, or walking from ``before`` to ``place``, and then on."""
+    """A human in a place, or walking from ``before`` to ``place``, and then on.
 
-    place: str
-    before: str
-    walks: bool
-    _floor: Floor
-    _ways: Mapping[str, Sequence[str]]
-    _cell: float
-    _random: Random
+    ``wanted`` is a place, ``random`` or ``walking``; where no robot starts or ends, unless it is
+    named.  Raises `UsageError` if there is no such place, a robot starts there, or none is left.
+    """
 
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         wanted: str,
         floor: Floor,
         starts: Collection[str],
         goals: Collection[str],
         cell: float,
         random: Random,
-    ) -> Human:
-        """Put a human on the floor; where no robot starts or ends, unless the place is named.
-
-        Raises `UsageError` if there is no such place, a robot starts there, or none is left.
-        """
+    ) -> None:
         free = sorted(set(floor.points) - {*starts, *goals})
         named = wanted not in (_STANDING_SOMEWHERE, _WALKING)
         if named and (wanted in starts or wanted not in floor.points):
@@ -195,12 +185,13 @@ class Human:
                 "there is no place for a human: robots start or end in all of them",
                 remedy="Leave out --human.",
             )
-        place = wanted if named else random.choice(free)
-        ways: dict[str, list[str]] = {name: [] for name in floor.points}
+        self.place = self.before = wanted if named else random.choice(free)
+        self.walks = wanted == _WALKING
+        self._floor, self._cell, self._random = floor, cell, random
+        self._ways: dict[str, list[str]] = {name: [] for name in floor.points}
         for one, other in floor.links:
-            ways[one].append(other)
-            ways[other].append(one)
-        return cls(place, place, wanted == _WALKING, floor, ways, cell, random)
+            self._ways[one].append(other)
+            self._ways[other].append(one)
 
     def velocity(self, at: Point, robots: Sequence[Point], clearance: float) -> tuple[float, float]:
         """Return how the human walks, in metres a second to the right and up.

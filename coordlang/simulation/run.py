@@ -127,7 +127,7 @@ class _Going:
         if settings.human is not None:
             ends = list(mission.starts.values()), list(mission.goals.values())
             drawn = Random(f"{seed} human")
-            self.human = Human.of(settings.human, floor, *ends, settings.cell, drawn)
+            self.human = Human(settings.human, floor, *ends, settings.cell, drawn)
         poses = {
             name: (
                 *floor.points[place],

@@ -8,7 +8,6 @@ sentence.  For comparison all robots follow one whole plan, or each an optimal p
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from random import Random
 from typing import Literal, NamedTuple
@@ -38,7 +37,6 @@ class Equipment(NamedTuple):
     words: OwnWords | None
 
 
-@dataclass(frozen=True, slots=True)
 class Mission:
     """A task, what the robots have agreed on, and where they are.
 
@@ -46,18 +44,38 @@ class Mission:
     place of each robot at the start and at the end of the plans (where they differ, of the first
     one), ``leads`` for each robot the place that each of its subactions leads to.  Plans have so
     many ``steps``.
+
+    Raises `NoPlanFits` if no optimal plan has the sentence, `BadInput` if no atom says where a
+    robot is.
     """
 
-    task_language: TaskLanguage
-    agreement: Agreement
-    sentence: tuple[int, ...]
-    world: World
-    starts: Mapping[str, str]
-    goals: Mapping[str, str]
-    leads: Mapping[str, Mapping[str, str]]
-    steps: int
-    _plans: Plans
-    _given: Mapping[str, Equipment]
+    def __init__(
+        self, task_language: TaskLanguage, agreement: Agreement, sentence: Sequence[int] = ()
+    ) -> None:
+        self.task_language, self.agreement = task_language, agreement
+        self.sentence = tuple(sentence)
+        model, space = task_language.model, task_language.space
+        path = space.nodes_on(task_language.start, space.first_path(task_language.start))
+        states = [model.codec.decode(space.rows[space.state[node]]) for node in path]
+        self.world = find_world(model, states)
+        self.starts, self.goals = (_robots_in(self.world, model.robots, states[k]) for k in (0, -1))
+        if lost := [name for name in model.robots if name not in self.starts]:
+            raise BadInput(
+                f"no atom says where {' and '.join(lost)} {'is' if len(lost) == 1 else 'are'} at "
+                "the start",
+                remedy="Simulate a domain whose robots move from place to place.",
+            )
+        _note_what_is_left_out(self.world, model.robots, space)
+        numbered = enumerate(model.robots)
+        self.leads = {name: _leads(self.world, space, robot) for robot, name in numbered}
+        self.steps = space.cost_of(task_language.task)[0]
+        self._plans = Plans.of(space, task_language.task)
+        self._given: dict[str, Equipment] = {}
+        if agreement == "sentence":
+            found = choices(task_language, sentence)
+            for robot, name in enumerate(model.robots):
+                words = own_words(found.fits, task_language, robot)
+                self._given[name] = Equipment(monitor(found, name), words)
 
     @property
     def robots(self) -> tuple[str, ...]:
@@ -122,41 +140,6 @@ class Mission:
         return self._plans.unrank(Random(seed).randrange(self._plans.count))
 
 
-def mission(
-    task_language: TaskLanguage, agreement: Agreement, sentence: Sequence[int] = ()
-) -> Mission:
-    """Prepare the robots for runs of a task.
-
-    Raises `NoPlanFits` if no optimal plan has the sentence, `BadInput` if no atom says where a
-    robot is.
-    """
-    model, space = task_language.model, task_language.space
-    plans = Plans.of(space, task_language.task)
-    path = space.nodes_on(task_language.start, space.first_path(task_language.start))
-    states = [model.codec.decode(space.rows[space.state[node]]) for node in path]
-    world = find_world(model, states)
-    starts = _starts(world, model.robots, states[0])
-    _note_what_is_left_out(world, model.robots, space)
-    given: dict[str, Equipment] = {}
-    if agreement == "sentence":
-        found = choices(task_language, sentence)
-        for robot, name in enumerate(model.robots):
-            words = own_words(found.fits, task_language, robot)
-            given[name] = Equipment(monitor(found, name), words)
-    return Mission(
-        task_language,
-        agreement,
-        tuple(sentence),
-        world,
-        starts,
-        _robots_in(world, model.robots, states[-1]),
-        {name: _leads(world, space, robot) for robot, name in enumerate(model.robots)},
-        space.cost_of(task_language.task)[0],
-        plans,
-        given,
-    )
-
-
 def own_words(fits: PlanSpace, task_language: TaskLanguage, robot: int) -> OwnWords:
     """How far in the sentence a robot may be after each of its own beginnings."""
     word = task_language.partition.word_of(fits.rows)[fits.state]
@@ -168,18 +151,6 @@ def own_words(fits: PlanSpace, task_language: TaskLanguage, robot: int) -> OwnWo
         {text(label) or IDLE: to for label, to in found.moves(state)} for state in range(len(found))
     ]
     return OwnWords(moves, [known.possible.bit_length() for known in found.known])
-
-
-def _starts(world: World, robots: Sequence[str], state: Sequence[str]) -> dict[str, str]:
-    located = _robots_in(world, robots, state)
-    lost = [name for name in robots if name not in located]
-    if lost:
-        raise BadInput(
-            f"no atom says where {' and '.join(lost)} {'is' if len(lost) == 1 else 'are'} at the "
-            "start",
-            remedy="Simulate a domain whose robots move from place to place.",
-        )
-    return located
 
 
 def _note_what_is_left_out(world: World, robots: Sequence[str], space: PlanSpace) -> None:

@@ -12,7 +12,7 @@ from coordlang.simulation.floor import Floor, floor_of
 from coordlang.simulation.record import RunRecord, SimulationRecord, WishRecord
 from coordlang.simulation.run import record_of, runs_of
 from coordlang.simulation.simulator import Settings
-from coordlang.simulation.team import Agreement, Mission, mission
+from coordlang.simulation.team import Agreement, Mission
 from tests.support.domains import own_task, read
 
 
@@ -30,7 +30,7 @@ def mission_of(
     """A mission in a shipped problem; a sentence is the one that leaves most plans open."""
     used = language_of_task(folder, stem, method)
     words = best_sentence(used, ["most-plans"]).words if agreement == "sentence" else ()
-    return mission(used, agreement, words)
+    return Mission(used, agreement, words)
 
 
 def floor_for(of: Mission, settings: Settings | None = None) -> Floor:

@@ -22,7 +22,7 @@ from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
 from coordlang.explanation.words import Conjunction
 from coordlang.exports.ltlf import export_ltlf, symbols_of
 from coordlang.exports.membership import exclusive_terms, short_terms
-from coordlang.exports.pddl import PddlExport, export_pddl, plan_names
+from coordlang.exports.pddl import PddlExport, plan_names
 from coordlang.language.sentences import sentence
 from planners.classical import ClassicalTask, action_names
 from planners.joint.model import show
@@ -88,7 +88,7 @@ def test_the_optimal_plans_are_the_plans_that_fit(lot: str) -> None:
     for task_language in tasks(lot):
         for words, plans in islice(by_sentence(task_language).items(), 4):
             for form, limit in FORMS.items():
-                exported = export_pddl(task_language, words, limit)
+                exported = PddlExport(task_language, words, limit)
                 assert exported.classical.form == form
                 assert Counter(planned(exported)) == Counter(plans)
                 assert optimal_plans(exported.classical).cost == exported.cost
@@ -230,7 +230,7 @@ def test_plan_files_of_other_planners() -> None:
 
 
 def test_a_plan_that_is_cut_off_or_none() -> None:
-    exported = export_pddl(rich(), max(by_sentence(rich()), key=len), 0)
+    exported = PddlExport(rich(), max(by_sentence(rich()), key=len), 0)
     names = action_names(exported.classical)
     plan = [names[n] for n in next(iter(optimal_plans(exported.classical)))]
     whole = exported.joint_plan([name.upper() for name in plan])
@@ -282,7 +282,7 @@ def test_every_plan_within_slack_has_the_sentence(folder: str, slack: int) -> No
         least = {plan: len(of_task.without_rest(plan)) for plan in plans}
         wanted = {plan[:n] for plan in plans for n in range(least[plan], len(plan) + 1)}
         for limit in FORMS.values():
-            exported = export_pddl(task_language, words, limit)
+            exported = PddlExport(task_language, words, limit)
             assert Counter(planned(exported, every_plan(exported.classical))) == Counter(wanted)
             assert exported.cost == min(map(len, wanted))
 
@@ -295,9 +295,9 @@ def test_the_formula_within_slack() -> None:
 
 def test_slack_that_pddl_cannot_say_is_refused() -> None:
     seen = within_slack("three-cells", 1, 1, words_see_slack=True)
-    for export in (export_pddl, export_ltlf):
+    for export in (PddlExport, export_ltlf):
         with pytest.raises(UsageError, match="see how much is left of the slack"):
             export(seen, [0])
     dear = within_slack("three-cells", 1, 1, cost="makespan+actions")
     with pytest.raises(UsageError, match="counts the joint steps"):
-        export_pddl(dear, [0])
+        PddlExport(dear, [0])

@@ -61,7 +61,7 @@ def test_under_a_whole_plan_a_detour_can_be_had_only_if_it_is_on_it() -> None:
 
 def test_a_walker_goes_along_links_and_turns_back_before_robots() -> None:
     floor = floor_for(mission_of("corridor"))
-    human = Human.of("walking", floor, (), (), 1.0, Random(4))
+    human = Human("walking", floor, (), (), 1.0, Random(4))
     at = floor.points[human.place]
     seen = set()
     for _ in range(2000):
@@ -81,7 +81,7 @@ def test_a_walker_goes_along_links_and_turns_back_before_robots() -> None:
 def test_a_human_needs_a_place_that_there_is_and_that_is_free() -> None:
     floor = floor_for(mission_of("t-map"))
     every = sorted(floor.points)
-    assert Human.of("random", floor, every[1:], (), 1.0, Random(0)).place == "c0-1"
+    assert Human("random", floor, every[1:], (), 1.0, Random(0)).place == "c0-1"
     for place, starts, goals, said in (
         ("nowhere", [], [], "there is no such place"),
         ("c9-9", [], [], "there is no such place"),
@@ -89,4 +89,4 @@ def test_a_human_needs_a_place_that_there_is_and_that_is_free() -> None:
         ("c1-1", ["c1-1"], [], "a robot starts in this place"),
     ):
         with pytest.raises(UsageError, match=said):
-            Human.of(place, floor, starts, goals, 1.0, Random(0))
+            Human(place, floor, starts, goals, 1.0, Random(0))
