@@ -10,7 +10,7 @@ from typing import Any
 from benchmarks.paper.task_choices import sentence_of
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.sentences import Sentence
-from coordlang.simulation.floor import floor_of
+from coordlang.simulation.floor import Floor
 from coordlang.simulation.record import RunRecord, WishRecord
 from coordlang.simulation.run import runs_of
 from coordlang.simulation.simulator import Settings
@@ -45,7 +45,7 @@ def drive(
     wishes: Sequence[WishRecord] = (),
 ) -> RunRecord:
     """Let robots do a mission once; ``known`` are coordinates that names do not say."""
-    floor = floor_of(prepared.world, known or {}, how.cell)
+    floor = Floor(prepared.world, known or {}, how.cell)
     [found] = runs_of(prepared, floor, how, 1, seed, wishes)
     return found
 

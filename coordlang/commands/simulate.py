@@ -18,8 +18,8 @@ from coordlang.commands.records import SimulateOptions
 from coordlang.commands.terminal import covered_code, echo, ended_early, working
 from coordlang.execution.best_sentence import best_sentence
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.language.provenance import Tolerance
-from coordlang.simulation.floor import floor_of
+from coordlang.language.tolerance import Tolerance
+from coordlang.simulation.floor import Floor
 from coordlang.simulation.record import (
     RunRecord,
     SimulationRecord,
@@ -129,7 +129,7 @@ def simulate(files: Arguments, options: SimulateOptions) -> Simulated:
     task = files.task(options.coordinates)
     prepared = _prepared(task.used, options)
     points = read_coordinates_of(options.coordinates, task.files.problems[0])
-    floor = floor_of(prepared.world, points, options.cell)
+    floor = Floor(prepared.world, points, options.cell)
     wishes = [_wish(prepared, text) for text in options.visit]
     done: list[RunRecord] = []
 

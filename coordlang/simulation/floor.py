@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import count
 from random import Random
 
@@ -36,13 +35,25 @@ _SPEED = 0.5
 _REACHED = 0.05
 
 
-@dataclass(frozen=True, slots=True)
 class Floor:
-    """Where places and walls are, and the pairs of places between which something moves."""
+    """Where the places and walls of a world are, and the pairs of places that moves link.
 
-    points: Mapping[str, Point]
-    walls: tuple[Wall, ...]
-    links: tuple[tuple[str, str], ...]
+    ``known`` are coordinates of places, x to the right and y down, as a file of coordinates has
+    them; where they are not all known, the names of the places have to say them (``c2-3``).
+    ``cell`` is the length of one unit of them in metres.  Raises `BadInput` if the coordinates are
+    not known.
+    """
+
+    def __init__(self, world: World, known: Mapping[str, Point], cell: float) -> None:
+        links = tuple(sorted({link.ends for link in world.links}))
+        points = _points(world.places, links, known)
+        top = max((y for _, y in points.values()), default=0.0)
+        left = min((x for x, _ in points.values()), default=0.0)
+        self.points: dict[str, Point] = {
+            name: ((x - left) * cell, (top - y) * cell) for name, (x, y) in points.items()
+        }
+        self.walls = _walls(points, links, cell)
+        self.links = tuple(link.ends for link in world.links if link.moves)
 
     @property
     def lengths(self) -> list[float]:
@@ -58,23 +69,6 @@ class Floor:
     def shortest(self) -> float:
         """The length of the shortest link, in metres; infinite without links."""
         return min(self.lengths, default=math.inf)
-
-
-def floor_of(world: World, known: Mapping[str, Point], cell: float) -> Floor:
-    """Lay the places of a world out on a floor.
-
-    ``known`` are coordinates of places, x to the right and y down, as a file of coordinates has
-    them; where they are not all known, the names of the places have to say them (``c2-3``).
-    ``cell`` is the length of one unit of them in metres.  Raises `BadInput` if the coordinates are
-    not known.
-    """
-    links = tuple(sorted({link.ends for link in world.links}))
-    points = _points(world.places, links, known)
-    top = max((y for _, y in points.values()), default=0.0)
-    left = min((x for x, _ in points.values()), default=0.0)
-    metres = {name: ((x - left) * cell, (top - y) * cell) for name, (x, y) in points.items()}
-    moves = tuple(link.ends for link in world.links if link.moves)
-    return Floor(metres, _walls(points, links, cell), moves)
 
 
 def require_room(floor: Floor, radius: float) -> None:

@@ -8,8 +8,8 @@ from functools import cache
 from coordlang.commands.building import build_language
 from coordlang.execution.best_sentence import best_sentence
 from coordlang.execution.task_language import TaskLanguage, language_in_task
-from coordlang.simulation.floor import Floor, floor_of
-from coordlang.simulation.record import RunRecord, SimulationRecord, WishRecord
+from coordlang.simulation.floor import Floor
+from coordlang.simulation.record import SimulationRecord
 from coordlang.simulation.run import record_of, runs_of
 from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Agreement, Mission
@@ -34,7 +34,7 @@ def mission_of(
 
 
 def floor_for(of: Mission, settings: Settings | None = None) -> Floor:
-    return floor_of(of.world, {}, (settings or Settings()).cell)
+    return Floor(of.world, {}, (settings or Settings()).cell)
 
 
 def recorded(
