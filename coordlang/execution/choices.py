@@ -1,14 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A robot's choices: exactly the subplans that it may follow under a sentence.
+"""A robot's choices: exactly the subplans that it may follow, whatever the others choose.
 
-Whatever the others choose from theirs.
-
-The optimal plans with one sentence are RC-free, so every combination of one own subplan for each
-robot is an optimal plan. Robot i's subplans are therefore the own parts of those plans, no more and
-no fewer.
-
-Choices files have them as JSON (docs/formats.md).  `coordlang.execution.monitor` reads these
-without this module, because a robot may have Python's standard library only.
+The optimal plans with one sentence are RC-free, so a robot's subplans are its parts of those plans,
+no more and no fewer.  Choices files have them as JSON (docs/formats.md), which
+`coordlang.execution.monitor` reads with Python's standard library only.
 """
 
 from __future__ import annotations

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every combination of the robots' choices, walked.
-
-Are they all optimal, and in which states can they be?
+"""Every combination of the robots' choices, walked: whether all are optimal, and the states in them.
 
 A direct proof, from the definition, for one task and one sentence: nodes are ``(a_1 .. a_n, y)``,
 the state of each robot's automaton and the plan-space node that all of them together have reached.
@@ -33,9 +31,8 @@ SMALL = 1 << 24
 class Mixtures:
     """What the robots can do together when each takes its choices as it likes.
 
-    ``space``: all of it, again as a plan space of one task, its nodes being ``(a_1 .. a_n, y)``;
-    None if some combination is no optimal plan, and then ``witness`` shows one.  ``nodes`` counts
-    what was walked.
+    ``space``: all of it, as a plan space of one task; None if some combination is no optimal plan,
+    and then ``witness`` shows one.  ``nodes`` counts what was walked.
     """
 
     space: PlanSpace | None
@@ -58,10 +55,8 @@ def walk_mixtures(
     """Walk all combinations of the robots' subplans in the task's optimal plans, layer by layer.
 
     At most (product of the automata's layers) * (layer of the plan space) nodes.  ``automata`` are
-    the robots' subplans in ``fits``, the plans with the sentence ``words``.
-
-    Raises `OutOfMemory`, with an estimate, before the joint moves fill the memory, or beyond
-    ``most`` of them.
+    the robots' subplans in ``fits``, the plans with the sentence ``words``.  Raises `OutOfMemory`,
+    with an estimate, before the joint moves fill the memory, or beyond ``most`` of them.
     """
     space = task_language.space
     index = EdgeIndex.of(space)

@@ -1,14 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A robot's choices at run time.
+"""A robot's choices at run time: what it may do next, and which detours are still possible.
 
-What may it do next, and are the detours that it wants still possible?
-
-This file needs Python's standard library and nothing else, so that a robot can carry it: copy it
-beside a choices file (docs/formats.md), which ``coordlang choices --format json`` writes.  Neither
-PDDL nor a planner is needed then.
+This file needs Python's standard library and nothing else, neither PDDL nor a planner: copy it
+beside a choices file (docs/formats.md), which ``coordlang choices --format json`` writes.
 
 A `Subplans` holds what is open under the sentence; `Monitor` is where the robot is in it.  All
-checks and all larger pieces of work are done when the file is read, and in `Monitor.can` and
+checks and larger pieces of work are done when the file is read, and in `Monitor.can` and
 `Monitor.commit`.  What a robot calls in every step takes the same time and memory however many
 steps were done before, opens no file and imports nothing.
 """
@@ -100,11 +97,9 @@ class Detour:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Whether a detour is still possible.
+    """Whether a detour is still possible; true in a condition iff it is.
 
     ``subplan`` is one way to do it (the first in order), ``subplans`` their number.
-
-    True in a condition iff it is possible.
     """
 
     subplan: tuple[str | None, ...] | None
@@ -292,13 +287,10 @@ class Monitor:
 
     @classmethod
     def read(cls, path: str, robot: str | None = None, *, max_bytes: int = MAX_BYTES) -> Monitor:
-        """The monitor of a choices file (compressed or not).
+        """The monitor of a choices file, compressed or not, of at most ``max_bytes`` bytes.
 
-        A file that holds more than ``max_bytes`` bytes, or more when it is decompressed, is
-        refused.
-
-        Raises `MonitorError` for a file that is no choices file, whatever it is; `OSError` where it
-        cannot be opened or read.
+        Raises `MonitorError` for a larger one and for a file that is no choices file, whatever it
+        is; `OSError` where it cannot be opened or read.
         """
         try:
             return cls(_parsed(path, max_bytes), robot)
@@ -361,15 +353,10 @@ class Monitor:
         return self._knowledge.value(self._open.state[self._here], text)
 
     def can(self, detour: Detour | None = None, /, **wanted: Texts) -> Answer:
-        """Whether all this can still be had at once, promises kept.
+        """Whether all this can still be had at once, promises kept: ``can(visit="(at r1 c)")``.
 
-        ``can(visit="(at r1 c)", never="idle")``; see `Detour`.
-
-        O(automaton * 2^(visits and dos)), of the automaton's steps that are still to be done; more
-        than `MAX_NODES` nodes are not explored.  (With any number of visits the question is
-        NP-complete.)
-
-        Raises `MonitorError` beyond that: ask for fewer at once.
+        O(automaton * 2^(visits and dos)), of the steps still to be done.  (With any number of
+        visits the question is NP-complete.)  Raises `MonitorError` beyond `MAX_NODES` nodes.
         """
         found = self._making((detour or Detour()) & Detour.of(**wanted))
         return Answer(None, 0) if found is None else Answer(found.first(), found.left[0])
@@ -377,9 +364,7 @@ class Monitor:
     def commit(self, detour: Detour | None = None, /, **wanted: Texts) -> None:
         """Promise it: from now on only what keeps the promise is allowed.
 
-        As much work as `can`; the steps after it are as fast as those before.
-
-        Raises `NotPossible`, and is then as it was before.
+        As much work as `can`.  Raises `NotPossible`, and is then as it was before.
         """
         promise = (detour or Detour()) & Detour.of(**wanted)
         found = self._making(promise)

@@ -59,11 +59,10 @@ def read_preference(task_language: TaskLanguage, text: str) -> Preference:
 def goes_first(model: JointModel, robot: str) -> PlanPreference:
     """The preference that a robot goes first.
 
-    A robot *acts* in a step if it does not idle.  Robot r goes before robot q in a plan if, in the
-    first step in which one of the two acts and the other one does not, it is r that acts.  Grades:
-    0 if r goes before every other robot, 2 if some other robot goes before r, else 1.
-
-    Raises `UsageError` for a robot that the model does not have.
+    Robot r goes before robot q if, in the first step in which one of the two *acts* (does not idle)
+    and the other one does not, it is r that acts.  Grades: 0 if r goes before every other robot, 2
+    if some other robot goes before r, else 1.  Raises `UsageError` for a robot that the model does
+    not have.
     """
     own = model.robot_number(robot)
     if own is None:
@@ -105,8 +104,21 @@ def avoids(task_language: TaskLanguage, atoms: str) -> PlanPreference:
         raise UsageError(
             "--prefer avoid: expected atoms", remedy='As in --prefer avoid:"(at r1 c1-1)".'
         )
-    facts, never = _facts_of(task_language, wanted)
-    codec = task_language.model.codec
+    model = task_language.model
+    facts, never, codec = [], [], model.codec
+    for text in wanted:  # what is always true is left out
+        predicate, *args = text[1:-1].split(" ")
+        number = codec.facts.number_of(text)
+        if number is not None:
+            facts.append(number)
+        elif not _is_declared(task_language, predicate, args):
+            raise UsageError(
+                f"--prefer avoid:{text}: this is no atom of the problem",
+                remedy="Write a predicate of the domain with objects of the problem, as in "
+                f"{next(iter(codec.facts.texts), '(at r1 c1-1)')}.",
+            )
+        elif Atom(predicate, tuple(args)) not in model.statics:
+            never.append(text)
     states = codec.facts_part(task_language.space.rows)
     mask = codec.mask(facts)
     hit: list[int] = ((states & mask) == mask).all(axis=1).astype(int).tolist()
@@ -122,30 +134,6 @@ def avoids(task_language: TaskLanguage, atoms: str) -> PlanPreference:
         lambda memory: memory[0],
         grades,
     )
-
-
-def _facts_of(task_language: TaskLanguage, texts: Sequence[str]) -> tuple[list[int], list[str]]:
-    """The numbers of the atoms that can change, and those that can never be true.
-
-    Left out is what is always true.  Raises `UsageError` for what is no atom of the problem.
-    """
-    model = task_language.model
-    facts, never = [], []
-    for text in texts:
-        predicate, *args = text[1:-1].split(" ")
-        number = model.codec.facts.number_of(text)
-        if number is not None:
-            facts.append(number)
-        elif _is_declared(task_language, predicate, args):
-            if Atom(predicate, tuple(args)) not in model.statics:
-                never.append(text)
-        else:
-            raise UsageError(
-                f"--prefer avoid:{text}: this is no atom of the problem",
-                remedy="Write a predicate of the domain with objects of the problem, as in "
-                f"{next(iter(model.codec.facts.texts), '(at r1 c1-1)')}.",
-            )
-    return facts, never
 
 
 def _is_declared(task_language: TaskLanguage, predicate: str, args: Sequence[str]) -> bool:

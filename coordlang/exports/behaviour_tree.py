@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Each robot's choices under a sentence as a behaviour tree, in the XML of BehaviorTree.CPP 4.
 
-A tree for each robot, all in one file; a robot runs the one with its name.  It is a sequence of the
-joint steps.  In each of them it waits for the step to begin (``AwaitStep``), chooses one of the
-subactions that the robot's automaton allows (``Chooses``), checks that what the robot knows and the
-subaction needs does hold (``Holds``), and does it.  The automaton's state is an entry of the
-tree's blackboard, so that the tree is as large as the automaton and no larger, although a behaviour
-tree has no way back.  Its own nodes are those that BehaviorTree.CPP brings: ``Sequence``,
-``Fallback``, ``Script``, ``ScriptCondition``.
+A robot runs the tree with its name: a sequence of the joint steps.  In each of them it waits for
+the step to begin (``AwaitStep``), chooses one of the subactions that its automaton allows
+(``Chooses``), checks that what it knows and the subaction needs does hold (``Holds``), and does it.
+The automaton's state is an entry of the tree's blackboard, so that the tree is as large as the
+automaton and no larger, although a behaviour tree has no way back.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A sentence as a formula of linear temporal logic over finite traces.
 
-LTLf: De Giacomo and Vardi, *Linear temporal logic and linear dynamic logic on finite traces* (IJCAI
-2013).  The text is that of the Python packages flloat and ltlf2dfa, which most others read as well:
-``!``, ``&``, ``|``, ``U`` (until), ``G`` (always), and symbols of lower-case letters, digits and
-``_``.
+LTLf: De Giacomo and Vardi (IJCAI 2013).  The text is that of the Python packages flloat and
+ltlf2dfa, which most others read as well: ``!``, ``&``, ``|``, ``U`` (until), ``G`` (always), and
+symbols of lower-case letters, digits and ``_``.
 """
 
 from __future__ import annotations
@@ -28,9 +27,9 @@ class SentenceFormula:
     """A sentence in LTLf.
 
     ``formula`` is satisfied by the states of a plan exactly if the plan has the sentence, as long
-    as the plan passes through states that the language maps, or that lie on optimal plans of the
-    task.  ``over_words`` is the same formula with the words as symbols, and ``words`` has each
-    word's formula.  ``symbols``: symbol -> PDDL atom; symbols hold in a state as their atoms do.
+    as it passes through states that the language maps, or that lie on optimal plans of the task.
+    ``over_words`` is the same with the words as symbols, ``words`` has each word's formula,
+    ``symbols``: symbol -> PDDL atom.
     """
 
     formula: str

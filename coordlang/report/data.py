@@ -71,7 +71,9 @@ def page_data(
         tables.state(key)
     tasks = [task_data(shown, tables, seed) for shown in selection.tasks]
     states = [model.codec.decode(row) for row in tables.rows]
-    world = _drawn_world(model, states, most_places)
+    world = find_world(model, states)
+    if not 1 < len(world.places) <= most_places:  # no map: atoms are text
+        world = replace(world, places=(), links=(), roles={})
     facts = sorted({fact for state in states for fact in state})
     number = {fact: k for k, fact in enumerate(facts)}
     for task, shown in zip(tasks, selection.tasks, strict=True):
@@ -104,14 +106,6 @@ def page_data(
             "complete": selection.complete,
         },
     }
-
-
-def _drawn_world(model: JointModel, states: Sequence[Sequence[str]], most_places: int) -> World:
-    """What is drawn; without a map, where there are too few or too many places, atoms are text."""
-    world = find_world(model, states)
-    if 1 < len(world.places) <= most_places:
-        return world
-    return replace(world, places=(), links=(), roles={})
 
 
 def word_rows(

@@ -82,7 +82,11 @@ def graph_layout(number: int, links: Sequence[tuple[int, int]]) -> Floats:
         pos=dict(enumerate(_classical_scaling(lengths))),
     )
     drawn = np.array([found[node] for node in range(number)])
-    points = _upright(_to_scale(drawn, lengths), links)
+    # By least squares distances are the path lengths.
+    first, second = np.triu_indices(number, 1)
+    distance = np.linalg.norm(drawn[first] - drawn[second], axis=1) / lengths[first, second]
+    scaled = drawn * (distance.sum() / np.maximum((distance**2).sum(), 1e-12))
+    points = _upright(scaled, links)
     placed: Floats = np.round(points - points.min(axis=0), 3) + 0.0
     return placed
 
@@ -116,14 +120,6 @@ def _classical_scaling(lengths: Floats) -> Floats:
         if points[largest, axis] < 0:
             points[:, axis] *= -1
     return points + np.random.default_rng(0).normal(0, 1e-3, points.shape)
-
-
-def _to_scale(points: Floats, lengths: Floats) -> Floats:
-    """Scale points so that their distances are, by least squares, the path lengths."""
-    first, second = np.triu_indices(len(points), 1)
-    distance = np.linalg.norm(points[first] - points[second], axis=1) / lengths[first, second]
-    scaled: Floats = points * (distance.sum() / np.maximum((distance**2).sum(), 1e-12))
-    return scaled
 
 
 def _upright(points: Floats, links: Sequence[tuple[int, int]]) -> Floats:

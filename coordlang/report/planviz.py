@@ -83,7 +83,14 @@ def planviz(task_language: TaskLanguage, known: Mapping[str, Point] | None = Non
         ],
         "tasks": [[robot, *path[-1]] for robot, path in enumerate(paths)],
     }
-    return PlanVizFiles(json.dumps(data) + "\n", _map_text(set(cells.values())))
+    passable = set(cells.values())
+    height, width = (max(cell[k] for cell in passable) + 1 for k in (0, 1))
+    rows = [
+        "".join("." if (row, column) in passable else "@" for column in range(width))
+        for row in range(height)
+    ]
+    lines = ["type octile", f"height {height}", f"width {width}", "map", *rows]
+    return PlanVizFiles(json.dumps(data) + "\n", "\n".join(lines) + "\n")
 
 
 def _cells(world: World, known: Mapping[str, Point] | None) -> dict[str, Cell]:
@@ -96,13 +103,3 @@ def _cells(world: World, known: Mapping[str, Point] | None) -> dict[str, Cell]:
     left = min(x for x, _ in layout.points.values())
     top = min(y for _, y in layout.points.values())
     return {place: (int(y - top), int(x - left)) for place, (x, y) in layout.points.items()}
-
-
-def _map_text(cells: set[Cell]) -> str:
-    """A map in movingai format: ``.`` for each cell, ``@`` elsewhere."""
-    height, width = (max(cell[k] for cell in cells) + 1 for k in (0, 1))
-    rows = [
-        "".join("." if (row, column) in cells else "@" for column in range(width))
-        for row in range(height)
-    ]
-    return "\n".join(["type octile", f"height {height}", f"width {width}", "map", *rows]) + "\n"

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What each robot is given before a run: its choices, and how far in the sentence they lead.
 
-Under a sentence that is the robot's own choices, which it can work out from language, task and
-sentence.  For comparison all robots follow one whole plan, or each an optimal plan of its own.
+For comparison all robots follow one whole plan, or each an optimal plan of its own.
 """
 
 from __future__ import annotations

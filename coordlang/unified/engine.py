@@ -186,7 +186,12 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         options = self._options
         with _notes() as messages:
             found = translate(problem, options.subactions, options.concurrency)
-            self._refuse_metrics(problem)
+            if (metrics := _other_metrics(problem)) and not self.skip_checks:
+                raise Unsupported(
+                    f"the quality metric {', '.join(metrics)}",
+                    remedy="coordlang minimises the makespan, and nothing else: give "
+                    "MinimizeMakespan or no metric. With skip_checks the metric is ignored.",
+                )
             if options.language is None:
                 loaded = build(found.domain, [found.problem], options.model_options(found))
                 return found, search(loaded.model, loaded.tasks[0]), messages
@@ -201,16 +206,6 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
             return found, task_language.space, messages
         words = task_language.words_of(options.sentence)
         return found, task_language.plans_with(words), messages
-
-    def _refuse_metrics(self, problem: Any) -> None:
-        """Raise `Unsupported` for a metric that is not ours, unless checks are to be skipped."""
-        metrics = _other_metrics(problem)
-        if metrics and not self.skip_checks:
-            raise Unsupported(
-                f"the quality metric {', '.join(metrics)}",
-                remedy="coordlang minimises the makespan, and nothing else: give "
-                "MinimizeMakespan or no metric. With skip_checks the metric is ignored.",
-            )
 
     def _language_in(self, found: Translated) -> TaskLanguage:
         """The language in this problem.

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Joint plans as unified-planning's plans, and back.
 
-A joint plan is a sequence of steps in each of which several robots act.  A *partial-order plan*
-says exactly this: every action of a step comes before every action of the next one.  Actions that
-share a step do not interfere, so that each of its linearisations is a plan, too.  A *time-triggered
-plan* says it with times 0, 1, ..  A *sequential plan* forgets which actions share a step, and
-different joint plans may become equal.
+A *partial-order plan* says exactly what a joint plan does: every action of a step comes before
+every action of the next one; those of one step do not interfere, so each linearisation is a plan.
+A *time-triggered plan* says it with times 0, 1, ..  A *sequential plan* forgets which actions share
+a step, and different joint plans may become equal.
 """
 
 from __future__ import annotations

@@ -89,14 +89,13 @@ def translate(
 ) -> Translated:
     """PDDL for a `unified_planning.model.Problem` or a `MultiAgentProblem`.
 
-    Boolean and object fluents over objects, instantaneous actions.  An agent becomes an object, its
-    own fluents get it as their first argument, and its actions ``:agent``; goals of agents are
-    goals.  An object fluent becomes a predicate with its value as the last argument.  With
-    ``subactions`` an action is a whole joint step; the formulas of ``concurrency`` are further
-    preconditions.
+    An agent becomes an object, its own fluents get it as their first argument, and its actions
+    ``:agent``; goals of agents are goals.  An object fluent becomes a predicate with its value as
+    the last argument.  With ``subactions`` an action is a whole joint step; the formulas of
+    ``concurrency`` are further preconditions.
 
-    Raises `Unsupported` for anything else, `UsageError` for subactions or formulas that belong to
-    no action, `BadInput` for a problem without a robot.
+    Raises `Unsupported` for what is not read, `UsageError` for subactions or formulas that belong
+    to no action, `BadInput` for a problem without a robot.
     """
     subactions, concurrency = subactions or {}, concurrency or {}
     if type(problem) not in (Problem, MultiAgentProblem):
