@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every combination of the robots' choices, walked: whether all are optimal, and the states in them.
+"""Every combination of the robots' choices, walked: whether all are optimal, and their states.
 
 A direct proof, from the definition, for one task and one sentence: nodes are ``(a_1 .. a_n, y)``,
 the state of each robot's automaton and the plan-space node that all of them together have reached.
