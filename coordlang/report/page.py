@@ -131,7 +131,7 @@ def _render(
         about=_about(language, domain, problems, data, seed),
         formula=_formula,
         counted=counted,
-        number=_number,
+        number="{:,}".format,
         css=Markup((here / "page.css").read_text("utf-8")),
         js=Markup(_script()),
         data=Markup(_json(data)),
@@ -161,13 +161,13 @@ def _figures(language: Language, plans: str) -> list[tuple[str, str, str]]:
     g, tolerance = language.guarantee, language.tolerance
     kind = {"all": "all pairs of states", "problems": "of the problems", "file": "of a task file"}
     figures = [
-        ("Words", _number(g.size), g.claim),
+        ("Words", f"{g.size:,}", g.claim),
         (
             "Tasks",
-            _number(int(language.provenance.tasks.get("count", 0))),
+            f"{int(language.provenance.tasks.get('count', 0)):,}",
             kind.get(str(language.provenance.tasks.get("kind")), ""),
         ),
-        ("States", _number(len(language.states)), f"on {plans} of these tasks"),
+        ("States", f"{len(language.states):,}", f"on {plans} of these tasks"),
     ]
     if tolerance is not None and tolerance.failure_mean is not None:
         share = percent(tolerance.failure_mean)
@@ -210,7 +210,3 @@ def _formula(text: str) -> Any:
             piece = f"<span>{piece}</span>"
         pieces.append(piece)
     return Markup(f'<span class="formula">{" ".join(pieces)}</span>')
-
-
-def _number(number: int) -> str:
-    return f"{number:,}"

@@ -29,18 +29,13 @@ _STEPS = {
 
 def require_of(record: SimulationRecord, domain: Domain, position: Position) -> None:
     """Raise `BadInput` if runs are of another domain, or if there are none."""
+    wrong, remedy = None, "Give the domain that `coordlang simulate` was given."
     if record.domain.get("sha256") != domain_sha256(domain):
-        raise BadInput(
-            "these runs are of another domain",
-            position=position,
-            remedy="Give the domain that `coordlang simulate` was given.",
-        )
-    if not record.runs:
-        raise BadInput(
-            "there is no run in this record",
-            position=position,
-            remedy="Make one with `coordlang simulate .. -o RUN.json`.",
-        )
+        wrong = "these runs are of another domain"
+    elif not record.runs:
+        wrong, remedy = "there is no run in this record", "Make one with `coordlang simulate`."
+    if wrong:
+        raise BadInput(wrong, position=position, remedy=remedy)
 
 
 def summary(record: SimulationRecord, shown: int, one: str = "an optimal plan") -> str:
@@ -83,14 +78,6 @@ def simulated_data(record: SimulationRecord) -> dict[str, Any]:
 
 
 def _run(found: RunRecord, robots: Sequence[str]) -> dict[str, Any]:
-    steps = {
-        robot: [
-            [step.begin, step.end, own_text(step.subaction, robot) if step.subaction else "idles"]
-            for step in found.steps
-            if step.robot == robot
-        ]
-        for robot in robots
-    }
     return {
         "seed": found.seed,
         "arrived": found.arrived,
@@ -102,7 +89,18 @@ def _run(found: RunRecord, robots: Sequence[str]) -> dict[str, Any]:
             for robot in robots
         ],
         "human": [[round(x, 2), round(y, 2)] for x, y in found.human],
-        "steps": [steps[robot] for robot in robots],
+        "steps": [
+            [
+                [
+                    step.begin,
+                    step.end,
+                    own_text(step.subaction, robot) if step.subaction else "idles",
+                ]
+                for step in found.steps
+                if step.robot == robot
+            ]
+            for robot in robots
+        ],
         "events": [
             [event.time, event_text(event), event.kind in ("collision", "deadlock", "missed")]
             for event in found.events
