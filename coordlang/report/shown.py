@@ -6,7 +6,7 @@ Candidate tasks are drawn at random if they are many.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from random import Random
 
@@ -83,30 +83,22 @@ def select_tasks(
     ]
     known = {_identity(task.language) for task in given}
     room = number - len(given)
-    candidates = _candidates(given[0].language, domain, problems[0], Random(seed), position)
-    requiring, others, complete = _drawn(candidates, known, room)
-    kept = [*requiring[: max(round(room * _REQUIRING), room - len(others))], *others][:room]
-    examined = len(requiring) + len(others)
-    return Selection((*given, *kept), examined, len(requiring), complete and examined <= room)
-
-
-def _drawn(
-    candidates: Iterable[TaskLanguage], known: set[tuple[str, str]], room: int
-) -> tuple[list[ShownTask], list[ShownTask], bool]:
-    """Enough candidate tasks that require coordination, others, and whether these are all."""
     requiring: list[ShownTask] = []
     others: list[ShownTask] = []
-    for language in candidates:
+    complete = True
+    for candidate in _candidates(given[0].language, domain, problems[0], Random(seed), position):
         examined = len(requiring) + len(others)
         enough = len(requiring) >= round(room * _REQUIRING) and examined >= room
         if enough or examined >= _TRIES * room:
-            return requiring, others, False
-        identity = _identity(language)
-        if identity not in known:
+            complete = False
+            break
+        if (identity := _identity(candidate)) not in known:
             known.add(identity)
-            task = _examined(None, language)
+            task = _examined(None, candidate)
             (others if task.witness is None else requiring).append(task)
-    return requiring, others, True
+    kept = [*requiring[: max(round(room * _REQUIRING), room - len(others))], *others][:room]
+    examined = len(requiring) + len(others)
+    return Selection((*given, *kept), examined, len(requiring), complete and examined <= room)
 
 
 def _examined(name: str | None, language: TaskLanguage) -> ShownTask:
