@@ -18,10 +18,9 @@ from coordlang.commands.terminal import covered_code, echo, write
 from coordlang.execution.choices import choices as choices_under
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.exports.behaviour_tree import behaviour_trees
-from coordlang.exports.ltlf import export_ltlf
+from coordlang.exports.ltlf import SentenceFormula, export_ltlf
 from coordlang.exports.pddl import PddlExport, plan_names
-from coordlang.language.tolerance import tolerance_data
-from planners.joint.model import JointModel
+from coordlang.language.provenance import tolerance_data
 from planners.search.plan_file import json_count, only_one_plan
 from planners.system.errors import BadInput, Position, Refuted
 from planners.system.files import read_text
@@ -30,13 +29,17 @@ from planners.system.notebook import counted
 from planners.system.writing import write_texts
 
 
-@dataclass(frozen=True, slots=True, repr=False)
 class ExportedTask(InTask, PddlExport):
     """A task under a sentence as plain PDDL, whose optimal plans are exactly the plans that fit."""
 
-    used: TaskLanguage
-    open_plans: SentencePlans
     shown = ("form", "actions", "cost")
+
+    def __init__(
+        self, used: TaskLanguage, words: Sequence[int], limit: int, *, strips_only: bool
+    ) -> None:
+        PddlExport.__init__(self, used, words, limit, strips_only=strips_only)
+        self.used = used
+        self.open_plans = SentencePlans(used, words)
 
     @property
     def form(self) -> str:
@@ -152,8 +155,7 @@ def export(files: Arguments, options: ExportOptions) -> Any:
     words = used.words_of(said)
     if options.to == "pddl":
         strips_only = options.for_planner == "pyperplan"
-        exported = PddlExport(used, words, options.max_actions, strips_only=strips_only)
-        return ExportedTask(used, SentencePlans(used, words), exported)
+        return ExportedTask(used, words, options.max_actions, strips_only=strips_only)
     if options.to == "bt":
         found = choices_under(used, words)
         counts = {used.model.robots[own.robot]: own.automaton.count for own in found.robots}

@@ -18,7 +18,7 @@ from coordlang.commands.records import SimulateOptions
 from coordlang.commands.terminal import covered_code, echo, ended_early, working
 from coordlang.execution.best_sentence import best_sentence
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.language.tolerance import Tolerance
+from coordlang.language.provenance import Tolerance
 from coordlang.simulation.floor import Floor
 from coordlang.simulation.record import (
     RunRecord,
@@ -31,7 +31,7 @@ from coordlang.simulation.recording import KINDS, recorded
 from coordlang.simulation.run import record_of, runs_of
 from coordlang.simulation.simulator import Settings, require_simulator
 from coordlang.simulation.team import Agreement, Mission
-from planners.system.errors import UsageError
+from planners.system.errors import UsageError, note
 from planners.system.limits import reaching, run_until_stopped
 from planners.system.messages import echoed
 from planners.system.notebook import Presented, counted

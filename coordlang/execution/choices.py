@@ -23,7 +23,7 @@ from coordlang.execution.mixtures import Mixtures, walk_mixtures
 from coordlang.execution.monitor import FORMAT, IDLE, VERSION, Monitor
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import describe
-from coordlang.language.tolerance import tolerance_data
+from coordlang.language.provenance import tolerance_data
 from planners.joint.model import JointModel
 from planners.pddl.lifted import TRUE
 from planners.search.plan_file import Count, json_count

@@ -9,7 +9,7 @@ from coordlang.commands.building import build_language
 from coordlang.execution.best_sentence import best_sentence
 from coordlang.execution.task_language import TaskLanguage, language_in_task
 from coordlang.simulation.floor import Floor
-from coordlang.simulation.record import SimulationRecord
+from coordlang.simulation.record import RunRecord, SimulationRecord, WishRecord
 from coordlang.simulation.run import record_of, runs_of
 from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Agreement, Mission

@@ -18,7 +18,7 @@ from coordlang.language.candidates import from_problems
 from coordlang.simulation.record import RunRecord
 from coordlang.simulation.run import runs_of
 from coordlang.simulation.simulator import Settings
-from coordlang.simulation.team import Mission, mission
+from coordlang.simulation.team import Mission
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.sexpr import Source
 from tests.support.domains import DOMAINS
@@ -62,7 +62,7 @@ def ring() -> Mission:
     problem = parse_problem(Source("ring.pddl", text), domain)
     language = build_language(from_problems(domain, [problem]), "greedy").language
     used = language_in_task(language, domain, problem)
-    return mission(used, "sentence", best_sentence(used, ["most-plans"]).words)
+    return Mission(used, "sentence", best_sentence(used, ["most-plans"]).words)
 
 
 STEPS = pytest.mark.parametrize("step", ["clock", "barrier"])
