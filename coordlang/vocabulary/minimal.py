@@ -266,7 +266,7 @@ class MinimalSearch:
 
         False if the budget was not enough.
         """
-        if size > self.lower and self._finds_tied(size, budget.rounds):
+        if size > self.lower and not self._is_one_task and self._finds_tied(size, budget.rounds):
             return True
         if self._find_or_refute(size, budget):
             return True
@@ -308,7 +308,7 @@ class MinimalSearch:
 
     def _finds_tied(self, size: int, rounds: int) -> bool:
         """Whether a language with so many words is soon found among those of some kinds."""
-        if self._is_spent or self._is_one_task:
+        if self._is_spent:
             return False
         self._report(f"trying {size} words that some states decide")
         found = self._tied.find(size, rounds)
