@@ -21,7 +21,7 @@ SCHEMAS = {
     "language": ("coordlang.language.file", "LANGUAGE"),
     "tasks": ("coordlang.language.listed", "TASKS"),
     "certificate": ("coordlang.verification.certificate_file", "CERTIFICATE"),
-    "lifted": ("coordlang.lifted.file", "LIFTED"),
+    "lifted": ("coordlang.lifted.language", "LIFTED"),
     "choices": ("coordlang.execution.choices", "CHOICES"),
     "simulation": ("coordlang.simulation.record", "SIMULATION"),
     "plans": ("planners.search.plan_file", "PLANS"),

@@ -127,7 +127,7 @@ _LIFTED = who_does_what(
     *("lift-pallet", "examine-pallet", "enter-forklift", "drive-forklift", "unlock"), "press-switch"
 )
 _DRIVEN = who_does_what("board-truck", "load-truck", "unload-truck", "drive-truck", "walk")
-#: Of a task: starts and goals that vary (`coordlang.language.patterns`), and what a sentence says
+#: Of a task: starts and goals that vary (`coordlang.language.listed`), and what a sentence says
 #: of a plan.
 LANGUAGES: dict[str, tuple[str, str, Feature]] = {
     "boxpushing": ("", "(at s1 ?), (at m1 ?)", who("push-small")),
