@@ -100,17 +100,20 @@ class TasksRecord(msgspec.Struct):
     tasks: Annotated[list[ListedTask] | None, Meta(description="The tasks; not for 'all'.")] = None
 
 
+FeatureValues = Annotated[
+    dict[str, str],
+    Meta(
+        description="The features' values, in their order, joined by blanks -> word. States with "
+        "other values have words of their own."
+    ),
+]
+
+
 class LiftedFromRecord(msgspec.Struct):
     """The lifted language whose words these are, in one problem."""
 
     features: Annotated[list[str], Meta(description="Features of states, as s-expressions.")]
-    values: Annotated[
-        dict[str, str],
-        Meta(
-            description="The features' values, in their order, joined by blanks -> word. States "
-            "with other values have words of their own."
-        ),
-    ]
+    values: FeatureValues
     verified: Annotated[
         list[str], Meta(description="The names of the problems on which it was verified.")
     ]

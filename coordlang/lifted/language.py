@@ -17,6 +17,7 @@ from coordlang.language.candidates import Candidates, Kind
 from coordlang.language.file import (
     DomainRecord,
     Fault,
+    FeatureValues,
     ModelRecord,
     faults_of_robots,
     present,
@@ -218,13 +219,7 @@ class LiftedRecord(msgspec.Struct):
     robots: Annotated[list[str], Meta(description="The robots, in the order of joint actions.")]
     features: Annotated[list[FeatureRecord], Meta(description="What is looked at.")]
     words: Annotated[list[str], Meta(description="The words.")]
-    values: Annotated[
-        dict[str, str],
-        Meta(
-            description="The features' values, in their order, joined by blanks -> word. States "
-            "with other values have words of their own."
-        ),
-    ]
+    values: FeatureValues
     verified: Annotated[
         list[Verified],
         Meta(description="The problems on which this was verified; of others nothing is claimed."),
