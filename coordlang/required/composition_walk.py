@@ -57,7 +57,7 @@ def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints, most: float = _MOST) 
     more than ``most``, or one node needs too much at once.
     """
     robots = nodes.shape[1] - 1
-    sizes = np.prod(space.out_degrees.astype(np.float64)[nodes[:, :-1]], axis=1)
+    sizes = move_counts(space, nodes[:, :-1])
     _check_size(sizes, space, most)
     for span in spans(sizes, _PIECE):
         source = np.arange(span.start, span.stop)
@@ -71,6 +71,12 @@ def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints, most: float = _MOST) 
         mixed = np.full(len(prefix), FAILED)
         mixed[prefix >= 0] = space.targets(prefix[prefix >= 0])
         yield Moves(source, np.stack(edges, axis=1), mixed)
+
+
+def move_counts(space: PlanSpace, plans: Ints) -> NDArray[np.float64]:
+    """(k) how many choices of next steps plans have that are at nodes ``plans`` (k, robots)."""
+    counts: NDArray[np.float64] = np.prod(space.out_degrees.astype(np.float64)[plans], axis=1)
+    return counts
 
 
 def can_fail(choices: Choices, targets: Ints, mixed: Ints) -> Bools:

@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from coordlang.required.choices import Choices
-from coordlang.required.composition_walk import FAILED, Moves, can_fail, moves
+from coordlang.required.composition_walk import FAILED, Moves, can_fail, move_counts, moves
 from coordlang.vocabulary.counterexamples import Counterexamples
 from coordlang.vocabulary.leads import NO_LEAD, NO_WORD, PARTED, Leads
 from coordlang.vocabulary.next_words import NextWords
@@ -188,8 +188,8 @@ class _Walk:
     def _expand(self, nodes: Ints) -> tuple[_Layer, Ints]:
         """A layer with the moves out of its nodes, and the nodes that they lead to."""
         robots, failed = self._space.robots, len(self._space)
-        degrees = self._space.out_degrees[nodes[:, :robots]]
-        if degrees.prod(axis=1, dtype=np.float64).sum() > self._at_once:
+        limited = self._at_once < np.inf
+        if limited and move_counts(self._space, nodes[:, :robots]).sum() > self._at_once:
             raise Undecided
         sources: list[Ints] = [np.zeros(0, np.int64)]
         edges: list[Ints] = [np.zeros((0, robots), np.int64)]

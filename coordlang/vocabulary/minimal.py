@@ -155,11 +155,9 @@ class MinimalSearch:
         while self.lower < self.upper and not self._is_spent and self.decide(self.lower, _SOON):
             pass
         self._try_abstractions()
-        if self._is_one_task:
-            self.merge(_VAIN)
-        else:
+        if not self._is_one_task:
             self._decide_between(_SOON)
-            self.merge(_VAIN)
+        self.merge(_VAIN)
         known = self.best
         close_bounds(lambda: (self.lower, self.upper), self._narrow, lambda: self._is_spent)
         if self.best is known and not self._is_spent:
