@@ -68,8 +68,7 @@ class Limits:
     )
     memory_limit: str | None = option(
         None,
-        "Stop before using more, e.g. 4G (exit 22); none: no limit.  Default: 80 % of what is "
-        "free.",
+        "Stop before using more, as in 4G (exit 22); none: no limit.",
         "SIZE",
         only="cli",
     )
@@ -127,27 +126,21 @@ def form_option(default: str, help: str) -> Any:
     return option(default, help, names=("--format",), only="cli")
 
 
-def output_option(
-    help: str = "Write to this file instead of stdout.",
-    metavar: str = "FILE",
-    *,
-    required: bool = False,
-) -> Any:
-    """The field ``output`` of an options record for ``-o``; ``-`` is stdout."""
-    names = ("-o", "--output")
-    default = "" if required else None
-    return option(
-        default, help, metavar, names=names, only="cli", is_output=True, required=required
-    )
+def output_option(what: str | None = None, metavar: str = "FILE") -> Any:
+    """The field ``output`` of an options record for ``-o``; it must be given where it is said what.
+
+    ``-`` is stdout.
+    """
+    default, help = None, "Write to this file instead of stdout."
+    if what is not None:
+        default, help = "", f"{what}; - for stdout."
+    more = {"only": "cli", "is_output": True, "required": what is not None}
+    return option(default, help, metavar, names=("-o", "--output"), **more)
 
 
 def coordinates_option() -> Any:
     """The field of an options record for ``--coordinates``."""
-    return option(
-        None,
-        "Where places lie (default: coordinates.json beside PROBLEM, else what names say).",
-        "FILE",
-    )
+    return option(None, "Where places lie (default: coordinates.json beside PROBLEM).", "FILE")
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,9 +152,7 @@ class Source:
     """
 
     factored: str | PathLike[str] | None = option(
-        None,
-        "In place of DOMAIN and PROBLEM: the folder of each robot's own domain and problem file.",
-        "DIR",
+        None, "In place of DOMAIN and PROBLEM: the folder of each robot's own files.", "DIR"
     )
     model: ModelOptions = group(ModelOptions)
     given: frozenset[str] = frozenset()
@@ -185,18 +176,12 @@ class AnswerOptions(PlanningOptions):
 class Jobs:
     """Who does large work: processes here, or a cluster; and where finished parts are kept."""
 
-    jobs: int | None = option(
-        None, "Processes for large work (default: one for each core).", "N", least=1
-    )
+    jobs: int | None = option(None, "Processes (default: one for each core).", "N", least=1)
     scheduler: str | PathLike[str] | None = option(
-        None, "Do the work on this running Dask cluster instead.", "ADDRESS|FILE", without=("jobs",)
+        None, "Do the work on this Dask cluster instead.", "ADDRESS|FILE", without=("jobs",)
     )
     resume: str | PathLike[str] | None = option(
-        None,
-        "Keep finished jobs here, and go on with those that are kept.",
-        "DIR",
-        is_output=True,
-        files=(".table",),
+        None, "Keep finished jobs here, and go on.", "DIR", is_output=True, files=(".table",)
     )
 
     def opened(self) -> AbstractContextManager[Workers]:
@@ -214,14 +199,14 @@ class Listing:
 
     only_count: bool = option(
         False,
-        "Print the exact number of plans only.",
+        "Print the number of plans only.",
         names=("--count",),
         only="cli",
         without=("most", "sample", "form=dot"),
     )
     most: int | None = option(
         None,
-        f"List at most so many plans (default: {DEFAULT_MAX}).",
+        f"List so many plans (default: {DEFAULT_MAX}).",
         "N",
         names=("--max",),
         least=0,
@@ -253,13 +238,11 @@ class MethodOptions:
 
     method: Method = option(
         "best",
-        "best: few words within some effort, and how many are needed at least.  greedy: fast.  "
-        "separating: fewest words that part plans where they differ first or last.  minimal: "
-        "fewest words at all, with proof.  exhaustive: brute force.",
+        "best: few words within some effort.  minimal: fewest, proved.  greedy: fast.",
     )
     effort: int = option(
         EFFORT,
-        "best: what the search for fewer words may spend, in thousands of conflicts of its solver.",
+        "best: thousands of conflicts that its solver may spend.",
         "N",
         least=0,
         needs=("method", "best"),
@@ -267,12 +250,11 @@ class MethodOptions:
     seed: int = option(0, "Seed of all random choices.", least=0)
     alpha_only: bool = option(
         False,
-        "separating: part plans where they differ first, never where last.",
+        "separating: part plans where they differ first.",
         needs=("method", "separating"),
     )
     prefer: BuildPreference | None = option(
         None,
-        "Of the languages with the fewest words that were found one whose ..  "
-        "flexible: sentences leave many plans open.  simple: words have short formulas.",
+        "Sentences leave many plans open; words have short formulas.",
         needs=("method", "best", "minimal", "exhaustive"),
     )

@@ -54,10 +54,7 @@ LiftPreference = Literal["features", "words"]
 
 @dataclass(frozen=True, slots=True)
 class InspectOptions(AnswerOptions):
-    """Show what was understood of DOMAIN and PROBLEM: a domain that was misread shows it here.
-
-    With --factored and --write: the files of all robots as one domain and one problem.
-    """
+    """Show what was understood of a domain: robots, subactions, constraints."""
 
     takes = "DOMAIN PROBLEM"
     doing = "reading and grounding"
@@ -65,12 +62,7 @@ class InspectOptions(AnswerOptions):
 
     states: bool = option(False, "Also count the reachable joint states and steps.")
     write: File | None = option(
-        None,
-        "Also write what was read as domain.pddl and problem.pddl in this folder: factored files "
-        "as one domain and one problem.",
-        "DIR",
-        is_output=True,
-        files=WRITTEN,
+        None, "Also write what was read here, as PDDL.", "DIR", is_output=True, files=WRITTEN
     )
 
 
@@ -78,8 +70,7 @@ class InspectOptions(AnswerOptions):
 class PlansOptions(PlanningOptions):
     """Count, list or sample all optimal plans of a task.
 
-    A plan is a sequence of joint actions; plans are listed in a stable order.  With --slack B those
-    that take at most B steps more, too; a rest at the end of a plan is left out.
+    With --slack B those that take at most B steps more, too.
     """
 
     takes = "DOMAIN PROBLEM"
@@ -107,11 +98,7 @@ class CheckOptions(AnswerOptions):
 
 @dataclass(frozen=True, slots=True)
 class CoordinationOptions(AnswerOptions):
-    """Decide which tasks require coordination.
-
-    Show how robots that follow different optimal plans miscoordinate; with --slack B plans that
-    take at most B steps more.
-    """
+    """Decide which tasks require coordination, with a miscoordination shown."""
 
     takes = "DOMAIN PROBLEMS..."
 
@@ -121,79 +108,50 @@ class CoordinationOptions(AnswerOptions):
 
 @dataclass(frozen=True, slots=True)
 class TasksOptions(PlanningOptions):
-    """Write a task file: the tasks of PROBLEM with other starts and other goals.
-
-    In a PATTERN ? stands for any one name.
-    """
+    """Write a task file: PROBLEM with other starts and goals; ? in a PATTERN is any name."""
 
     takes = "DOMAIN PROBLEM"
     module = "domains"
     doing = "reading and grounding"
     keeps_plans = False
 
-    start: tuple[str, ...] = option(
-        (), "Atoms in which the start may differ from the problem's, as in '(at r1 ?)'.", "PATTERN"
-    )
-    goal: tuple[str, ...] = option(
-        (), "Each goal has one atom of this pattern (default: the problem's goal).", "PATTERN"
-    )
-    output: str = output_option("The task file, - for stdout.", required=True)
+    start: tuple[str, ...] = option((), "Atoms of which starts have others.", "PATTERN")
+    goal: tuple[str, ...] = option((), "Each goal has one atom like this.", "PATTERN")
+    output: str = output_option("The task file")
     as_json: bool = json_option("Print the figures as one JSON object.")
 
 
 @dataclass(frozen=True, slots=True)
 class BuildOptions(PlanningOptions):
-    """Build a coordination language and verify it before it is written.
+    """Build a coordination language and verify it.
 
-    With --words K: words that may be too few for that, and how often robots then fail.
-
-    Exit 0: written, with the proof that the method promises.  3: written without it (a limit was
-    hit).
+    Exit 0: written, with the proof that the method promises.  3: without it (a limit was hit).
     """
 
     takes = "DOMAIN PROBLEMS..."
 
     tasks: TasksSource | None = option(
-        None,
-        "Candidate tasks: every pair of reachable states, or a task file (default: the problems' "
-        "own).",
-        "all|FILE",
+        None, "Tasks: every pair of reachable states, or a task file.", "all|FILE"
     )
     way: MethodOptions = group(MethodOptions)
     words: int | None = option(
         None,
-        "At most K words, in place of a method: those under which robots that choose by themselves "
-        "fail least often.  1: silence.",
+        "At most K words, under which robots fail least often.",
         "K",
         least=1,
         without=("method", "alpha_only", "prefer", "certificate", "start"),
     )
-    worst: bool = option(
-        False,
-        "With --words: minimise how often they fail in the worst task, not on average.",
-        needs=("words",),
-    )
+    worst: bool = option(False, "With --words: least often in the worst task.", needs=("words",))
     start: LanguageSource | None = option(
         None,
-        "Repair this language in place of building one: as few states as possible change their "
-        "word.",
+        "Repair this language: few states change their word.",
         "LANGUAGE",
         without=("method", "alpha_only", "prefer"),
     )
-    unsolvable: Literal["fail", "skip"] = option(
-        "fail",
-        "What to do about candidate tasks without plans: stop (exit 11), or name and leave them "
-        "out.",
-    )
-    output: str = output_option(
-        "The language file; .json or .json.gz, - for stdout.", "LANGUAGE", required=True
-    )
+    unsolvable: Literal["fail", "skip"] = option("fail", "What to do with tasks without plans.")
+    output: str = output_option("The language file (.json, .json.gz)", "LANGUAGE")
     certificate: str | None = option(
-        None,
-        "Also write why fewer words do not suffice, for verify --certificate.",
-        "FILE",
-        only="cli",
-        is_output=True,
+        None, "Also write why fewer words do not suffice.", "FILE", only="cli", is_output=True
     )
     as_json: bool = json_option("Print the figures as one JSON object.")
     work: Jobs = group(Jobs)
@@ -204,24 +162,21 @@ class BuildOptions(PlanningOptions):
 class VerifyOptions(AnswerOptions):
     """Check by definition that LANGUAGE is a coordination language.
 
-    All plans of one sentence then mix freely.
-
-    Exit 0: it is, or robots fail as rarely as its file claims.  1: neither, and two plans that
-    miscoordinate are shown.
+    Exit 0: it is, or robots fail as rarely as its file claims.  1: neither.
     """
 
     takes = "LANGUAGE DOMAIN PROBLEMS..."
     doing = "verifying by definition"
 
     tasks: TasksSource | None = option(
-        None, "Check these tasks (default: those that the language file records).", "all|FILE"
+        None, "Check these tasks, not those that the file records.", "all|FILE"
     )
     certificate: CertificateSource | None = option(
-        None, "Also check why fewer words do not suffice (a file of `build --certificate`).", "FILE"
+        None, "Also check why fewer words do not suffice.", "FILE"
     )
     dimacs: str | None = option(
         None,
-        "With --certificate: write the formula that was refuted, for any SAT solver.",
+        "With --certificate: write the formula that was refuted.",
         "FILE",
         only="cli",
         is_output=True,
@@ -234,37 +189,22 @@ class VerifyOptions(AnswerOptions):
 class LiftOptions(PlanningOptions):
     """Learn words as functions of features of states, for all PROBLEMS at once.
 
-    The problems have the same robots, and may have other objects: maps of other sizes.  The words
-    are verified by definition on every problem, and on those to --check.
-
-    Exit 0: written.  3: a limit ended the search for fewer words (--prefer); the best ones so far
-    are written.  11: no features suffice.
+    Exit 0: written.  3: written, but a limit ended the search.  11: no features suffice.
     """
 
     takes = "DOMAIN PROBLEMS..."
 
-    tasks: Literal["all"] | None = option(
-        None,
-        "Candidate tasks: every pair of reachable states of each problem (default: the problems' "
-        "own).",
-    )
+    tasks: Literal["all"] | None = option(None, "Tasks: every pair of reachable states.")
     check: Sequence[ProblemSource] = option(
-        (),
-        "Verify on this problem, too; learn from it if it refutes what was learned.",
-        "PROBLEM",
-        without=("factored",),
+        (), "Verify on this problem, too, or learn from it.", "PROBLEM", without=("factored",)
     )
     complexity: int = option(8, "Leave out features that are more complex.", least=1)
     prefer: LiftPreference | None = option(
-        None,
-        "Few words, where states with different features may share one: for the simplest "
-        "features, or for those that do with fewest words (default: a word for each combination).",
+        None, "Few words, for the simplest features, or for those that do with fewest."
     )
     coordinates: CoordinatesSource | None = coordinates_option()
     jobs: int | None = option(None, "Processes that verify (default: the cores).", "N", least=1)
-    output: str = output_option(
-        "The lifted file; .json or .json.gz, - for stdout.", "LIFTED", required=True
-    )
+    output: str = output_option("The lifted file (.json, .json.gz)", "LIFTED")
     seed: int = option(0, "Seed of all random choices.", least=0)
     as_json: bool = json_option("Print the figures as one JSON object.")
 
@@ -278,37 +218,27 @@ class LiftOptions(PlanningOptions):
 
 @dataclass(frozen=True, slots=True)
 class GroundOptions(PlanningOptions):
-    """Write the language of one problem, an ordinary language file, from LIFTED.
+    """Write the language file of one problem from a lifted language.
 
-    Exit 0: written, and verified by definition unless --unverified.  1: refuted for this problem;
-    nothing is written.  3: written, but not verified, for the memory did not suffice.
+    Exit 0: written, and verified unless --unverified.  1: refuted, and nothing is written.  3:
+    written, but the memory did not suffice to verify it.
     """
 
     takes = "LIFTED DOMAIN PROBLEM"
     module = "lift"
 
     tasks: TasksSource | None = option(
-        "all",
-        "Candidate tasks: every pair of reachable states, a task file, or the problem's own task.",
-        "all|FILE|own",
+        "all", "Tasks: every pair of reachable states, a file's, the problem's.", "all|FILE|own"
     )
-    verified: bool = option(
-        True, "Do not verify it here; the file says so.", names=("--unverified",)
-    )
+    verified: bool = option(True, "Do not verify it here.", names=("--unverified",))
     coordinates: CoordinatesSource | None = coordinates_option()
     jobs: int | None = option(None, "Processes that verify (default: the cores).", "N", least=1)
-    output: str = output_option(
-        "The language file; .json or .json.gz, - for stdout.", "LANGUAGE", required=True
-    )
+    output: str = output_option("The language file (.json, .json.gz)", "LANGUAGE")
 
 
 @dataclass(frozen=True, slots=True)
 class SayOptions(AnswerOptions):
-    """Print the sentence of an optimal plan, the words on one line.
-
-    PLAN is a plan file, IPC text or JSON, or - for stdin; a JSON file with several plans gives one
-    sentence a line.
-    """
+    """Print the sentence of an optimal plan, or of each plan of a file, one a line."""
 
     takes = "LANGUAGE DOMAIN PROBLEM PLAN"
     module = "sentences"
@@ -316,26 +246,18 @@ class SayOptions(AnswerOptions):
 
 @dataclass(frozen=True, slots=True)
 class UnderstandOptions(PlanningOptions):
-    """Understand a sentence ("w1 w0").
-
-    The optimal plans that it leaves open are counted, listed, sampled or drawn.
-
-    --format dot draws them as one DAG, whose paths they are; json has both the listed plans and
-    the DAG.
-    """
+    """Count, list, sample or draw the optimal plans that a SENTENCE ("w1 w0") leaves open."""
 
     takes = "LANGUAGE DOMAIN PROBLEM SENTENCE"
     module = "sentences"
     doing = "finding the plans with the sentence"
 
     listing: Listing = group(Listing)
-    form: Literal["ipc", "json", "dot"] = form_option(
-        "ipc", "How plans are written; dot: drawn as one DAG."
-    )
+    form: Literal["ipc", "json", "dot"] = form_option("ipc", "dot: drawn as one DAG.")
     as_json: bool = json_option("Short for --format json.")
     nodes: int | None = option(
         None,
-        f"Cut the DAG to about N nodes (default: {NODES_DRAWN} for dot; json: not cut).",
+        f"Cut the DAG to about N nodes (default for dot: {NODES_DRAWN}).",
         "N",
         least=1,
         only="cli",
@@ -347,21 +269,14 @@ class UnderstandOptions(PlanningOptions):
 
 @dataclass(frozen=True, slots=True)
 class PlanOptions(PlanningOptions):
-    """Find one optimal plan that has SENTENCE ("w1 w0"), by A* that prunes what does not fit.
-
-    With --prefer the best sentence of the task is found first.  The nodes expanded with and without
-    the sentence go to stderr.
-    """
+    """Find one optimal plan under SENTENCE ("w1 w0"), or under the best sentence (--prefer)."""
 
     takes = "LANGUAGE DOMAIN PROBLEM [SENTENCE]"
     module = "sentences"
     doing = "searching for a plan"
 
     prefer: str | Sequence[str] = option(
-        (),
-        'In place of SENTENCE: shortest, most-plans, first:ROBOT or avoid:"(ATOM)"; '
-        "a second one decides among equals.",
-        "PREFERENCE",
+        (), 'shortest, most-plans, first:ROBOT or avoid:"(ATOM)".', "PREFERENCE"
     )
     heuristic: HeuristicName = option("relaxed", "The lower bound of A*.")
     form: Literal["ipc", "json", "plansys2"] = form_option("ipc", "How the plan is written.")
@@ -374,34 +289,21 @@ class PlanOptions(PlanningOptions):
 
 @dataclass(frozen=True, slots=True)
 class ChoicesOptions(PlanningOptions):
-    """Show which subplans each robot may follow under SENTENCE ("w1 w0").
+    """Show what each robot may do under SENTENCE ("w1 w0"), whatever the others choose.
 
-    Whatever the others choose from theirs, together they follow an optimal plan.
-
-    With --history and the detours: what one robot may do next, and whether the detours are still
-    possible, all at once.
+    With --history and detours: what one robot may do next, and whether it may make them all.
     """
 
     takes = "LANGUAGE DOMAIN PROBLEM SENTENCE"
     doing = "finding the robots' choices"
 
     robot: str | Sequence[str] = option((), "Whose choices; may be repeated (default: all).", "R")
-    check: bool = option(
-        False, "Walk every combination of all robots' choices: is each an optimal plan?"
-    )
-    history: tuple[str, ...] = option(
-        (), "What the robot did so far, one step each; or idle.", "SUBACTION", only="cli"
-    )
-    visit: tuple[str, ...] = option(
-        (), "A detour: this becomes true, now or later.", "ATOM", only="cli"
-    )
-    avoid: tuple[str, ...] = option((), "A detour: this is false from now on.", "ATOM", only="cli")
-    do: tuple[str, ...] = option(
-        (), "A detour: it does this at least once; * is any text.", "PATTERN", only="cli"
-    )
-    never: tuple[str, ...] = option(
-        (), "A detour: it never does this any more.", "PATTERN", only="cli"
-    )
+    check: bool = option(False, "Walk every combination: is each an optimal plan?")
+    history: tuple[str, ...] = option((), "A step that it did; or idle.", "SUBACTION", only="cli")
+    visit: tuple[str, ...] = option((), "Detour: this becomes true.", "ATOM", only="cli")
+    avoid: tuple[str, ...] = option((), "Detour: this is false from now on.", "ATOM", only="cli")
+    do: tuple[str, ...] = option((), "Detour: it does this; * is any text.", "PATTERN", only="cli")
+    never: tuple[str, ...] = option((), "Detour: it never does this.", "PATTERN", only="cli")
     form: Literal["text", "json", "dot"] = form_option("text", "How they are shown.")
     as_json: bool = json_option("Short for --format json.")
     output: str | None = output_option()
@@ -409,70 +311,37 @@ class ChoicesOptions(PlanningOptions):
 
 @dataclass(frozen=True, slots=True)
 class SimulateOptions(PlanningOptions):
-    """Let robots with wheels do the task of PROBLEM in a simulator.
-
-    Each robot draws its own choices under a sentence of LANGUAGE.  What comes of it is counted:
-    collisions, deadlocks, late arrivals, messages.  Needs `pip install 'coordlang[sim]'`.
-    """
+    """Let robots with wheels do a task in a simulator (`pip install 'coordlang[sim]'`)."""
 
     takes = "LANGUAGE DOMAIN PROBLEM"
     doing = "simulating"
     alone = "replay"
 
     sentence: SentenceSource | None = option(
-        None,
-        'What the robots have agreed on, "w1 w0" (default: what leaves most plans open).',
-        "SENTENCE",
-        without=("without", "plan"),
+        None, "What robots have agreed on.", "SENTENCE", without=("without", "plan")
     )
-    without: bool = option(
-        False, "Without a sentence: each follows an optimal plan of its own.", without=("plan",)
-    )
-    plan: bool = option(False, "In place of a sentence all follow one whole plan.")
+    without: bool = option(False, "Each follows an optimal plan of its own.", without=("plan",))
+    plan: bool = option(False, "All follow one whole plan.")
     runs: int = option(1, "How many runs.", "N", least=1)
     seed: int = option(0, "Of the first run; the next ones follow.", least=0)
-    step: Literal["clock", "barrier", "word"] = option(
-        "clock",
-        "How robots keep step: a common clock, a barrier before each step, or before each word.",
-    )
+    step: Literal["clock", "barrier", "word"] = option("clock", "How robots keep step.")
     cell: float = option(1.0, "How far apart neighbouring cells are.", "METRES")
-    radius: float | None = option(
-        None, "The radius of a robot (default: a fifth of --cell).", "METRES"
-    )
-    noise: float = option(
-        0.1, "The standard deviation of what wheels do, as a share of what they are told.", "SHARE"
-    )
-    lidar: bool = option(
-        True, "Robots do not stop before what is ahead of them.", names=("--no-lidar",)
-    )
-    human: str | None = option(
-        None,
-        "A human whom only lidars see: in a place, in one drawn for each run, or walking about.",
-        "PLACE|random|walking",
-    )
-    visit: Sequence[str] = option(
-        (),
-        "This robot comes to want to visit a place when it has done so many steps.",
-        "ROBOT:STEP:PLACE",
-    )
+    radius: float | None = option(None, "Of a robot (default: a fifth of --cell).", "METRES")
+    noise: float = option(0.1, "The standard deviation of what wheels do.", "SHARE")
+    lidar: bool = option(True, "Robots do not look ahead.", names=("--no-lidar",))
+    human: str | None = option(None, "Somebody whom only lidars see.", "PLACE|random|walking")
+    visit: Sequence[str] = option((), "After STEP it wants to visit PLACE.", "ROBOT:STEP:PLACE")
     coordinates: CoordinatesSource | None = coordinates_option()
     output: tuple[str, ...] = option(
         (),
-        "Write the record (.json), or a recording of one run (.gif, .mp4, a sheet as .png).",
+        "The record (.json), or one run (.gif, .mp4, .png).",
         "FILE",
         names=("-o", "--output"),
         only="cli",
         is_output=True,
     )
-    shown: int | None = option(
-        None, "The run that is recorded (default: the first).", "SEED", only="cli"
-    )
-    replay: str | None = option(
-        None,
-        "Simulate nothing: record a run of this .json file; without LANGUAGE DOMAIN PROBLEM.",
-        "RECORD",
-        only="cli",
-    )
+    shown: int | None = option(None, "Of the run that -o shows.", "SEED", only="cli")
+    replay: str | None = option(None, "Only read and show this record.", "RECORD", only="cli")
     as_json: bool = json_option("Print the record as one JSON object.")
 
     def __post_init__(self) -> None:
@@ -484,11 +353,7 @@ class SimulateOptions(PlanningOptions):
 
 @dataclass(frozen=True, slots=True)
 class ExportOptions(AnswerOptions):
-    """Write the task under SENTENCE ("w1 w0") for other programs.
-
-    The optimal plans of the exported PDDL are exactly the plans that fit, one to one; a plan
-    satisfies the LTLf formula exactly if it has the sentence; each robot's behaviour tree
-    (BehaviorTree.CPP 4) does exactly its choices.
+    """Write a task under SENTENCE ("w1 w0") as PDDL, LTLf or behaviour trees.
 
     Exit 1: no plan fits, or the language does not cover the task and guarantees nothing for it.
     """
@@ -496,37 +361,22 @@ class ExportOptions(AnswerOptions):
     takes = "LANGUAGE DOMAIN PROBLEM SENTENCE"
     doing = "compiling the task"
 
-    to: Target = option(
-        "pddl",
-        "pddl: a planning problem.  ltlf: a temporal formula over plans.  bt: each robot's "
-        "choices as a behaviour tree.",
-    )
+    to: Target = option("pddl", "A problem, a temporal formula, or behaviour trees.")
     output: str | None = option(
-        None,
-        "pddl: a folder for domain.pddl and problem.pddl; ltlf, bt: a file.",
-        "PATH",
-        names=("-o", "--output"),
-        only="cli",
+        None, "pddl: a folder; else a file.", "PATH", names=("-o", "--output"), only="cli"
     )
     max_actions: int = option(
         MAX_ACTIONS,
-        "Beyond N joint actions robots choose one after another in the PDDL.",
+        "Beyond N joint actions robots choose one by one.",
         "N",
         least=0,
         needs=("to", "pddl"),
     )
     for_planner: Reader = option(
-        "fd",
-        "Who reads the PDDL: fd (Fast Downward) and kstar the same, pyperplan STRIPS only.",
-        names=("--for",),
-        needs=("to", "pddl"),
+        "fd", "Who reads the PDDL.", names=("--for",), needs=("to", "pddl")
     )
     translate_plan: str | None = option(
-        None,
-        "Do not export: translate a plan of the exported problem into a plan file (FILE).",
-        "FILE",
-        only="cli",
-        needs=("to", "pddl"),
+        None, "Only translate a plan of what is exported.", "FILE", only="cli", needs=("to", "pddl")
     )
 
     @property
@@ -546,50 +396,30 @@ class ExportOptions(AnswerOptions):
 
 @dataclass(frozen=True, slots=True)
 class ExplainOptions(AnswerOptions):
-    """Show what the sentences of a task leave open, and each word as a short formula.
-
-    With --task also show what the sentences demand of each robot.
-    """
+    """Show a language: words as formulas, sentences of a task."""
 
     takes = "LANGUAGE DOMAIN PROBLEM"
     doing = "finding formulas of the words"
 
     task: bool = option(False, "What each sentence of PROBLEM's task asks of each robot.")
     sentence: SentenceSource | None = option(
-        None, 'With --task: this sentence only, as in "w1 w0".', "WORDS", needs=("task",)
+        None, "With --task: this sentence only.", "WORDS", needs=("task",)
     )
-    formula_per_word: bool = option(
-        False, "A formula of its own for every word, also where less would say the same."
-    )
+    formula_per_word: bool = option(False, "A formula of its own for every word.")
 
 
 @dataclass(frozen=True, slots=True)
 class ReportOptions(PlanningOptions):
-    """Write a self-contained HTML page that shows LANGUAGE.
-
-    It has the words, and the sentences and plans in the tasks of PROBLEM.. and in some of the
-    candidate tasks.
-    """
+    """Write a page that shows a language: words, sentences, plans played."""
 
     takes = "LANGUAGE DOMAIN PROBLEMS..."
     doing = "drawing the page"
 
-    output: str = output_option("The HTML file; - for stdout.", "PAGE", required=True)
-    tasks_shown: int = option(
-        30,
-        "Show at most this many tasks: those of PROBLEM.., then candidate tasks, drawn.",
-        "N",
-        least=1,
-    )
+    output: str = output_option("The HTML file", "PAGE")
+    tasks_shown: int = option(30, "Show at most this many tasks.", "N", least=1)
     coordinates: str | None = coordinates_option()
-    run: str | None = option(
-        None, "Also play these runs of `coordlang simulate -o RUN.json`.", "RUN.json"
-    )
-    planviz: bool = option(
-        False,
-        "Also write a plan of the first task for PlanViz, and its map, beside PAGE.",
-        without=("output=-",),
-    )
+    run: str | None = option(None, "Also play these runs of simulate.", "RUN.json")
+    planviz: bool = option(False, "Also write a plan for PlanViz.", without=("output=-",))
     seed: int = option(0, "Draws the tasks.")
 
     def __post_init__(self) -> None:
@@ -608,26 +438,16 @@ class ReportOptions(PlanningOptions):
 
 @dataclass(frozen=True, slots=True)
 class DomainsOptions(CommandOptions):
-    """List the domains that come with coordlang, one a line, copy them, or write a map as PDDL."""
+    """List or copy the domains that come with coordlang, or write a map as PDDL."""
 
     doing = "copying"
     keeps_plans = False
 
     copy: tuple[str, str] | None = option(
-        None,
-        "Copy this domain, or all of them, with problems and README into DIR/NAME.",
-        "NAME|all DIR",
-        without=("map",),
+        None, "Copy this domain, or all, into DIR/NAME.", "NAME|all DIR", without=("map",)
     )
-    map: str | None = option(
-        None,
-        "A map of movingai.com, to be written as a problem of the grid domain.",
-        "FILE.map",
-        needs=("scen",),
-    )
-    scen: str | None = option(
-        None, "The scenario: where robots start and go.", "FILE.scen", needs=("agents",)
-    )
+    map: str | None = option(None, "A map of movingai.com.", "FILE.map", needs=("scen",))
+    scen: str | None = option(None, "Who starts and goes where.", "FILE.scen", needs=("agents",))
     agents: int | None = option(None, "The first K robots of the scenario.", "K", needs=("output",))
     output: str | None = option(
         None, "The folder for a map's domain and problem.", "DIR", names=("-o",), needs=("map",)
