@@ -10,13 +10,12 @@ from dataclasses import asdict, replace
 from importlib.metadata import version
 from os import PathLike, fspath
 from time import monotonic, perf_counter
-from typing import Any
 
 import coordlang
 from coordlang.commands.building import Built, build_language
 from coordlang.commands.inputs import Arguments, PlanningInput, note_size, public, read_language
-from coordlang.commands.options import EFFORT, LanguageSource
-from coordlang.commands.records import BuildOptions
+from coordlang.commands.layout import fitted
+from coordlang.commands.records import EFFORT, BuildOptions, LanguageSource
 from coordlang.commands.terminal import (
     UNPROVED,
     code_of_interrupt,
@@ -81,14 +80,16 @@ def build(arguments: Arguments, options: BuildOptions) -> Built:
             workers=workers,
         )
     seconds |= built.seconds
-    language = _with_producer(
-        built.language,
-        version=coordlang.__version__,
-        arguments=_arguments(options),
-        seed=way.seed,
-        solver=f"python-sat {version('python-sat')}",
-        seconds={name: round(value, 3) for name, value in seconds.items()},
-    )
+    producer = {
+        **built.language.provenance.producer,
+        "version": coordlang.__version__,
+        "arguments": [*map(visible, sys.argv[1:])] if options.output else _arguments(options),
+        "seed": way.seed,
+        "solver": f"python-sat {version('python-sat')}",
+        "seconds": {name: round(value, 3) for name, value in seconds.items()},
+    }
+    provenance = replace(built.language.provenance, producer=producer)
+    language = replace(built.language, provenance=provenance)
     return replace(built, language=language, seconds=seconds, fewest=fewest, deadline=deadline)
 
 
@@ -123,7 +124,7 @@ def _to_repair(
 
 
 def _arguments(options: BuildOptions) -> list[str]:
-    """Return the keywords of a call as a language file records them."""
+    """Return the keywords of a call as a language file records them (a command: as it is typed)."""
     named = {**asdict(options.way), "words": options.words, "worst": options.worst}
     if options.way.effort == EFFORT:
         del named["effort"]
@@ -131,12 +132,6 @@ def _arguments(options: BuildOptions) -> list[str]:
     files = {"tasks": options.tasks, "start": options.start}
     given |= {k: fspath(file) for k, file in files.items() if isinstance(file, str | PathLike)}
     return [f"{name}={value}" for name, value in sorted(given.items())]
-
-
-def _with_producer(language: Language, **more: Any) -> Language:
-    """The language with further entries in what its file says of its making."""
-    producer = {**language.provenance.producer, **more}
-    return replace(language, provenance=replace(language.provenance, producer=producer))
 
 
 def show_build(built: Built, options: BuildOptions) -> int:
@@ -156,29 +151,28 @@ def show_build(built: Built, options: BuildOptions) -> int:
             echo(json.dumps(built.data()))
         else:
             place = "stdout" if to_stderr else visible(output)
-            echo(f"{built.text(line_width(err=to_stderr))}written to {place}", err=to_stderr)
+            text = f"{built.text()}\nwritten to {place}"
+            echo(fitted(text, line_width(err=to_stderr)), err=to_stderr)
     except KeyboardInterrupt as error:
         stopped = error
     return _exit_code(built, output, certificate, stopped)
 
 
 def _save(built: Built, output: str, certificate: str | None) -> BaseException | None:
-    """Write the language with the arguments of the command line, in place of the one before.
+    """Write the language in place of the one before, whose certificate goes with it.
 
-    The certificate of that one goes with it.  An interrupt is returned; it loses nothing.
+    An interrupt is returned; it loses nothing.
     """
-    arguments = [visible(argument) for argument in sys.argv[1:]]
-    language = _with_producer(built.language, arguments=arguments)
     if output == "-":
         remove_file(certificate)
-        echo(to_bytes(language).decode(), nl=False)
+        echo(to_bytes(built.language).decode(), nl=False)
         return None
     try:
-        write_language(language, output, outdated=certificate)
+        write_language(built.language, output, outdated=certificate)
     except KeyboardInterrupt as error:
         if is_device(output):
             raise  # part of it may be out: no second time
-        write_language(language, output, outdated=certificate)
+        write_language(built.language, output, outdated=certificate)
         return error
     return None
 

@@ -3,18 +3,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
+from itertools import count
 from math import inf
 from time import perf_counter
 from typing import Any
 
-from coordlang.commands.options import BuildPreference, MethodOptions
-from coordlang.commands.repairing import Repaired, repair_language
+import numpy as np
+
+from coordlang.commands.records import BuildPreference, MethodOptions
+from coordlang.commands.witness import witness_data, witness_text
 from coordlang.explanation.simple import simple
 from coordlang.language.candidates import Candidates, require_solvable
-from coordlang.language.partition import Partition
+from coordlang.language.partition import Partition, keys_of, read_keys
 from coordlang.language.provenance import Guarantee, Tolerance, provenance_of
 from coordlang.language.warping import Clause
 from coordlang.language.words import Language
@@ -25,7 +28,7 @@ from coordlang.required.divergences import (
     without_divergences,
 )
 from coordlang.required.failure import NONE, Failures
-from coordlang.required.miscoordination import Inseparable
+from coordlang.required.miscoordination import Inseparable, Miscoordination
 from coordlang.verification.by_definition import Verdict, verify_candidates
 from coordlang.verification.certificate_file import Certificate
 from coordlang.verification.check_certificate import check as check_certificate
@@ -37,6 +40,9 @@ from coordlang.vocabulary.greedy import first_language
 from coordlang.vocabulary.hidden_slack import hidden_differences
 from coordlang.vocabulary.job import Assignment, Evidence
 from coordlang.vocabulary.minimal import refuting_clauses
+from coordlang.vocabulary.repair import Repair, repair
+from planners.joint.model import NO_FACT
+from planners.joint.tables import Ints, Rows, find_rows
 from planners.parallel.workers import Workers
 from planners.search.portions import require_room
 from planners.system.errors import OutOfMemory, Refuted, UsageError
@@ -48,8 +54,86 @@ PREFERENCES: Mapping[BuildPreference, Callable[[Job, Outcome], Outcome]] = {
     "flexible": flexible,
     "simple": simple,
 }
-#: What a file says of how a limited number of words was found.
-FEW_WORDS = "few-words"
+#: What a file says of how a limited number of words, or a repaired language, was found.
+FEW_WORDS, REPAIR = "few-words", "repair"
+#: Changed states that are shown to a person.
+_SHOWN = 12
+
+
+@dataclass(frozen=True, slots=True)
+class ChangedState:
+    """A state, by its key, with the word that it had and the one that it has."""
+
+    state: str
+    old: str
+    new: str
+
+
+@dataclass(frozen=True, slots=True)
+class Repaired:
+    """What became of a language.
+
+    ``witness`` has plans of one sentence of the old language that miscoordinate; None: it still
+    holds, and no word was changed.  Other words have the states ``changed``; every language for the
+    tasks changes ``changes_bound`` states at least, and one that changes so few has at least
+    ``new_words_bound`` of ``new_words``.  ``new_states`` on plans of the tasks are not listed in
+    the old language, and ``gone`` of its states the problem cannot have any more.
+    """
+
+    witness: Miscoordination | None
+    changed: tuple[ChangedState, ...] = ()
+    changes_bound: int = 0
+    new_words: tuple[str, ...] = ()
+    new_words_bound: int = 0
+    new_states: int = 0
+    gone: int = 0
+
+    @property
+    def still_holds(self) -> bool:
+        """Whether the old language serves the tasks as it is."""
+        return self.witness is None
+
+    def data(self) -> dict[str, Any]:
+        """The same as JSON data."""
+        return {
+            "still_holds": self.still_holds,
+            "miscoordination": witness_data(self.witness),
+            "changed": [asdict(change) for change in self.changed],
+            "changed_lower_bound": self.changes_bound,
+            "new_words": list(self.new_words),
+            "new_words_lower_bound": self.new_words_bound,
+            "new_states": self.new_states,
+            "states_gone": self.gone,
+        }
+
+    def text(self) -> str:
+        """Why the language was changed, and which states have other words."""
+        gone = f"{counted(self.gone, 'state')} of the old language: not on this map"
+        lines = [gone] if self.gone else []
+        if self.witness is None:
+            return "\n".join(["the old language still holds: no word is changed", *lines])
+        sentence, number, new = " ".join(self.witness.sentence or ()), len(self.changed), ""
+        verb = "changes its word" if number == 1 else "change their word"
+        if self.new_states:
+            new = f"; {counted(self.new_states, 'new state')}"
+        if words := self.new_words:
+            new += f"; {counted(len(words), 'new word')} ({', '.join(words)})"
+            new += _proof(len(words), self.new_words_bound)
+        lines += [
+            f'the old language fails: plans with the sentence "{sentence}" do not mix',
+            witness_text(self.witness),
+            f"{counted(number, 'state')} {verb}{_proof(number, self.changes_bound)}{new}",
+            *(f"  {c.state or NO_FACT}: {c.old} -> {c.new}" for c in self.changed[:_SHOWN]),
+        ]
+        if number > _SHOWN:
+            lines.append(f"  .. and {number - _SHOWN:,} more; --json has all")
+        return "\n".join(lines)
+
+
+def _proof(number: int, bound: int) -> str:
+    if not number or number == bound:
+        return ", proved the fewest" * (number > 0)
+    return f", at least {bound} are needed" if bound else ", not proved the fewest"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -57,15 +141,11 @@ class Built(Presented):
     """A language, verified by definition, and how it was made.
 
     With a limit on the words it may be none: ``failures`` says how often robots then fail, and
-    ``few_words`` how it was found.
-
-    ``job`` is what words were looked for, ``verdict`` that it is a coordination language;
-    ``figures`` and ``seconds`` are the method's own figures and the time by phase.  ``stopped`` is
-    the error that ended the method before its proof was complete, or None.  By the clauses
-    ``refuting`` the lower bound was proved.  ``repaired`` says what became of the language that it
-    started from, and ``fewest`` how many tasks would require coordination if only plans with the
-    fewest actions counted, if that is known.  The time limit ends at the ``deadline``, on the clock
-    `time.monotonic`.
+    ``few_words`` how it was found.  ``job`` is what words were looked for; ``figures`` are the
+    method's own, ``seconds`` the time by phase; ``stopped`` is the error that ended the method
+    before its proof was complete; by the clauses ``refuting`` the lower bound was proved.
+    ``repaired`` says what became of the language that it started from, ``fewest`` how many tasks
+    would require coordination with the fewest actions only; the time limit ends at ``deadline``.
     """
 
     language: Language
@@ -149,8 +229,8 @@ class Built(Presented):
             "seconds": {name: round(value, 3) for name, value in self.seconds.items()},
         }
 
-    def text(self, width: int) -> str:
-        """The figures of the making in whole lines of at most ``width`` characters."""
+    def text(self) -> str:
+        """The figures of the making, in lines of any length."""
         figures = self.data()
         proof, verified = f"at least {figures['lower_bound']} needed, ", "verified"
         if figures["proved_minimal"]:
@@ -167,9 +247,9 @@ class Built(Presented):
             *self._what_would_be(),
             *self._how_often_robots_fail(),
             *_optimised(figures),
-            *([self.repaired.text(width)] if self.repaired else []),
+            *([self.repaired.text()] if self.repaired else []),
         ]
-        return "".join(f"{line}\n" for line in lines)
+        return "\n".join(lines)
 
     def _what_would_be(self) -> Iterator[str]:
         """What more effort might bring, and what another cost would change."""
@@ -209,13 +289,14 @@ def _optimised(figures: Mapping[str, Any]) -> Iterator[str]:
             f"communication saving {100 * figures['communication_saving']:.1f} %"
         )
     if "terms" in figures:
-        terms, limits = figures["terms"], figures["limits"]
-        proved = (terms, limits) == (figures["terms_lower_bound"], figures["limits_lower_bound"])
-        proof = "proved the shortest" if proved else f"at least {figures['terms_lower_bound']}"
-        before = f"{counted(figures['terms_before'], 'term')}, {figures['limits_before']} limits"
+        now, before, bound = (
+            tuple(figures[f"{what}{when}"] for what in ("terms", "limits"))
+            for when in ("", "_before", "_lower_bound")
+        )
+        proof = "proved the shortest" if now == bound else f"at least {bound[0]}"
         yield (
-            f"formulas of {counted(terms, 'term')} with {counted(limits, 'limit')} on variables "
-            f"({before} before; {proof})"
+            f"formulas of {counted(now[0], 'term')} with {counted(now[1], 'limit')} on variables "
+            f"({counted(before[0], 'term')}, {before[1]} limits before; {proof})"
         )
 
 
@@ -248,13 +329,14 @@ class Making:
         self.seconds[phase] = now - self._since
         self._since = now
 
-    def job(self, options: MethodOptions) -> Job:
-        """What words are to be found; `Inseparable` if there is no language over states."""
-        find = hidden_differences if self.candidates.model.hides_slack else differences
-        return self.job_for(find(self.candidates, self.workers, self.progress), options)
+    def job(self, options: MethodOptions, found: FirstDifferences | None = None) -> Job:
+        """What words are to be found, for plans that part as ``found``.
 
-    def job_for(self, found: FirstDifferences, options: MethodOptions) -> Job:
-        """The same, for plans that part like that."""
+        `Inseparable` if there is no language over states.
+        """
+        if found is None:
+            find = hidden_differences if self.candidates.model.hides_slack else differences
+            found = find(self.candidates, self.workers, self.progress)
         return Job(
             self.candidates,
             tuple(found.states.tolist()),
@@ -281,29 +363,33 @@ class Making:
             )
         self.verified.append((words, partition, verdict))
 
-    def known(self, words: Assignment) -> tuple[Partition, Verdict] | None:
-        """The partition and the verdict, if this very assignment was verified."""
-        return next(((own, verdict) for w, own, verdict in self.verified if w is words), None)
+    def built(self, job: Job, found: Outcome, method: str, **more: Any) -> Built:
+        """The language of words that were found, with what is proved of it; ``more`` of `Built`.
 
-    def built(
-        self,
-        job: Job,
-        found: tuple[Partition, Verdict] | None,
-        method: str,
-        lower_bound: int,
-        **more: Any,
-    ) -> Built:
-        """The language of words that were found, with what is proved of it; ``more`` of `Built`."""
-        assert found is not None, "it was verified"
-        partition, verdict = found
-        guarantee = Guarantee.of(method, len(partition.words), lower_bound, verdict.holds)
+        Words that were not verified are none.
+        """
+        verified = (own for own in self.verified if own[0] is found.partition)
+        unverified = Verdict(False, self.candidates.count, 0, None)
+        _, partition, verdict = next(
+            verified, (None, self.partition_of(found.partition), unverified)
+        )
+        guarantee = Guarantee.of(method, len(partition.words), found.lower_bound, verdict.holds)
         provenance = provenance_of(self.candidates, guarantee, {"program": "coordlang"})
         if not verdict.holds:
             slack = provenance.tolerance.slack if provenance.tolerance else None
             tolerance = more["failures"].tolerance or Tolerance()
             provenance = replace(provenance, tolerance=replace(tolerance, slack=slack))
         language = Language.of(partition, self.candidates.model, provenance)
-        return Built(language, job, verdict, seconds=self.seconds, **more)
+        return Built(
+            language,
+            job,
+            verdict,
+            found.figures,
+            self.seconds,
+            found.stopped,
+            found.refuting,
+            **more,
+        )
 
 
 def build_language(
@@ -322,18 +408,13 @@ def build_language(
     """Build a coordination language for candidate tasks and verify it by definition.
 
     ``method`` and ``way`` are as in `MethodOptions`, of which ``options`` may be given in their
-    place.  A search that has a language leaves the share ``reserve`` of a time limit's rest for
-    `Built.certificate`.  The language does not depend on ``workers``.
-
-    With ``words`` there are at most so many, under which robots that choose by themselves fail
-    least often (``worst``: in the worst task, not over all).  Plans of the tasks may then be
-    inseparable; one word is silence.  With ``start`` as few states of this language as possible
-    change their word; those that the tasks' problem cannot have are left out.
+    place; ``words``, ``worst`` and ``start`` as in `BuildOptions`.  A search that has a language
+    leaves the share ``reserve`` of a time limit's rest for `Built.certificate`.
 
     Raises `Inseparable`, which has two plans that show it, if there is no language over states,
-    `ProvedImpossible` if there is no candidate task, `OutOfMemory` before the memory limit is
-    reached, where there is no language yet to return, `UsageError` for options that contradict each
-    other, and `TooManyToCount` where not even failures in silence can be counted.
+    `ProvedImpossible` if there is no candidate task, `OutOfMemory` where there is no language yet
+    to return, `UsageError` for options that contradict each other, and `TooManyToCount` where not
+    even failures in silence can be counted.
     """
     options = options or record_from(MethodOptions, {"method": method, **way}, "build_language")
     method, making = options.method, Making(candidates, workers, progress)
@@ -366,15 +447,7 @@ def build_language(
     progress(f"building words ({method})")
     found = _outcome(job, options, making)
     making.note("verify")
-    return making.built(
-        job,
-        making.known(found.partition),
-        method,
-        found.lower_bound,
-        figures=found.figures,
-        stopped=found.stopped,
-        refuting=found.refuting,
-    )
+    return making.built(job, found, method)
 
 
 def _outcome(job: Job, options: MethodOptions, making: Making) -> Outcome:
@@ -387,7 +460,7 @@ def _outcome(job: Job, options: MethodOptions, making: Making) -> Outcome:
         if options.prefer and outcome.stopped is None:
             outcome = PREFERENCES[options.prefer](job, outcome)
             making.note(options.prefer)
-        if making.known(outcome.partition) is None:
+        if all(words is not outcome.partition for words, *_ in making.verified):
             job.progress("verifying by definition")
             with little_time_after(outcome.stopped):
                 job.check(outcome.partition)
@@ -415,26 +488,16 @@ def _few_words(making: Making, words: int, *, worst: bool, seed: int) -> Built:
         if not isinstance(stopped, KeyboardInterrupt):
             stopped = None  # no search was left where nothing fails
     making.note("verify")
-    unverified = (
-        making.partition_of(found.partition),
-        Verdict(False, making.candidates.count, 0, None),
-    )
-    return making.built(
-        job,
-        making.known(found.partition) or unverified,
-        FEW_WORDS,
-        job.lower_bound,
-        figures={
-            "silence_mean": float(found.silence.mean),
-            "silence_worst": float(found.silence.worst),
-            "partitions_measured": found.measured,
-            "partitions_recounted": found.recounted,
-            "least_of_all_partitions": found.is_best,
-        },
-        stopped=stopped,
-        failures=Failures(found.failures.mean, found.failures.worst),
-        few_words=found,
-    )
+    figures = {
+        "silence_mean": float(found.silence.mean),
+        "silence_worst": float(found.silence.worst),
+        "partitions_measured": found.measured,
+        "partitions_recounted": found.recounted,
+        "least_of_all_partitions": found.is_best,
+    }
+    outcome = Outcome(found.partition, job.lower_bound, figures, stopped)
+    failures = Failures(found.failures.mean, found.failures.worst)
+    return making.built(job, outcome, FEW_WORDS, failures=failures, few_words=found)
 
 
 def job_for_few_words(making: Making, seed: int = 0) -> Job:
@@ -447,6 +510,100 @@ def job_for_few_words(making: Making, seed: int = 0) -> Job:
     try:
         job = making.job(options)
     except Inseparable:
-        job = making.job_for(without_divergences(spaces), options)
+        job = making.job(options, without_divergences(spaces))
         return replace(job, states=tuple(states_on_plans(spaces).tolist()))
     return replace(job, incumbent=first_language(job))
+
+
+def repair_language(making: Making, start: Language, options: MethodOptions) -> Built:
+    """Change the words of as few states as makes a language serve candidate tasks.
+
+    The result is verified by definition.  States that are on no plan of the candidate tasks keep
+    their words.
+    """
+    job = making.job(MethodOptions(seed=options.seed))
+    making.note("coordination")
+    old = _Old.of(start, making.candidates)
+    words = old.words_of(job.states)
+    making.progress("verifying the old language")
+    partition = old.partition
+    verdict = making.verdict(partition)
+    making.note("verify")
+    repaired = Repaired(verdict.witness, new_states=len(job.states) - len(words), gone=old.gone)
+    # What the old file claims of fewer words is not believed: the bound is the job's.
+    outcome = Outcome(words, job.lower_bound)
+    if verdict.holds:
+        making.verified.append((words, partition, verdict))
+        return making.built(job, outcome, REPAIR, repaired=repaired)
+    making.partition_of = old.repaired
+    result = repair(job, words, len(partition.words), partition.default)
+    making.note("repair")
+    now = old.repaired(result.partition)
+    repaired = replace(
+        repaired,
+        changed=old.changes(result, now),
+        changes_bound=result.changes_bound,
+        new_words=tuple(w for w in now.words if w not in partition.words),
+        new_words_bound=result.new_words_bound,
+    )
+    outcome = Outcome(result.partition, job.lower_bound, result.figures, result.stopped)
+    return making.built(job, outcome, REPAIR, repaired=repaired)
+
+
+@dataclass(frozen=True, slots=True)
+class _Old:
+    """The old words in the model of the candidate tasks.
+
+    ``listed`` (states) is the place of each candidate state in ``partition``, -1 where it has none.
+    ``gone`` of the language's states are none of this model.
+    """
+
+    candidates: Candidates
+    partition: Partition
+    listed: Ints
+    gone: int
+
+    @classmethod
+    def of(cls, language: Language, candidates: Candidates) -> _Old:
+        _, wrong = read_keys(candidates.model.codec, language.states)
+        if len(wrong):
+            gone = set(wrong.tolist())
+            kept = [item for n, item in enumerate(language.states.items()) if n not in gone]
+            language = replace(language, states=dict(kept))
+        partition = language.partition(candidates.model)
+        listed = find_rows(partition.rows, candidates.rows)
+        return cls(candidates, partition, listed, len(wrong))
+
+    def words_of(self, states: Sequence[int]) -> dict[int, int]:
+        """The word numbers of those states that the language lists."""
+        places = self.listed[list(states)].tolist()
+        word = self.partition.word.tolist()
+        return {s: word[p] for s, p in zip(states, places, strict=True) if p >= 0}
+
+    def repaired(self, assignment: Assignment) -> Partition:
+        """The partition with other words of some states; words without states are left out."""
+        states = sorted(assignment)
+        fresh = self.listed[states] < 0
+        rows: Rows = np.concatenate((self.partition.rows, self.candidates.rows[states][fresh]))
+        given = np.array([assignment[state] for state in states], np.int64)
+        word = np.concatenate((self.partition.word, given[fresh]))
+        word[self.listed[states][~fresh]] = given[~fresh]
+        used, number = np.unique(word, return_inverse=True)
+        kept, old, default = used.tolist(), self.partition.words, self.partition.default
+        new = (name for name in (f"w{n}" for n in count()) if name not in old)
+        names = tuple(old[word] if word < len(old) else next(new) for word in kept)
+        most = int(np.bincount(number).argmax())
+        default = kept.index(default) if default in kept else most
+        return Partition.of_table(names, rows, number.reshape(-1), default)
+
+    def changes(self, result: Repair, partition: Partition) -> tuple[ChangedState, ...]:
+        """The changed states, sorted by their keys."""
+        rows = self.candidates.rows[list(result.changed)]
+        names = zip(
+            keys_of(self.candidates.model.codec, rows),
+            self.partition.word_of(rows).tolist(),
+            partition.word_of(rows).tolist(),
+            strict=True,
+        )
+        old, new = self.partition.words, partition.words
+        return tuple(ChangedState(key, old[was], new[now]) for key, was, now in sorted(names))

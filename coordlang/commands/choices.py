@@ -14,9 +14,8 @@ from typing import Any
 import click
 
 from coordlang.commands.inputs import Arguments, InTask, public
-from coordlang.commands.layout import alike, columns, named, wrapped
-from coordlang.commands.options import File
-from coordlang.commands.records import ChoicesOptions
+from coordlang.commands.layout import alike, columns, fitted, named
+from coordlang.commands.records import ChoicesOptions, File
 from coordlang.commands.terminal import REFUTED, covered_code, echo, line_width, write
 from coordlang.commands.witness import witness_text
 from coordlang.execution import choices as execution
@@ -171,7 +170,8 @@ def _guarantee_code(found: RobotsChoices, check: bool) -> int:
             if found.covered:
                 why = "the file holds no coordination language"
             said = f"coordlang: refuted: choices of this task miscoordinate; {why}"
-        echo(f"{said}\n{witness_text(found.witness, line_width(err=True))}", err=True)
+        text = fitted(f"{said}\n{witness_text(found.witness)}", line_width(err=True))
+        echo(text, err=True)
         if not is_tolerated:
             return REFUTED
     if check and not found.covered:
@@ -234,7 +234,7 @@ def _text(found: RobotsChoices, width: int, *, is_checked: bool) -> str:
     used, mixtures = found.used, found.found.mixtures
     plans = counted(Plans.of(found.found.fits).count, "plan")
     lines = [
-        *wrapped(f"The task {describe(used.space, used.task)}", width, "", "  "),
+        fitted(f"The task {describe(used.space, used.task)}", width),
         f'"{found.sentence}" leaves {plans} open.',
     ]
     if is_checked and mixtures is not None and mixtures.holds:
@@ -245,9 +245,9 @@ def _text(found: RobotsChoices, width: int, *, is_checked: bool) -> str:
         )
     tables = [_table(found, found.found.robots[robot], width) for robot in found.chosen]
     for group in alike(tables):
-        robots = named([found.robots[number] for number in group])
-        may, table = "may" if len(group) == 1 else "may each", tables[group[0]]
-        lines += ["", *wrapped(f"{robots} {may} {table[0]}", width, "", "  "), *table[1:]]
+        head, *table = tables[group[0]]
+        may = f"{named([found.robots[n] for n in group])} may{' each' * (len(group) > 1)}"
+        lines += ["", fitted(f"{may} {head}", width), *table]
     return "\n".join(lines) + "\n"
 
 

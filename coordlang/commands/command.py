@@ -7,7 +7,7 @@ A command calls the Python function of its name and shows the result; nothing el
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from importlib import import_module
 from pathlib import Path
@@ -15,7 +15,8 @@ from typing import Any, get_args, get_origin
 
 import click
 
-from coordlang.commands.options import CommandOptions, Limits, OutputFile
+from coordlang.commands.layout import fitted
+from coordlang.commands.records import CommandOptions, Limits, OutputFile
 from coordlang.commands.terminal import SAYING, echo, line_width, working
 from planners.system.errors import CoordlangError, OutOfTime, UsageError, note
 from planners.system.limits import default_memory_limit, limited_memory, require_memory, time_limit
@@ -29,9 +30,7 @@ _FILES = ("FILE", "LANGUAGE", "PROBLEM", "RECORD", "RUN.json")
 FILE = click.Path(readable=False)
 
 
-def command_of(
-    name: str, record: type[CommandOptions], loaded: Callable[[str], Any] = import_module
-) -> click.Command:
+def command_of(name: str, record: type[CommandOptions]) -> click.Command:
     """Make a command whose help is the docstring of its record.
 
     Its module is loaded when it is called: there are the function of its name, made by
@@ -59,14 +58,13 @@ def command_of(
                 short = "--json is short for --format json"
                 raise click.UsageError(f"{short}: leave out --format {form}")
             given["form"] = "json"
-        module = loaded(f"coordlang.commands.{record.module or name}")
+        module = import_module(f"coordlang.commands.{record.module or name}")
         options = record_from(record, given, name, on_cli=True)
         is_kept = record.keeps_plans and not options.no_cache
         cache = _keeping() if is_kept else nullcontext()
         with limited(options.limits), cache, _said(given.get("resume")):
             with working(record.doing) as context.meta[SAYING]:
-                outputs, inputs = _files(arguments, files)
-                check_outputs([*outputs, *options.outputs()], inputs)
+                check_outputs(*_files(arguments, files, options))
                 result = getattr(module, name).with_record(options, **read)
             shown: int | None = getattr(module, f"show_{name}")(result, options)
             return shown
@@ -133,12 +131,12 @@ def _said(resume: object) -> Iterator[None]:
         if (witness := getattr(error, "witness", None)) is not None:
             from coordlang.commands.witness import witness_text
 
-            echo(witness_text(witness, line_width(err=True)), err=True)
+            echo(fitted(witness_text(witness), line_width(err=True)), err=True)
         raise
 
 
 def _files(
-    arguments: tuple[str, ...], given: Iterable[tuple[Option, object]]
+    arguments: tuple[str, ...], given: Iterable[tuple[Option, object]], options: CommandOptions
 ) -> tuple[list[OutputFile], list[str]]:
     """The files that options name, or that are written into a folder that one names; and others.
 
@@ -156,8 +154,9 @@ def _files(
             spelling = each.spelling if len(paths) == 1 else f"{each.spelling} {number}"
             if each.name != "output" and path == "-":
                 raise UsageError(f"{spelling} -: this cannot go to stdout", remedy="Name a file.")
-            if each.metavar != "DIR":
+            if not each.files or not getattr(options, "writes_folder", True):
                 outputs.append(OutputFile(spelling, path))
+                continue
             for file in each.files:
                 place = os.path.join(path, file) if path else ""
                 outputs.append(OutputFile(spelling, place, makes_folder=True))

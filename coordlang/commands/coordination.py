@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing import Any
 
 from coordlang.commands.inputs import Arguments, extended, public
-from coordlang.commands.layout import WIDTH
+from coordlang.commands.layout import WIDTH, fitted
 from coordlang.commands.records import CoordinationOptions
 from coordlang.commands.terminal import note_single_robot, show_answer
 from coordlang.commands.witness import witness_data, witness_text
@@ -65,10 +65,10 @@ class TaskCoordination(Presented, TaskAnswer):
         }
 
     def __str__(self) -> str:
-        return self.text()
+        return fitted(self.text(), WIDTH)
 
-    def text(self, width: int = WIDTH) -> str:
-        """The answer in lines of at most ``width`` characters, as far as atoms allow."""
+    def text(self) -> str:
+        """The answer, in lines of any length."""
         answer = "is required" if self.required else "is not required"
         if not self.required and self.plans > 1:
             answer += f": any mixture of them is {'one' if self.slack else 'optimal'}"
@@ -86,7 +86,7 @@ class TaskCoordination(Presented, TaskAnswer):
             line += "\nWithout a word, robots that choose by themselves "
             line += f"fail in {share} of all runs."
         fewest = f"\n{self.fewest.text()}" if self.fewest else ""
-        return f"{line}{fewest}\n\n{witness_text(self.witness, width)}"
+        return f"{line}{fewest}\n\n{witness_text(self.witness)}"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -142,11 +142,11 @@ class Coordination(Presented):
         return {"tasks": [task.data() for task in self.tasks], **self.failures.data()}
 
     def __str__(self) -> str:
-        return self.text()
+        return fitted(self.text(), WIDTH)
 
-    def text(self, width: int = WIDTH) -> str:
-        """The answers in lines of at most ``width`` characters, as far as atoms allow."""
-        lines = [task.text(width) for task in self.tasks]
+    def text(self) -> str:
+        """All answers, in lines of any length."""
+        lines = [task.text() for task in self.tasks]
         if len(lines) > 1 and self.required and self.failures.mean is not None:
             lines.append(f"\nOver all tasks, without a word, robots {self.failures.text()}.")
         return "\n".join(lines)

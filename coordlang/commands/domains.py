@@ -12,8 +12,7 @@ from pathlib import Path
 
 from coordlang.commands.command import check_outputs
 from coordlang.commands.inputs import Arguments, public
-from coordlang.commands.options import OutputFile
-from coordlang.commands.records import DomainsOptions, TasksOptions
+from coordlang.commands.records import DomainsOptions, OutputFile, TasksOptions
 from coordlang.commands.terminal import echo, write
 from coordlang.language.listed import ListedTask, tasks_text, varied_tasks
 from coordlang.sites.movingai import planning_files

@@ -59,11 +59,6 @@ class WordsExplained:
     lifted: LiftedWords | None
 
     @property
-    def formulas(self) -> dict[str, str]:
-        """Word -> its formula as text, exact by itself."""
-        return {word: formula_text(cover) for word, cover in self.covers.items()}
-
-    @property
     def pddl(self) -> dict[str, str]:
         """Word -> its formula as a PDDL condition."""
         return {word: pddl_condition(cover) for word, cover in self.covers.items()}
@@ -150,8 +145,8 @@ class Explanation(InTask):
 
     @property
     def formulas(self) -> dict[str, str]:
-        """Word -> its formula as text."""
-        return self.words.formulas
+        """Word -> its formula as text, exact by itself."""
+        return {word: formula_text(cover) for word, cover in self.words.covers.items()}
 
     def data(self) -> dict[str, Any]:
         """Words and sentences, as ``--json`` has them."""

@@ -11,8 +11,8 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
-from coordlang.commands import options as given
-from coordlang.commands.options import Source, TasksSource
+from coordlang.commands import records as given
+from coordlang.commands.records import Source, TasksSource
 from coordlang.sites.coordinates import Point, checked, read_coordinates
 from planners.loading import PlanningInstance, build
 from planners.pddl import read_domain, read_problem
@@ -95,11 +95,6 @@ class Arguments:
     values: Mapping[str, Any] = field(default_factory=dict)
 
     @property
-    def domain(self) -> given.DomainSource | None:
-        """The domain, or what was loaded; None if it is not given."""
-        return self.values.get("DOMAIN")
-
-    @property
     def problems(self) -> list[given.ProblemSource]:
         """The problems that are given."""
         found = [*self.values.get("PROBLEMS...", ()), self.values.get("PROBLEM")]
@@ -118,7 +113,7 @@ class Arguments:
 
         Raises `UsageError` for too few or too many of them.
         """
-        domain, problems, source = self.domain, self.problems, self.source
+        domain, problems, source = self.values.get("DOMAIN"), self.problems, self.source
         is_single = "PROBLEMS..." not in self.takes
         if source.factored is not None:
             if domain is not None or problems:
@@ -150,7 +145,7 @@ class Arguments:
 
     def instance(self) -> PlanningInstance:
         """Read the joint model and the task of one problem."""
-        loaded = self.domain
+        loaded = self.values.get("DOMAIN")
         if isinstance(loaded, PlanningInstance) and self.source == Source() and not self.problems:
             return loaded
         return self.read().instance()

@@ -3,15 +3,16 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from os import fspath
 from typing import Any
 
 from coordlang.commands.inputs import Arguments, public
-from coordlang.commands.layout import WIDTH, wrapped
+from coordlang.commands.layout import WIDTH, columns
 from coordlang.commands.records import WRITTEN, InspectOptions
-from coordlang.commands.terminal import note_single_robot, show_answer
+from coordlang.commands.terminal import echo, line_width, note_single_robot
 from planners.inspection import Inspection
 from planners.inspection import inspect as inspect_instance
 from planners.pddl.pddl_text import domain_text, problem_text
@@ -21,8 +22,6 @@ from planners.system.errors import note
 from planners.system.notebook import Presented, counted
 from planners.system.writing import write_texts
 
-#: The most columns of the names on the left.
-_WIDEST_NAME = 30
 #: States, and joint steps out of one layer, beyond which a search is not likely to end.
 _MOST_STATES, _MOST_STEPS = 20_000_000, 50_000_000
 #: Reachable states up to which fewest words were proved for all tasks (README.md).
@@ -31,25 +30,19 @@ _PROVABLE = 132
 _ALL_TASKS = 1_000
 #: Layers that are shown.
 _SHOWN = 8
-
-
-@dataclass(frozen=True, slots=True)
-class ReachableSize:
-    """How large the joint model is: reachable states, and applicable joint steps in them."""
-
-    states: int
-    joint_steps: int
+#: Where there are too many states for languages for all tasks.
+_TASKS = "use coordlang tasks, or list tasks"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Inspected(Presented):
     """What was understood of a domain and problem; ``print`` shows it as `coordlang inspect`.
 
-    ``reachable`` is None where it was not counted.
+    ``reachable``: how many joint states can be reached, and joint steps in them, if counted.
     """
 
     inspection: Inspection
-    reachable: ReachableSize | None
+    reachable: tuple[int, int] | None
 
     def facts(self) -> dict[str, object]:
         """What was read, and the robots."""
@@ -57,21 +50,15 @@ class Inspected(Presented):
 
     def data(self) -> dict[str, Any]:
         """Everything as JSON data."""
-        return asdict(self.inspection) | (asdict(self.reachable) if self.reachable else {})
+        counts = zip(("states", "joint_steps"), self.reachable or (), strict=False)
+        return asdict(self.inspection) | dict(counts)
 
     def __str__(self) -> str:
         return self.text()
 
     def text(self, width: int = WIDTH) -> str:
         """Return everything as text, a name in the left column, at most ``width`` wide."""
-        lines = self._lines()
-        left = min(_WIDEST_NAME, max(len(name) for name, _ in lines))
-        further = (left + 2) * " "
-        return "\n".join(
-            line
-            for name, text in lines
-            for line in wrapped(text, width, f"{name:<{left}}  ", further)
-        )
+        return "\n".join(columns(self._lines(), width, indent=""))
 
     def _lines(self) -> list[tuple[str, str]]:
         found = self.inspection
@@ -103,9 +90,9 @@ class Inspected(Presented):
             *feasibility(found.estimate),
         ]
         if self.reachable:
-            states = counted(self.reachable.states, "joint state")
-            steps = counted(self.reachable.joint_steps, "joint step")
-            lines.append(("reachable", f"{states}, {steps}"))
+            states, steps = self.reachable
+            text = f"{counted(states, 'joint state')}, {counted(steps, 'joint step')}"
+            lines.append(("reachable", text))
         return [(name, text or "none") for name, text in lines]
 
     def _subactions(self, robot: str) -> tuple[str, str]:
@@ -122,7 +109,7 @@ def inspect(files: Arguments, options: InspectOptions) -> Inspected:
     loaded = files.instance()
     size = None
     if options.states:
-        size = ReachableSize(*count_reachable(loaded.model, loaded.tasks[0].init[None, :]))
+        size = count_reachable(loaded.model, loaded.tasks[0].init[None, :])
     found = Inspected(inspect_instance(loaded), size)
     if options.write is not None:
         texts = domain_text(loaded.domain), problem_text(loaded.problems[0], loaded.domain)
@@ -135,7 +122,7 @@ def show_inspect(found: Inspected, options: InspectOptions) -> None:
     if options.write is not None:
         note(f"written to {fspath(options.write)}: {', '.join(WRITTEN)}")
     note_single_robot(found.inspection.robots)
-    show_answer(found, as_json=options.as_json)
+    echo(json.dumps(found.data()) if options.as_json else found.text(line_width()))
 
 
 def _counts(counts: dict[str, int]) -> str:
@@ -145,19 +132,18 @@ def _counts(counts: dict[str, int]) -> str:
 def feasibility(found: SearchEstimate) -> list[tuple[str, str]]:
     """Return lines (name, text): labels, layers, bound, what these mean, what to try."""
     each = [f"{robot} {found.choices[robot]:,} of {n:,}" for robot, n in found.labels.items()]
-    layers = f"{_sizes(found.layers)} states, and no other can be reached"
+    further, tasks = ", and no other can be reached", _all_tasks(found.states)
     if found.next_steps is not None:
-        layers = (
-            f"{_sizes(found.layers)} state{'s' * (found.states > 1)}; not looked at: the next, "
-        )
-        layers += f"with at most about {counted(found.next_steps, 'joint step')} into it"
+        steps = counted(found.next_steps, "joint step")
+        further = f"; not looked at: the next, with at most about {steps} into it"
+        tasks = f"more than {found.states:,} states: {_TASKS}"
     too_large = (found.next_steps or 0) > _MOST_STEPS or (found.expected or 0) > _MOST_STATES
     lines = [
         ("labels", f"{', '.join(each)} possible at the start, idling included"),
-        ("first layers", layers),
+        ("first layers", f"{_sizes(found.layers)} states{further}"),
         ("bound", f"{found.heuristic}: {_bound(found)}"),
         ("this task", _this_task(found, too_large)),
-        ("--tasks all", _all_tasks(found)),
+        ("--tasks all", tasks),
     ]
     if found.solvable is None and too_large:
         most = max(found.choices, key=lambda robot: found.choices[robot])
@@ -169,7 +155,7 @@ def feasibility(found: SearchEstimate) -> list[tuple[str, str]]:
 def _sizes(layers: Sequence[int]) -> str:
     sizes = [f"{size:,}" for size in layers]
     if len(sizes) > _SHOWN:
-        sizes = [*sizes[: _SHOWN - 2], "..", sizes[-1]]
+        sizes[_SHOWN - 2 : -1] = [".."]
     return ", ".join(sizes)
 
 
@@ -189,29 +175,23 @@ def _this_task(found: SearchEstimate, too_large: bool) -> str:
         return "no plan: the goal cannot be reached"
     if found.makespan is not None:
         return f"makespan {found.makespan:,}: plans, coordination and build are feasible"
-    least = f"makespan {max(found.hmax or 0, found.at_least or 0):,} at least"
-    ends = "plans ends in seconds to minutes if the makespan is not much more: set a --time-limit"
+    text = f"makespan {max(found.hmax or 0, found.at_least or 0):,} at least"
     if found.expected is not None:
-        large = found.expected >= 1_000_000
+        large, by = found.expected >= 1_000_000, f"{found.factor:.1f} times the one before"
         number = f"{found.expected:.1e}" if large else f"{float(f'{found.expected:.2g}'):,.0f}"
-        by = f"{found.factor:.1f} times the one before"
-        least += f": about {number} states if each layer is {by}"
-    else:
-        ends = "whether plans ends is not known: set a --time-limit"
-    if too_large:
+        text += f": about {number} states if each layer is {by}"
+    ends = "whether plans ends is not known: set a --time-limit"
+    if too_large and found.solver_after is None:
         ends = "plans, and all that needs them, are not likely to end"
-        if found.solver_after is not None:
-            ends = "too many to search them all; whether the bounds suffice is not known: "
-            ends += "set a --time-limit"
-    return f"{least}; {ends}"
+    elif not too_large and found.expected is not None:
+        ends = "plans ends in seconds to minutes if the makespan is not much more"
+    return f"{text}; {ends}"
 
 
-def _all_tasks(found: SearchEstimate) -> str:
-    states, other = counted(found.states, "state"), "use coordlang tasks, or list tasks"
-    if found.next_steps is not None:
-        return f"more than {states}: {other}"
-    if found.states <= _PROVABLE:
-        other = "every method is feasible"
-    elif found.states <= _ALL_TASKS:
-        other = "greedy and separating; minimal is not likely to end with a proof"
-    return f"{states}, at most {counted(found.states * (found.states - 1), 'task')}: {other}"
+def _all_tasks(states: int) -> str:
+    advice = _TASKS
+    if states <= _PROVABLE:
+        advice = "every method is feasible"
+    elif states <= _ALL_TASKS:
+        advice = "greedy and separating; minimal is not likely to end with a proof"
+    return f"{counted(states, 'state')}, at most {counted(states * (states - 1), 'task')}: {advice}"

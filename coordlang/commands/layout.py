@@ -14,7 +14,8 @@ WIDTH = 120
 HELD = "\xa0"
 #: Characters that the last column of a table has at least.
 _LEAST_ROOM = 30
-_ATOM = re.compile(r"(?:\((?:not|last \S+) )?\([^()]*\)")
+#: An atom or an action, and whose it is.
+_ATOM = re.compile(r"(?:\S+: )?(?:\((?:not|last \S+) )?\([^()]*\)")
 
 
 def wrapped(text: str, width: int, indent: str, further: str) -> list[str]:
@@ -57,7 +58,9 @@ def alike(items: Sequence[object]) -> Iterator[list[int]]:
         left = [n for n in left if items[n] != items[left[0]]]
 
 
-def columns(rows: Sequence[Sequence[str]], width: int, numbers: int) -> Iterator[str]:
+def columns(
+    rows: Sequence[Sequence[str]], width: int, numbers: int = 0, indent: str = "  "
+) -> Iterator[str]:
     """Rows of cells as lines, the first ``numbers`` columns to the right.
 
     A column is as wide as its widest line; the last one is wrapped where it does not fit.
@@ -66,7 +69,7 @@ def columns(rows: Sequence[Sequence[str]], width: int, numbers: int) -> Iterator
         max(len(line) for cell in column for line in cell.split("\n"))
         for column in zip(*rows, strict=True)
     )
-    room = max(_LEAST_ROOM, width - sum(sizes) - 2 * len(sizes) - 2)
+    room = max(_LEAST_ROOM, width - sum(sizes) - 2 * len(sizes) - len(indent))
     for row in rows:
         cells = [*(cell.split("\n") for cell in row[:-1]), wrapped(row[-1], room, "", "")]
         for *left, last in zip_longest(*cells, fillvalue=""):
@@ -74,4 +77,4 @@ def columns(rows: Sequence[Sequence[str]], width: int, numbers: int) -> Iterator
                 text.rjust(size) if column < numbers else text.ljust(size)
                 for column, (text, size) in enumerate(zip(left, sizes, strict=True))
             ]
-            yield "  ".join(["", *padded, last]).rstrip()
+            yield f"{indent}{'  '.join([*padded, last])}".rstrip()

@@ -11,8 +11,14 @@ from typing import Any
 
 import coordlang
 from coordlang.commands.inputs import Arguments, PlanningInput, public, read_coordinates_of
-from coordlang.commands.options import File, Jobs, ProblemSource, TasksSource
-from coordlang.commands.records import GroundOptions, LiftOptions
+from coordlang.commands.records import (
+    File,
+    GroundOptions,
+    Jobs,
+    LiftOptions,
+    ProblemSource,
+    TasksSource,
+)
 from coordlang.commands.terminal import UNPROVED, echo, ended_early, say, write
 from coordlang.language import file as language_file
 from coordlang.language.candidates import require_solvable
@@ -66,16 +72,13 @@ class Lifted(Presented):
     def data(self) -> dict[str, Any]:
         """The figures of the learning, as ``--json`` has them."""
         counted_by = ("problem", "states", "tasks", "words")
+        features = [
+            (str(feature), formula(feature), english(feature), feature.complexity)
+            for feature in self.language.features
+        ]
+        keys = ("definition", "formula", "text", "complexity")
         return {
-            "features": [
-                {
-                    "definition": str(feature),
-                    "formula": formula(feature),
-                    "text": english(feature),
-                    "complexity": feature.complexity,
-                }
-                for feature in self.language.features
-            ],
+            "features": [dict(zip(keys, feature, strict=True)) for feature in features],
             "words": len(self.language.words),
             "fewest_proved": self.learned.proved,
             "tried": self.learned.tried,
@@ -115,9 +118,9 @@ def lift(files: Arguments, options: LiftOptions) -> Lifted:
     The problems need not have the same objects, but the same robots.  Raises `ProvedImpossible` if
     no features up to this complexity suffice.
     """
-    check, problems = options.check, files.problems
-    if isinstance(files.domain, PlanningInstance):
-        problems = problems or [*files.domain.problems]
+    check, problems, loaded = options.check, files.problems, files.values.get("DOMAIN")
+    if isinstance(loaded, PlanningInstance):
+        problems = problems or [*loaded.problems]
     given: list[Any] = [*problems, *check] if options.source.factored is None else [None]
     every = [_instance(files, problem, options) for problem in given]
     if not every:
@@ -161,7 +164,7 @@ def _instance(
     arguments: Arguments, problem: ProblemSource | None, options: LiftOptions
 ) -> Instance:
     """A problem; that of a factored folder where none is given."""
-    given = {"DOMAIN": arguments.domain, "PROBLEM": problem}
+    given = {"DOMAIN": arguments.values.get("DOMAIN"), "PROBLEM": problem}
     files = Arguments(options.source, (*given,), given).read()
     say(f"finding all optimal plans of {files.problems[0].name}")
     points = read_coordinates_of(options.coordinates, files.problems[0])

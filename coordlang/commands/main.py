@@ -21,7 +21,7 @@ from typing import Any
 import click
 
 import coordlang
-from coordlang.commands.terminal import BROKEN_PIPE, INTERRUPTED, SIGNALS, Output, echo
+from coordlang.commands.terminal import BROKEN_PIPE, INTERRUPTED, SIGNALS, echo
 from planners.system.errors import CoordlangError, Note, OutOfMemory, UsageError
 from planners.system.limits import lacks_memory
 from planners.system.messages import sentence, visible
@@ -96,7 +96,7 @@ def run(arguments: list[str], interruptions: Interruptions | None = None) -> int
 
     ``interruptions`` look after the signals that end the process, if anything does.
     """
-    output = Output()
+    output: dict[str, bool] = {}
     try:
         return _run(arguments, output)
     except (Exception, KeyboardInterrupt) as error:
@@ -105,7 +105,7 @@ def run(arguments: list[str], interruptions: Interruptions | None = None) -> int
             if "--debug" in arguments and not isinstance(error, click.ClickException):
                 _show("".join(traceback.format_exception(error)))
             _show(text)
-            if wants_json(arguments) and not output.written:
+            if wants_json(arguments) and not output:
                 from coordlang.commands.schema import error_json
 
                 echo(error_json(known))
@@ -114,7 +114,7 @@ def run(arguments: list[str], interruptions: Interruptions | None = None) -> int
         return known.exit_code
 
 
-def _run(arguments: list[str], output: Output) -> int:
+def _run(arguments: list[str], output: dict[str, bool]) -> int:
     """Run one command through click; the exit code."""
     if sys.stdout is None:
         raise UsageError(

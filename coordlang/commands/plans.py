@@ -9,8 +9,7 @@ from itertools import islice
 from typing import Any, ClassVar
 
 from coordlang.commands.inputs import Arguments, public
-from coordlang.commands.options import DEFAULT_MAX
-from coordlang.commands.records import PlansOptions, UnderstandOptions
+from coordlang.commands.records import DEFAULT_MAX, PlansOptions, UnderstandOptions
 from coordlang.commands.terminal import echo, note_single_robot, write
 from planners.search.kept_plans import search
 from planners.search.optimal_plans import search as bounded_search
@@ -28,14 +27,6 @@ class OptimalPlans(Presented):
     Iteration is lazy: nothing is listed until it is asked for, and the number of plans is known
     without listing them.  A plan is a tuple of joint steps, and a joint step has one text for each
     robot, None where it idles.
-
-    Examples
-    --------
-    >>> plans = coordlang.plans("domain.pddl", "problem.pddl")         # doctest: +SKIP
-    >>> plans.count, plans.makespan                                    # doctest: +SKIP
-    (2, 4)
-    >>> next(iter(plans))[0]                                           # doctest: +SKIP
-    (None, '(move r2 c1-0 c1-1)')
     """
 
     __slots__ = ("_plans",)

@@ -1,41 +1,52 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each command and its Python function can be asked for.
+"""What each command and its Python function can be asked for, and the types of what they read.
 
 The docstring of a record is the command's ``--help``.  Nothing heavy is imported here.
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from os import PathLike, fspath
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Union
 
-from coordlang.commands.options import (
-    AnswerOptions,
-    CertificateSource,
-    CommandOptions,
-    CoordinatesSource,
-    File,
-    Jobs,
-    LanguageSource,
-    Listing,
-    MethodOptions,
-    OutputFile,
-    PlanningOptions,
-    ProblemSource,
-    SentenceSource,
-    Source,
-    TasksSource,
-    coordinates_option,
-    form_option,
-    json_option,
-    output_option,
-)
+import click
+
+from planners.pddl.model_options import ModelOptions
 from planners.search import HeuristicName, SearchHeuristic
-from planners.system.errors import UsageError
+from planners.system.errors import UsageError, note
 from planners.system.options import group, option
+
+if TYPE_CHECKING:
+    from coordlang.language.listed import ListedTask
+    from coordlang.language.words import Language
+    from coordlang.lifted.language import LiftedLanguage
+    from coordlang.verification.certificate_file import Certificate
+    from planners.loading import PlanningInstance
+    from planners.parallel.workers import Workers
+    from planners.pddl.lifted import Domain, Problem
+
+File = str | PathLike[str]
+#: A domain file, a parsed domain, or domain and problems together (`coordlang.load`).
+DomainSource = Union[File, "Domain", "PlanningInstance"]
+ProblemSource = Union[File, "Problem"]
+#: ``"all"``, a task file, its data, or tasks: each with ``init`` and ``goal``, lists of PDDL texts.
+TasksSource = Union[File, Mapping[str, Any], "Sequence[ListedTask | Mapping[str, Any]]"]
+LanguageSource = Union[File, "Language", "LiftedLanguage"]
+CertificateSource = Union[File, "Certificate"]
+#: A file of coordinates, or place -> (x, y).
+CoordinatesSource = File | Mapping[str, tuple[float, float]]
+#: A sentence: ``"w1 w0"``, its words ``("w1", "w0")``, or one of `explain`.
+SentenceSource = str | Iterable[str]
+
+#: What the command line has not where plans take no slack, or a language file says how much.
+NO_SLACK = ("slack", "words_see_slack")
+#: Plans that are listed where no number is given.
+DEFAULT_MAX = 10
 
 #: The files of a domain and a problem that are written.
 WRITTEN = ("domain.pddl", "problem.pddl")
@@ -46,10 +57,208 @@ NODES_DRAWN = 200
 
 #: What `export` writes.
 Target = Literal["pddl", "ltlf", "bt"]
-#: Planners whose PDDL differs: what Fast Downward and K* read, or STRIPS alone.
-Reader = Literal["fd", "kstar", "pyperplan"]
-#: What a lifted language should have few of first, features or words.
-LiftPreference = Literal["features", "words"]
+
+
+class OutputFile(NamedTuple):
+    """A file that is written: the option that names it, and its path.
+
+    None is no file, ``-`` is stdout and not looked at.  ``makes_folder``: its folder is made where
+    it is missing.
+    """
+
+    option: str
+    path: str | None
+    makes_folder: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What bounds the work of a command."""
+
+    time_limit: float | None = option(
+        None, "Stop after this long (exit 23).", "SECONDS", only="cli"
+    )
+    memory_limit: str | None = option(
+        None, "Stop before using more, as in 4G (exit 22); none: no limit.", "SIZE", only="cli"
+    )
+    debug: bool = option(False, "Show tracebacks.", only="cli")
+
+    def __post_init__(self) -> None:
+        if self.time_limit is not None and not self.time_limit > 0:
+            raise click.UsageError("--time-limit: expected a number of seconds above 0")
+
+    @property
+    def bytes(self) -> int | None:
+        """The most memory that was given, None for no limit; `click.BadParameter` for no size."""
+        text = (self.memory_limit or "none").strip().lower()
+        if text == "none":
+            return None
+        match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([kmgt]?)i?b?", text)
+        if not match:
+            raise click.BadParameter(
+                "expected a size such as 500M or 4G, or none", param_hint="'--memory-limit'"
+            )
+        return int(float(match[1]) * 1024 ** " kmgt".index(match[2] or " "))
+
+
+@dataclass(frozen=True, slots=True)
+class CommandOptions:
+    """What a command can be asked for; the docstring of each record is the command's ``--help``.
+
+    The command ``takes`` arguments as the usage line shows them, and none where the option
+    ``alone`` is given.  A terminal shows what it is ``doing``.  Its function is in the ``module``
+    of its name, unless another one is named, and searches no task again that was searched before
+    if it ``keeps_plans``.
+    """
+
+    takes: ClassVar[str] = ""
+    doing: ClassVar[str] = "finding all optimal plans"
+    module: ClassVar[str | None] = None
+    keeps_plans: ClassVar[bool] = True
+    alone: ClassVar[str | None] = None
+
+    no_cache: bool = option(False, "Search anew: read no plans that were found before.", only="cli")
+    limits: Limits = group(Limits)
+
+
+def json_option() -> Any:
+    """The field of an options record for ``--json``."""
+    return option(False, "One JSON object.", names=("--json",), only="cli")
+
+
+def form_option(default: str, help: str) -> Any:
+    """The field of an options record for ``--format``."""
+    return option(default, help, names=("--format",), only="cli")
+
+
+def output_option(help: str, metavar: str = "FILE", default: Any = None, **more: Any) -> Any:
+    """The field ``output`` of an options record for ``-o``; ``-`` is stdout."""
+    names = ("-o", "--output")
+    return option(default, help, metavar, names=names, only="cli", is_output=True, **more)
+
+
+def result_option(what: str, metavar: str = "FILE") -> Any:
+    """The same, where it must be given."""
+    return output_option(f"{what}; - for stdout.", metavar, "", required=True)
+
+
+def coordinates_option() -> Any:
+    """The field of an options record for ``--coordinates``."""
+    return option(None, "Where places lie (default: coordinates.json beside PROBLEM).", "FILE")
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """How domain and problems are read.
+
+    ``given`` are the names of the model options that were given: a language file records them all,
+    and one that was given must not contradict it.
+    """
+
+    factored: str | PathLike[str] | None = option(
+        None, "In place of DOMAIN and PROBLEM: the folder of each robot's own files.", "DIR"
+    )
+    model: ModelOptions = group(ModelOptions)
+    given: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class PlanningOptions(CommandOptions):
+    """What a command can be asked for that reads a domain and problems."""
+
+    source: Source = group(Source, without=NO_SLACK)
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerOptions(PlanningOptions):
+    """The same, of one whose answer can be JSON."""
+
+    as_json: bool = json_option()
+
+
+@dataclass(frozen=True, slots=True)
+class Jobs:
+    """Who does large work: processes here, or a cluster; and where finished parts are kept."""
+
+    jobs: int | None = option(None, "Processes (default: one for each core).", "N", least=1)
+    scheduler: str | PathLike[str] | None = option(
+        None, "Do the work on this Dask cluster instead.", "ADDRESS|FILE", without=("jobs",)
+    )
+    resume: str | PathLike[str] | None = option(
+        None, "Keep finished jobs here, and go on.", "DIR", is_output=True, files=(".table",)
+    )
+
+    def opened(self) -> AbstractContextManager[Workers]:
+        """Who does jobs, for a block."""
+        from planners.parallel.workers import workers
+
+        scheduler = None if self.scheduler is None else fspath(self.scheduler)
+        packages = ("planners", "coordlang")  # whose code does jobs
+        return workers(self.jobs, scheduler, self.resume, packages, note)
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """Which plans are listed: the first ``most`` ones, or ``sample`` drawn ones."""
+
+    only_count: bool = option(
+        False,
+        "Print the number of plans only.",
+        names=("--count",),
+        only="cli",
+        without=("most", "sample", "form=dot"),
+    )
+    most: int | None = option(
+        None,
+        f"List so many plans (default: {DEFAULT_MAX}).",
+        "N",
+        names=("--max",),
+        least=0,
+        only="cli",
+        without=("form=dot",),
+    )
+    sample: int | None = option(
+        None,
+        "Draw N plans uniformly instead of the first ones.",
+        "N",
+        least=1,
+        only="cli",
+        without=("most", "form=dot"),
+    )
+    seed: int = option(0, "Seed of --sample.", only="cli", needs=("sample",))
+
+
+#: How words are found: a key of `coordlang.vocabulary.METHODS`.
+Method = Literal["best", "greedy", "separating", "minimal", "exhaustive"]
+#: What the language should be like, of those with the fewest words, by the value of ``--prefer``.
+BuildPreference = Literal["flexible", "simple"]
+#: Effort of ``--method best`` that takes a second or two on small tasks.
+EFFORT = 10
+
+
+@dataclass(frozen=True, slots=True)
+class MethodOptions:
+    """How the words of a language are found."""
+
+    method: Method = option(
+        "best", "best: few words within some effort.  minimal: fewest, proved.  greedy: fast."
+    )
+    effort: int = option(
+        EFFORT,
+        "best: thousands of conflicts that its solver may spend.",
+        "N",
+        least=0,
+        needs=("method", "best"),
+    )
+    seed: int = option(0, "Seed of all random choices.", least=0)
+    alpha_only: bool = option(
+        False, "separating: part plans where they differ first.", needs=("method", "separating")
+    )
+    prefer: BuildPreference | None = option(
+        None,
+        "Sentences leave many plans open; words have short formulas.",
+        needs=("method", "best", "minimal", "exhaustive"),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +276,7 @@ class InspectOptions(AnswerOptions):
 
 
 @dataclass(frozen=True, slots=True)
-class PlansOptions(PlanningOptions):
+class PlansOptions(AnswerOptions):
     """Count, list or sample all optimal plans of a task.
 
     With --slack B those that take at most B steps more, too.
@@ -79,7 +288,6 @@ class PlansOptions(PlanningOptions):
         "auto", "What the search is bounded by; the plans are the same."
     )
     form: Literal["ipc", "json"] = form_option("ipc", "How plans are written.")
-    as_json: bool = json_option("Short for --format json.")
     listing: Listing = group(Listing)
     source: Source = group(Source, without=("words_see_slack",))
 
@@ -107,7 +315,7 @@ class CoordinationOptions(AnswerOptions):
 
 
 @dataclass(frozen=True, slots=True)
-class TasksOptions(PlanningOptions):
+class TasksOptions(AnswerOptions):
     """Write a task file: PROBLEM with other starts and goals; ? in a PATTERN is any name."""
 
     takes = "DOMAIN PROBLEM"
@@ -117,12 +325,11 @@ class TasksOptions(PlanningOptions):
 
     start: tuple[str, ...] = option((), "Atoms of which starts have others.", "PATTERN")
     goal: tuple[str, ...] = option((), "Each goal has one atom like this.", "PATTERN")
-    output: str = output_option("The task file")
-    as_json: bool = json_option("Print the figures as one JSON object.")
+    output: str = result_option("The task file")
 
 
 @dataclass(frozen=True, slots=True)
-class BuildOptions(PlanningOptions):
+class BuildOptions(AnswerOptions):
     """Build a coordination language and verify it.
 
     Exit 0: written, with the proof that the method promises.  3: without it (a limit was hit).
@@ -149,11 +356,10 @@ class BuildOptions(PlanningOptions):
         without=("method", "alpha_only", "prefer"),
     )
     unsolvable: Literal["fail", "skip"] = option("fail", "What to do with tasks without plans.")
-    output: str = output_option("The language file (.json, .json.gz)", "LANGUAGE")
+    output: str = result_option("The language file (.json, .json.gz)", "LANGUAGE")
     certificate: str | None = option(
         None, "Also write why fewer words do not suffice.", "FILE", only="cli", is_output=True
     )
-    as_json: bool = json_option("Print the figures as one JSON object.")
     work: Jobs = group(Jobs)
     source: Source = group(Source)
 
@@ -186,7 +392,7 @@ class VerifyOptions(AnswerOptions):
 
 
 @dataclass(frozen=True, slots=True)
-class LiftOptions(PlanningOptions):
+class LiftOptions(AnswerOptions):
     """Learn words as functions of features of states, for all PROBLEMS at once.
 
     Exit 0: written.  3: written, but a limit ended the search.  11: no features suffice.
@@ -199,14 +405,13 @@ class LiftOptions(PlanningOptions):
         (), "Verify on this problem, too, or learn from it.", "PROBLEM", without=("factored",)
     )
     complexity: int = option(8, "Leave out features that are more complex.", least=1)
-    prefer: LiftPreference | None = option(
+    prefer: Literal["features", "words"] | None = option(
         None, "Few words, for the simplest features, or for those that do with fewest."
     )
     coordinates: CoordinatesSource | None = coordinates_option()
     jobs: int | None = option(None, "Processes that verify (default: the cores).", "N", least=1)
-    output: str = output_option("The lifted file (.json, .json.gz)", "LIFTED")
+    output: str = result_option("The lifted file (.json, .json.gz)", "LIFTED")
     seed: int = option(0, "Seed of all random choices.", least=0)
-    as_json: bool = json_option("Print the figures as one JSON object.")
 
     def __post_init__(self) -> None:
         if self.source.model.slack:
@@ -233,7 +438,7 @@ class GroundOptions(PlanningOptions):
     verified: bool = option(True, "Do not verify it here.", names=("--unverified",))
     coordinates: CoordinatesSource | None = coordinates_option()
     jobs: int | None = option(None, "Processes that verify (default: the cores).", "N", least=1)
-    output: str = output_option("The language file (.json, .json.gz)", "LANGUAGE")
+    output: str = result_option("The language file (.json, .json.gz)", "LANGUAGE")
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,7 +450,7 @@ class SayOptions(AnswerOptions):
 
 
 @dataclass(frozen=True, slots=True)
-class UnderstandOptions(PlanningOptions):
+class UnderstandOptions(AnswerOptions):
     """Count, list, sample or draw the optimal plans that a SENTENCE ("w1 w0") leaves open."""
 
     takes = "LANGUAGE DOMAIN PROBLEM SENTENCE"
@@ -254,7 +459,6 @@ class UnderstandOptions(PlanningOptions):
 
     listing: Listing = group(Listing)
     form: Literal["ipc", "json", "dot"] = form_option("ipc", "dot: drawn as one DAG.")
-    as_json: bool = json_option("Short for --format json.")
     nodes: int | None = option(
         None,
         f"Cut the DAG to about N nodes (default for dot: {NODES_DRAWN}).",
@@ -264,11 +468,11 @@ class UnderstandOptions(PlanningOptions):
         needs=("form", "dot", "json"),
         without=("only_count",),
     )
-    output: str | None = output_option()
+    output: str | None = output_option("Write to this file instead of stdout.")
 
 
 @dataclass(frozen=True, slots=True)
-class PlanOptions(PlanningOptions):
+class PlanOptions(AnswerOptions):
     """Find one optimal plan under SENTENCE ("w1 w0"), or under the best sentence (--prefer)."""
 
     takes = "LANGUAGE DOMAIN PROBLEM [SENTENCE]"
@@ -280,7 +484,6 @@ class PlanOptions(PlanningOptions):
     )
     heuristic: HeuristicName = option("relaxed", "The lower bound of A*.")
     form: Literal["ipc", "json", "plansys2"] = form_option("ipc", "How the plan is written.")
-    as_json: bool = json_option("Short for --format json.")
 
     def __post_init__(self) -> None:
         if isinstance(self.prefer, str):
@@ -288,7 +491,7 @@ class PlanOptions(PlanningOptions):
 
 
 @dataclass(frozen=True, slots=True)
-class ChoicesOptions(PlanningOptions):
+class ChoicesOptions(AnswerOptions):
     """Show what each robot may do under SENTENCE ("w1 w0"), whatever the others choose.
 
     With --history and detours: what one robot may do next, and whether it may make them all.
@@ -305,12 +508,11 @@ class ChoicesOptions(PlanningOptions):
     do: tuple[str, ...] = option((), "Detour: it does this; * is any text.", "PATTERN", only="cli")
     never: tuple[str, ...] = option((), "Detour: it never does this.", "PATTERN", only="cli")
     form: Literal["text", "json", "dot"] = form_option("text", "How they are shown.")
-    as_json: bool = json_option("Short for --format json.")
-    output: str | None = output_option()
+    output: str | None = output_option("Write to this file instead of stdout.")
 
 
 @dataclass(frozen=True, slots=True)
-class SimulateOptions(PlanningOptions):
+class SimulateOptions(AnswerOptions):
     """Let robots with wheels do a task in a simulator (`pip install 'coordlang[sim]'`)."""
 
     takes = "LANGUAGE DOMAIN PROBLEM"
@@ -332,17 +534,11 @@ class SimulateOptions(PlanningOptions):
     human: str | None = option(None, "Somebody whom only lidars see.", "PLACE|random|walking")
     visit: Sequence[str] = option((), "After STEP it wants to visit PLACE.", "ROBOT:STEP:PLACE")
     coordinates: CoordinatesSource | None = coordinates_option()
-    output: tuple[str, ...] = option(
-        (),
-        "The record (.json), or one run (.gif, .mp4, .png).",
-        "FILE",
-        names=("-o", "--output"),
-        only="cli",
-        is_output=True,
+    output: tuple[str, ...] = output_option(
+        "The record (.json), or one run (.gif, .mp4, .png).", default=()
     )
     shown: int | None = option(None, "Of the run that -o shows.", "SEED", only="cli")
     replay: str | None = option(None, "Only read and show this record.", "RECORD", only="cli")
-    as_json: bool = json_option("Print the record as one JSON object.")
 
     def __post_init__(self) -> None:
         from coordlang.commands.simulate import kind_of
@@ -362,9 +558,7 @@ class ExportOptions(AnswerOptions):
     doing = "compiling the task"
 
     to: Target = option("pddl", "A problem, a temporal formula, or behaviour trees.")
-    output: str | None = option(
-        None, "pddl: a folder; else a file.", "PATH", names=("-o", "--output"), only="cli"
-    )
+    output: str | None = output_option("pddl: a folder; else a file.", "PATH", files=WRITTEN)
     max_actions: int = option(
         MAX_ACTIONS,
         "Beyond N joint actions robots choose one by one.",
@@ -372,7 +566,7 @@ class ExportOptions(AnswerOptions):
         least=0,
         needs=("to", "pddl"),
     )
-    for_planner: Reader = option(
+    for_planner: Literal["fd", "kstar", "pyperplan"] = option(
         "fd", "Who reads the PDDL.", names=("--for",), needs=("to", "pddl")
     )
     translate_plan: str | None = option(
@@ -381,17 +575,9 @@ class ExportOptions(AnswerOptions):
 
     @property
     def writes_folder(self) -> bool:
-        """Whether ``output`` is a folder for two files."""
+        """Whether ``output`` is a folder for `WRITTEN`, not a file."""
         is_text = self.as_json or self.translate_plan is not None or self.output in (None, "-")
         return self.to == "pddl" and not is_text
-
-    def outputs(self) -> list[OutputFile]:
-        """The file, or those in the folder."""
-        if not self.writes_folder:
-            return [OutputFile("-o", self.output)]
-        folder = self.output
-        paths = [os.path.join(folder, name) if folder else "" for name in WRITTEN]
-        return [OutputFile("-o", path, makes_folder=True) for path in paths]
 
 
 @dataclass(frozen=True, slots=True)
@@ -415,7 +601,7 @@ class ReportOptions(PlanningOptions):
     takes = "LANGUAGE DOMAIN PROBLEMS..."
     doing = "drawing the page"
 
-    output: str = output_option("The HTML file", "PAGE")
+    output: str = result_option("The HTML file", "PAGE")
     tasks_shown: int = option(30, "Show at most this many tasks.", "N", least=1)
     coordinates: str | None = coordinates_option()
     run: str | None = option(None, "Also play these runs of simulate.", "RUN.json")
@@ -429,7 +615,8 @@ class ReportOptions(PlanningOptions):
                 remedy="Make a page for each of several problems.",
             )
 
-    def outputs(self) -> list[OutputFile]:
+    @property
+    def beside(self) -> list[OutputFile]:
         """Beside the page and under its name: a plan for PlanViz, and its map."""
         kinds = ("json", "map") if self.planviz else ()
         paths = (str(Path(self.output).with_suffix(f".planviz.{kind}")) for kind in kinds)

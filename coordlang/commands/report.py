@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from coordlang.commands.command import check_outputs
 from coordlang.commands.inputs import Arguments, language_for, public, read_coordinates_of
 from coordlang.commands.records import ReportOptions
 from coordlang.commands.terminal import warn_of_failures, write
@@ -23,6 +24,7 @@ Page = tuple[Report, Tolerance | None, tuple[str, ...]]
 @public(ReportOptions)
 def report(arguments: Arguments, options: ReportOptions) -> Page:
     """Make the page of a language: its words, and sentences and plans of tasks."""
+    check_outputs(options.beside, ())
     files = arguments.read()
     points = read_coordinates_of(options.coordinates, files.problems[0])
     read, position = language_for(arguments.needed("LANGUAGE"), files, coordinates=points)
@@ -54,6 +56,6 @@ def show_report(found: Page, options: ReportOptions) -> None:
     shown = f"{counted(page.tasks, 'task')} of {page.candidates:,}"
     place = "stdout" if output == "-" else visible(output)
     write(page.html, output, f"{shown}, {len(page.html):,} bytes, written to {place}")
-    for file, text in zip(options.outputs(), beside, strict=True):
+    for file, text in zip(options.beside, beside, strict=True):
         write(text, file.path)
     warn_of_failures(tolerance)

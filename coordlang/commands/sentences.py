@@ -165,11 +165,10 @@ class Fulfilled:
 
     def data(self) -> dict[str, Any]:
         """An entry of ``wishes`` in the JSON plan file."""
-        plans = {"worst_plan": self.worst_plan, "best_plan": self.best_plan}
-        own: dict[str, Any] = {"granted": self.is_granted, **plans}
         if self.value is not None:
-            own = {"value": json_count(self.value)}
-        return {"wish": self.preference, **own}
+            return {"wish": self.preference, "value": json_count(self.value)}
+        plans = {"worst_plan": self.worst_plan, "best_plan": self.best_plan}
+        return {"wish": self.preference, "granted": self.is_granted, **plans}
 
     def text(self) -> str:
         """How the sentence meets the preference, in a line or two."""
@@ -213,9 +212,6 @@ class PlanUnderSentence(InTask):
 
     def __iter__(self) -> Iterator[Texts]:
         return iter(self.steps)
-
-    def __len__(self) -> int:
-        return len(self.steps)
 
     def data(self) -> dict[str, Any]:
         """A JSON plan file (docs/formats.md) with the search and the preferences."""

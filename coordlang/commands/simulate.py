@@ -13,8 +13,7 @@ from typing import Any
 import msgspec
 
 from coordlang.commands.inputs import Arguments, public, read_coordinates_of
-from coordlang.commands.options import File
-from coordlang.commands.records import SimulateOptions
+from coordlang.commands.records import File, SimulateOptions
 from coordlang.commands.terminal import covered_code, echo, ended_early, working
 from coordlang.execution.best_sentence import best_sentence
 from coordlang.execution.task_language import TaskLanguage

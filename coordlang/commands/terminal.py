@@ -11,14 +11,13 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from functools import partial
 from time import monotonic
 from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
-from coordlang.commands.layout import WIDTH
+from coordlang.commands.layout import WIDTH, fitted
 from planners.system.errors import note
 from planners.system.limits import underway
 from planners.system.messages import visible
@@ -44,6 +43,8 @@ BROKEN_PIPE = 141
 
 #: Where the context of a command has what shows its progress.
 SAYING = "coordlang.saying"
+#: Where what `coordlang.commands.main.run` hands to a command says that stdout has been written to.
+WRITTEN = "written"
 #: Seconds of work before progress is shown: short commands neither flicker nor load rich.
 _DELAY = 0.4
 #: Seconds between two looks at how far the work got.
@@ -54,21 +55,14 @@ _LEAST_WIDTH = 60
 _STDERR = 2
 
 
-@dataclass(slots=True)
-class Output:
-    """What a command has done to stdout: whether something is written there already."""
-
-    written: bool = False
-
-
 def echo(text: object, *, err: bool = False, nl: bool = True) -> None:
     """Write text like `click.echo`, with control characters escaped.
 
     Names of files and arguments may hold any character, and escapes of a terminal among them.
     """
     context = click.get_current_context(silent=True)
-    if not err and context is not None and isinstance(context.obj, Output):
-        context.obj.written = True
+    if not err and context is not None and context.obj is not None:
+        context.obj[WRITTEN] = True
     click.echo(visible(str(text), keep="\n\t"), err=err, nl=nl)
 
 
@@ -89,7 +83,7 @@ def write(data: str | bytes, output: str | None, said: str | None = None) -> Non
 
 def show_answer(found: Any, *, as_json: bool) -> None:
     """Write the ``data`` of a result as one JSON object, or its ``text`` as wide as the page."""
-    echo(json.dumps(found.data()) if as_json else found.text(line_width()))
+    echo(json.dumps(found.data()) if as_json else fitted(found.text(), line_width()))
 
 
 def tell(text: str) -> None:

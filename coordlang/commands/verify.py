@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import Any
 
 from coordlang.commands.inputs import Arguments, extended, language_for, note_size, public
 from coordlang.commands.records import VerifyOptions
-from coordlang.commands.terminal import REFUTED, echo, say, show_answer, write
+from coordlang.commands.terminal import REFUTED, say, show_answer, write
 from coordlang.commands.witness import witness_data, witness_text
 from coordlang.language.candidates import require_solvable
 from coordlang.language.provenance import Tolerance, tolerance_data
@@ -96,8 +97,8 @@ class Verification(Presented, Verdict):
             **tolerance_data(self.tolerance),
         }
 
-    def text(self, width: int) -> str:
-        """The answer for people, in lines of at most ``width`` characters."""
+    def text(self) -> str:
+        """The answer for people, in lines of any length."""
         words = counted(self.words, "word")
         tasks = f"{counted(self.tasks, 'task')}, {self.options}"
         fail = f"robots that choose by themselves {self.failures.text()}"
@@ -111,12 +112,32 @@ class Verification(Presented, Verdict):
             head = f'refuted: plans with the sentence "{sentence} .." miscoordinate'
             if self.tolerance is not None and self.tolerance.may_fail:
                 fail += f".\nThe file claims less: {self.tolerance.warning}"
-            text = witness_text(self.witness, width)
+            text = witness_text(self.witness)
             return f"{head}\n{text}\n\nOn the whole ({self.options}) {fail}."
         slack = self.tolerance.slack if self.tolerance else None
         plans = f"plans within slack {slack}" if slack else "optimal plans"
         mixing = f"all {plans} of one sentence mix freely"
-        return f"verified: {words}, {tasks}: {mixing} ({self.nodes:,} walk nodes)"
+        head = f"verified: {words}, {tasks}: {mixing} ({self.nodes:,} walk nodes)"
+        return "\n".join([head, *self._what_is_proved()])
+
+    def _what_is_proved(self) -> Iterator[str]:
+        """Why fewer words do not suffice, or what was not checked."""
+        checked = self.certificate
+        if self.unchecked is not None:
+            yield self.unchecked
+        if checked is None or not self.proves_claim:
+            return
+        bound, why = checked.lower_bound, "every language has a word"
+        if bound > 1:
+            why = (
+                f"{counted(checked.reasons, 'reason')} checked, and with "
+                f"{counted(bound - 1, 'word')} they contradict each other "
+                f"({counted(len(checked.cnf.clauses), 'clause')})"
+            )
+        yield f"lower bound {bound}: {why}"
+        if bound != self.words:
+            least = f"at least {bound:,} and at most {self.words:,}"
+            yield f"not proved minimal: the least number of words is {least}"
 
 
 @public(VerifyOptions)
@@ -168,37 +189,16 @@ def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
 
 
 def show_verify(found: Verification, options: VerifyOptions) -> int:
-    """Print the verdict, and what the certificate proves."""
+    """Print the verdict; `Refuted` if a certificate proves less than the language claims."""
     show_answer(found, as_json=options.as_json)
-    if found.unchecked and not options.as_json:
-        echo(found.unchecked)
     if not found.holds:
         return 0 if found.is_tolerated else REFUTED
-    if found.certificate is not None:
-        _show_bound(found, found.certificate, options)
-    return 0
-
-
-def _show_bound(found: Verification, checked: Checked, options: VerifyOptions) -> None:
-    """Show what the certificate proves; `Refuted` if that is less than the language claims."""
-    bound = checked.lower_bound
-    if options.dimacs:
-        write(checked.dimacs(), options.dimacs)
+    if options.dimacs and found.certificate is not None:
+        write(found.certificate.dimacs(), options.dimacs)
     if not found.proves_claim:
         raise Refuted(
             f"{found.language} claims that {counted(found.claimed, 'word')} are needed; "
-            f"the certificate proves {bound} only",
+            f"the certificate proves {found.lower_bound} only",
             remedy="Give the certificate that was written with this language, or build both again.",
         )
-    if options.as_json:
-        return
-    why = "every language has a word"
-    if bound > 1:
-        why = (
-            f"{counted(checked.reasons, 'reason')} checked, and with {counted(bound - 1, 'word')} "
-            f"they contradict each other ({counted(len(checked.cnf.clauses), 'clause')})"
-        )
-    echo(f"lower bound {bound}: {why}")
-    if bound != found.words:
-        least = f"at least {bound:,} and at most {found.words:,}"
-        echo(f"not proved minimal: the least number of words is {least}")
+    return 0

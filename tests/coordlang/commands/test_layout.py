@@ -27,7 +27,7 @@ def test_equal_plans_are_shown_once_and_lines_fit(coordlang: Command) -> None:
     witness = door.coordination(*files).witness
     assert witness is not None
     for width in (60, WIDTH, 200):
-        text = witness_text(witness, width)
+        text = fitted(witness_text(witness), width)
         assert max(map(len, text.split("\n"))) <= width
         for atom in split_atoms(witness.states[0][0]):
             assert atom in text.replace("\n", "")
