@@ -14,13 +14,11 @@ from time import monotonic, perf_counter
 import coordlang
 from coordlang.commands.building import Built, build_language
 from coordlang.commands.inputs import Arguments, PlanningInput, note_size, public, read_language
-from coordlang.commands.layout import fitted
 from coordlang.commands.records import EFFORT, BuildOptions, LanguageSource
 from coordlang.commands.terminal import (
     UNPROVED,
     code_of_interrupt,
     echo,
-    line_width,
     note_single_robot,
     say,
     tell,
@@ -151,8 +149,7 @@ def show_build(built: Built, options: BuildOptions) -> int:
             echo(json.dumps(built.data()))
         else:
             place = "stdout" if to_stderr else visible(output)
-            text = f"{built.text()}\nwritten to {place}"
-            echo(fitted(text, line_width(err=to_stderr)), err=to_stderr)
+            echo(f"{built.text()}\nwritten to {place}", err=to_stderr, fit=True)
     except KeyboardInterrupt as error:
         stopped = error
     return _exit_code(built, output, certificate, stopped)

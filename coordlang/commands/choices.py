@@ -170,8 +170,7 @@ def _guarantee_code(found: RobotsChoices, check: bool) -> int:
             if found.covered:
                 why = "the file holds no coordination language"
             said = f"coordlang: refuted: choices of this task miscoordinate; {why}"
-        text = fitted(f"{said}\n{witness_text(found.witness)}", line_width(err=True))
-        echo(text, err=True)
+        echo(f"{said}\n{witness_text(found.witness)}", err=True, fit=True)
         if not is_tolerated:
             return REFUTED
     if check and not found.covered:

@@ -15,9 +15,8 @@ from typing import Any, get_args, get_origin
 
 import click
 
-from coordlang.commands.layout import fitted
 from coordlang.commands.records import CommandOptions, Limits, OutputFile
-from coordlang.commands.terminal import SAYING, echo, line_width, working
+from coordlang.commands.terminal import SAYING, echo, working
 from planners.system.errors import CoordlangError, OutOfTime, UsageError, note
 from planners.system.limits import default_memory_limit, limited_memory, require_memory, time_limit
 from planners.system.options import Option, options_of, record_from
@@ -131,7 +130,7 @@ def _said(resume: object) -> Iterator[None]:
         if (witness := getattr(error, "witness", None)) is not None:
             from coordlang.commands.witness import witness_text
 
-            echo(fitted(witness_text(witness), line_width(err=True)), err=True)
+            echo(witness_text(witness), err=True, fit=True)
         raise
 
 

@@ -10,9 +10,8 @@ from functools import cached_property
 from typing import Any
 
 from coordlang.commands.inputs import Arguments, InTask, public, read_coordinates_of
-from coordlang.commands.layout import fitted
 from coordlang.commands.records import ExplainOptions
-from coordlang.commands.terminal import covered_code, echo, line_width, warn_of_failures, working
+from coordlang.commands.terminal import covered_code, echo, warn_of_failures, working
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import SentenceDemands, sentence_demands
 from coordlang.explanation.text import (
@@ -242,19 +241,17 @@ def show_explain(found: Explanation, options: ExplainOptions) -> int:
 
     What is easier to read comes first; where a task has too many sentences, the words alone.
     """
-    width, words = line_width(), ""
-    if not options.as_json:
-        words = fitted(found.words.text(), width)
+    words = "" if options.as_json else found.words.text()
+    if words:
         echo(found.head + "\n")
     try:
         with working("listing the sentences of the task"):
-            is_json = options.as_json
-            text = json.dumps(found.data()) if is_json else fitted(found.task_text(), width)
+            text = f"{found.task_text()}\n\n{words}" if words else json.dumps(found.data())
     except OutOfMemory:
         if words:
-            echo(words)
+            echo(words, fit=True)
         raise
-    echo(f"{text}\n\n{words}" if words else text)
+    echo(text, fit=not options.as_json)
     if options.task:
         return covered_code(found)
     warn_of_failures(found.tolerance)

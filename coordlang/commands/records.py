@@ -485,10 +485,6 @@ class PlanOptions(AnswerOptions):
     heuristic: HeuristicName = option("relaxed", "The lower bound of A*.")
     form: Literal["ipc", "json", "plansys2"] = form_option("ipc", "How the plan is written.")
 
-    def __post_init__(self) -> None:
-        if isinstance(self.prefer, str):
-            object.__setattr__(self, "prefer", (self.prefer,))
-
 
 @dataclass(frozen=True, slots=True)
 class ChoicesOptions(AnswerOptions):

@@ -240,7 +240,8 @@ def plan(files: Arguments, options: PlanOptions) -> PlanUnderSentence:
             remedy="--prefer shortest finds the sentence with the fewest words.",
         )
     used = files.task().used
-    preferences = [read_preference(used, text) for text in options.prefer]
+    wanted = (options.prefer,) if isinstance(options.prefer, str) else options.prefer
+    preferences = [read_preference(used, text) for text in wanted]
     best = best_sentence(used, preferences) if preferences else None
     words = best.words if best else used.words_of(sentence or ())
     expanded = ExpandedStates(used.model, used.partition)

@@ -55,15 +55,16 @@ _LEAST_WIDTH = 60
 _STDERR = 2
 
 
-def echo(text: object, *, err: bool = False, nl: bool = True) -> None:
-    """Write text like `click.echo`, with control characters escaped.
+def echo(text: object, *, err: bool = False, nl: bool = True, fit: bool = False) -> None:
+    """Write text like `click.echo`, with control characters escaped, in lines that ``fit``.
 
     Names of files and arguments may hold any character, and escapes of a terminal among them.
     """
     context = click.get_current_context(silent=True)
     if not err and context is not None and context.obj is not None:
         context.obj[WRITTEN] = True
-    click.echo(visible(str(text), keep="\n\t"), err=err, nl=nl)
+    text = fitted(str(text), line_width(err=err)) if fit else str(text)
+    click.echo(visible(text, keep="\n\t"), err=err, nl=nl)
 
 
 def write(data: str | bytes, output: str | None, said: str | None = None) -> None:
@@ -83,7 +84,7 @@ def write(data: str | bytes, output: str | None, said: str | None = None) -> Non
 
 def show_answer(found: Any, *, as_json: bool) -> None:
     """Write the ``data`` of a result as one JSON object, or its ``text`` as wide as the page."""
-    echo(json.dumps(found.data()) if as_json else fitted(found.text(), line_width()))
+    echo(json.dumps(found.data()) if as_json else found.text(), fit=not as_json)
 
 
 def tell(text: str) -> None:

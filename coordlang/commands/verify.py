@@ -113,7 +113,7 @@ class Verification(Presented, Verdict):
             if self.tolerance is not None and self.tolerance.may_fail:
                 fail += f".\nThe file claims less: {self.tolerance.warning}"
             text = witness_text(self.witness)
-            return f"{head}\n{text}\n\nOn the whole ({self.options}) {fail}."
+            return f"{head}\n{text}\n\nOn the whole ({self.options})\n{fail}."
         slack = self.tolerance.slack if self.tolerance else None
         plans = f"plans within slack {slack}" if slack else "optimal plans"
         mixing = f"all {plans} of one sentence mix freely"
