@@ -60,80 +60,313 @@ FEW_WORDS, REPAIR = "few-words", "repair"
 _SHOWN = 12
 
 
-@dataclass(frozen=True, slots=True)
-class ChangedState:
-    """A state, by its key, with the word that it had and the one that it has."""
+def build_language(
+    candidates: Candidates,
+    method: str = "best",
+    *,
+    options: MethodOptions | None = None,
+    words: int | None = None,
+    worst: bool = False,
+    start: Language | None = None,
+    reserve: float = 0.0,
+    progress: Callable[[str], None] = lambda _: None,
+    workers: Workers | None = None,
+    **way: object,
+) -> Built:
+    """Build a coordination language for candidate tasks and verify it by definition.
 
-    state: str
-    old: str
-    new: str
+    ``method`` and ``way`` are as in `MethodOptions`, of which ``options`` may be given in their
+    place; ``words``, ``worst`` and ``start`` as in `BuildOptions`.  A search that has a language
+    leaves the share ``reserve`` of a time limit's rest for `Built.certificate`.
+
+    Raises `Inseparable`, which has two plans that show it, if there is no language over states,
+    `ProvedImpossible` if there is no candidate task, `OutOfMemory` where there is no language yet
+    to return, `UsageError` for options that contradict each other, and `TooManyToCount` where not
+    even failures in silence can be counted.
+    """
+    options = options or record_from(MethodOptions, {"method": method, **way}, "build_language")
+    method, making = options.method, Making(candidates, workers, progress)
+    if words is not None:
+        return _few_words(making, words, worst=worst, seed=options.seed)
+    if start is not None:
+        return repair_language(making, start, options)
+    if candidates.model.hides_slack and method in ("greedy", "separating"):
+        raise UsageError(
+            f"--method {method} parts plans where their states first differ, and with slack they "
+            "may differ in where they wait",
+            remedy="Add --words-see-slack, by which states say how much is left, or --method "
+            "minimal.",
+        )
+    job = making.job(options)
+    making.note("coordination")
+    if method != "greedy":
+        try:
+            require_room(candidates.source)
+        except OutOfMemory:
+            if method != "best":
+                raise
+            job = replace(job, effort=0)
+        # It is verified now, for there is no time when an anytime method is stopped.
+        job = replace(job, incumbent=first_language(job))
+        making.check(job.incumbent or {})
+        making.note("incumbent")
+        if reserve:
+            start_clock((1 - reserve) * time_left())
+    progress(f"building words ({method})")
+    found = _outcome(job, options, making)
+    making.note("verify")
+    return making.built(job, found, method)
 
 
-@dataclass(frozen=True, slots=True)
-class Repaired:
-    """What became of a language.
+def _outcome(job: Job, options: MethodOptions, making: Making) -> Outcome:
+    """What the method finds; if it is stopped early, the last partition that was verified."""
+    found: list[Outcome] = []
 
-    ``witness`` has plans of one sentence of the old language that miscoordinate; None: it still
-    holds, and no word was changed.  Other words have the states ``changed``; every language for the
-    tasks changes ``changes_bound`` states at least, and one that changes so few has at least
-    ``new_words_bound`` of ``new_words``.  ``new_states`` on plans of the tasks are not listed in
-    the old language, and ``gone`` of its states the problem cannot have any more.
+    def run() -> None:
+        outcome = METHODS[options.method](job)
+        making.note("vocabulary")
+        if options.prefer and outcome.stopped is None:
+            outcome = PREFERENCES[options.prefer](job, outcome)
+            making.note(options.prefer)
+        if all(words is not outcome.partition for words, *_ in making.verified):
+            job.progress("verifying by definition")
+            with little_time_after(outcome.stopped):
+                job.check(outcome.partition)
+        found.append(outcome)
+
+    stopped = run_until_stopped(run)
+    if stopped is None:
+        return found[0]
+    if not making.verified:
+        raise stopped
+    return Outcome(making.verified[-1][0], job.lower_bound, stopped=stopped)
+
+
+def _few_words(making: Making, words: int, *, worst: bool, seed: int) -> Built:
+    """The few words; where robots never fail they are verified, as every coordination language."""
+    require_room(making.candidates.source)
+    job = job_for_few_words(making, seed)
+    making.note("coordination")
+    found = few_words(job, words, worst=worst)
+    making.note("vocabulary")
+    stopped = found.stopped
+    if not found.failures.worst:
+        with little_time_after(stopped):
+            making.check(found.partition)
+        if not isinstance(stopped, KeyboardInterrupt):
+            stopped = None  # no search was left where nothing fails
+    making.note("verify")
+    figures = {
+        "silence_mean": float(found.silence.mean),
+        "silence_worst": float(found.silence.worst),
+        "partitions_measured": found.measured,
+        "partitions_recounted": found.recounted,
+        "least_of_all_partitions": found.is_best,
+    }
+    outcome = Outcome(found.partition, job.lower_bound, figures, stopped)
+    failures = Failures(found.failures.mean, found.failures.worst)
+    return making.built(job, outcome, FEW_WORDS, failures=failures, few_words=found)
+
+
+def job_for_few_words(making: Making, seed: int = 0) -> Job:
+    """What words are looked for, with a language as the incumbent if there is one.
+
+    Where plans are inseparable there is none, and divergences are not defined; nor are they where
+    states hide slack.
+    """
+    options, spaces = MethodOptions(seed=seed), making.candidates.spaces
+    try:
+        job = making.job(options)
+    except Inseparable:
+        job = making.job(options, without_divergences(spaces))
+        return replace(job, states=tuple(states_on_plans(spaces).tolist()))
+    return replace(job, incumbent=first_language(job))
+
+
+def repair_language(making: Making, start: Language, options: MethodOptions) -> Built:
+    """Change the words of as few states as makes a language serve candidate tasks.
+
+    The result is verified by definition.  States that are on no plan of the candidate tasks keep
+    their words.
+    """
+    job = making.job(MethodOptions(seed=options.seed))
+    making.note("coordination")
+    old = _Old.of(start, making.candidates)
+    words = old.words_of(job.states)
+    making.progress("verifying the old language")
+    partition = old.partition
+    verdict = making.verdict(partition)
+    making.note("verify")
+    repaired = Repaired(verdict.witness, new_states=len(job.states) - len(words), gone=old.gone)
+    # What the old file claims of fewer words is not believed: the bound is the job's.
+    outcome = Outcome(words, job.lower_bound)
+    if verdict.holds:
+        making.verified.append((words, partition, verdict))
+        return making.built(job, outcome, REPAIR, repaired=repaired)
+    making.partition_of = old.repaired
+    result = repair(job, words, len(partition.words), partition.default)
+    making.note("repair")
+    now = old.repaired(result.partition)
+    repaired = replace(
+        repaired,
+        changed=old.changes(result, now),
+        changes_bound=result.changes_bound,
+        new_words=tuple(w for w in now.words if w not in partition.words),
+        new_words_bound=result.new_words_bound,
+    )
+    outcome = Outcome(result.partition, job.lower_bound, result.figures, result.stopped)
+    return making.built(job, outcome, REPAIR, repaired=repaired)
+
+
+class Making:
+    """Candidate tasks on their way to a language: who works, the time by phase, what is verified.
+
+    ``progress`` is called with a line of text now and then, ``partition_of`` makes a partition of
+    what a method finds, ``verified`` are the partitions that were verified, with the verdict.
+    Raises `ProvedImpossible` if there is no candidate task.
     """
 
-    witness: Miscoordination | None
-    changed: tuple[ChangedState, ...] = ()
-    changes_bound: int = 0
-    new_words: tuple[str, ...] = ()
-    new_words_bound: int = 0
-    new_states: int = 0
-    gone: int = 0
+    def __init__(
+        self,
+        candidates: Candidates,
+        workers: Workers | None = None,
+        progress: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        require_solvable(candidates)
+        self.candidates, self.workers, self.progress = candidates, workers or Workers(), progress
+        self.seconds: dict[str, float] = {}
+        self.partition_of: Callable[[Assignment], Partition] = partial(
+            Partition.of_states, candidates.rows
+        )
+        self.verified: list[tuple[Assignment, Partition, Verdict]] = []
+        self._since = perf_counter()
 
-    @property
-    def still_holds(self) -> bool:
-        """Whether the old language serves the tasks as it is."""
-        return self.witness is None
+    def note(self, phase: str) -> None:
+        """Say that a phase has ended."""
+        now = perf_counter()
+        self.seconds[phase] = now - self._since
+        self._since = now
 
-    def data(self) -> dict[str, Any]:
-        """The same as JSON data."""
-        return {
-            "still_holds": self.still_holds,
-            "miscoordination": witness_data(self.witness),
-            "changed": [asdict(change) for change in self.changed],
-            "changed_lower_bound": self.changes_bound,
-            "new_words": list(self.new_words),
-            "new_words_lower_bound": self.new_words_bound,
-            "new_states": self.new_states,
-            "states_gone": self.gone,
-        }
+    def job(self, options: MethodOptions, found: FirstDifferences | None = None) -> Job:
+        """What words are to be found, for plans that part as ``found``.
 
-    def text(self) -> str:
-        """Why the language was changed, and which states have other words."""
-        gone = f"{counted(self.gone, 'state')} of the old language: not on this map"
-        lines = [gone] if self.gone else []
-        if self.witness is None:
-            return "\n".join(["the old language still holds: no word is changed", *lines])
-        sentence, number, new = " ".join(self.witness.sentence or ()), len(self.changed), ""
-        verb = "changes its word" if number == 1 else "change their word"
-        if self.new_states:
-            new = f"; {counted(self.new_states, 'new state')}"
-        if words := self.new_words:
-            new += f"; {counted(len(words), 'new word')} ({', '.join(words)})"
-            new += _proof(len(words), self.new_words_bound)
-        lines += [
-            f'the old language fails: plans with the sentence "{sentence}" do not mix',
-            witness_text(self.witness),
-            f"{counted(number, 'state')} {verb}{_proof(number, self.changes_bound)}{new}",
-            *(f"  {c.state or NO_FACT}: {c.old} -> {c.new}" for c in self.changed[:_SHOWN]),
-        ]
-        if number > _SHOWN:
-            lines.append(f"  .. and {number - _SHOWN:,} more; --json has all")
-        return "\n".join(lines)
+        `Inseparable` if there is no language over states.
+        """
+        if found is None:
+            find = hidden_differences if self.candidates.model.hides_slack else differences
+            found = find(self.candidates, self.workers, self.progress)
+        return Job(
+            self.candidates,
+            tuple(found.states.tolist()),
+            found,
+            seed=options.seed,
+            alpha_only=options.alpha_only,
+            effort=options.effort,
+            progress=self.progress,
+            check=self.check,
+            workers=self.workers,
+        )
+
+    def verdict(self, partition: Partition) -> Verdict:
+        """Whether a partition is a coordination language, by definition."""
+        return verify_candidates(partition, self.candidates, self.workers, self.progress)
+
+    def check(self, words: Assignment) -> None:
+        """Verify what a method found; `AssertionError` if it is no language: it has erred."""
+        partition = self.partition_of(words)
+        verdict = self.verdict(partition)
+        if not verdict.holds:
+            raise AssertionError(
+                f"a method returned what is no coordination language: {verdict.witness}"
+            )
+        self.verified.append((words, partition, verdict))
+
+    def built(self, job: Job, found: Outcome, method: str, **more: Any) -> Built:
+        """The language of words that were found, with what is proved of it; ``more`` of `Built`.
+
+        Words that were not verified are none.
+        """
+        verified = (own for own in self.verified if own[0] is found.partition)
+        unverified = Verdict(False, self.candidates.count, 0, None)
+        _, partition, verdict = next(
+            verified, (None, self.partition_of(found.partition), unverified)
+        )
+        guarantee = Guarantee.of(method, len(partition.words), found.lower_bound, verdict.holds)
+        provenance = provenance_of(self.candidates, guarantee, {"program": "coordlang"})
+        if not verdict.holds:
+            slack = provenance.tolerance.slack if provenance.tolerance else None
+            tolerance = more["failures"].tolerance or Tolerance()
+            provenance = replace(provenance, tolerance=replace(tolerance, slack=slack))
+        language = Language.of(partition, self.candidates.model, provenance)
+        return Built(
+            language,
+            job,
+            verdict,
+            found.figures,
+            self.seconds,
+            found.stopped,
+            found.refuting,
+            **more,
+        )
 
 
-def _proof(number: int, bound: int) -> str:
-    if not number or number == bound:
-        return ", proved the fewest" * (number > 0)
-    return f", at least {bound} are needed" if bound else ", not proved the fewest"
+@dataclass(frozen=True, slots=True)
+class _Old:
+    """The old words in the model of the candidate tasks.
+
+    ``listed`` (states) is the place of each candidate state in ``partition``, -1 where it has none.
+    ``gone`` of the language's states are none of this model.
+    """
+
+    candidates: Candidates
+    partition: Partition
+    listed: Ints
+    gone: int
+
+    @classmethod
+    def of(cls, language: Language, candidates: Candidates) -> _Old:
+        _, wrong = read_keys(candidates.model.codec, language.states)
+        if len(wrong):
+            gone = set(wrong.tolist())
+            kept = [item for n, item in enumerate(language.states.items()) if n not in gone]
+            language = replace(language, states=dict(kept))
+        partition = language.partition(candidates.model)
+        listed = find_rows(partition.rows, candidates.rows)
+        return cls(candidates, partition, listed, len(wrong))
+
+    def words_of(self, states: Sequence[int]) -> dict[int, int]:
+        """The word numbers of those states that the language lists."""
+        places = self.listed[list(states)].tolist()
+        word = self.partition.word.tolist()
+        return {s: word[p] for s, p in zip(states, places, strict=True) if p >= 0}
+
+    def repaired(self, assignment: Assignment) -> Partition:
+        """The partition with other words of some states; words without states are left out."""
+        states = sorted(assignment)
+        fresh = self.listed[states] < 0
+        rows: Rows = np.concatenate((self.partition.rows, self.candidates.rows[states][fresh]))
+        given = np.array([assignment[state] for state in states], np.int64)
+        word = np.concatenate((self.partition.word, given[fresh]))
+        word[self.listed[states][~fresh]] = given[~fresh]
+        used, number = np.unique(word, return_inverse=True)
+        kept, old, default = used.tolist(), self.partition.words, self.partition.default
+        new = (name for name in (f"w{n}" for n in count()) if name not in old)
+        names = tuple(old[word] if word < len(old) else next(new) for word in kept)
+        most = int(np.bincount(number).argmax())
+        default = kept.index(default) if default in kept else most
+        return Partition.of_table(names, rows, number.reshape(-1), default)
+
+    def changes(self, result: Repair, partition: Partition) -> tuple[ChangedState, ...]:
+        """The changed states, sorted by their keys."""
+        rows = self.candidates.rows[list(result.changed)]
+        names = zip(
+            keys_of(self.candidates.model.codec, rows),
+            self.partition.word_of(rows).tolist(),
+            partition.word_of(rows).tolist(),
+            strict=True,
+        )
+        old, new = self.partition.words, partition.words
+        return tuple(ChangedState(key, old[was], new[now]) for key, was, now in sorted(names))
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -300,310 +533,77 @@ def _optimised(figures: Mapping[str, Any]) -> Iterator[str]:
         )
 
 
-class Making:
-    """Candidate tasks on their way to a language: who works, the time by phase, what is verified.
+@dataclass(frozen=True, slots=True)
+class Repaired:
+    """What became of a language.
 
-    ``progress`` is called with a line of text now and then, ``partition_of`` makes a partition of
-    what a method finds, ``verified`` are the partitions that were verified, with the verdict.
-    Raises `ProvedImpossible` if there is no candidate task.
+    ``witness`` has plans of one sentence of the old language that miscoordinate; None: it still
+    holds, and no word was changed.  Other words have the states ``changed``; every language for the
+    tasks changes ``changes_bound`` states at least, and one that changes so few has at least
+    ``new_words_bound`` of ``new_words``.  ``new_states`` on plans of the tasks are not listed in
+    the old language, and ``gone`` of its states the problem cannot have any more.
     """
 
-    def __init__(
-        self,
-        candidates: Candidates,
-        workers: Workers | None = None,
-        progress: Callable[[str], None] = lambda _: None,
-    ) -> None:
-        require_solvable(candidates)
-        self.candidates, self.workers, self.progress = candidates, workers or Workers(), progress
-        self.seconds: dict[str, float] = {}
-        self.partition_of: Callable[[Assignment], Partition] = partial(
-            Partition.of_states, candidates.rows
-        )
-        self.verified: list[tuple[Assignment, Partition, Verdict]] = []
-        self._since = perf_counter()
+    witness: Miscoordination | None
+    changed: tuple[ChangedState, ...] = ()
+    changes_bound: int = 0
+    new_words: tuple[str, ...] = ()
+    new_words_bound: int = 0
+    new_states: int = 0
+    gone: int = 0
 
-    def note(self, phase: str) -> None:
-        """Say that a phase has ended."""
-        now = perf_counter()
-        self.seconds[phase] = now - self._since
-        self._since = now
+    @property
+    def still_holds(self) -> bool:
+        """Whether the old language serves the tasks as it is."""
+        return self.witness is None
 
-    def job(self, options: MethodOptions, found: FirstDifferences | None = None) -> Job:
-        """What words are to be found, for plans that part as ``found``.
+    def data(self) -> dict[str, Any]:
+        """The same as JSON data."""
+        return {
+            "still_holds": self.still_holds,
+            "miscoordination": witness_data(self.witness),
+            "changed": [asdict(change) for change in self.changed],
+            "changed_lower_bound": self.changes_bound,
+            "new_words": list(self.new_words),
+            "new_words_lower_bound": self.new_words_bound,
+            "new_states": self.new_states,
+            "states_gone": self.gone,
+        }
 
-        `Inseparable` if there is no language over states.
-        """
-        if found is None:
-            find = hidden_differences if self.candidates.model.hides_slack else differences
-            found = find(self.candidates, self.workers, self.progress)
-        return Job(
-            self.candidates,
-            tuple(found.states.tolist()),
-            found,
-            seed=options.seed,
-            alpha_only=options.alpha_only,
-            effort=options.effort,
-            progress=self.progress,
-            check=self.check,
-            workers=self.workers,
-        )
-
-    def verdict(self, partition: Partition) -> Verdict:
-        """Whether a partition is a coordination language, by definition."""
-        return verify_candidates(partition, self.candidates, self.workers, self.progress)
-
-    def check(self, words: Assignment) -> None:
-        """Verify what a method found; `AssertionError` if it is no language: it has erred."""
-        partition = self.partition_of(words)
-        verdict = self.verdict(partition)
-        if not verdict.holds:
-            raise AssertionError(
-                f"a method returned what is no coordination language: {verdict.witness}"
-            )
-        self.verified.append((words, partition, verdict))
-
-    def built(self, job: Job, found: Outcome, method: str, **more: Any) -> Built:
-        """The language of words that were found, with what is proved of it; ``more`` of `Built`.
-
-        Words that were not verified are none.
-        """
-        verified = (own for own in self.verified if own[0] is found.partition)
-        unverified = Verdict(False, self.candidates.count, 0, None)
-        _, partition, verdict = next(
-            verified, (None, self.partition_of(found.partition), unverified)
-        )
-        guarantee = Guarantee.of(method, len(partition.words), found.lower_bound, verdict.holds)
-        provenance = provenance_of(self.candidates, guarantee, {"program": "coordlang"})
-        if not verdict.holds:
-            slack = provenance.tolerance.slack if provenance.tolerance else None
-            tolerance = more["failures"].tolerance or Tolerance()
-            provenance = replace(provenance, tolerance=replace(tolerance, slack=slack))
-        language = Language.of(partition, self.candidates.model, provenance)
-        return Built(
-            language,
-            job,
-            verdict,
-            found.figures,
-            self.seconds,
-            found.stopped,
-            found.refuting,
-            **more,
-        )
-
-
-def build_language(
-    candidates: Candidates,
-    method: str = "best",
-    *,
-    options: MethodOptions | None = None,
-    words: int | None = None,
-    worst: bool = False,
-    start: Language | None = None,
-    reserve: float = 0.0,
-    progress: Callable[[str], None] = lambda _: None,
-    workers: Workers | None = None,
-    **way: object,
-) -> Built:
-    """Build a coordination language for candidate tasks and verify it by definition.
-
-    ``method`` and ``way`` are as in `MethodOptions`, of which ``options`` may be given in their
-    place; ``words``, ``worst`` and ``start`` as in `BuildOptions`.  A search that has a language
-    leaves the share ``reserve`` of a time limit's rest for `Built.certificate`.
-
-    Raises `Inseparable`, which has two plans that show it, if there is no language over states,
-    `ProvedImpossible` if there is no candidate task, `OutOfMemory` where there is no language yet
-    to return, `UsageError` for options that contradict each other, and `TooManyToCount` where not
-    even failures in silence can be counted.
-    """
-    options = options or record_from(MethodOptions, {"method": method, **way}, "build_language")
-    method, making = options.method, Making(candidates, workers, progress)
-    if words is not None:
-        return _few_words(making, words, worst=worst, seed=options.seed)
-    if start is not None:
-        return repair_language(making, start, options)
-    if candidates.model.hides_slack and method in ("greedy", "separating"):
-        raise UsageError(
-            f"--method {method} parts plans where their states first differ, and with slack they "
-            "may differ in where they wait",
-            remedy="Add --words-see-slack, by which states say how much is left, or --method "
-            "minimal.",
-        )
-    job = making.job(options)
-    making.note("coordination")
-    if method != "greedy":
-        try:
-            require_room(candidates.source)
-        except OutOfMemory:
-            if method != "best":
-                raise
-            job = replace(job, effort=0)
-        # It is verified now, for there is no time when an anytime method is stopped.
-        job = replace(job, incumbent=first_language(job))
-        making.check(job.incumbent or {})
-        making.note("incumbent")
-        if reserve:
-            start_clock((1 - reserve) * time_left())
-    progress(f"building words ({method})")
-    found = _outcome(job, options, making)
-    making.note("verify")
-    return making.built(job, found, method)
-
-
-def _outcome(job: Job, options: MethodOptions, making: Making) -> Outcome:
-    """What the method finds; if it is stopped early, the last partition that was verified."""
-    found: list[Outcome] = []
-
-    def run() -> None:
-        outcome = METHODS[options.method](job)
-        making.note("vocabulary")
-        if options.prefer and outcome.stopped is None:
-            outcome = PREFERENCES[options.prefer](job, outcome)
-            making.note(options.prefer)
-        if all(words is not outcome.partition for words, *_ in making.verified):
-            job.progress("verifying by definition")
-            with little_time_after(outcome.stopped):
-                job.check(outcome.partition)
-        found.append(outcome)
-
-    stopped = run_until_stopped(run)
-    if stopped is None:
-        return found[0]
-    if not making.verified:
-        raise stopped
-    return Outcome(making.verified[-1][0], job.lower_bound, stopped=stopped)
-
-
-def _few_words(making: Making, words: int, *, worst: bool, seed: int) -> Built:
-    """The few words; where robots never fail they are verified, as every coordination language."""
-    require_room(making.candidates.source)
-    job = job_for_few_words(making, seed)
-    making.note("coordination")
-    found = few_words(job, words, worst=worst)
-    making.note("vocabulary")
-    stopped = found.stopped
-    if not found.failures.worst:
-        with little_time_after(stopped):
-            making.check(found.partition)
-        if not isinstance(stopped, KeyboardInterrupt):
-            stopped = None  # no search was left where nothing fails
-    making.note("verify")
-    figures = {
-        "silence_mean": float(found.silence.mean),
-        "silence_worst": float(found.silence.worst),
-        "partitions_measured": found.measured,
-        "partitions_recounted": found.recounted,
-        "least_of_all_partitions": found.is_best,
-    }
-    outcome = Outcome(found.partition, job.lower_bound, figures, stopped)
-    failures = Failures(found.failures.mean, found.failures.worst)
-    return making.built(job, outcome, FEW_WORDS, failures=failures, few_words=found)
-
-
-def job_for_few_words(making: Making, seed: int = 0) -> Job:
-    """What words are looked for, with a language as the incumbent if there is one.
-
-    Where plans are inseparable there is none, and divergences are not defined; nor are they where
-    states hide slack.
-    """
-    options, spaces = MethodOptions(seed=seed), making.candidates.spaces
-    try:
-        job = making.job(options)
-    except Inseparable:
-        job = making.job(options, without_divergences(spaces))
-        return replace(job, states=tuple(states_on_plans(spaces).tolist()))
-    return replace(job, incumbent=first_language(job))
-
-
-def repair_language(making: Making, start: Language, options: MethodOptions) -> Built:
-    """Change the words of as few states as makes a language serve candidate tasks.
-
-    The result is verified by definition.  States that are on no plan of the candidate tasks keep
-    their words.
-    """
-    job = making.job(MethodOptions(seed=options.seed))
-    making.note("coordination")
-    old = _Old.of(start, making.candidates)
-    words = old.words_of(job.states)
-    making.progress("verifying the old language")
-    partition = old.partition
-    verdict = making.verdict(partition)
-    making.note("verify")
-    repaired = Repaired(verdict.witness, new_states=len(job.states) - len(words), gone=old.gone)
-    # What the old file claims of fewer words is not believed: the bound is the job's.
-    outcome = Outcome(words, job.lower_bound)
-    if verdict.holds:
-        making.verified.append((words, partition, verdict))
-        return making.built(job, outcome, REPAIR, repaired=repaired)
-    making.partition_of = old.repaired
-    result = repair(job, words, len(partition.words), partition.default)
-    making.note("repair")
-    now = old.repaired(result.partition)
-    repaired = replace(
-        repaired,
-        changed=old.changes(result, now),
-        changes_bound=result.changes_bound,
-        new_words=tuple(w for w in now.words if w not in partition.words),
-        new_words_bound=result.new_words_bound,
-    )
-    outcome = Outcome(result.partition, job.lower_bound, result.figures, result.stopped)
-    return making.built(job, outcome, REPAIR, repaired=repaired)
+    def text(self) -> str:
+        """Why the language was changed, and which states have other words."""
+        gone = f"{counted(self.gone, 'state')} of the old language: not on this map"
+        lines = [gone] if self.gone else []
+        if self.witness is None:
+            return "\n".join(["the old language still holds: no word is changed", *lines])
+        sentence, number, new = " ".join(self.witness.sentence or ()), len(self.changed), ""
+        verb = "changes its word" if number == 1 else "change their word"
+        if self.new_states:
+            new = f"; {counted(self.new_states, 'new state')}"
+        if words := self.new_words:
+            new += f"; {counted(len(words), 'new word')} ({', '.join(words)})"
+            new += _proof(len(words), self.new_words_bound)
+        lines += [
+            f'the old language fails: plans with the sentence "{sentence}" do not mix',
+            witness_text(self.witness),
+            f"{counted(number, 'state')} {verb}{_proof(number, self.changes_bound)}{new}",
+            *(f"  {c.state or NO_FACT}: {c.old} -> {c.new}" for c in self.changed[:_SHOWN]),
+        ]
+        if number > _SHOWN:
+            lines.append(f"  .. and {number - _SHOWN:,} more; --json has all")
+        return "\n".join(lines)
 
 
 @dataclass(frozen=True, slots=True)
-class _Old:
-    """The old words in the model of the candidate tasks.
+class ChangedState:
+    """A state, by its key, with the word that it had and the one that it has."""
 
-    ``listed`` (states) is the place of each candidate state in ``partition``, -1 where it has none.
-    ``gone`` of the language's states are none of this model.
-    """
+    state: str
+    old: str
+    new: str
 
-    candidates: Candidates
-    partition: Partition
-    listed: Ints
-    gone: int
 
-    @classmethod
-    def of(cls, language: Language, candidates: Candidates) -> _Old:
-        _, wrong = read_keys(candidates.model.codec, language.states)
-        if len(wrong):
-            gone = set(wrong.tolist())
-            kept = [item for n, item in enumerate(language.states.items()) if n not in gone]
-            language = replace(language, states=dict(kept))
-        partition = language.partition(candidates.model)
-        listed = find_rows(partition.rows, candidates.rows)
-        return cls(candidates, partition, listed, len(wrong))
-
-    def words_of(self, states: Sequence[int]) -> dict[int, int]:
-        """The word numbers of those states that the language lists."""
-        places = self.listed[list(states)].tolist()
-        word = self.partition.word.tolist()
-        return {s: word[p] for s, p in zip(states, places, strict=True) if p >= 0}
-
-    def repaired(self, assignment: Assignment) -> Partition:
-        """The partition with other words of some states; words without states are left out."""
-        states = sorted(assignment)
-        fresh = self.listed[states] < 0
-        rows: Rows = np.concatenate((self.partition.rows, self.candidates.rows[states][fresh]))
-        given = np.array([assignment[state] for state in states], np.int64)
-        word = np.concatenate((self.partition.word, given[fresh]))
-        word[self.listed[states][~fresh]] = given[~fresh]
-        used, number = np.unique(word, return_inverse=True)
-        kept, old, default = used.tolist(), self.partition.words, self.partition.default
-        new = (name for name in (f"w{n}" for n in count()) if name not in old)
-        names = tuple(old[word] if word < len(old) else next(new) for word in kept)
-        most = int(np.bincount(number).argmax())
-        default = kept.index(default) if default in kept else most
-        return Partition.of_table(names, rows, number.reshape(-1), default)
-
-    def changes(self, result: Repair, partition: Partition) -> tuple[ChangedState, ...]:
-        """The changed states, sorted by their keys."""
-        rows = self.candidates.rows[list(result.changed)]
-        names = zip(
-            keys_of(self.candidates.model.codec, rows),
-            self.partition.word_of(rows).tolist(),
-            partition.word_of(rows).tolist(),
-            strict=True,
-        )
-        old, new = self.partition.words, partition.words
-        return tuple(ChangedState(key, old[was], new[now]) for key, was, now in sorted(names))
+def _proof(number: int, bound: int) -> str:
+    if not number or number == bound:
+        return ", proved the fewest" * (number > 0)
+    return f", at least {bound} are needed" if bound else ", not proved the fewest"

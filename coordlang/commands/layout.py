@@ -15,7 +15,7 @@ HELD = "\xa0"
 #: Characters that the last column of a table has at least.
 _LEAST_ROOM = 30
 #: An atom or an action, and whose it is.
-_ATOM = re.compile(r"(?:\S+: )?(?:\((?:not|last \S+) )?\([^()]*\)")
+_ATOM = re.compile(r"(?:[^\s()]{1,80}: )?(?:\((?:not|last \S+) )?\([^()]*\)")
 
 
 def wrapped(text: str, width: int, indent: str, further: str) -> list[str]:

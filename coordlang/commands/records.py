@@ -256,7 +256,7 @@ class MethodOptions:
     )
     prefer: BuildPreference | None = option(
         None,
-        "Sentences leave many plans open; words have short formulas.",
+        "flexible: many plans are left open.  simple: short formulas.",
         needs=("method", "best", "minimal", "exhaustive"),
     )
 
