@@ -10,17 +10,17 @@ that takes too long, the best so far is verified, and the bound says how much sh
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import replace
+from sys import maxsize
 
 import numpy as np
 
 from coordlang.explanation.variables import Valuation, valuation
 from coordlang.explanation.words import MappedStates, all_covers
-from coordlang.language.warping import Clause
 from coordlang.vocabulary.clauses import most_constrained_first, without_implied
 from coordlang.vocabulary.job import Assignment, Job, Outcome
-from coordlang.vocabulary.loop import Budget, Languages, ProblemsBySize, close_bounds, find
+from coordlang.vocabulary.loop import Budget, Languages, close_bounds
 from coordlang.vocabulary.sat import PartitionProblem, Undecided, at_most
 from planners.joint.tables import Ints
 from planners.system.limits import run_until_stopped
@@ -44,9 +44,8 @@ def simple(job: Job, found: Outcome, conflicts: int = _CONFLICTS) -> Outcome:
     ``figures`` also hold ``terms`` and ``limits`` of the formulas, as ``.._before`` those of
     ``found``, and ``.._lower_bound``, that of limits for languages with so few terms.
     """
-    with closing(_Search(job, found, conflicts)) as search:
-        stopped = run_until_stopped(search.run)
-    return search.outcome(stopped)
+    search = _Search(job, found, conflicts)
+    return search.outcome(run_until_stopped(search.run))
 
 
 def formula_lengths(mapped: MappedStates) -> Lengths:
@@ -78,9 +77,6 @@ class _Search:
         self._before = self.lengths = formula_lengths(_mapped(job, values, found.partition))
         self.bound: Lengths = (found.size - 1, found.size - 1)  # each term limits a variable
         self._languages: Languages | None = found.languages
-        self._problems: ProblemsBySize[Clause] = ProblemsBySize(
-            self._problem, PartitionProblem.separate_one
-        )
 
     @property
     def languages(self) -> Languages:
@@ -88,10 +84,6 @@ class _Search:
         if self._languages is None:
             self._languages = Languages.of(self._job)
         return self._languages
-
-    def close(self) -> None:
-        """Give back what the solvers hold."""
-        self._problems.close()
 
     def outcome(self, stopped: BaseException | None) -> Outcome:
         """The best language, with what is known of it."""
@@ -105,12 +97,10 @@ class _Search:
         """Fewer terms, and then fewer variables in them, until none can be."""
         if self._found.size < 2 or len(self._job.states) * self.lengths[0] > _PLACES:
             return
-        try:
+        with suppress(Undecided):  # a question is too hard
             close_bounds(lambda: (self.bound[0], self.lengths[0]), self._decide)
             while self.bound[1] < self.lengths[1]:
                 self._limit_fewer()
-        except Undecided:  # a question is too hard
-            return
 
     def _decide(self, terms: int, budget: Budget) -> bool:
         """Find a language with so many terms or prove that there is none.
@@ -119,39 +109,34 @@ class _Search:
         """
         if budget.conflicts > self._conflicts:
             raise Undecided
-
-        def problem() -> FormulaProblem:
-            under = self._problems.under(terms, self.languages.clauses)
-            assert isinstance(under, FormulaProblem)
-            return under
-
         try:
-            found = find(
-                lambda most: problem().solve(most),
-                lambda p: self._is_accepted(p, problem()),
-                budget,
-            )
+            if not self._finds(terms, None, budget):
+                self.bound = (terms + 1, terms + 1)
         except Undecided:
             return False
-        self._problems.drop(terms)
-        if found is None:
-            self.bound = (terms + 1, terms + 1)
         return True
 
     def _limit_fewer(self) -> None:
         """Find a language with as many terms that limit fewer variables, or prove there is none."""
-        clauses = self.languages.clauses
         terms, limits = self.lengths
-        with closing(self._problem(terms, clauses, limits - 1)) as problem:
-            seen = len(clauses)
-            while (partition := problem.solve(self._conflicts)) is not None:
-                if self._is_accepted(partition, problem):
-                    return
-                clauses = self.languages.clauses
-                for clause in clauses[seen:]:
-                    problem.separate_one(clause)
-                seen = len(clauses)
+        if not self._finds(terms, limits - 1, Budget(maxsize, self._conflicts)):
             self.bound = self.lengths
+
+    def _finds(self, terms: int, limits: int | None, budget: Budget) -> bool:
+        """Whether there is a language with such formulas, which then is the best."""
+        clauses = without_implied(self.languages.clauses, _COMPARISONS)
+        order = most_constrained_first(self._job.states, clauses)
+        problem = FormulaProblem(order, self._found.size, self._value, self._sizes, terms, limits)
+        with closing(problem):
+            for _ in range(budget.rounds):
+                for clause in clauses:
+                    problem.separate_one(clause)
+                seen = len(self.languages.clauses)
+                partition = problem.solve(budget.conflicts)
+                if partition is None or self._is_accepted(partition, problem):
+                    return partition is not None
+                clauses = self.languages.clauses[seen:]
+        raise Undecided
 
     def _is_accepted(self, partition: dict[int, int], problem: FormulaProblem) -> bool:
         """Whether a partition is a language; then it is the best."""
@@ -166,16 +151,6 @@ class _Search:
         self._job.check(partition)
         self.best, self.lengths = partition, lengths
         return True
-
-    def _problem(
-        self, terms: int, known: Sequence[Clause], limits: int | None = None
-    ) -> FormulaProblem:
-        clauses = without_implied(known, _COMPARISONS)
-        order = most_constrained_first(self._job.states, clauses)
-        problem = FormulaProblem(order, self._found.size, self._value, self._sizes, terms, limits)
-        for clause in clauses:
-            problem.separate_one(clause)
-        return problem
 
 
 def _mapped(job: Job, values: Valuation, partition: Assignment) -> MappedStates:
