@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 
@@ -14,7 +14,6 @@ from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.partition import Partition
 from coordlang.language.sentences import sentence
 from planners.joint.model import Goal, JointModel
-from planners.joint.states import bits
 from planners.joint.tables import Rows
 from planners.search.goals import FAR, Values
 from planners.search.heuristics import heuristic
@@ -90,7 +89,7 @@ def plan_under_sentence(
     """Find an optimal plan of the task with a sentence (word numbers); any optimal plan for None.
 
     ``name`` is one of `planners.search.heuristics.HEURISTICS`; ``states`` are what earlier searches
-    with the same language and model have expanded; for ``count_words`` see `AStar`.  Of plans
+    with the same language and model have expanded; for ``count_words`` see `_a_star`.  Of plans
     within slack the earliest is read off the plan space, without a search.  Raises `NoPlanFits`.
     """
     space = task_language.space
@@ -100,7 +99,7 @@ def plan_under_sentence(
     goal = space.goals[space.goal[task_language.start]]
     init = space.rows[space.state[task_language.start]]
     bound = heuristic(name, task_language.model, goal, init)
-    found = AStar(states, goal, bound, words, count_words).run(init)
+    found = _a_star(states, init, goal, bound, words, count_words)
     if found is None or found.cost != space.cost_of(task_language.task):
         task_language.plans_with(words or ())  # raises: says where the sentence first breaks
         raise AssertionError("A* missed an optimal plan")
@@ -134,123 +133,99 @@ def _earliest(task_language: TaskLanguage, words: Sequence[int] | None) -> Guide
     return GuidedPlan(found, sentence_of_plan(task_language, texts), (len(found), second), 0, 0, 0)
 
 
-class AStar:
-    """A search for an optimal plan with a sentence; for other sentences a longer plan or none.
+def _a_star(
+    states: ExpandedStates,
+    init: Rows,
+    goal: Goal,
+    bound: Values,
+    words: Sequence[int] | None,
+    count_words: bool,
+) -> GuidedPlan | None:
+    """Search for an optimal plan with a sentence; for other sentences a longer plan or none.
 
-    With a sentence a node is a state and the *index* of its word in the sentence.  What does not
-    fit is pruned: a step stays in its word or goes on to the next one, and a goal state counts at
-    the last word.  All indices of a state are expanded together, and a state only at the least cost
-    at which it was met: an optimal plan is at none of its states later than it could be.  A word
-    takes at least one step, so with ``count_words`` the number of words that are left is a lower
-    bound, too (the paper only prunes).
+    A node is a state and the *index* of its word in the sentence (0 without a sentence).  What does
+    not fit is pruned: a step stays in its word or goes on to the next one, and a goal state counts
+    at the last word.  A state counts only at the least cost at which it was met: an optimal plan is
+    at none of its states later than it could be.  A word takes at least one step, so with
+    ``count_words`` the number of words that are left is a lower bound, too (the paper only prunes).
 
     Costs are lexicographic: steps, second component.  ``bound`` is an admissible, consistent lower
     bound on the steps left.  The next node is one with least (steps + bound, second component),
     then least bound, then the largest index, then the one whose predecessor was expanded last, then
     the one with the smallest labels.
-
-    Sets of indices in the sentence are bits of a number.
     """
+    (start,), last = states.numbers(init[None, :]), len(words or (0,)) - 1
+    height: dict[int, int] = {}  # the lower bound of every state met
+    best: dict[int, Cost] = {start: (0, 0)}
+    ways: dict[Node, tuple[Cost, Node, tuple[int, ...]]] = {}  # cost, predecessor, labels
+    queue: list[tuple[Cost, int, int, int, int, Node, Cost]] = []
+    expanded: set[Node] = set()
+    generated = 0
 
-    def __init__(
-        self,
-        states: ExpandedStates,
-        goal: Goal,
-        bound: Values,
-        words: Sequence[int] | None = None,
-        count_words: bool = True,
-    ) -> None:
-        self.states, self.goal, self.bound = states, goal, bound
-        self.count_words = count_words
-        self.words, self.guided = words, words is not None
-        self.last = len(words) - 1 if words else 0
-        self.indices: dict[int, int] = {}  # word -> its indices in the sentence
-        for index, word in enumerate(words or ()):
-            self.indices[word] = self.indices.get(word, 0) | 1 << index
-        self.height: dict[int, int] = {}  # the lower bound of every state met
-        self.is_goal: dict[int, bool] = {}
-        self.best: dict[int, Cost] = {}
-        self.met: dict[int, int] = {}  # state -> indices met at the best cost
-        self.waiting: dict[int, int] = {}  # state -> those of them that are not expanded yet
-        self.before: dict[Node, tuple[Node, tuple[int, ...]]] = {}
-        self.queue: list[tuple[Cost, int, int, int, int, int]] = []
-        self.expanded = self.generated = 0
+    def put(node: Node, cost: Cost, order: int) -> None:
+        least, left = height[node[0]], last - node[1]
+        if count_words:
+            least = max(least, left)
+        key = (cost[0] + least, cost[1]), least, left, -len(expanded), order
+        heappush(queue, (*key, node, cost))
 
-    def run(self, init: Rows) -> GuidedPlan | None:
-        """Search from a state to the nearest goal state whose word is the sentence's last."""
-        [start] = self.states.numbers(init[None, :])
-        if self.guided and (not self.words or self.states.word[start] != self.words[0]):
-            return None
-        self._meet([start])
-        self.best[start] = (0, 0)
-        self.met[start] = 0
-        self._put(start, 1, 0)
-        looked_at: set[int] = set()
-        while self.queue:
-            *_, state = heappop(self.queue)
-            here = self.waiting[state]
-            if not here:
-                continue
-            self.waiting[state] = 0
-            if self.is_goal[state] and here >> self.last & 1:
-                return self._found(state, len(looked_at))
-            looked_at.add(state)
-            self._expand(state, here)
-        return None
+    if words is None or states.word[start] in words[:1]:
+        _bound(states, bound, height, [start])
+        put((start, 0), (0, 0), 0)
+        generated = 1
+    while queue:
+        *_, node, cost = heappop(queue)
+        if node in expanded or cost != best[node[0]]:
+            continue
+        goal_holds = states.model.holds(goal, states.rows[node[0]][None, :])
+        if node[1] == last and goal_holds[0]:
+            work = len(expanded), len({state for state, _ in expanded}), generated
+            return _found(states, ways, node, cost, work)
+        expanded.add(node)
+        steps = list(_fitting(states, words, node))
+        _bound(states, bound, height, [target for _, (target, _), _, _ in steps])
+        for order, to, labels, second in steps:
+            after = cost[0] + 1, cost[1] + second
+            is_met = to in ways and ways[to][0] <= after
+            if height[to[0]] < FAR and after <= best.get(to[0], after) and not is_met:
+                best[to[0]], ways[to] = after, (after, node, labels)
+                put(to, after, order)
+                generated += 1
+    return None
 
-    def _expand(self, state: int, here: int) -> None:
-        """Take all joint steps out of a state, for some indices of its word."""
-        self.expanded += 1
-        word, height = self.states.word, self.height
-        steps = self.states.steps(state)
-        self._meet([target for target, _, _ in steps])
-        makespan, second = self.best[state]
-        for order, (target, labels, cost) in enumerate(steps):
-            goes_on = self.guided and word[target] != word[state]
-            fresh = here << 1 & self.indices.get(word[target], 0) if goes_on else here
-            if not fresh or height[target] >= FAR:
-                continue
-            fresh = self._improved(target, (makespan + 1, second + cost), fresh)
-            for index in bits(fresh):
-                self.before[target, index] = ((state, index - goes_on), labels)
-            self._put(target, fresh, order)
 
-    def _meet(self, states: Sequence[int]) -> None:
-        """Look at states, those among them that are new as one table."""
-        fresh = sorted({state for state in states if state not in self.height})
-        if fresh:
-            rows = np.stack([self.states.rows[state] for state in fresh])
-            self.height.update(zip(fresh, self.bound(rows).tolist(), strict=True))
-            reached = self.states.model.holds(self.goal, rows).tolist()
-            self.is_goal.update(zip(fresh, reached, strict=True))
+def _fitting(
+    states: ExpandedStates, words: Sequence[int] | None, node: Node
+) -> Iterator[tuple[int, Node, tuple[int, ...], int]]:
+    """The joint steps out of a node that fit the sentence: (number, next node, labels, cost)."""
+    state, index = node
+    for number, (target, labels, cost) in enumerate(states.steps(state)):
+        if words is None or states.word[target] == words[index]:
+            yield number, (target, index), labels, cost
+        elif states.word[target] in words[index + 1 : index + 2]:
+            yield number, (target, index + 1), labels, cost
 
-    def _improved(self, state: int, cost: Cost, indices: int) -> int:
-        """Those of the indices that a state was not met with yet at this cost or a lower one."""
-        if state not in self.best or cost < self.best[state]:
-            self.best[state], self.met[state], self.waiting[state] = cost, 0, 0
-        return indices & ~self.met[state] if cost == self.best[state] else 0
 
-    def _put(self, state: int, indices: int, order: int) -> None:
-        """Add indices to a state, and queue it if one is beyond those that wait already."""
-        if indices > self.waiting.get(state, 0):
-            left = self.last + 1 - indices.bit_length()
-            height = self.height[state]
-            if self.count_words:
-                height = max(height, left)
-            steps, second = self.best[state]
-            key = ((steps + height, second), height, left, -self.expanded, order, state)
-            heappush(self.queue, key)
-            self.generated += 1
-        self.met[state] |= indices
-        self.waiting[state] = self.waiting.get(state, 0) | indices
+def _bound(
+    states: ExpandedStates, bound: Values, height: dict[int, int], met: Sequence[int]
+) -> None:
+    """Bound states, those among them that are new as one table."""
+    if fresh := sorted({*met} - height.keys()):
+        rows = np.stack([states.rows[state] for state in fresh])
+        height.update(zip(fresh, bound(rows).tolist(), strict=True))
 
-    def _found(self, state: int, expanded_states: int) -> GuidedPlan:
-        """The path found to a goal state whose word is the sentence's last."""
-        node, plan, passed = (state, self.last), [], [self.states.word[state]]
-        while node in self.before:
-            node, labels = self.before[node]
-            plan.append(labels)
-            passed.append(self.states.word[node[0]])
-        words = sentence(reversed(passed))
-        work = self.expanded, expanded_states, self.generated
-        return GuidedPlan(tuple(reversed(plan)), words, self.best[state], *work)
+
+def _found(
+    states: ExpandedStates,
+    ways: Mapping[Node, tuple[Cost, Node, tuple[int, ...]]],
+    node: Node,
+    cost: Cost,
+    work: tuple[int, int, int],
+) -> GuidedPlan:
+    """The path found to a node."""
+    plan, passed = [], [states.word[node[0]]]
+    while node in ways:
+        _, node, labels = ways[node]
+        plan.append(labels)
+        passed.append(states.word[node[0]])
+    return GuidedPlan(tuple(reversed(plan)), sentence(reversed(passed)), cost, *work)

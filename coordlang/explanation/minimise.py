@@ -4,8 +4,8 @@
 A *box* allows a set of values for each variable; as a row of bits it has one column for each value
 of each variable.  It is *prime* for ``off`` points if it holds none of them and no value can be
 allowed in addition.  The way of espresso (Rudell and Sangiovanni-Vincentelli 1987): expand points
-to prime boxes, take an irredundant cover, reduce and expand again.  Where it is small enough, a SAT
-solver then looks for a cover with one box less until it proves that there is none.
+to prime boxes and take an irredundant cover.  Where it is small enough, a SAT solver then looks for
+a cover with one box less until it proves that there is none.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 from math import comb
-from random import Random
 
 import numpy as np
 
@@ -24,14 +23,12 @@ from planners.joint.tables import Bools, Ints
 from planners.search.sat import sat_solver
 from planners.system.errors import CoordlangError
 
-#: Array elements looked at in expansions; decides how many passes are made.
-_WORK = 300_000_000
-_PASSES = 12
 #: Literals in the question whether fewer boxes suffice, and conflicts until it is given up.
 _LITERALS = 400_000
 _CONFLICTS = 3_000
 #: Sets of variables tried for the shortest box; beyond, one is built greedily.
 _SUBSETS = 3_000
+#: Points of which as many as possible are chosen that need boxes of their own.
 _CLIQUE = 400
 
 
@@ -101,11 +98,10 @@ def minimise(points: Points, quick: bool = False) -> Boxes:
     if not len(points.off):
         everything = points.supercube(np.arange(len(points.on)))[None, :]
         return Boxes(np.ones_like(everything), everything, True)
-    boxes = _irredundant(points, np.array(_pass(points, None)))
+    boxes = _irredundant(points, _pass(points))
     fewest = False
     if not quick:
         needed = _apart(points, boxes)
-        boxes = _search(points, boxes, len(needed))
         fewest = len(boxes) == len(needed)
         while not fewest and (smaller := _fewer(points, len(boxes) - 1, needed)) is not None:
             fewest = not len(smaller)
@@ -121,22 +117,21 @@ def minimise(points: Points, quick: bool = False) -> Boxes:
 # ---- covers by expanding points
 
 
-def expand(points: Points, seed: Bools, wanted: Ints, order: Sequence[int] | None = None) -> Bools:
+def expand(points: Points, seed: Bools, wanted: Ints) -> Bools:
     """A prime box around the box ``seed``, which must hold no ``off`` point.
 
     Variables are opened one after the other, each to all values that keep the ``off`` points out:
-    in the given order, or else first what takes in most of the ``wanted`` points (and then brings
-    most of them nearest). O(variables² · points).
+    first what takes in most of the ``wanted`` points (and then brings most of them nearest).
+    O(variables² · points).
     """
     box = seed.copy()
     out_off = points.blocked(box, points.off)
     out_on = points.blocked(box, wanted)
-    left = list(range(len(points.sizes))) if order is None else list(order)
+    left = list(range(len(points.sizes)))
     while left:
         critical = out_off.sum(axis=1) == 1
-        tried = left if order is None else left[:1]
-        opened = {v: _opened(points, box, v, critical & out_off[:, v]) for v in tried}
-        chosen = tried[0] if len(tried) == 1 else _most(opened, out_on, wanted)
+        opened = {v: _opened(points, box, v, critical & out_off[:, v]) for v in left}
+        chosen = _most(opened, out_on, wanted)
         box[points.spans[chosen]] = opened[chosen]
         out_off[:, chosen] &= ~opened[chosen][points.off[:, chosen]]
         out_on[:, chosen] &= ~opened[chosen][wanted[:, chosen]]
@@ -164,37 +159,14 @@ def _most(opened: Mapping[int, Bools], out: Bools, wanted: Ints) -> int:
     return max(opened, key=gain)
 
 
-def _search(points: Points, best: Bools, bound: int) -> Bools:
-    """Passes with other orders of points and variables; the best cover out of all their primes."""
-    pool = {box.tobytes(): box for box in best}
-    work = 0
-    for number in range(1, _PASSES):
-        if len(best) <= bound or work > _WORK:
-            break
-        fresh = _pass(points, Random(number))
-        pool |= {box.tobytes(): box for box in fresh}
-        found = _irredundant(points, np.array(list(pool.values())))
-        best = min(best, found, key=lambda boxes: (len(boxes), int((~boxes).sum())))
-        work += len(fresh) * len(points.sizes) ** 2 * (len(points.off) + len(points.on))
-    return best
-
-
-def _pass(points: Points, random: Random | None) -> list[Bools]:
-    """Prime boxes that hold every ``on`` point: greedy ones, or some in random orders."""
+def _pass(points: Points) -> Bools:
+    """Prime boxes that hold every ``on`` point, built greedily."""
     left = np.arange(len(points.on))
-    if random:
-        order = list(range(len(left)))
-        random.shuffle(order)
-        left = left[order]
     found = []
     while len(left):
-        variables = None
-        if random and random.random() < 0.5:
-            variables = list(range(len(points.sizes)))
-            random.shuffle(variables)
-        found.append(expand(points, points.supercube(left[:1]), points.on[left], variables))
+        found.append(expand(points, points.supercube(left[:1]), points.on[left]))
         left = left[~points.inside(found[-1][None, :], points.on[left])[0]]
-    return found
+    return np.array(found)
 
 
 def _irredundant(points: Points, pool: Bools) -> Bools:
@@ -328,10 +300,9 @@ def _freed(points: Points, seed: Bools) -> Bools:
     packed = np.unique(np.packbits(points.blocked(seed, points.off), axis=1), axis=0)
     outside = np.unpackbits(packed, axis=1, count=len(points.sizes)).astype(np.bool_)
     kept = _hitting(outside, [_said(seed[span], seed[span]) for span in points.spans])
-    box = seed.copy()
-    for v, span in enumerate(points.spans):
-        if v not in kept:
-            box[span] = True
+    box = np.ones_like(seed)
+    for v in kept:
+        box[points.spans[v]] = seed[points.spans[v]]
     return box
 
 
