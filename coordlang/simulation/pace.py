@@ -72,6 +72,10 @@ class Pace:
         own = steps if self._way == "barrier" else words
         return all(heard >= own for heard in self._heard.values())
 
+    def missed(self, steps: int, time: float) -> int:
+        """How many beginnings by the clock a step comes too late that now begins after others."""
+        return round(time / self._period) - steps if self._way == "clock" else 0
+
 
 @dataclass(frozen=True, slots=True)
 class OwnWords:

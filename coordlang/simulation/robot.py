@@ -16,13 +16,18 @@ from dataclasses import dataclass, replace
 from itertools import accumulate
 from random import Random
 
-from coordlang.execution.monitor import IDLE, Monitor
+from coordlang.execution.monitor import IDLE, Detour, Monitor
 from coordlang.simulation.pace import Message, OwnWords, Pace
 
 #: Metres x, metres y, heading in radians (0: to the right, counterclockwise).
 Pose = tuple[float, float, float]
 #: Metres a second ahead, radians a second to the left.
 Velocity = tuple[float, float]
+
+#: ``stopped``: something is in its way, told once in a step; ``missed``: it was late for a
+#: beginning by the clock; ``word``: it may have come to a word; ``detour``: it asked its choices,
+#: to ``visit`` an atom or ``avoid`` a place, and has committed to it if that is ``granted``.
+Event = tuple[str, Mapping[str, object]]
 
 STANDING: Velocity = (0.0, 0.0)
 
@@ -86,18 +91,6 @@ def _bearing(pose: Pose, target: tuple[float, float]) -> float:
     return math.remainder(angle, 2 * math.pi)
 
 
-def turned(pose: Pose, target: tuple[float, float], body: Body) -> Velocity:
-    """Turn on the spot towards a point."""
-    return 0.0, _bounded(_GAIN * _bearing(pose, target), body.turn)
-
-
-def driven(pose: Pose, target: tuple[float, float], body: Body) -> Velocity:
-    """Drive towards a point, steering; slower where it is near or not straight ahead."""
-    angle = _bearing(pose, target)
-    ahead = _GAIN * distance(pose, target) * max(0.0, math.cos(angle))
-    return _bounded(ahead, body.speed), _bounded(_GAIN * angle, body.turn)
-
-
 def _bounded(value: float, most: float) -> float:
     return max(-most, min(most, value))
 
@@ -125,12 +118,12 @@ class Sensed:
 class Act:
     """What a robot does in a tick: what its wheels are told, and what it tells all robots.
 
-    ``is_stopped``: something is in its way.
+    ``events`` are what else is worth recording: its kind, and its further fields.
     """
 
     velocity: Velocity = STANDING
     messages: tuple[Message, ...] = ()
-    is_stopped: bool = False
+    events: tuple[Event, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,18 +140,6 @@ class OwnStep:
     begin: float
     end: float | None = None
     words: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """What a robot asked of its choices on the way: to visit an atom, or to avoid a place.
-
-    ``granted`` says whether it could be had; then the robot has committed to it.
-    """
-
-    visit: str | None
-    avoid: str | None
-    granted: bool
 
 
 class Robot:
@@ -184,13 +165,16 @@ class Robot:
     ) -> None:
         self.name = name
         self.steps: list[OwnStep] = []
-        self.detours: list[Asked] = []
         self._body, self._points, self._leads = body, points, leads
         self._monitor, self._pace, self._period = monitor, pace, period
         self._random, self._own_words, self._word_state = random, words, 0
         #: Own steps done, and words of the sentence passed at most, by its own account.
         self.done = self.words = 0
         self._is_turning = False
+        self._events: list[Event] = []
+        #: Places that it asked to avoid, beginnings missed, the step in which it was stopped.
+        self._met: set[str] = set()
+        self._missed, self._stopped_in = 0, -1
 
     @property
     def finished(self) -> bool:
@@ -220,40 +204,43 @@ class Robot:
     def act(self, sensed: Sensed) -> Act:
         """Take a tick: hear, go on with the step under way or begin the next one, and drive."""
         self._pace.hears(sensed.heard)
+        velocity, messages = self._gone_on(sensed)
+        events, self._events = tuple(self._events), []
+        return Act(velocity, messages, events)
+
+    def _gone_on(self, sensed: Sensed) -> tuple[Velocity, tuple[Message, ...]]:
         if not self._is_underway:
             self._look_around(sensed)
             begun = self.steps[-1].begin if self.steps else -1.0
             if self._monitor.finished or not self._pace.may_begin(
                 self.done, self.words, begun, sensed.time
             ):
-                return Act()
+                return STANDING, ()
             self._begin(sensed.time)
         step = self.steps[-1]
         if step.place is None:
-            if self._pace.is_common or sensed.time >= step.begin + self._period:
-                return Act(messages=self._finish(step, sensed.time))
-            return Act()
+            ends = self._pace.is_common or sensed.time >= step.begin + self._period
+            return STANDING, self._finish(step, sensed.time) if ends else ()
         target = self._points[step.place]
         if distance(sensed.pose, target) < ARRIVED * self._body.cell:
-            return Act(messages=self._finish(step, sensed.time))
-        return self._drive(target, step, sensed)
+            return STANDING, self._finish(step, sensed.time)
+        return self._driven(target, step, sensed), ()
 
     def _look_around(self, sensed: Sensed) -> None:
         """Commit to what is wanted, and to keep out of places that somebody stands in."""
         for atom in sensed.wanted:
-            granted = bool(self._monitor.can(visit=atom))
-            if granted:
-                self._monitor.commit(visit=atom)
-            self.detours.append(Asked(atom, None, granted))
+            self._ask({"visit": atom}, Detour.of(visit=atom))
         met = {self._place_of(stranger, sensed.pose) for stranger in sensed.strangers}
-        for place in sorted(met - {detour.avoid for detour in self.detours}):
-            ways = [text for text, led in sorted(self._leads.items()) if led == place]
-            if not ways:
-                continue
-            granted = bool(self._monitor.can(never=ways))
-            if granted:
-                self._monitor.commit(never=ways)
-            self.detours.append(Asked(None, place, granted))
+        for place in sorted(met - self._met):
+            if ways := [text for text, led in sorted(self._leads.items()) if led == place]:
+                self._met.add(place)
+                self._ask({"avoid": place}, Detour.of(never=ways))
+
+    def _ask(self, told: Mapping[str, object], detour: Detour) -> None:
+        granted = bool(self._monitor.can(detour))
+        if granted:
+            self._monitor.commit(detour)
+        self._events.append(("detour", {**told, "granted": granted}))
 
     def _place_of(self, stranger: tuple[float, float], pose: Pose) -> str:
         """The place nearest to what the lidar sees, behind the surface that it sees."""
@@ -273,6 +260,10 @@ class Robot:
         self._monitor.did(subaction)
         self.steps.append(OwnStep(self.done, subaction, place, time))
         self._is_turning = place is not None
+        missed = self._pace.missed(self.done, time)
+        if missed > self._missed:
+            self._events.append(("missed", {}))
+        self._missed = missed
 
     def _finish(self, step: OwnStep, time: float) -> tuple[Message, ...]:
         before, words = self.words, None
@@ -282,24 +273,29 @@ class Robot:
         self.steps[-1] = replace(step, end=time, words=words)
         self.done += 1
         told = self._pace.told(self.done, self.words, self.words > before)
+        self._events += [("word", {}) for kind, _ in told if kind == "word"]
         return tuple(Message(self.name, kind, number) for kind, number in told)
 
-    def _drive(self, target: tuple[float, float], step: OwnStep, sensed: Sensed) -> Act:
-        """Turn on the spot, then drive: where all begin together, all drive off together."""
-        body = self._body
+    def _driven(self, target: tuple[float, float], step: OwnStep, sensed: Sensed) -> Velocity:
+        """Turn on the spot, then drive, steering; slower where it is near or not straight ahead.
+
+        Where all begin together, all drive off together.
+        """
+        body, angle = self._body, _bearing(sensed.pose, target)
+        turn = _bounded(_GAIN * angle, body.turn)
         if self._is_turning:
-            aligned = abs(_bearing(sensed.pose, target)) < _ALIGNED
             waits = self._pace.is_common and sensed.time - step.begin < body.turning
-            if waits or not aligned:
-                return Act(turned(sensed.pose, target, body))
+            if waits or abs(angle) >= _ALIGNED:
+                return 0.0, turn
             self._is_turning = False
         if sensed.ahead is None:
-            return Act()
-        ahead, turn = driven(sensed.pose, target, body)
+            return STANDING
         room = (sensed.ahead - body.clearance) / body.reaction
-        if room <= 0:
-            return Act((0.0, turn), is_stopped=True)
-        return Act((min(ahead, room), turn))
+        if room <= 0 and self._stopped_in != self.done:
+            self._stopped_in = self.done
+            self._events.append(("stopped", {}))
+        ahead = _GAIN * distance(sensed.pose, target) * max(0.0, math.cos(angle))
+        return max(0.0, min(_bounded(ahead, body.speed), room)), turn
 
 
 def drawn(monitor: Monitor, random: Random) -> str | None:

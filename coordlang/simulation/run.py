@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, astuple
+from dataclasses import astuple
 from itertools import combinations
 from random import Random
 from typing import Any
@@ -22,7 +22,7 @@ from coordlang.simulation.record import (
     StepRecord,
     WishRecord,
 )
-from coordlang.simulation.robot import Act, Pose, Robot, Sensed
+from coordlang.simulation.robot import Pose, Robot, Sensed
 from coordlang.simulation.simulator import POSITION_NOISE, Settings, Simulator, require_simulator
 from coordlang.simulation.team import Mission
 from coordlang.sites.coordinates import Point
@@ -142,9 +142,6 @@ class _Going:
         self.heard: tuple[Message, ...] = ()
         self.touching: set[tuple[str, str]] = set()
         self.collided: set[str] = set()
-        #: By robot: detours told, the step in which it was stopped, beginnings missed.
-        self.asked, self.missed = dict.fromkeys(self.robots, 0), dict.fromkeys(self.robots, 0)
-        self.stopped: dict[str, int] = {}
         self.events: list[EventRecord] = []
         self.poses: dict[str, list[Pose]] = {name: [] for name in self.robots}
         self.human_at: list[Point] = []
@@ -174,7 +171,10 @@ class _Going:
         for name, robot in self.robots.items():
             act = robot.act(self._sensed(name, robot, heard))
             velocities[name] = act.velocity
-            self._take(name, robot, act)
+            self.heard += act.messages
+            self.messages += len(act.messages)
+            for kind, further in act.events:
+                self._event(kind, [name], **further)
         changes = sum(len(robot.steps) + robot.done for robot in self.robots.values())
         if changes > self.changes:
             self.changes, self.last_change = changes, self.time
@@ -240,26 +240,6 @@ class _Going:
     def _middles(self) -> list[Point]:
         """Where the robots are."""
         return [self.simulator.pose(name)[:2] for name in self.robots]
-
-    def _take(self, name: str, robot: Robot, act: Act) -> None:
-        """Take in what a robot does: its messages, and what is worth an event."""
-        self.heard += act.messages
-        self.messages += len(act.messages)
-        for message in act.messages:
-            if message.kind == "word":
-                self._event("word", [name])
-        for detour in robot.detours[self.asked[name] :]:
-            self._event("detour", [name], **asdict(detour))
-        self.asked[name] = len(robot.detours)
-        if act.is_stopped and self.stopped.get(name) != robot.done:
-            self.stopped[name] = robot.done  # once in a step
-            self._event("stopped", [name])
-        if self.settings.step == "clock" and robot.steps:
-            step = robot.steps[-1]
-            missed = round(step.begin / self.period) - step.number
-            if missed > self.missed[name]:
-                self._event("missed", [name])
-            self.missed[name] = missed
 
     def _see_collisions(self) -> None:
         touching = self.simulator.touching()

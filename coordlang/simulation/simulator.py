@@ -18,11 +18,16 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from coordlang.simulation.floor import Floor, outlines
 from coordlang.simulation.robot import Body, Pose, Velocity
 from coordlang.sites.coordinates import Point
 from planners.system.errors import UsageError
 from planners.system.signals import postponed_signals
+
+Floats = NDArray[np.float64]
 
 #: The names of the human and of walls: with a space, as no robot is called.
 HUMAN, WALL = "the human", "the wall"
@@ -139,34 +144,29 @@ class Simulator:
 
     def ahead(self, robot: str) -> float:
         """How far ahead of a robot's middle its lidar sees something in its way."""
-        found = math.inf
-        for length, angle in self._scan(robot):
-            beside = abs(length * math.sin(angle))
-            if beside < self._settings.radius + _BESIDE and math.cos(angle) > 0:
-                found = min(found, length * math.cos(angle))
-        return found
+        length, angle = self._scan(robot)
+        ahead, beside = length * np.cos(angle), np.abs(length * np.sin(angle))
+        in_way = (beside < self._settings.radius + _BESIDE) & (ahead > 0)
+        return float(ahead[in_way].min(initial=math.inf))
 
     def strangers(self, robot: str) -> tuple[tuple[float, float], ...]:
         """What a robot's lidar sees of the human: (metres, radians from straight ahead).
 
         The map tells walls from it, and robots carry a mark.
         """
-        x, y, heading = self.pose(robot)
-        surface = self._settings.radius + _SURFACE
-        found = []
-        for length, angle in self._scan(robot):
-            at = x + length * math.cos(heading + angle), y + length * math.sin(heading + angle)
-            if math.dist(at, self.human()) < surface:
-                found.append((length, angle))
-        return tuple(found)
+        (x, y, heading), (length, angle) = self.pose(robot), self._scan(robot)
+        at = x + length * np.cos(heading + angle), y + length * np.sin(heading + angle)
+        away = np.hypot(*(own - human for own, human in zip(at, self.human(), strict=True)))
+        seen = away < self._settings.radius + _SURFACE
+        return tuple(zip(length[seen].tolist(), angle[seen].tolist(), strict=True))
 
-    def _scan(self, robot: str) -> list[tuple[float, float]]:
-        """The hits of a robot's lidar: (metres, radians from straight ahead)."""
+    def _scan(self, robot: str) -> tuple[Floats, Floats]:
+        """The hits of a robot's lidar: metres, and radians from straight ahead."""
         own = self._robots[robot]
         own.lidar.step(own.state[0:3])
         scan = own.lidar.get_scan()
-        rays = zip(scan["ranges"].tolist(), own.lidar.angle_list.tolist(), strict=True)
-        return [ray for ray, is_hit in zip(rays, scan["valid"], strict=True) if is_hit]
+        hits = np.asarray(scan["valid"], np.bool_)
+        return scan["ranges"][hits], own.lidar.angle_list[hits]
 
     def touching(self) -> set[tuple[str, str]]:
         """The pairs that touch, in order: robots by name, `HUMAN` and ``the wall``."""
