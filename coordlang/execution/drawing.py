@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from functools import reduce
 from operator import and_
 
@@ -22,21 +21,9 @@ _ACTIONS_SHOWN = 3
 _LONGEST = 40
 
 
-@dataclass(frozen=True, slots=True)
-class Ink:
-    """The colour of a word, and the colour of text on it.
-
-    ``again``: every colour is in use already.
-    """
-
-    fill: str
-    text: str
-    again: bool
-
-
 def plans_dot(dag: PlanDag) -> str:
     """A DAG of plans, layers from left to right.  The same DAG gives the same text."""
-    ink, note = inks(dag), cut_note(dag)
+    looks, note = _looks(dag), cut_note(dag)
     headline = f'"{" ".join(dag.sentence)}" leaves {_plans_text(dag.count)} open'
     title = "\n".join([headline, dag.task, *([note] if note else [])])
     out = [
@@ -50,7 +37,7 @@ def plans_dot(dag: PlanDag) -> str:
     always = set.intersection(*states) if len(states) > 1 else set()
     for layer in dag.layers:
         out.append(f"  subgraph step{dag.nodes[layer.start].step} {{ rank=same;")
-        out += [f"    n{n} [{_node(dag.nodes[n], always, ink)}];" for n in layer]
+        out += [f"    n{n} [{_node(dag.nodes[n], always, looks)}];" for n in layer]
         out.append("  }")
     for edge in dag.edges:
         merged = dag.nodes[edge.source].merged or dag.nodes[edge.target].merged
@@ -59,14 +46,18 @@ def plans_dot(dag: PlanDag) -> str:
     return "\n".join([*out, "}"]) + "\n"
 
 
-def inks(dag: PlanDag) -> dict[str, Ink]:
-    """A colour for each word, in the order in which plans come to them."""
+def _looks(dag: PlanDag) -> dict[str, str]:
+    """The attributes of each word's nodes: a colour, with a second border when all are in use.
+
+    In the order in which plans come to the words.
+    """
     result = {}
     for number, word in enumerate(dag.words):
         fill = COLOURS[number % len(COLOURS)]
         red, green, blue = (int(fill[k : k + 2], 16) / 255 for k in (1, 3, 5))
-        dark = 0.299 * red + 0.587 * green + 0.114 * blue < 0.5
-        result[word] = Ink(fill, "#ffffff" if dark else "#000000", number >= len(COLOURS))
+        text = "#ffffff" if 0.299 * red + 0.587 * green + 0.114 * blue < 0.5 else "#000000"
+        again = ", peripheries=2" if number >= len(COLOURS) else ""
+        result[word] = f'fillcolor="{fill}", fontcolor="{text}"{again}'
     return result
 
 
@@ -81,7 +72,7 @@ def cut_note(dag: PlanDag) -> str | None:
     )
 
 
-def _node(node: DagNode, always: Collection[str], ink: dict[str, Ink]) -> str:
+def _node(node: DagNode, always: Collection[str], looks: dict[str, str]) -> str:
     """A node's attributes: its word, its atoms without those of all nodes, its plans."""
     plans = _plans_text(node.plans)
     if node.merged:
@@ -93,10 +84,7 @@ def _node(node: DagNode, always: Collection[str], ink: dict[str, Ink]) -> str:
         rest = len(lines) - _ATOMS_SHOWN + 1
         lines = [*lines[: _ATOMS_SHOWN - 1], f"and {rest} more atoms"]
     text = "\n".join([node.word, *(lines if atoms else [NO_FACT]), plans])
-    own = ink[node.word]
-    again = ", peripheries=2" if own.again else ""
-    colours = f'fillcolor="{own.fill}", fontcolor="{own.text}"{again}'
-    return f"label={_quoted(text)}, tooltip={_quoted(node.key)}, {colours}"
+    return f"label={_quoted(text)}, tooltip={_quoted(node.key)}, {looks[node.word]}"
 
 
 def _edge_text(dag: PlanDag, edge: DagEdge) -> str:

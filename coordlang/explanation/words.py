@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import compress, product
 from typing import Any
@@ -54,11 +54,6 @@ class Literal:
         """The number of values that its text mentions."""
         return min(len(self.values), len(self.others))
 
-    def holds(self, true: Collection[Atom]) -> bool:
-        """Whether it is true in a state given by its true atoms."""
-        own = [atom for atom in self.variable.atoms if atom in true]
-        return any(atom in self.values for atom in own) if own else None in self.values
-
     def conjunctions(self) -> list[Conjunction]:
         """The same as a disjunction of conjunctions of ground literals.
 
@@ -99,13 +94,6 @@ class Cover:
         """
         values = sum(literal.length for term in self.terms for literal in term)
         return values + max(0, len(self.terms) - 1)
-
-    def holds(self, atoms: Iterable[str]) -> bool:
-        """Whether it is true in a state given by its true atoms (PDDL text, as in its key)."""
-        texts = frozenset(atoms)
-        variables = {literal.variable for term in self.terms for literal in term}
-        true = {atom for variable in variables for atom in variable.atoms if show(atom) in texts}
-        return any(all(literal.holds(true) for literal in term) for term in self.terms)
 
     def conjunctions(self) -> list[Conjunction]:
         """The same as a disjunction of conjunctions of ground literals.

@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -72,7 +73,7 @@ def task_data(shown: ShownTask, tables: Tables, seed: int) -> dict[str, Any]:
     """Return a task as JSON data, with states and labels as numbers into ``tables``."""
     language, space = shown.language, shown.language.space
     graph = plan_graph(language, seed)
-    sentences, total = shown_sentences(language, graph, seed)
+    sentences, total = shown_sentences(language, seed)
     verdict = _verdict(language)
     violation = verdict.witness if verdict else None  # plans of one sentence that miscoordinate
     makespan, second = space.cost_of(language.task)
@@ -255,7 +256,10 @@ def plan_graph(language: TaskLanguage, seed: int, most: int = EDGES) -> Graph:
     """
     space = language.space
     complete = len(space.target) <= most
-    edges = np.arange(len(space.target)) if complete else _drawn_edges(language, seed, most)
+    edges = np.arange(len(space.target))
+    if not complete:
+        drawn = {edge for path in _drawn_paths(language, seed, most) for edge in path}
+        edges = np.array(sorted(drawn), np.int64)
     source, target = space.sources[edges], space.targets(edges)
     nodes = np.unique(np.concatenate((source, target, [language.start])))
     makespan = int(space.layer[language.start])
@@ -266,33 +270,26 @@ def plan_graph(language: TaskLanguage, seed: int, most: int = EDGES) -> Graph:
     sizes = np.bincount(step, minlength=makespan + 1).tolist()
     ends = zip(number[source].tolist(), number[target].tolist(), strict=True)
     order = np.array(layer_orders(sizes, list(ends)))
-    drawn = np.lexsort((order, step))
-    _, out = space.edges_from(nodes[drawn])
-    return Graph(nodes[drawn], tuple(order[drawn].tolist()), out[np.isin(out, edges)], complete)
+    by_step = np.lexsort((order, step))
+    _, out = space.edges_from(nodes[by_step])
+    return Graph(nodes[by_step], tuple(order[by_step].tolist()), out[np.isin(out, edges)], complete)
 
 
-def _drawn_paths(language: TaskLanguage, seed: int, most: int) -> Iterator[list[int]]:
-    """Yield the edges of plans drawn uniformly."""
-    space = language.space
-    plans = Plans.of(space, language.task)
+def _drawn_paths(language: TaskLanguage, seed: int, most: int) -> list[list[int]]:
+    """The edges of plans drawn uniformly, as many as have together a quarter of ``most`` edges."""
+    plans, found, kept = Plans.of(language.space, language.task), list[list[int]](), set[int]()
     for plan in plans.sample(most, seed):
-        path = space.path_with(plans.start, plan)
+        path = language.space.path_with(plans.start, plan)
         assert path is not None, "a plan is a path of its plan space"
-        yield path
-
-
-def _drawn_edges(language: TaskLanguage, seed: int, most: int) -> Ints:
-    """Return the edges of plans drawn uniformly, as many as fit."""
-    kept: set[int] = set()
-    for path in _drawn_paths(language, seed, most):
-        if len(kept.union(path)) > most // 4:
-            break
         kept.update(path)
-    return np.array(sorted(kept), np.int64)
+        if len(kept) > most // 4:
+            break
+        found.append(path)
+    return found
 
 
 def shown_sentences(
-    language: TaskLanguage, graph: Graph, seed: int, most: int = EDGES
+    language: TaskLanguage, seed: int, most: int = EDGES
 ) -> tuple[list[ShownSentence], int | None]:
     """Return the task's sentences that leave most plans open, and the number of all sentences.
 
@@ -307,28 +304,19 @@ def shown_sentences(
             )[language.start]
     total = None if found is None else len(found)
     if found is None:
-        drawn = _drawn_sentences(language, graph, seed, most)
-        found = {words: Plans.of(language.plans_with(words)).count for words in drawn}
+        passed = (
+            language.word[language.space.nodes_on(language.start, path)]
+            for path in _drawn_paths(language, seed, most)
+        )
+        drawn = dict.fromkeys(sentence(words.tolist()) for words in passed)
+        some = islice(drawn, SENTENCES)
+        found = {words: Plans.of(language.plans_with(words)).count for words in some}
     listed = []
     for words, number in sorted(found.items(), key=lambda entry: (-entry[1], entry[0]))[:SENTENCES]:
         open_plans = language.plans_with(words)
         own = tuple(_own_count(open_plans, robot) for robot in range(len(language.model.robots)))
         listed.append(ShownSentence(words, number, own))
     return listed, total
-
-
-def _drawn_sentences(
-    language: TaskLanguage, graph: Graph, seed: int, most: int
-) -> dict[Sentence, None]:
-    """The sentences of plans within the drawn part, in the order in which they were drawn."""
-    inside = set(graph.edges.tolist())
-    found: dict[Sentence, None] = {}
-    for path in _drawn_paths(language, seed, most):
-        if not inside.issuperset(path) or len(found) >= SENTENCES:
-            break
-        nodes = language.space.nodes_on(language.start, path)
-        found[sentence(language.word[nodes].tolist())] = None
-    return found
 
 
 def _own_count(open_plans: PlanSpace, robot: int) -> int | None:

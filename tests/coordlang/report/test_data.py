@@ -129,7 +129,7 @@ def test_random_models() -> None:
 def test_large_tasks_are_drawn() -> None:
     spoken = language_in_task(*make_language("grid", "three-robots-3x3", None))
     whole = page_task.plan_graph(spoken, 0)
-    exact = {s.words: s.plans for s in page_task.shown_sentences(spoken, whole, 0)[0]}
+    exact = {s.words: s.plans for s in page_task.shown_sentences(spoken, 0)[0]}
     part = page_task.plan_graph(spoken, 0, most=60)
     assert whole.complete
     assert not part.complete
@@ -140,7 +140,7 @@ def test_large_tasks_are_drawn() -> None:
     # whole plan.
     assert set(targets) | {spoken.start} == nodes
     assert set(sources) | {n for n in nodes if space.layer[n] == 0} == nodes
-    drawn, total = page_task.shown_sentences(spoken, part, 0, most=60)
+    drawn, total = page_task.shown_sentences(spoken, 0, most=60)
     assert total is None
     assert drawn
     assert all(exact.get(s.words, s.plans) == s.plans for s in drawn)
