@@ -64,7 +64,6 @@ def walk_mixtures(
     table = np.array([[0] * robots + [task_language.start]])
     layers = [table[:, robots]]
     steps: list[UnfoldingStep] = []
-    taken: list[Labels] = []  # of each step the labels of its joint moves
     walked, held = 1, 0
     for step in range(automata[0].steps):
         _check(space.model, automata, table, step, held, most)
@@ -75,11 +74,10 @@ def walk_mixtures(
         broken = np.flatnonzero(edge < 0)
         if len(broken):
             last = int(source[broken[0]]), tuple(labels[broken[0]].tolist())
-            return Mixtures(None, _witness(task_language, fits, words, steps, taken, *last), walked)
+            return Mixtures(None, _witness(task_language, fits, words, steps, *last), walked)
         reached = np.column_stack((after, space.targets(edge)))
         table, number = unique_tuples(reached, [*(len(a) for a in automata), len(space)])
         steps.append(UnfoldingStep(source, edge, number))
-        taken.append(labels)
         layers.append(table[:, robots])
         walked += len(table)
         held += 40 * len(edge) + table.nbytes
@@ -105,17 +103,15 @@ def _witness(
     fits: PlanSpace,
     words: Sequence[int],
     steps: Sequence[UnfoldingStep],
-    taken: Sequence[Labels],
     node: int,
     labels: tuple[int, ...],
 ) -> Miscoordination:
     """Plans with the sentence whose mixture breaks at a node of the last layer, by these labels."""
-    done = [labels]
-    for step, of_step in zip(reversed(steps), reversed(taken), strict=True):
+    space, start, done, paths = task_language.space, task_language.start, [labels], []
+    for step in reversed(steps):
         arrival = int(np.flatnonzero(step.target == node)[0])
-        done.append(tuple(of_step[arrival].tolist()))
+        done.append(space.labels_of(int(step.edge[arrival])))
         node = int(step.source[arrival])
-    space, start, paths = task_language.space, task_language.start, []
     for robot in range(len(labels)):
         own = [[step[robot]] for step in reversed(done)]
         path = fits.path_of_robots(int(fits.starts[0]), [robot], own)

@@ -19,6 +19,7 @@ import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from decimal import Decimal
+from fnmatch import fnmatchcase
 from functools import cache, partial
 from io import BytesIO
 from typing import Any, TypeVar
@@ -110,33 +111,30 @@ class Answer:
 
 
 class Knowledge:
-    """What is known in each state of a choices file: facts that are true, others unknown or false.
-
-    Two sets of numbers ``state * facts + fact``: one object each for the garbage collector.
-    """
+    """What is known in each state of a choices file: which facts are true, unknown or false."""
 
     def __init__(self, entry: Mapping[str, Any], states: Sequence[Any], where: str) -> None:
         facts, others = _atoms(entry, "facts", where), _atoms(entry, "others", where)
-        if len({*facts, *others}) < len(facts) + len(others):
+        #: Every atom, and whether something is ever known of it.
+        self.atoms = {**dict.fromkeys(facts, True), **dict.fromkeys(sorted(others), False)}
+        if len(self.atoms) < len(facts) + len(others):
             raise _broken(f"{where}: an atom occurs twice in 'facts' and 'others'")
-        self._size = len(facts)
-        #: The number of each atom; None for one of which nothing is ever known.
-        self.atoms: dict[str, int | None] = {text: n for n, text in enumerate(facts)}
-        self.atoms |= dict.fromkeys(sorted(others))
-        self._true: set[int] = set()
-        self._unknown: set[int] = set()
+        #: In each state the facts that are true (True) or unknown (None); others are false.
+        self._in_state: list[dict[str, bool | None]] = []
         for state, record in enumerate(states):
-            for key, found in (("true", self._true), ("unknown", self._unknown)):
+            found: dict[str, bool | None] = {}
+            for key, value in (("true", True), ("unknown", None)):
                 for fact in _get(record, key, list, f"state {state}"):
-                    if not _is_number(fact) or not 0 <= fact < self._size:
+                    if not _is_number(fact) or not 0 <= fact < len(facts):
                         raise _broken(
                             f"state {state}: '{key}' has {_shown(fact)}; "
-                            f"facts are numbers below {self._size}"
+                            f"facts are numbers below {len(facts)}"
                         )
-                    found.add(state * self._size + fact)
-        if both := self._true & self._unknown:
-            state, fact = divmod(min(both), self._size)
-            raise MonitorError(f"state {state} says that fact {fact} is true and unknown")
+                    if found.setdefault(facts[fact], value) is not value:
+                        raise MonitorError(
+                            f"state {state} says that fact {fact} is true and unknown"
+                        )
+            self._in_state.append(found)
 
     def value(self, state: int, atom: str) -> bool | None:
         """Whether an atom is true in a state; None where it is unknown.
@@ -145,10 +143,7 @@ class Knowledge:
         """
         if atom not in self.atoms:
             raise self._no_atom(atom)
-        fact = self.atoms[atom]
-        if fact is None or state * self._size + fact in self._unknown:
-            return None
-        return state * self._size + fact in self._true
+        return self._in_state[state].get(atom, False) if self.atoms[atom] else None
 
     def _no_atom(self, atom: str) -> MonitorError:
         head = _head(atom)
@@ -575,10 +570,7 @@ def _matches(pattern: str, text: str | None) -> bool:
     """Whether a text is the pattern, in which every * stands for any text."""
     if pattern == IDLE or text is None:
         return pattern == IDLE and text is None
-    head, *pieces = map(re.escape, pattern.split("*"))
-    # Each piece but the last where it stands first: what is tried is linear in the text.
-    between = "".join(f"(?>.*?{piece})" for piece in pieces[:-1])
-    return bool(re.fullmatch(head + between + "".join(f".*{tail}" for tail in pieces[-1:]), text))
+    return fnmatchcase(text, re.sub(r"[?[]", r"[\g<0>]", pattern))
 
 
 def _shown(value: object) -> str:

@@ -174,18 +174,16 @@ def _sequence(subplan: Sequence[str | None]) -> str:
     return ", ".join(parts)
 
 
-def _alternatives(texts: Sequence[str]) -> str:
+def _alternatives(texts: Sequence[str], between: str = " or ") -> str:
     rest = len(texts) - _ALTERNATIVES
     if rest <= 1:  # "one of 1 others" would be as long as its name
-        return " or ".join(texts)
-    return f"{', '.join(texts[:_ALTERNATIVES])} or one of {rest} others"
+        return between.join(texts)
+    return between.join([*texts[:_ALTERNATIVES], f"one of {rest} others"])
 
 
 def _when(change: WordChange) -> str:
     if change.earliest == change.latest:
         return f"in step {change.earliest}"
-    if change.latest == change.earliest + 1:
-        return f"in step {change.earliest} or {change.latest}"
     return f"in steps {change.earliest} to {change.latest}"
 
 
@@ -193,20 +191,17 @@ def _cause(change: WordChange) -> str:
     """Who brings the change about."""
     if not change.robots:
         return "whatever the robots do"
-    if len(change.robots) == 1:
+    *others, last = change.robots
+    if not others:
         ways = [own or "waiting" for (own,), _ in change.ways]
-        return f"{change.robots[0]} decides it by {_alternatives(ways)}"
-    together = [
+        return f"{last} decides it by {_alternatives(ways)}"
+    ways = [
         " and ".join(
-            f"{robot} {own or 'wait'}" for robot, own in zip(change.robots, does, strict=True)
+            f"{name} {own or 'wait'}" for name, own in zip(change.robots, does, strict=True)
         )
         for does, _ in change.ways
     ]
-    rest = len(together) - _ALTERNATIVES
-    more = f"; or in {counted(rest, 'other way')}" if rest > 1 else ""
-    first = "; or ".join(together[:_ALTERNATIVES] if rest > 1 else together)
-    *others, last = change.robots
-    return f"{', '.join(others)} and {last} decide it together: {first}{more}"
+    return f"{', '.join(others)} and {last} decide it together: {_alternatives(ways, '; or ')}"
 
 
 def demands_data(demands: SentenceDemands) -> dict[str, Any]:

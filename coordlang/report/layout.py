@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from coordlang.sites.coordinates import Point, from_names
 from planners.joint.tables import Ints
-from planners.search.graphs import csgraph
 
 Floats = NDArray[np.float64]
 
@@ -67,20 +66,21 @@ def graph_layout(number: int, links: Sequence[tuple[int, int]]) -> Floats:
     """Place the nodes of an undirected graph so that distances are close to path lengths.
 
     Least stress, ``sum (distance - length)^2 / length^2`` over pairs of nodes, by the method of
-    Kamada and Kawai (1989), which starts from classical scaling.  O(number^2) a step.  Returns an
-    array (number, 2): linked nodes are about 1 apart, parts that are not connected a little more,
-    the longer axis lies along x, the least coordinates are 0.
+    Kamada and Kawai (1989).  O(number^2) a step.  Returns an array (number, 2): linked nodes are
+    about 1 apart, parts that are not connected a little more, the longer axis lies along x, the
+    least coordinates are 0.
     """
     if number <= 1:
         return np.zeros((number, 2))
     import networkx as nx
 
-    lengths = _path_lengths(number, links)
-    found = nx.kamada_kawai_layout(
-        nx.empty_graph(number),
-        dist={node: dict(enumerate(row)) for node, row in enumerate(lengths.tolist())},
-        pos=dict(enumerate(_classical_scaling(lengths))),
-    )
+    graph = nx.empty_graph(number)
+    graph.add_edges_from(links)
+    lengths = nx.floyd_warshall_numpy(graph, nodelist=range(number))
+    known = np.isfinite(lengths)
+    lengths[~known] = lengths[known].max() + 1.5  # without a path a little more than the longest
+    distances = {node: dict(enumerate(row)) for node, row in enumerate(lengths.tolist())}
+    found = nx.kamada_kawai_layout(graph, dist=distances)
     drawn = np.array([found[node] for node in range(number)])
     # By least squares distances are the path lengths.
     first, second = np.triu_indices(number, 1)
@@ -89,37 +89,6 @@ def graph_layout(number: int, links: Sequence[tuple[int, int]]) -> Floats:
     points = _upright(scaled, links)
     placed: Floats = np.round(points - points.min(axis=0), 3) + 0.0
     return placed
-
-
-def _path_lengths(number: int, links: Sequence[tuple[int, int]]) -> Floats:
-    """Return the path lengths (number, number); without a path a little more than the longest."""
-    graphs = csgraph()
-    from scipy.sparse import coo_array
-
-    ends = np.array(links, np.int64).reshape(-1, 2)
-    graph = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(number, number))
-    lengths: Floats = graphs.shortest_path(graph.tocsr(), directed=False, unweighted=True)
-    known = np.isfinite(lengths)
-    lengths[~known] = lengths[known].max() + 1.5
-    return lengths
-
-
-def _classical_scaling(lengths: Floats) -> Floats:
-    """Return the points of classical multidimensional scaling, by eigenvectors (Torgerson 1952).
-
-    A little noise keeps points apart that would coincide.
-    """
-    number = len(lengths)
-    centre = np.eye(number) - 1 / number
-    values, vectors = np.linalg.eigh(-centre @ (lengths**2) @ centre / 2)
-    vectors = vectors[:, ::-1][:, :2] * np.sqrt(np.maximum(values[::-1][:2], 0.0))
-    points = np.zeros((number, 2))
-    points[:, : vectors.shape[1]] = vectors
-    for axis in (0, 1):  # the sign of an eigenvector is arbitrary
-        largest = np.argmax(np.round(np.abs(points[:, axis]), 6))
-        if points[largest, axis] < 0:
-            points[:, axis] *= -1
-    return points + np.random.default_rng(0).normal(0, 1e-3, points.shape)
 
 
 def _upright(points: Floats, links: Sequence[tuple[int, int]]) -> Floats:
