@@ -136,7 +136,12 @@ class MappedStates:
 
 
 def mapped_states(language: Language, model: JointModel, also: Rows | None = None) -> MappedStates:
-    """The states that a language maps, and ``also`` these, which have its default word."""
+    """The states that a language maps, and ``also`` these, which have its default word.
+
+    States that the language does not map are on no optimal plan of a candidate task; ``also``
+    (states, blocks) are for tasks that are no candidates.  Raises `BadInput` for a language of
+    another model.
+    """
     table = language.partition(model)
     rows, word = table.rows, table.word
     if also is not None:
@@ -147,21 +152,12 @@ def mapped_states(language: Language, model: JointModel, also: Rows | None = Non
     return MappedStates(table.words, valuation(model, rows), word)
 
 
-def word_formulas(
-    language: Language, model: JointModel, also: Rows | None = None
-) -> dict[str, Cover]:
+def all_covers(mapped: MappedStates) -> dict[str, Cover]:
     """Each word as a disjunction of few short terms over multi-valued variables.
 
-    In every mapped state exactly one of the formulas is true, that of its word.  States that the
-    language does not map are on no optimal plan of a candidate task; there the formulas are
-    arbitrary, unless the states (states, blocks) are given as ``also``, for tasks that are no
-    candidates.  Raises `BadInput` for a language of another model.
+    In every mapped state exactly one of the formulas is true, that of its word.  Elsewhere they are
+    arbitrary.
     """
-    return all_covers(mapped_states(language, model, also))
-
-
-def all_covers(mapped: MappedStates) -> dict[str, Cover]:
-    """Each word's formula; see `word_formulas`."""
     return {word: cover(mapped, number) for number, word in enumerate(mapped.words)}
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.variables import truth
-from coordlang.explanation.words import Conjunction, word_formulas
+from coordlang.explanation.words import Conjunction, all_covers, mapped_states
 from planners.joint.model import JointModel
 from planners.joint.tables import Bools, Ints, Rows, unique_rows
 from planners.system.errors import UsageError
@@ -29,7 +29,7 @@ def short_terms(task_language: TaskLanguage, states: int = _STATES) -> Terms:
     rows = _rows(task_language)
     if len(rows) > states:
         return exclusive_terms(task_language)
-    formulas = word_formulas(task_language.language, task_language.model, rows)
+    formulas = all_covers(mapped_states(task_language.language, task_language.model, rows))
     words = task_language.partition.words
     return tuple(tuple(formulas[word].conjunctions()) for word in words)
 

@@ -41,7 +41,7 @@ class Pace:
     """One robot's way to keep step with the others, one of `PACES`; a period is in seconds."""
 
     def __init__(self, way: str, robots: Iterable[str], period: float) -> None:
-        self._way, self._period = way, period
+        self._way, self.period = way, period
         self._heard = dict.fromkeys(robots, 0)
 
     @property
@@ -68,13 +68,13 @@ class Pace:
         beginning.
         """
         if self._way == "clock":
-            return abs(math.remainder(time, self._period)) < _SAME and begun < time
+            return abs(math.remainder(time, self.period)) < _SAME and begun < time
         own = steps if self._way == "barrier" else words
         return all(heard >= own for heard in self._heard.values())
 
     def missed(self, steps: int, time: float) -> int:
         """How many beginnings by the clock a step comes too late that now begins after others."""
-        return round(time / self._period) - steps if self._way == "clock" else 0
+        return round(time / self.period) - steps if self._way == "clock" else 0
 
 
 @dataclass(frozen=True, slots=True)

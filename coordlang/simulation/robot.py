@@ -31,53 +31,27 @@ Event = tuple[str, Mapping[str, object]]
 
 STANDING: Velocity = (0.0, 0.0)
 
+#: The greatest of a robot's wheels: metres a second ahead, radians a second on the spot.
+SPEED, TURN = 1.0, 3.0
+#: Seconds between two looks at sensors and commands to wheels.
+TICK = 0.1
+#: A robot drives so slowly that it would come too near to something only after three ticks: two
+#: robots that come head on take at most two thirds of what is between them in a tick, and so never
+#: touch.
+_REACTION = 3 * TICK
 #: Gains in 1/s: velocity per metre or radian that is left.
 _GAIN = 4.0
 #: Headings are right within this, in radians, and places are reached within this share of the cell.
-_ALIGNED = 0.06
-ARRIVED = 0.05
+_ALIGNED, _ARRIVED = 0.06, 0.05
 #: What turning and driving take longer than at full speed, in seconds: slowing down, and noise.
 _SLACK = 0.8
+#: The time in which every turn on the spot is done: half a turn, and some slack.
+_TURNING = math.pi / TURN + _SLACK
 
 
-@dataclass(frozen=True, slots=True)
-class Body:
-    """How a robot is built, with lengths in metres and times in seconds.
-
-    ``cell`` is the length of one unit of the coordinates of places, ``radius`` the robot's,
-    ``speed`` (m/s) and ``turn`` (rad/s) are the greatest of its wheels; ``tick`` lies between two
-    looks at sensors and commands to wheels.
-    """
-
-    cell: float = 1.0
-    radius: float = 0.2
-    speed: float = 1.0
-    turn: float = 3.0
-    tick: float = 0.1
-
-    @property
-    def clearance(self) -> float:
-        """How near to its middle a robot lets come what is straight ahead."""
-        return self.radius + 0.03 * self.cell
-
-    @property
-    def reaction(self) -> float:
-        """A robot drives so slowly that it would come as near as that only after this time.
-
-        Three ticks: two robots that come head on take at most two thirds of what is between them
-        in a tick, and so never touch.
-        """
-        return 3 * self.tick
-
-    @property
-    def turning(self) -> float:
-        """The time in which every turn on the spot is done: half a turn, and some slack."""
-        return math.pi / self.turn + _SLACK
-
-    def period(self, longest: float) -> float:
-        """The time of a joint step whose longest way has this length, in whole ticks."""
-        needed = self.turning + (longest / self.speed + _SLACK)
-        return round(math.ceil(needed / self.tick) * self.tick, 6)
+def period(longest: float) -> float:
+    """The time of a joint step whose longest way has this length, in whole ticks."""
+    return round(math.ceil((_TURNING + (longest / SPEED + _SLACK)) / TICK) * TICK, 6)
 
 
 def distance(pose: Pose, target: tuple[float, float]) -> float:
@@ -145,28 +119,29 @@ class OwnStep:
 class Robot:
     """One robot.
 
-    It follows ``monitor``, its choices, and draws among them with ``random``.  ``points`` are the
-    places in metres, ``leads`` the place that each own subaction leads to, if it leads anywhere; a
-    step takes ``period`` seconds at most where nothing comes in between.  ``words`` says how far in
-    the sentence own subactions may lead; None where no sentence is agreed.
+    ``cell`` is the length of one unit of the coordinates of places, ``radius`` the robot's, in
+    metres.  It follows ``monitor``, its choices, and draws among them with ``random``.  ``points``
+    are the places in metres, ``leads`` the place that each own subaction leads to, if it leads
+    anywhere.  ``words`` says how far in the sentence own subactions may lead; None where no
+    sentence is agreed.
     """
 
     def __init__(
         self,
         name: str,
-        body: Body,
+        cell: float,
+        radius: float,
         points: Mapping[str, tuple[float, float]],
         leads: Mapping[str, str],
         monitor: Monitor,
         words: OwnWords | None,
         pace: Pace,
-        period: float,
         random: Random,
     ) -> None:
         self.name = name
         self.steps: list[OwnStep] = []
-        self._body, self._points, self._leads = body, points, leads
-        self._monitor, self._pace, self._period = monitor, pace, period
+        self._cell, self._radius, self._points, self._leads = cell, radius, points, leads
+        self._monitor, self._pace = monitor, pace
         self._random, self._own_words, self._word_state = random, words, 0
         #: Own steps done, and words of the sentence passed at most, by its own account.
         self.done = self.words = 0
@@ -219,10 +194,10 @@ class Robot:
             self._begin(sensed.time)
         step = self.steps[-1]
         if step.place is None:
-            ends = self._pace.is_common or sensed.time >= step.begin + self._period
+            ends = self._pace.is_common or sensed.time >= step.begin + self._pace.period
             return STANDING, self._finish(step, sensed.time) if ends else ()
         target = self._points[step.place]
-        if distance(sensed.pose, target) < ARRIVED * self._body.cell:
+        if distance(sensed.pose, target) < _ARRIVED * self._cell:
             return STANDING, self._finish(step, sensed.time)
         return self._driven(target, step, sensed), ()
 
@@ -244,7 +219,7 @@ class Robot:
 
     def _place_of(self, stranger: tuple[float, float], pose: Pose) -> str:
         """The place nearest to what the lidar sees, behind the surface that it sees."""
-        length = stranger[0] + self._body.cell / 10
+        length = stranger[0] + self._cell / 10
         angle = pose[2] + stranger[1]
         at = pose[0] + length * math.cos(angle), pose[1] + length * math.sin(angle)
         away = {name: math.dist(at, point) for name, point in self._points.items()}
@@ -281,21 +256,21 @@ class Robot:
 
         Where all begin together, all drive off together.
         """
-        body, angle = self._body, _bearing(sensed.pose, target)
-        turn = _bounded(_GAIN * angle, body.turn)
+        angle = _bearing(sensed.pose, target)
+        turn = _bounded(_GAIN * angle, TURN)
         if self._is_turning:
-            waits = self._pace.is_common and sensed.time - step.begin < body.turning
+            waits = self._pace.is_common and sensed.time - step.begin < _TURNING
             if waits or abs(angle) >= _ALIGNED:
                 return 0.0, turn
             self._is_turning = False
         if sensed.ahead is None:
             return STANDING
-        room = (sensed.ahead - body.clearance) / body.reaction
+        room = (sensed.ahead - (self._radius + 0.03 * self._cell)) / _REACTION
         if room <= 0 and self._stopped_in != self.done:
             self._stopped_in = self.done
             self._events.append(("stopped", {}))
         ahead = _GAIN * distance(sensed.pose, target) * max(0.0, math.cos(angle))
-        return max(0.0, min(_bounded(ahead, body.speed), room)), turn
+        return max(0.0, min(_bounded(ahead, SPEED), room)), turn
 
 
 def drawn(monitor: Monitor, random: Random) -> str | None:

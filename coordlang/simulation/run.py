@@ -22,7 +22,7 @@ from coordlang.simulation.record import (
     StepRecord,
     WishRecord,
 )
-from coordlang.simulation.robot import Pose, Robot, Sensed
+from coordlang.simulation.robot import TICK, Pose, Robot, Sensed, period
 from coordlang.simulation.simulator import POSITION_NOISE, Settings, Simulator, require_simulator
 from coordlang.simulation.team import Mission
 from coordlang.sites.coordinates import Point
@@ -33,8 +33,8 @@ _PATIENCE = 4
 _WITH_WALKER = 12
 #: The settings that the record has.
 _RECORDED = ("step", "cell", "radius", "noise", "lidar", "human")
-#: Seconds between two poses of the record.
-_INTERVAL = 0.2
+#: Ticks from one pose of the record to the next.
+_INTERVAL = 2
 
 
 def runs_of(
@@ -79,8 +79,8 @@ def record_of(
         sentence=used.text(mission.sentence) if mission.agreement == "sentence" else None,
         covered=used.covered,
         makespan=mission.steps,
-        period=settings.period(floor.longest),
-        interval=_ticks_of_interval(settings) * settings.tick,
+        period=period(floor.longest),
+        interval=_INTERVAL * TICK,
         **{name: getattr(settings, name) for name in _RECORDED},
         wishes=list(wishes),
         places={name: (round(x, 6), round(y, 6)) for name, (x, y) in sorted(floor.points.items())},
@@ -88,11 +88,6 @@ def record_of(
         goals=dict(mission.goals),
         runs=list(runs),
     )
-
-
-def _ticks_of_interval(settings: Settings) -> int:
-    """How many ticks there are from one pose of the record to the next."""
-    return max(1, round(_INTERVAL / settings.tick))
 
 
 class _Going:
@@ -107,16 +102,16 @@ class _Going:
         wishes: Sequence[WishRecord],
     ) -> None:
         self.mission, self.settings, self.seed = mission, settings, seed
-        self.period = settings.period(floor.longest)
+        self.period = period(floor.longest)
         self.robots = {
             name: Robot(
                 name,
-                settings,
+                settings.cell,
+                settings.radius,
                 floor.points,
                 mission.leads[name],
                 *given,
                 Pace(settings.step, mission.robots, self.period),
-                self.period,
                 Random(f"{seed} choices {name}"),
             )
             for name, given in mission.team(seed).items()
@@ -149,7 +144,7 @@ class _Going:
     @property
     def time(self) -> float:
         """Seconds since the start."""
-        return round(self.ticks * self.settings.tick, 6)
+        return round(self.ticks * TICK, 6)
 
     @property
     def has_arrived(self) -> bool:
@@ -252,7 +247,7 @@ class _Going:
         self.touching = touching
 
     def _keep_poses(self) -> None:
-        if self.ticks % _ticks_of_interval(self.settings) == 0:
+        if self.ticks % _INTERVAL == 0:
             for name, poses in self.poses.items():
                 x, y, heading = self.simulator.pose(name)
                 poses.append((round(x, 3), round(y, 3), round(heading, 3)))

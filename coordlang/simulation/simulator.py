@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coordlang.simulation.floor import Floor, outlines
-from coordlang.simulation.robot import Body, Pose, Velocity
+from coordlang.simulation.robot import SPEED, TICK, TURN, Pose, Velocity
 from coordlang.sites.coordinates import Point
 from planners.system.errors import UsageError
 from planners.system.signals import postponed_signals
@@ -42,9 +42,10 @@ POSITION_NOISE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Settings(Body):
+class Settings:
     """How robots are built and keep step.
 
+    ``cell`` is the length of a unit of coordinates of places, ``radius`` a robot's, in metres.
     ``step`` is one of `coordlang.simulation.pace.PACES`.  ``noise`` is the standard deviation of
     what wheels do, as a share of what they are told, drawn anew in each tick; a tenth of it, in
     metres and in radians, is that of where a robot believes to be.  ``lidar``: robots stop before
@@ -53,6 +54,8 @@ class Settings(Body):
     for nobody.
     """
 
+    cell: float = 1.0
+    radius: float = 0.2
     step: str = "clock"
     noise: float = 0.1
     lidar: bool = True
@@ -60,17 +63,17 @@ class Settings(Body):
 
     def __post_init__(self) -> None:
         """Raise `UsageError` for what no robot can be built with."""
-        for name in ("cell", "radius", "speed", "turn", "tick"):
+        for name in ("cell", "radius"):
             value = getattr(self, name)
             if not 0 < value < math.inf:
                 raise UsageError(
-                    f"{name} {value:g}: expected a length, speed or time above 0",
+                    f"{name} {value:g}: expected a length above 0",
                     remedy="Leave it out for the usual value.",
                 )
-        if self.radius < self.speed * self.tick:
+        if self.radius < SPEED * TICK:
             raise UsageError(
                 f"robots with a radius of {self.radius:g} m are too small: in a tick they drive "
-                f"{self.speed * self.tick:g} m, so that two could pass through each other unseen",
+                f"{SPEED * TICK:g} m, so that two could pass through each other unseen",
                 remedy="Use a larger --radius, and a larger --cell where it does not fit.",
             )
         if not 0 <= self.noise <= 1:
@@ -214,8 +217,8 @@ def _world(
             },
             "shape": disc,
             "state": list(pose),
-            "vel_max": [settings.speed, settings.turn],
-            "vel_min": [-settings.speed, -settings.turn],
+            "vel_max": [SPEED, TURN],
+            "vel_min": [-SPEED, -TURN],
             "sensors": [lidar],
         }
         for name, pose in poses.items()
@@ -231,5 +234,5 @@ def _world(
     if human is not None:
         walker = {"name": HUMAN, "kinematics": {"name": "omni"}, "shape": disc}
         others.append({**walker, "state": [*human, 0]})
-    world = {"step_time": settings.tick, "collision_mode": "stop"}
+    world = {"step_time": TICK, "collision_mode": "stop"}
     return {"world": world, "robot": robots, "obstacle": others}

@@ -14,7 +14,7 @@ from coordlang.commands.building import build_language
 from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
 from coordlang.explanation.demands import RobotPart, SentenceDemands, sentence_demands
 from coordlang.explanation.text import demands_text
-from coordlang.explanation.words import word_formulas
+from coordlang.explanation.words import all_covers, mapped_states
 from coordlang.language.candidates import all_pairs, from_problems
 from planners.pddl import read_domain, read_problem
 from planners.search.plans import Plan, Plans
@@ -90,7 +90,7 @@ def test_against_listed_plans(robots: int) -> None:
         language = random_language(
             Random(seed), candidates
         )  # RC or not: what is asked is about listed plans
-        formulas = word_formulas(language, candidates.model)
+        formulas = all_covers(mapped_states(language, candidates.model))
         for task_language in list(languages_in_tasks(language, candidates))[:8]:
             try:
                 groups = by_sentence(task_language, 60)
@@ -121,7 +121,7 @@ def test_who_decides_a_change(folder: str, stem: str, every: int) -> None:
     """
     candidates = all_tasks(folder, stem)
     language = build_language(candidates, "greedy").language
-    formulas = word_formulas(language, candidates.model)
+    formulas = all_covers(mapped_states(language, candidates.model))
     sizes: Counter[int] = Counter()
     for task_language in list(languages_in_tasks(language, candidates))[::every]:
         for words in by_sentence(task_language, 1000):
@@ -178,7 +178,7 @@ def test_the_running_example_in_plain_sentences() -> None:
         domain, [read_problem(DOMAINS / "three-cells" / "problem.pddl", domain)]
     )
     language = build_language(candidates, "greedy").language
-    formulas = word_formulas(language, candidates.model)
+    formulas = all_covers(mapped_states(language, candidates.model))
     (task_language,) = languages_in_tasks(language, candidates)
     found = sentence_demands(
         task_language.plans_with(task_language.words_of("w1 w0")), task_language.partition, formulas

@@ -20,7 +20,6 @@ from coordlang.explanation.words import (
     all_covers,
     describe_words,
     mapped_states,
-    word_formulas,
 )
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.language.words import Language
@@ -116,14 +115,14 @@ def test_exact_on_shipped_domains(folder: str, stem: str, method: str) -> None:
     make = from_problems if folder == "charger" else all_pairs
     candidates = make(domain, [read_problem(DOMAINS / folder / f"{stem}.pddl", domain)])
     language = build_language(candidates, method).language
-    check_exact(language, candidates, word_formulas(language, candidates.model))
+    check_exact(language, candidates, all_covers(mapped_states(language, candidates.model)))
 
 
 def test_where_a_robot_is() -> None:
     """The three words of the running example say where one of the robots is."""
     candidates = all_tasks("three-cells")
     language = build_language(candidates, "minimal").language
-    formulas = word_formulas(language, candidates.model)
+    formulas = all_covers(mapped_states(language, candidates.model))
     for robot in ("r1", "r2"):
         if {shown(f) for f in formulas.values()} == {f"at({robot}) = {cell}" for cell in "abc"}:
             break
@@ -141,12 +140,14 @@ def test_text_and_pddl() -> None:
     language = language_of(
         {key: "w1" if "(at r1 a)" in key else "w0" for key in keys}, ("w0", "w1")
     )
-    formulas = word_formulas(language, candidates.model)
+    formulas = all_covers(mapped_states(language, candidates.model))
     assert shown(formulas["w1"]) == "at(r1) = a"
     assert pddl_condition(formulas["w1"]) == "(at r1 a)"
     assert shown(formulas["w0"]) == "at(r1) != a"
     assert pddl_condition(formulas["w0"]) == "(not (at r1 a))"
-    one = word_formulas(language_of(dict.fromkeys(keys, "w0"), ("w0", "w1")), candidates.model)
+    one = all_covers(
+        mapped_states(language_of(dict.fromkeys(keys, "w0"), ("w0", "w1")), candidates.model)
+    )
     assert [shown(one["w0"]), shown(one["w1"])] == ["true", "false"]
     assert [pddl_condition(one["w0"]), pddl_condition(one["w1"])] == ["(and)", "(or)"]
 
@@ -181,8 +182,8 @@ def test_further_states_have_the_default() -> None:
     candidates = all_tasks("three-cells")
     keys = [candidates.model.codec.key(row) for row in candidates.rows]
     language = language_of({keys[0]: "w0", keys[1]: "w1"}, ("w0", "w1"))
-    free = word_formulas(language, candidates.model)
-    exact = word_formulas(language, candidates.model, candidates.rows)
+    free = all_covers(mapped_states(language, candidates.model))
+    exact = all_covers(mapped_states(language, candidates.model, candidates.rows))
     states = [set(candidates.model.codec.decode(row)) for row in candidates.rows]
     assert all(
         [w for w, f in exact.items() if holds(f, s)] == [language.states.get(k, "w0")]
@@ -312,7 +313,7 @@ def test_remembered_actions_are_one_variable_a_robot() -> None:
     problem = read_problem(DOMAINS / "three-cells" / "problem.pddl", domain)
     candidates = from_problems(domain, [problem], ModelOptions(remember_actions=True))
     language = build_language(candidates, "greedy").language
-    formulas = word_formulas(language, candidates.model)
+    formulas = all_covers(mapped_states(language, candidates.model))
     check_exact(language, candidates, formulas)
     table = language.partition(candidates.model)
     names = {variable.name for variable in valuation(candidates.model, table.rows).variables}
