@@ -7,7 +7,7 @@ all partitions finds none.  An abstraction is a choice of what is looked at and 
 whether a partition is a language is decided elsewhere.
 
 What is looked at are the state variables (`planners.search.state_variables`), and of the graph of a
-variable's values, which actions join: two colours, nearness, directions, coordinates.
+variable's values, which actions join: two colours, and nearness.
 """
 
 from __future__ import annotations
@@ -27,8 +27,6 @@ from planners.search.state_variables import StateVariable, state_variables
 
 #: Variables that are looked at, and values of one for which distances are taken, at most.
 _VARIABLES, _VALUES = 12, 200
-#: Coordinates that values may have: more are those of a ring, of which each says next to nothing.
-_COORDINATES = 3
 #: States beyond which nothing is looked for.
 _STATES = 20_000
 #: A distance between values that nothing joins.
@@ -93,40 +91,6 @@ class _Values:
         found: Ints = colour[self.of_state]
         return found
 
-    @cached_property
-    def coordinates(self) -> tuple[Bools, ...]:
-        """(cuts, values) of each coordinate: on which side of its cuts values are.
-
-        A cut parts the values that are nearer to one of two neighbours than to the other.  Two cuts
-        cross if both sides of one meet both sides of the other.  Cuts that do not cross, or are
-        linked by such, are those of one coordinate: on a grid, of the rows or of the columns.
-        """
-        sides = {}
-        for a, b in self.graph.edges:
-            nearer = self.away[a] < self.away[b]
-            side = nearer ^ nearer[0]
-            sides[side.tobytes()] = side
-        cuts = list(sides.values())
-        if len(cuts) > _VALUES:
-            return ()
-        together: nx.Graph[int] = nx.empty_graph(len(cuts))
-        together.add_edges_from(
-            (n, m) for n, m in combinations(range(len(cuts)), 2) if not _cross(cuts[n], cuts[m])
-        )
-        parts = sorted(sorted(part) for part in nx.connected_components(together))
-        if not 2 <= len(parts) <= _COORDINATES:
-            return ()
-        return tuple(np.stack([cuts[n] for n in part]) for part in parts)
-
-    def coordinate(self, cuts: Bools) -> Ints:
-        """(states) the value of one coordinate."""
-        return _numbered(np.append(_numbered(cuts), -1)[self.of_state][None])
-
-    def coordinate_colours(self, cuts: Bools) -> Ints:
-        """(states) two colours of the values of one coordinate."""
-        found: Ints = np.append(cuts.sum(axis=0) % 2, 0)[self.of_state]
-        return found
-
     def of_other(self, other: _Values) -> Ints | None:
         """(states) the value that has the other one's name; None if the two have none in common."""
         number_of = {name: number for number, name in enumerate(self.names)}
@@ -138,24 +102,12 @@ class _Values:
         known = (self.of_state >= 0) & (other >= 0)
         return known & (self.away[self.of_state, other] <= 1)
 
-    def direction(self, other: Ints, cuts: Bools) -> Ints:
-        """(states) across which of some cuts are neighbours that are nearer to another value."""
-        towards = np.zeros((len(self.names) + 1,) * 2, np.int64)
-        for a, b in self.graph.edges:
-            crossed = np.flatnonzero(cuts[:, a] != cuts[:, b])
-            if len(crossed):
-                bit = 1 << int(crossed[0]) % 62
-                towards[a, :-1] |= np.where(self.away[b] < self.away[a], bit, 0)
-                towards[b, :-1] |= np.where(self.away[a] < self.away[b], bit, 0)
-        found: Ints = towards[self.of_state, other]
-        return found
-
 
 def abstractions(candidates: Candidates, states: Sequence[int]) -> list[Ints]:
     """Abstractions of the states, those with few abstract states first.
 
-    In each one variable is told, or a coordinate of it or a second one besides; and of the others
-    colours, with nearness or a direction as seen from the first one.
+    In each one variable is told, or a second one besides; and of the others colours, with nearness
+    as seen from the first one.
 
     Parameters
     ----------
@@ -222,11 +174,6 @@ def _chosen(variables: Sequence[_Values]) -> Iterator[Sequence[Ints | Bools]]:
         yield [own]
         yield [own, *colours]
         yield from _seen_from(told, others, colours)
-        for cuts in told.coordinates:
-            all_of_others = [values.of_state for values in others]
-            yield [told.coordinate(cuts), told.colours, *all_of_others]
-        if others and all(values.coordinates for values in others):
-            yield [own, *(v.coordinate_colours(c) for v in others for c in v.coordinates)]
     if len(variables) > 2:
         for one, other in combinations(variables, 2):
             rest = [v.colours for v in variables if v is not one and v is not other]
@@ -245,15 +192,6 @@ def _seen_from(
     near = [told.is_near(at) for at in seen]
     yield [*base, *near]
     yield [*base, *(np.where(close, at, -1) for close, at in zip(near, seen, strict=True))]
-    for cuts in told.coordinates:
-        yield [*base, *(told.direction(at, cuts) for at in seen)]
-
-
-def _cross(one: Bools, other: Bools) -> bool:
-    """Whether both sides of one cut meet both sides of another."""
-    return bool((one & other).any() and (one & ~other).any() and (~one & other).any()) and not bool(
-        (one | other).all()
-    )
 
 
 def _numbered(columns: Sequence[Ints | Bools] | Ints | Bools) -> Ints:

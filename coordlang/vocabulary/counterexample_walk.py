@@ -5,8 +5,7 @@ Where two robots have many tasks in a small space the walk is several times as f
 (`coordlang.vocabulary.counterexamples`), since it handles all tasks at once; for more robots it is
 hopeless.  It keeps, for every node, the way to a violation with the fewest steps at which the plans
 are in different states: such pairs give short clauses.  It is cut off where no mixture can fail,
-whatever the words are, and where what the plans can say next does not meet (Proposition 14 of
-docs/concepts.md).
+whatever the words are (Proposition 14 of docs/concepts.md), and where sentences part.
 """
 
 from __future__ import annotations
@@ -20,7 +19,6 @@ from coordlang.required.choices import Choices
 from coordlang.required.composition_walk import FAILED, Moves, can_fail, move_counts, moves
 from coordlang.vocabulary.counterexamples import Counterexamples
 from coordlang.vocabulary.leads import NO_LEAD, NO_WORD, PARTED, Leads
-from coordlang.vocabulary.next_words import NextWords
 from coordlang.vocabulary.sat import Undecided
 from planners.joint.tables import Bools, Ints, unique_tuples
 from planners.search.edge_index import EdgeIndex
@@ -155,7 +153,6 @@ class _Walk:
         #: (edges): the word that a plan enters, `NO_WORD` where it goes on in its word.
         self._entered = np.where(before == after, NO_WORD, after)
         self._leads = Leads()
-        self._next = NextWords(self._space, word)
 
     def layers(self) -> list[_Layer]:
         """The nodes: ``layers[k]`` has k joint steps to go."""
@@ -220,10 +217,7 @@ class _Walk:
             agree = lead != PARTED
             kept, first = kept[agree], first[agree]
             leads = [known[agree] for known in (*leads, lead)]
-        target = self._space.targets(move.edges[kept])
-        lead = np.column_stack(leads)
-        agree = self._next.can_agree(target, lead, self._leads)
-        return kept[agree], target[agree], lead[agree]
+        return kept, self._space.targets(move.edges[kept]), np.column_stack(leads)
 
 
 def _layer(nodes: Ints, source: Ints, edges: Ints) -> _Layer:

@@ -27,19 +27,6 @@ class Leads:
         self._leads: list[tuple[int, tuple[int, ...]]] = [(0, ())]
         self._number = {self._leads[NO_LEAD]: NO_LEAD}
         self._after: dict[tuple[int, int, int], int] = {}
-        self._beginnings: list[tuple[int, ...]] = []
-
-    def beginnings(self) -> Ints:
-        """(leads, 3): which of the two plans is ahead, 0 for neither, and its first two words.
-
-        `NO_WORD` where it is ahead by fewer.
-        """
-        rows = [
-            (ahead, *(*words, NO_WORD, NO_WORD)[:2])
-            for ahead, words in self._leads[len(self._beginnings) :]
-        ]
-        self._beginnings += rows
-        return np.array(self._beginnings, np.int64)
 
     def after(self, lead: Ints, first: Ints, second: Ints) -> Ints:
         """The leads when the plans enter words ``first`` and ``second``, or `NO_WORD`.

@@ -218,7 +218,8 @@ class MinimalSearch:
         if "languages" not in self.__dict__:
             return 0
         rounds = self.languages.rounds + self._merges // _MERGES
-        return self._partitions.conflicts + rounds * (_ROUND + self._pairs // _PAIRS)
+        tied = self._tied.conflicts if "_tied" in self.__dict__ else 0
+        return self._partitions.conflicts + tied + rounds * (_ROUND + self._pairs // _PAIRS)
 
     @property
     def _is_spent(self) -> bool:
