@@ -154,7 +154,6 @@ class MinimalSearch:
                 budget = budget.doubled()
         while self.lower < self.upper and not self._is_spent and self.decide(self.lower, _SOON):
             pass
-        self._try_abstractions()
         if not self._is_one_task:
             self._decide_between(_SOON)
         self.merge(_VAIN)
@@ -192,19 +191,6 @@ class MinimalSearch:
                 self._offer(found)
                 return
             size = self._least_stutter_free = size + 1
-
-    def _try_abstractions(self) -> None:
-        """Take the first abstraction whose abstract states, each with a word, are a language."""
-        from coordlang.vocabulary.abstractions import abstractions
-
-        for classes in abstractions(self._job.candidates, self._job.states):
-            partition = {state: int(classes[state]) for state in self._job.states}
-            if word_count(partition) >= self.upper or self._is_spent:
-                return
-            self._report(f"trying {word_count(partition)} words by an abstraction")
-            if self.languages.holds(partition):
-                self._offer(partition)
-                return
 
     @cached_property
     def _pairs(self) -> int:

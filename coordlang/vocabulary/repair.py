@@ -10,13 +10,13 @@ words is then looked for, as `minimal` does.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 
 from coordlang.language.warping import Clause
 from coordlang.vocabulary.clauses import most_constrained_first, without_implied
-from coordlang.vocabulary.hitting import LeastHitting, StateSet, greedy_hitting
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.loop import Budget, Languages, ProblemsBySize, close_bounds, find
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
@@ -90,8 +90,7 @@ class _Repair:
         self._kept = {state: kept[state] for state in job.states if state in kept}
         self.best: dict[int, int] | None = None
         self._languages = Languages.of(job)
-        self._hitting = LeastHitting(list(self._kept))
-        self._seen = 0
+        self._changes_bound = 0
         self._new_words_bound = 0
         self._anchors = [-1 - word for word in range(old_words)]
         self._problems: ProblemsBySize[Clause] = ProblemsBySize(
@@ -100,19 +99,18 @@ class _Repair:
 
     def close(self) -> None:
         """Give back what the solvers hold."""
-        self._hitting.close()
         self._problems.close()
 
     def result(self, stopped: BaseException | None) -> Repair:
         """The best language, with what is proved of it."""
         assert self.best is not None
         changes, new_words = self._distance(self.best)
-        proved = changes == self._hitting.bound
+        proved = changes == self._changes_bound
         return Repair(
             self.best,
             tuple(sorted(s for s, word in self._kept.items() if self.best[s] != word)),
             new_words,
-            self._hitting.bound,
+            self._changes_bound,
             self._new_words_bound if proved else 0,
             {
                 "rounds": self._languages.rounds,
@@ -139,22 +137,32 @@ class _Repair:
         return changes, len({word for word in partition.values() if word >= self._old_words})
 
     def _hit_greedily(self) -> set[int]:
-        """States that suffice to change; few, and soon."""
+        """States that suffice to change; few, and soon: always the one in most clauses left."""
         changed: set[int] = set()
         while not self._holds(self._apart(changed)):
-            changed = greedy_hitting(self._violated_sets(), changed)
+            left = [states for states in self._violated_sets() if not states & changed]
+            while left:
+                count = Counter(state for states in left for state in states)
+                chosen = min(count, key=lambda state: (-count[state], state))
+                changed.add(chosen)
+                left = [states for states in left if chosen not in states]
         return changed
 
     def _hit_least(self) -> set[int]:
         """As few states as suffice to change."""
-        while True:
-            self._hitting.add(self._violated_sets(self._seen))
-            self._seen = len(self._languages.clauses)
-            changed = self._hitting.find()
-            if self._holds(self._apart(changed)):
-                return changed
+        from pysat.examples.hitman import Hitman
 
-    def _violated_sets(self, first: int = 0) -> Iterable[StateSet]:
+        seen, changed = 0, set[int]()
+        with Hitman(htype="sorted") as hitting:
+            while not self._holds(self._apart(changed)):
+                for states in self._violated_sets(seen):
+                    hitting.hit(sorted(states))
+                seen = len(self._languages.clauses)
+                changed = set(hitting.get())
+                self._changes_bound = len(changed)
+        return changed
+
+    def _violated_sets(self, first: int = 0) -> Iterable[frozenset[int]]:
         """The states of every clause, from number ``first`` on, that the old words violate."""
         kept = self._kept
         for clause in self._languages.clauses[first:]:
@@ -222,7 +230,7 @@ class _Repair:
         """Whether there is no counterexample; those that are found are added to the clauses."""
         changes, new_words = self._distance(partition)
         self._job.progress(
-            f"at least {self._hitting.bound} states change their word; trying {changes}, and "
+            f"at least {self._changes_bound} states change their word; trying {changes}, and "
             f"{new_words} new words: round {self._languages.rounds}, "
             f"{len(self._languages.clauses):,} clauses"
         )
@@ -258,7 +266,7 @@ class _Repair:
         for anchor in self._anchors:
             for other in self._anchors[: -1 - anchor]:
                 problem.separate_one([(anchor, other)])
-        problem.keep_words(self._kept, self._hitting.bound)
+        problem.keep_words(self._kept, self._changes_bound)
         for clause in clauses:
             problem.separate_one(clause)
         return problem

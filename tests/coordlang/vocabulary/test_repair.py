@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Repaired words against all partitions, and the least hitting set against all sets."""
+"""Repaired words against all partitions."""
 
 from __future__ import annotations
 
@@ -13,41 +13,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coordlang.commands.building import build_language
-from coordlang.vocabulary.hitting import LeastHitting, greedy_hitting
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.repair import _Repair, repair
 from planners.system.errors import OutOfTime
 from tests.support.candidates import failing, is_language, small_worlds
 from tests.support.domains import all_tasks
 
-Sets = list[frozenset[int]]
 Failing = list[list[tuple[int, ...]]]
-some_sets = st.lists(st.frozensets(st.integers(0, 6), min_size=1, max_size=4), max_size=9)
-
-
-@settings(max_examples=60, deadline=None)
-@given(some_sets, st.integers(0, 9))
-def test_the_fewest_states_that_meet_all_sets(sets: Sets, later: int) -> None:
-    """Against all sets of states; some of the sets are added after the first answer."""
-    least = LeastHitting(range(7))
-    for so_far in (sets[:later], sets):
-        least.add(so_far)
-        found = least.find()
-        assert all(found & one for one in so_far)
-        assert least.bound == len(found) == fewest(so_far)
-    least.close()
-    greedy = greedy_hitting(sets)
-    assert all(greedy & one for one in sets)
-    assert {1, 2} <= greedy_hitting(sets, [1, 2])
-
-
-def fewest(sets: Sets) -> int:
-    return next(
-        size
-        for size in range(8)
-        for chosen in combinations(range(7), size)
-        if all(one & set(chosen) for one in sets)
-    )
 
 
 def with_others(word: dict[int, int], states: list[int], used: int) -> Iterator[dict[int, int]]:
