@@ -125,7 +125,7 @@ def _joint_model(
     idling = idling_costs(domain, problem, team, costs=costs)
     stepper: Stepper
     if domain.is_joint_action:
-        positions = {s.name: domain.source.position(s.offset) for s in domain.schemas}
+        positions = {s.name: s.position for s in domain.schemas}
         stepper = JointActionStepper(
             codec, evaluator, robots, labels, actions, options.cost, positions
         )

@@ -18,7 +18,7 @@ from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import MOST_SLACK
 from planners.pddl.pddl_text import domain_text
 from planners.pddl.robots import fluent_predicates, static_atoms
-from planners.pddl.sexpr import JoinedSource, Source
+from planners.pddl.sexpr import Source
 from planners.system.notebook import counted
 
 _SIZE = {"minimum": 1}
@@ -201,7 +201,7 @@ def domain_sha256(domain: Domain) -> str:
 
     So a language built with ``--factored DIR`` belongs to what ``inspect --write`` makes of DIR.
     """
-    if isinstance(domain.source, JoinedSource):
+    if domain.source.is_union:
         return Source(domain.source.name, domain_text(domain)).sha256
     return domain.source.sha256
 

@@ -137,7 +137,7 @@ class Meaning:
         if self._domain.is_joint_action:
             raise BadInput(
                 f"action {echoed(schema.name)} is used as a formula in a joint-action domain",
-                position=self._domain.source.position(schema.offset),
+                position=schema.position,
                 remedy="A joint action already says what every robot does: use predicates only.",
             )
         args = _ground(formula, binding).args

@@ -321,7 +321,7 @@ class Rules:
             first, second = sorted(results.values())[:2]
             raise BadInput(
                 f"{first} and {second} have the same subactions but different results",
-                position=self.domain.source.position(self.domain.schemas[0].offset),
+                position=self.domain.schemas[0].position,
                 remedy="The subactions of a joint action must determine what it does: rename one "
                 "of them.",
             )

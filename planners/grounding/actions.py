@@ -24,11 +24,8 @@ from planners.pddl.lifted import (
     Problem,
     Schema,
     StepAtom,
-    have_common,
 )
 from planners.pddl.robots import Team, fluent_predicates, objects_of
-from planners.system.errors import BadInput
-from planners.system.messages import echoed
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,8 +149,6 @@ def apply_network(
     """
     if not domain.constraints:
         return tuple(actions)
-    for constraint in domain.constraints:
-        _check_types(domain, problem, constraint)
     by_name = {c.name: c for c in domain.constraints}
     members = {
         variable.types: frozenset(objects_of(domain, problem, variable.types))
@@ -171,31 +166,6 @@ def apply_network(
         _bound(domain, by_name, groups, action, keys[action]) if action in keys else action
         for action in actions
     )
-
-
-def _check_types(domain: Domain, problem: Problem, constraint: Constraint) -> None:
-    """Raise `BadInput` for a position whose type excludes the parameter's.
-
-    The constraint would never match.
-    """
-    schemas = {schema.name: schema for schema in domain.schemas}
-    for (name, positions), offset in zip(constraint.actions, constraint.offsets, strict=True):
-        for parameter, position in zip(constraint.parameters, positions, strict=True):
-            argument = schemas[name].parameters[position]
-            asked, own = (
-                {*objects_of(domain, problem, one.types)} for one in (parameter, argument)
-            )
-            if have_common(domain.types, parameter.types, argument.types) or asked & own:
-                continue
-            here, there = (
-                f"{one.name} - {' or '.join(one.types)}" for one in (argument, parameter)
-            )
-            raise BadInput(
-                f"argument {position} of {name} is {here}, which is never {there}: the "
-                f"constraint {echoed(constraint.name)} would never match",
-                position=domain.source.position(offset),
-                remedy="Positions count from 0; if the action has an :agent, it is argument 0.",
-            )
 
 
 def _bindings(

@@ -10,7 +10,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 from itertools import product
 from math import prod
-from typing import NamedTuple
 
 from planners.grounding.actions import GroundAction, GroundEffect
 from planners.grounding.reachability import reachable_arguments
@@ -55,26 +54,14 @@ Binding = dict[str, str]
 Arguments = tuple[str, ...]
 #: An atom without which an instance of a quantified part is no matter.
 Guard = Atom | StepAtom
+#: A quantified formula, its free variables and its guards (`_Grounder._shape`).
+_Shape = tuple[Formula, tuple[str, ...], tuple[Atom, ...], tuple[StepAtom, ...]]
 #: From this many values for the variables on, only subactions that are ever possible are tried.
 _MANY = 1000
 
 
-class Quantified(NamedTuple):
-    """What is known of a quantified formula before any value is.
-
-    ``free`` are the variables that it has from outside.  ``statics`` and ``steps`` are atoms that
-    the quantified part requires under ``exists``, and its negation under ``forall``: where one of
-    them is false, the instance is no matter.
-    """
-
-    formula: Forall | Exists
-    free: tuple[str, ...]
-    statics: tuple[Atom, ...]
-    steps: tuple[StepAtom, ...]
-
-
 class Bindings:
-    """The objects of a problem, its static facts and its possible subactions by each argument.
+    """The objects of a problem, its static facts and its possible subactions.
 
     Parameters
     ----------
@@ -86,40 +73,21 @@ class Bindings:
         self,
         domain: Domain,
         problem: Problem,
-        fluents: Set[str],
         statics: Iterable[Atom],
         instances: Mapping[str, Sequence[Arguments]],
     ) -> None:
         self._domain = domain
         self._problem = problem
-        self._fluents = fluents
         self._members: dict[tuple[str, ...], dict[str, int]] = {}
-        #: The arguments with which a guard's predicate is true, or its action possible.
-        self._true: dict[tuple[type[Guard], str], list[Arguments]] = {}
+        #: The arguments with which a guard is true, by what it is about and their number.
+        self._true: dict[tuple[type[Guard], str, int], list[Arguments]] = {}
         for fact in statics:
-            self._true.setdefault((Atom, fact.predicate), []).append(fact.args)
+            self._true.setdefault((Atom, fact.predicate, len(fact.args)), []).append(fact.args)
         for action, own in instances.items():
-            self._true[StepAtom, action] = [*own]
-        #: The same by each argument; made for the predicates and actions that are asked for.
-        self._by_argument: dict[
-            tuple[type[Guard], str], dict[tuple[int, str], list[Arguments]]
-        ] = {}
-        # By identity; the formula stays alive here.
-        self._quantified: dict[int, Quantified] = {}
-
-    def quantified(self, f: Forall | Exists) -> Quantified:
-        """What is known of a quantified formula before any value is."""
-        found = self._quantified.get(id(f))
-        if found is None:
-            part = f.part if isinstance(f, Exists) else negated(f.part)
-            steps = tuple(p for p in conjuncts(part) if isinstance(p, StepAtom))
-            found = Quantified(f, free_variables(f), self.static_atoms(part), steps)
-            self._quantified[id(f)] = found
-        return found
-
-    def static_atoms(self, f: Formula) -> tuple[Atom, ...]:
-        """The static atoms among the parts that must all hold."""
-        return tuple(a for a in required_atoms(f) if a.args and a.predicate not in self._fluents)
+            for args in own:
+                self._true.setdefault((StepAtom, action, len(args)), []).append(args)
+        #: For a guard, the places of known arguments and a wanted one: known values -> the others.
+        self._tables: dict[tuple[object, ...], dict[Arguments, set[str]]] = {}
 
     def values(
         self,
@@ -128,78 +96,47 @@ class Bindings:
         statics: tuple[Atom, ...] = (),
         steps: tuple[StepAtom, ...] = (),
     ) -> Iterator[Binding]:
-        """Values for the variables, in the order of the objects.
+        """Bindings of the variables too, in the order of the objects.
 
-        Without such as make one of the guards false: the first guard that leaves the fewest facts
-        is looked up; the others are left to the formula.  Only where there are many values,
-        subactions are guards, too (`coordlang inspect` names subactions that a formula speaks of
-        and that nobody can ever do).
+        Many that make one of the guards false are left out, the others are left to the formula.
+        Only where there are many values, subactions are guards, too (`coordlang inspect` names
+        subactions that a formula speaks of and that nobody can ever do).
         """
+        named = {arg for guard in statics for arg in guard.args}
+        others = [self.objects(v.types) for v in variables if v.name not in named]
+        guards: tuple[Guard, ...] = statics
+        if prod(map(len, others)) > _MANY:
+            guards += steps
+        own = {v.name for v in variables}
+        outer = {name: value for name, value in binding.items() if name not in own}
+        return self._extended(outer, variables, guards)
+
+    def _extended(
+        self, binding: Binding, variables: tuple[Variable, ...], guards: tuple[Guard, ...]
+    ) -> Iterator[Binding]:
         if not variables:
             yield binding
             return
-        names = [v.name for v in variables]
-        members = [self.objects(v.types) for v in variables]
-        outer = {name: value for name, value in binding.items() if name not in names}
-        known = [*self._known(statics, outer, names)]
-        if steps and _count(known, names, members) > _MANY:
-            known += self._known(steps, outer, names)
-        rows: Iterable[Arguments] = product(*members)
-        if known:
-            rows = self._unified(*min(known, key=lambda one: len(one[1])), outer, names, members)
-        for values in rows:
-            yield {**binding, **dict(zip(names, values, strict=True))}
-
-    def _known(
-        self, guards: Sequence[Guard], outer: Binding, names: Sequence[str]
-    ) -> Iterator[tuple[Guard, Sequence[Arguments]]]:
-        """The guards with the facts that may match them, looked up by an argument that is known.
-
-        Of a static atom some argument is known; of a subaction of which none is, all are taken.
-        """
+        name, members = variables[0].name, self.objects(variables[0].types)
+        fitting: Set[str] = members.keys()
         for guard in guards:
-            given = [
-                (n, outer.get(arg, arg)) for n, arg in enumerate(guard.args) if arg not in names
-            ]
-            key = type(guard), guard.predicate if isinstance(guard, Atom) else guard.action
-            if given:
-                table = self._table(key)
-                yield guard, min((table.get(one, []) for one in given), key=len)
-            elif isinstance(guard, StepAtom):
-                yield guard, self._true.get(key, [])
+            if name in guard.args:
+                fitting = fitting & self._allowed(guard, name, binding)
+        for value in sorted(fitting, key=members.__getitem__):
+            yield from self._extended({**binding, name: value}, variables[1:], guards)
 
-    def _table(self, key: tuple[type[Guard], str]) -> dict[tuple[int, str], list[Arguments]]:
-        table = self._by_argument.get(key)
+    def _allowed(self, guard: Guard, name: str, binding: Binding) -> Set[str]:
+        """The values of a variable with which a guard may be true, by its known arguments."""
+        about = guard.predicate if isinstance(guard, Atom) else guard.action
+        values = [binding.get(arg, arg) for arg in guard.args]
+        known = [n for n, value in enumerate(values) if not value.startswith("?")]
+        kind, place = (type(guard), about, len(values)), guard.args.index(name)
+        table = self._tables.get((kind, place, *known))
         if table is None:
-            table = self._by_argument[key] = {}
-            for args in self._true.get(key, ()):
-                for one in enumerate(args):
-                    table.setdefault(one, []).append(args)
-        return table
-
-    @staticmethod
-    def _unified(
-        guard: Guard,
-        facts: Iterable[Arguments],
-        outer: Binding,
-        names: Sequence[str],
-        members: Sequence[dict[str, int]],
-    ) -> list[Arguments]:
-        """All values under which the guard is one of the facts, in the order of the objects."""
-        rows: set[Arguments] = set()
-        for fact in facts:
-            values: Binding = {}
-            if len(fact) == len(guard.args) and all(
-                value == (values.setdefault(arg, value) if arg in names else outer.get(arg, arg))
-                for arg, value in zip(guard.args, fact, strict=True)
-            ):
-                own = zip(names, members, strict=True)
-                rows.update(product(*((values[n],) if n in values else (*m,) for n, m in own)))
-
-        def numbers(row: Arguments) -> list[int | None]:
-            return [own.get(value) for value, own in zip(row, members, strict=True)]
-
-        return sorted((row for row in rows if None not in numbers(row)), key=numbers)
+            table = self._tables[kind, place, *known] = {}
+            for args in self._true.get(kind, ()):
+                table.setdefault(tuple(args[n] for n in known), set()).add(args[place])
+        return table.get(tuple(values[n] for n in known), frozenset())
 
     def objects(self, types: tuple[str, ...]) -> dict[str, int]:
         """The objects of some types, numbered in their order."""
@@ -207,18 +144,6 @@ class Bindings:
             found = objects_of(self._domain, self._problem, types)
             self._members[types] = {name: number for number, name in enumerate(found)}
         return self._members[types]
-
-
-def _count(
-    known: Sequence[tuple[Guard, Sequence[object]]],
-    names: Sequence[str],
-    members: Sequence[Mapping[str, int]],
-) -> int:
-    """How many values there are at most, by the guard that leaves the fewest facts."""
-    guard, facts = min(known, key=lambda one: len(one[1]), default=(None, (None,)))
-    given = guard.args if guard else ()
-    own = zip(names, members, strict=True)
-    return len(facts) * prod(len(objects) for name, objects in own if name not in given)
 
 
 #: What to try when grounding is too much.
@@ -307,13 +232,15 @@ class _Grounder:
         self._fluents = fluent_predicates(domain)
         self._statics = static_atoms(domain, problem)
         self._schemas = {schema.name: schema for schema in domain.schemas}
-        self._bindings = Bindings(domain, problem, self._fluents, self._statics, reachable)
+        self._bindings = Bindings(domain, problem, self._statics, reachable)
         #: Every literal once: thousands of actions share what their preconditions have in common.
-        self._literals: dict[tuple[type[GroundLeaf], str, tuple[str, ...], bool], Formula] = {}
+        self._literals: dict[Formula, Formula] = {}
         #: The owners of a subaction that a formula names; None for arguments of other types.
         self._acting: dict[tuple[str, tuple[str, ...]], frozenset[int] | None] = {}
         #: Ground quantified formulas by the values of their free variables: actions share most.
         self._quantified: dict[tuple[object, ...], Formula] = {}
+        #: By the identity of a quantified formula, which is there too so that it stays alive.
+        self._shapes: dict[int, _Shape] = {}
 
     def action(self, schema: Schema, args: tuple[str, ...], costs: bool) -> GroundAction | None:
         """The instance, or None if its precondition is false in every state."""
@@ -327,7 +254,7 @@ class _Grounder:
             raise BadInput(
                 f"action {label(schema.name, args)} names no robot "
                 f"(robots: {', '.join(self._team.robots)})",
-                position=self._domain.source.position(schema.offset),
+                position=schema.position,
                 remedy="Say --unowned environment (one extra robot owns such actions) "
                 "or --unowned shared (all robots choose them together).",
             )
@@ -369,15 +296,30 @@ class _Grounder:
     def _quantifier(
         self, f: Forall | Exists, binding: Binding, positive: bool, acting: tuple[int, ...]
     ) -> Formula:
-        known = self._bindings.quantified(f)
-        key = id(f), positive, acting, *(binding.get(name) for name in known.free)
+        _, free, statics, steps = self._shapes.get(id(f)) or self._shape(f)
+        key = id(f), positive, acting, *(binding.get(name) for name in free)
         found = self._quantified.get(key)
         if found is None:
             kind = And if isinstance(f, Forall) == positive else Or
-            instances = self._bindings.values(f.variables, binding, known.statics, known.steps)
+            instances = self._bindings.values(f.variables, binding, statics, steps)
             ground = (self.formula(f.part, inner, positive, acting) for inner in instances)
             found = self._quantified[key] = joined(kind, ground)
         return found
+
+    def _shape(self, f: Forall | Exists) -> _Shape:
+        """The variables that a formula has from outside, and its guards.
+
+        Guards are static atoms and actions that the part requires under ``exists``, and its
+        negation under ``forall``: where one of them is false, the instance is no matter.
+        """
+        part = f.part if isinstance(f, Exists) else negated(f.part)
+        steps = tuple(p for p in conjuncts(part) if isinstance(p, StepAtom))
+        found = self._shapes[id(f)] = (f, free_variables(f), self._static_atoms(part), steps)
+        return found
+
+    def _static_atoms(self, f: Formula) -> tuple[Atom, ...]:
+        """The static atoms among the parts that must all hold."""
+        return tuple(a for a in required_atoms(f) if a.predicate not in self._fluents)
 
     def _state_literal(self, f: Truth | Equal | Atom, binding: Binding, positive: bool) -> Formula:
         if isinstance(f, Truth):
@@ -388,7 +330,7 @@ class _Grounder:
         args = tuple([binding.get(a, a) for a in f.args])
         if f.predicate not in self._fluents:
             return TRUE if (Atom(f.predicate, args) in self._statics) == positive else FALSE
-        return self._literal(Atom, f.predicate, args, positive)
+        return self._literal(Atom(f.predicate, args), positive)
 
     def _step_atom(
         self, action: str, args: tuple[str, ...], positive: bool, acting: tuple[int, ...]
@@ -401,14 +343,14 @@ class _Grounder:
             return FALSE if positive else TRUE
         if not positive and not owners.isdisjoint(acting):
             return TRUE
-        return self._literal(StepAtom, action, args, positive)
+        return self._literal(StepAtom(action, args), positive)
 
     def _owners_named(self, action: str, args: tuple[str, ...]) -> frozenset[int] | None:
         schema = self._schemas[action]
         if self._domain.is_joint_action:
             raise BadInput(
                 f"action {echoed(action)} is used as a formula in a joint-action domain",
-                position=self._domain.source.position(schema.offset),
+                position=schema.position,
                 remedy="A joint action already says what every robot does: use predicates only.",
             )
         for parameter, arg in zip(schema.parameters, args, strict=True):
@@ -417,26 +359,23 @@ class _Grounder:
         return frozenset(self._team.owners(schema, args))
 
     def _effect(self, effect: Effect, binding: Binding) -> Iterator[GroundEffect]:
-        guards = self._bindings.static_atoms(effect.condition) if effect.variables else ()
+        guards = self._static_atoms(effect.condition) if effect.variables else ()
         for inner in self._bindings.values(effect.variables, binding, guards):
             condition = self.formula(effect.condition, inner, True)
             if condition != FALSE:
-                atom = self._atom(effect.atom, inner)
-                yield GroundEffect(atom, effect.adds, condition)
+                yield GroundEffect(self._atom(effect.atom, inner), effect.adds, condition)
 
-    def _literal(
-        self, kind: type[GroundLeaf], name: str, args: tuple[str, ...], positive: bool
-    ) -> Formula:
-        key = kind, name, args, positive
-        found = self._literals.get(key)
-        if found is None:
-            found = kind(name, args) if positive else Not(self._literal(kind, name, args, True))
-            self._literals[key] = found
-        return found
+    def _literal(self, atom: GroundLeaf, positive: bool) -> Formula:
+        found = self._literals.setdefault(atom, atom)
+        if positive:
+            return found
+        negative = Not(found)
+        return self._literals.setdefault(negative, negative)
 
     def _atom(self, atom: Atom, binding: Binding) -> Atom:
-        args = tuple([binding.get(a, a) for a in atom.args])
-        found = self._literal(Atom, atom.predicate, args, True)
+        found = self._literal(
+            Atom(atom.predicate, tuple([binding.get(a, a) for a in atom.args])), True
+        )
         assert isinstance(found, Atom)
         return found
 
@@ -474,7 +413,7 @@ class _Grounder:
             if (schema.cost or 0) > MAX_COST:
                 raise Unsupported(
                     f"an action cost above {MAX_COST} (of {schema.name}) is not supported",
-                    position=self._domain.source.position(schema.offset),
+                    position=schema.position,
                     remedy="Write costs in a larger unit, or leave out --cost makespan+cost.",
                 )
             return schema.cost or 0
@@ -485,7 +424,7 @@ class _Grounder:
                 f"the cost {label(atom.predicate, atom.args)} has no whole value from 0 "
                 f"to {MAX_COST} in the initial state "
                 f"of {self._problem.source.name}",
-                position=self._domain.source.position(schema.offset),
+                position=schema.position,
                 remedy="Give it a value in (:init ..), or leave out --cost makespan+cost.",
             )
         return int(value)

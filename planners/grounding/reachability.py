@@ -88,7 +88,7 @@ def _require_memory(domain: Domain, objects: Mapping[str, tuple[str, ...]]) -> N
             raise OutOfMemory(
                 f"action {schema.name!r} has {count:,} instances: they take "
                 f"{count * _INSTANCE / 2**20:,.0f} MiB, {left / 2**20:,.0f} MiB are left",
-                position=domain.source.position(schema.offset),
+                position=schema.position,
                 remedy="Use fewer objects, or an action with fewer parameters.",
             )
 

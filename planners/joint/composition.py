@@ -318,7 +318,7 @@ class JointActionStepper(Stepper):
         labels: Sequence[Sequence[str]],
         actions: Sequence[GroundAction],
         cost: Cost,
-        positions: Mapping[str, Position],
+        positions: Mapping[str, Position | None],
     ) -> None:
         self._positions = positions
         self._robots = tuple(robots)

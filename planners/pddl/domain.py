@@ -4,13 +4,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 from planners.pddl.formulas import read_effects, read_formula
-from planners.pddl.lifted import TRUE, Constraint, Domain, Formula, Part, Schema, Signatures
+from planners.pddl.lifted import (
+    TRUE,
+    Constraint,
+    Domain,
+    Formula,
+    Part,
+    Schema,
+    Signatures,
+    have_common,
+)
 from planners.pddl.names import (
     Names,
     Sections,
@@ -186,43 +195,47 @@ def _read_actions(document: Document, sections: Sections) -> dict[str, Group]:
     """The sections of the actions by their names."""
     actions: dict[str, Group] = {}
     for item in sections.get(":action", ()):
-        name = action_name(document, item)
+        name = section_name(document, item)
         if actions.setdefault(name.text, item) is not item:
             what = f"action {echoed(name.text)} is declared twice"
             raise document.fail(what, name, "Rename or remove one of them.")
     return actions
 
 
-def action_name(document: Document, item: Group) -> Token:
-    """The name of an action section; raises `BadInput` if it has none."""
+def section_name(document: Document, item: Group, form: str = _FORM) -> Token:
+    """The name behind a section's keyword; raises `BadInput` if there is none."""
+    what = f"the name of the {item.head[1:]}"
     if len(item) < 2:
-        raise document.fail("expected the name of the action", item, remedy=_FORM)
-    return document.token(item.items[1], "the name of the action")
+        raise document.fail(f"expected {what}", item, form)
+    return document.token(item.items[1], what)
 
 
-def _fields(document: Document, item: Group) -> dict[str, tuple[Expression, ...]]:
-    """The parts of an action by keyword, in any order."""
+def _fields(
+    document: Document, item: Group, keys: Collection[str], form: str
+) -> dict[str, tuple[Expression, ...]]:
+    """What stands behind each keyword of a section with a name, in any order.
+
+    One expression each, but for ``:agent``.
+    """
     fields: dict[str, tuple[Expression, ...]] = {}
     key = ""
     for part in item.items[2:]:
         if isinstance(part, Token) and part.text.startswith(":"):
             key = part.text
-            if key not in _FIELDS:
-                remedy = "Known here: " + ", ".join(_FIELDS) + "."
-                raise document.fail(f"unknown keyword {echoed(key)} in an action", part, remedy)
+            if key not in keys:
+                what = f"unknown keyword {echoed(key)} in '({item.head} ..)'"
+                raise document.fail(what, part, f"Known here: {', '.join(keys)}.")
             if key in fields:
                 remedy = "Join the two by (and ..), or remove one."
-                raise document.fail(f"{key} occurs twice in one action", part, remedy)
+                raise document.fail(f"{key} occurs twice in one {item.head[1:]}", part, remedy)
             fields[key] = ()
         elif not key:
-            raise document.fail("expected a keyword such as ':parameters'", part, _FORM)
+            raise document.fail("expected a keyword such as ':parameters'", part, form)
         else:
             fields[key] = (*fields[key], part)
-    for key in (":parameters", ":precondition", ":effect"):
-        if len(fields.get(key, ())) > 1:
-            what = f"expected one expression after {key}, found {len(fields[key])}"
-            remedy = "Join several conditions or effects by (and ..)."
-            raise document.fail(what, fields[key][1], remedy)
+            if len(fields[key]) > 1 and key != ":agent":
+                remedy = "Join several conditions or effects by (and ..)."
+                raise document.fail(f"expected one expression after {key}", part, remedy)
     return fields
 
 
@@ -272,15 +285,15 @@ def _agent(
 
 def arity_of(names: Names, item: Group) -> int:
     """The number of arguments of an action, with the agent."""
-    items, _ = _parameter_items(names.document, _fields(names.document, item))
+    items, _ = _parameter_items(names.document, _fields(names.document, item, _FIELDS, _FORM))
     return len(typed_list(names.document, items, "a variable"))
 
 
 def read_schema(names: Names, item: Group) -> Schema:
     """Read an action section; raises `BadInput` or `Unsupported` with the position."""
     document = names.document
-    name = action_name(document, item)
-    fields = _fields(document, item)
+    name = section_name(document, item)
+    fields = _fields(document, item, _FIELDS, _FORM)
     items, agent_name = _parameter_items(document, fields)
     parameters = names.variables_of(items)
     agent = next((i for i, v in enumerate(parameters) if v.name == agent_name), None)
@@ -305,7 +318,7 @@ def read_schema(names: Names, item: Group) -> Schema:
         effects,
         _read_parts(inner, item),
         cost,
-        item.offset,
+        document.source.position(item.offset),
     )
 
 
@@ -354,8 +367,8 @@ def check_parts(document: Document, schemas: tuple[Schema, ...], actions: dict[s
 _NETWORK_FORM = (
     "As in (:concurrency-constraint v :parameters (?b - boat) :bounds (2 inf) :actions ((row 1)))."
 )
-#: More robots than there ever are: larger numbers mean the same.
-_MANY = 1_000_000_000
+_NETWORK_FIELDS = (":parameters", ":bounds", ":actions")
+_FROM_0 = "Arguments are counted from 0; if the action has an :agent, it is argument 0."
 
 
 def read_network(
@@ -367,9 +380,9 @@ def read_network(
     unknown constraints.
     """
     document = names.document
-    arities = {schema.name: len(schema.parameters) for schema in schemas}
+    by_action = {schema.name: schema for schema in schemas}
     constraints = [
-        _constraint(names, arities, s) for s in sections.get(":concurrency-constraint", ())
+        _constraint(names, by_action, s) for s in sections.get(":concurrency-constraint", ())
     ]
     by_name = {c.name: c for c in constraints}
     dependences = []
@@ -393,42 +406,39 @@ def read_network(
     return tuple(constraints), tuple(dependences)
 
 
-def _constraint(names: Names, arities: dict[str, int], section: Group) -> Constraint:
+def _constraint(names: Names, schemas: Mapping[str, Schema], section: Group) -> Constraint:
     document = names.document
-    if len(section) < 2:
-        raise document.fail("expected the name of the constraint", section, _NETWORK_FORM)
-    name = document.token(section.items[1], "the name of the constraint").text
-    items = section.items[2:]
-    fields = {
-        document.token(key, "a keyword").text: value
-        for key, value in zip(items[::2], items[1::2], strict=False)
-    }
-    missing = {":parameters", ":bounds", ":actions"} - set(fields)
-    if missing or len(items) % 2:
-        what = "a constraint has :parameters, :bounds and :actions"
-        what += f"; missing: {', '.join(sorted(missing))}" if missing else ""
+    name = section_name(document, section, _NETWORK_FORM).text
+    fields = _fields(document, section, _NETWORK_FIELDS, _NETWORK_FORM)
+    if missing := sorted(key for key in _NETWORK_FIELDS if not fields.get(key)):
+        what = f"a constraint has {', '.join(_NETWORK_FIELDS)}; missing: {', '.join(missing)}"
         raise document.fail(what, section, _NETWORK_FORM)
-    parameters = names.read_variables(fields[":parameters"])
-    low, high = _bounds(names, document.group(fields[":bounds"], "'(LOW HIGH)'"))
-    actions, offsets = [], []
-    for item in document.group(fields[":actions"], "a list of actions").items:
+    listed, bounds, actions = (fields[key][0] for key in _NETWORK_FIELDS)
+    parameters = names.read_variables(listed)
+    low, high = _bounds(names, document.group(bounds, "'(LOW HIGH)'"))
+    bound = []
+    for item in document.group(actions, "a list of actions"):
         entry = document.group(item, "'(action POSITION ..)'")
-        if entry.head not in arities:
-            raise names.unknown("action", entry, arities)
-        arity = arities[entry.head]
+        if entry.head not in schemas:
+            raise names.unknown("action", entry, schemas)
+        own = schemas[entry.head].parameters
         positions = tuple(_number(names, part) for part in entry.items[1:])
-        if len(positions) != len(parameters) or any(p >= arity for p in positions):
-            what = (
-                f"expected {len(parameters)} argument positions below {arity} (the agent is "
-                "argument 0)"
+        if len(positions) != len(parameters) or any(p >= len(own) for p in positions):
+            raise document.fail(
+                f"expected {len(parameters)} argument positions below {len(own)}",
+                entry,
+                f"Each says which argument a parameter of the constraint is. {_FROM_0}",
             )
-            remedy = (
-                "Each number says which argument of the action a parameter of the constraint is."
-            )
-            raise document.fail(what, entry, remedy)
-        actions.append((entry.head, positions))
-        offsets.append(entry.offset)
-    return Constraint(name, parameters, low, high, tuple(actions), tuple(offsets))
+        for parameter, position in zip(parameters, positions, strict=True):
+            if not have_common(names.types, parameter.types, own[position].types):
+                here, there = (
+                    f"{one.name} - {' or '.join(one.types)}" for one in (own[position], parameter)
+                )
+                what = f"argument {position} of {entry.head} is {here}, which is never {there}"
+                what += f": the constraint {echoed(name)} would never match"
+                raise document.fail(what, entry, _FROM_0)
+        bound.append((entry.head, positions))
+    return Constraint(name, parameters, low, high, tuple(bound))
 
 
 def _bounds(names: Names, item: Group) -> tuple[int, int | None]:
@@ -451,7 +461,5 @@ def _number(names: Names, item: Expression) -> int:
     text = names.document.token(item, "a number").text
     if not re.fullmatch(r"[0-9]+", text):
         what = f"expected a number from 0, found {echoed(text)}"
-        remedy = "Arguments of an action are counted from 0, bounds are numbers of robots."
-        raise names.document.fail(what, item, remedy)
-    digits = text.lstrip("0") or "0"
-    return int(digits) if len(digits) <= len(str(_MANY)) else _MANY
+        raise names.document.fail(what, item, f"Bounds are numbers of robots. {_FROM_0}")
+    return int(min(float(text), 1e9))  # larger ones mean the same: there are fewer robots

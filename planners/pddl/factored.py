@@ -8,7 +8,7 @@ the action's ``:agent``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
 from operator import or_
 from pathlib import Path
@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 from planners.pddl.domain import read_domain
 from planners.pddl.lifted import And, Atom, Domain, Formula, Problem, Schema, Variable
 from planners.pddl.problem import read_problem
-from planners.pddl.sexpr import JoinedSource
+from planners.pddl.sexpr import Source
 from planners.system.errors import BadInput, Position
 from planners.system.messages import echoed
 
@@ -99,14 +99,13 @@ def _agent(robot: str, schema: Schema, domain: Domain, problem: Problem) -> int:
             return number
     raise BadInput(
         f"action {echoed(schema.name)} has no parameter that can only be {echoed(robot)}",
-        position=domain.source.position(schema.offset),
+        position=schema.position,
         remedy="Give the robot a type of its own and a parameter of this type.",
     )
 
 
 def _join_domains(domains: list[Domain], name: str) -> Domain:
     first = domains[0]
-    source = JoinedSource(name, [domain.source for domain in domains])
     schemas: dict[str, Schema] = {}
     for domain in domains:
         if domain.name != first.name:
@@ -116,31 +115,25 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
                 remedy="All files of a folder belong to one domain.",
             )
         for schema in domain.schemas:
-            own = replace(schema, offset=source.offset(domain.source, schema.offset))
-            known = schemas.setdefault(schema.name, own)
-            if _without_agent(known) != _without_agent(own):
+            known = schemas.setdefault(schema.name, schema)
+            if _without_agent(known) != _without_agent(schema):
                 raise BadInput(
                     f"action {echoed(schema.name)} differs between the robots' files in more than "
                     "the agent's name and type",
-                    position=domain.source.position(schema.offset),
-                    remedy=f"The other one is at {source.position(known.offset)}. Give different "
-                    "actions different names.",
+                    position=schema.position,
+                    remedy=f"The other one is at {known.position}. Give different actions "
+                    "different names.",
                 )
-            schemas[schema.name] = _with_agent_of(known, own)
-    constraints = (
-        replace(c, offsets=tuple(source.offset(domain.source, at) for at in c.offsets))
-        for domain in domains
-        for c in domain.constraints
-    )
+            schemas[schema.name] = _with_agent_of(known, schema)
     return replace(
         first,
-        source=source,
+        source=_union(name, domains),
         types=_merged((domain.types for domain in domains), _both),
         constants=_merged((domain.constants for domain in domains), _both),
         predicates=_merged((domain.predicates for domain in domains), or_),
         functions=_merged((domain.functions for domain in domains), or_),
         schemas=tuple(schemas.values()),
-        constraints=tuple(dict.fromkeys(constraints)),
+        constraints=tuple(dict.fromkeys(c for domain in domains for c in domain.constraints)),
         dependences=tuple(dict.fromkeys(d for domain in domains for d in domain.dependences)),
         signatures=_merged(
             (domain.signatures for domain in domains), lambda a, b: tuple(map(or_, a, b))
@@ -148,13 +141,17 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
     )
 
 
+def _union(name: str, files: Sequence[Domain | Problem]) -> Source:
+    return Source(name, "\n".join(file.source.text for file in files), is_union=True)
+
+
 def _without_agent(schema: Schema) -> Schema:
-    """The action with neither the name nor the type of its agent, nor its position."""
+    """The action with neither the name nor the type of its agent."""
     assert schema.agent is not None
     parameters = list(schema.parameters)
     own = parameters[schema.agent].name
     parameters[schema.agent] = Variable(own)
-    changed = replace(schema, offset=0, parameters=tuple(parameters))
+    changed = replace(schema, parameters=tuple(parameters))
     found: Schema = _renamed(changed, own, "?")  # no variable of a file has this name
     return found
 
@@ -196,7 +193,7 @@ def _require_owners(views: list[tuple[Domain, Problem]], robots: list[str]) -> N
                     raise BadInput(
                         f"action {echoed(schema.name)} is for agents such as {echoed(robot)}, "
                         f"whose own domain {other.source.name} does not have it",
-                        position=domain.source.position(schema.offset),
+                        position=schema.position,
                         remedy="Give robots with different actions different types.",
                     )
 
@@ -240,7 +237,7 @@ def _join_problems(problems: list[Problem], domain: Domain, name: str) -> Proble
     goal = next(iter(goals)) if len(goals) == 1 else And(tuple(goals))
     return replace(
         first,
-        source=JoinedSource(name, [problem.source for problem in problems]),
+        source=_union(name, problems),
         objects=dict(sorted(objects.items())),
         init=frozenset(init),
         goal=goal,

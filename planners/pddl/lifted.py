@@ -10,6 +10,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from planners.pddl.sexpr import Source
+from planners.system.errors import Position
 
 #: The types that each argument of a predicate may have, by the predicate's name and arity.
 Signatures = dict[tuple[str, int], tuple[frozenset[str], ...]]
@@ -126,7 +127,7 @@ class Schema:
 
     ``agent`` is the index of the acting robot's parameter (MA-PDDL), None in plain PDDL; ``parts``
     is not empty exactly for joint-action PDDL; ``cost`` is the ``(increase (total-cost) ..)`` term:
-    a number, a function term, or None.  ``offset`` points into the domain's source.
+    a number, a function term, or None.
     """
 
     name: str
@@ -136,7 +137,7 @@ class Schema:
     effects: tuple[Effect, ...]
     parts: tuple[Part, ...] = ()
     cost: int | Atom | None = None
-    offset: int = 0
+    position: Position | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,8 +146,7 @@ class Constraint:
 
     For each binding of ``parameters``, the subactions of a joint step that match it are none, or at
     least ``low`` and at most ``high`` (None: no bound).  ``actions`` lists each action with the
-    positions of its arguments (the agent is argument 0) that the parameters bind; ``offsets`` are
-    the positions of its entries in the text.
+    positions of its arguments (the agent is argument 0) that the parameters bind.
     """
 
     name: str
@@ -154,7 +154,6 @@ class Constraint:
     low: int
     high: int | None
     actions: tuple[tuple[str, tuple[int, ...]], ...]
-    offsets: tuple[int, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True, slots=True)

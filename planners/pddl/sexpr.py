@@ -11,7 +11,6 @@ from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
-from itertools import accumulate
 from pathlib import Path
 from unicodedata import normalize
 
@@ -60,17 +59,23 @@ _NO_PDDL = "Give a PDDL file: DOMAIN first, then PROBLEM."
 
 
 class Source:
-    """A text with a name: turns offsets into positions for messages."""
+    """A text with a name: turns offsets into positions for messages.
 
-    __slots__ = ("_line_starts", "name", "text")
+    ``is_union``: it is that of several files, and ``name`` their folder; it has no lines.
+    """
 
-    def __init__(self, name: str, text: str) -> None:
+    __slots__ = ("_line_starts", "is_union", "name", "text")
+
+    def __init__(self, name: str, text: str, is_union: bool = False) -> None:
         self.name = name
         self.text = text
+        self.is_union = is_union
         self._line_starts: list[int] | None = None
 
     def position(self, offset: int) -> Position:
         """The line and column (from 1) of a character offset."""
+        if self.is_union:
+            return Position(self.name)
         if self._line_starts is None:
             self._line_starts = [0, *(m.end() for m in re.finditer(r"\n", self.text))]
         line = bisect_right(self._line_starts, offset)
@@ -98,26 +103,6 @@ class Source:
     def text_sha256(self) -> str:
         """The hash of the text, byte by byte, as language files had it up to version 0.1."""
         return sha256(self.text.encode()).hexdigest()
-
-
-class JoinedSource(Source):
-    """Several texts as one, one below the other; positions are those in the texts themselves."""
-
-    __slots__ = ("_parts", "_starts")
-
-    def __init__(self, name: str, parts: Sequence[Source]) -> None:
-        super().__init__(name, "\n".join(part.text for part in parts))
-        self._parts = tuple(parts)
-        self._starts = [0, *accumulate(len(part.text) + 1 for part in parts)][:-1]
-
-    def position(self, offset: int) -> Position:
-        """The position of an offset, in the text that it lies in."""
-        number = bisect_right(self._starts, offset) - 1
-        return self._parts[number].position(offset - self._starts[number])
-
-    def offset(self, part: Source, offset: int) -> int:
-        """An offset in one of the texts as an offset in the whole."""
-        return self._starts[self._parts.index(part)] + offset
 
 
 @dataclass(frozen=True, slots=True)

@@ -76,7 +76,7 @@ WRONG = [
     (d(PLACES, PLACES.replace("room", "rom")), "type 'rom' of '?x' is not declared"),
     (d("(at ?r ?y)", "(at ?r ?z)"), "variable ?z is not declared here"),
     (d(PLACES, PLACES.replace("?y", "?x")), "variable ?x is declared twice\n  Give one of the two"),
-    (d(":effect", ":effects"), "unknown keyword ':effects' in an action"),
+    (d(":effect", ":effects"), "unknown keyword ':effects' in"),
     (("(define (domain hall))", PROBLEM), "this domain has no action"),
     ((f"{DOMAIN.rstrip()[:-1]}(:action go))", PROBLEM), "action 'go' is declared twice"),
     (
