@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planners.grounding import GroundAction, idling_schemas
+from planners.grounding.actions import GroundAction
+from planners.grounding.instantiate import idling_schemas
 from planners.joint.interference import footprint
 from planners.joint.model import JointModel, show
 from planners.joint.tables import Rows

@@ -8,15 +8,8 @@ from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
-from planners.grounding import (
-    FEWER,
-    GroundAction,
-    ground_actions,
-    ground_goal,
-    idling_costs,
-    impossible_actions,
-)
-from planners.grounding.actions import apply_network
+from planners.grounding.actions import GroundAction, apply_network, impossible_actions
+from planners.grounding.instantiate import FEWER, ground_actions, ground_goal, idling_costs
 from planners.joint.composition import ComposingStepper, JointActionStepper
 from planners.joint.conditions import Evaluator
 from planners.joint.model import IDLE, SLACK_LEFT, JointModel, PlanningTask, Stepper, show

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 from coordlang.execution.choices import RobotChoices, SentenceChoices
-from planners.grounding import GroundAction
+from planners.grounding.actions import GroundAction
 from planners.joint.model import IDLE, JointModel
 from planners.pddl.formula_tree import required_atoms
 

@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from planners.grounding import ground_goal
+from planners.grounding.instantiate import ground_goal
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask, show
 from planners.joint.states import split_atoms
 from planners.joint.tables import Bools

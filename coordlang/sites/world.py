@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from itertools import combinations, permutations
 
-from planners.grounding import GroundAction
+from planners.grounding.actions import GroundAction
 from planners.joint.model import JointModel, show
 from planners.pddl.lifted import TRUE, Atom
 from planners.pddl.robots import natural

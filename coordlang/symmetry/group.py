@@ -20,7 +20,7 @@ import numpy as np
 from coordlang.language.candidates import Candidates
 from coordlang.language.warping import Clause, pair
 from coordlang.symmetry.graph import LARGEST_GRAPH, Renaming, automorphism_generators, joined_order
-from planners.grounding import GroundAction
+from planners.grounding.actions import GroundAction
 from planners.joint.model import FullState, Goal
 from planners.joint.tables import Ints, find_rows
 from planners.pddl.formula_tree import Compound, Leaf, fold

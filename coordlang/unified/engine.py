@@ -45,7 +45,7 @@ from coordlang.unified.options import PLAN_KINDS, EngineOptions, in_parameters
 from coordlang.unified.plans import NoSteps, of_up, to_up
 from coordlang.unified.translation import FEATURES, Translated, translate
 from planners.check.validate import validate
-from planners.grounding import idling_schemas
+from planners.grounding.instantiate import idling_schemas
 from planners.loading import build
 from planners.search.optimal_plans import search
 from planners.search.plan_file import Texts

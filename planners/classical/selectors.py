@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
-from planners.grounding import GroundAction
+from planners.grounding.actions import GroundAction
 from planners.joint.model import JointModel
 from planners.pddl.formula_tree import forbidden_steps, literals
 from planners.pddl.lifted import And, Atom, Equal, Formula, Not, Or, StepAtom, Truth

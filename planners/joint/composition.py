@@ -10,7 +10,7 @@ from itertools import combinations, product
 
 import numpy as np
 
-from planners.grounding import GroundAction
+from planners.grounding.actions import GroundAction
 from planners.joint.conditions import Evaluator, Labels, Operators, speaks_of_step
 from planners.joint.interference import Choices, compatible, conflict
 from planners.joint.model import Options, Stepper, Steps

@@ -11,7 +11,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.grounding import GroundAction, GroundEffect
+from planners.grounding.actions import GroundAction, GroundEffect
 from planners.joint.states import FactTable, StateCodec, TrueFacts, test_bits
 from planners.joint.tables import Bools, Ints, Numbers, Rows, ranges
 from planners.pddl.formula_tree import Compound, Leaf, conjuncts, fold, literals, signed

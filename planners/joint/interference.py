@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.grounding import GroundAction, GroundEffect
+from planners.grounding.actions import GroundAction, GroundEffect
 from planners.pddl.formula_tree import Leaf, forbidden_steps, label, literals, substituted
 from planners.pddl.lifted import FALSE, Atom, Formula, StepAtom, Truth
 

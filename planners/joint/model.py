@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planners.grounding import GroundAction, Impossible
+from planners.grounding.actions import GroundAction, Impossible
 from planners.joint.conditions import Evaluator, Labels
 from planners.joint.states import StateCodec
 from planners.joint.tables import Bools, Ints, Rows

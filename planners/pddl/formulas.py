@@ -22,20 +22,14 @@ from planners.pddl.lifted import (
     StepAtom,
     Variable,
 )
-from planners.pddl.names import Names, is_token, known
+from planners.pddl.names import Names
 from planners.pddl.sexpr import Expression, Group, Token
-from planners.system.errors import BadInput, Unsupported
 from planners.system.messages import echoed
 
 #: How PDDL writes a number.
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)$")
 #: The largest action cost: they are summed as 64-bit integers.
 MAX_COST = 2**31
-_NUMERIC_TESTS = frozenset({"<", "<=", ">", ">="})
-_NUMERIC_EFFECTS = frozenset({"assign", "increase", "decrease", "scale-up", "scale-down"})
-_TEMPORAL = frozenset(
-    {"always", "sometime", "within", "at-most-once", "sometime-after", "hold-after"}
-)
 
 
 def read_formula(names: Names, item: Expression) -> Formula:
@@ -66,7 +60,7 @@ def read_formula(names: Names, item: Expression) -> Formula:
             return _equal(names, item)
     if head in names.actions:
         return StepAtom(head, names.arguments(item, [names.actions[head]], "action"))
-    raise _no_formula(names, item, head)
+    raise names.unknown("predicate", item, names.predicates)
 
 
 def _parts(names: Names, item: Group, number: int | None = None) -> tuple[Formula, ...]:
@@ -89,19 +83,6 @@ def _equal(names: Names, item: Group) -> Formula:
         if isinstance(side, Group) or (NUMBER.match(side.text) and side.text not in names.objects):
             raise names.document.unsupported("numeric condition '(= ..)' is", item)
     return Equal(names.term(left), names.term(right))
-
-
-def _no_formula(names: Names, item: Group, head: str) -> BadInput | Unsupported:
-    """The error for something else than a formula: what PDDL has and coordlang not, or nothing."""
-    unsupported = names.document.unsupported
-    if head in _NUMERIC_TESTS:
-        return unsupported(f"numeric condition '({head} ..)' is", item)
-    if head == "preference":
-        return unsupported("a preference is", item)
-    timed = head == "at" and len(item) > 1 and is_token(item.items[1], "end", "start")
-    if head in _TEMPORAL or timed:
-        return unsupported(f"trajectory constraint '({head} ..)' is", item)
-    return names.unknown("predicate", item, names.predicates)
 
 
 def read_effects(names: Names, item: Expression) -> tuple[tuple[Effect, ...], int | Atom | None]:
@@ -142,7 +123,8 @@ def _effects(scope: _Scope, item: Expression) -> Iterator[Effect | int | Atom]:
             for part in item.items[1:]:
                 yield from _effects(scope, part)
         case "not":
-            yield _deleted(scope, item)
+            _expect(names, item, 1)
+            yield scope.effect(document.group(item.items[1], "an atom in parentheses"), False)
         case "when":
             _expect(names, item, 2)
             condition = read_formula(names, item.items[1])
@@ -151,18 +133,10 @@ def _effects(scope: _Scope, item: Expression) -> Iterator[Effect | int | Atom]:
             yield from _effects(replace(scope, condition=condition), item.items[2])
         case "forall":
             yield from _forall(scope, item)
+        case "increase":
+            yield _cost(scope, item)
         case _:
-            yield _changed_number(scope, item, head)
-
-
-def _deleted(scope: _Scope, item: Group) -> Effect:
-    names = scope.names
-    _expect(names, item, 1)
-    part = names.document.group(item.items[1], "an atom in parentheses")
-    if part.head not in names.predicates:
-        what = f"only atoms can be deleted, found '({part.head} ..)'"
-        raise names.document.fail(what, part, known(names.predicates, part.head, "predicate"))
-    return scope.effect(part, False)
+            raise names.unknown("predicate", item, names.predicates)
 
 
 def _forall(scope: _Scope, item: Group) -> Iterator[Effect | int | Atom]:
@@ -179,51 +153,33 @@ def _forall(scope: _Scope, item: Group) -> Iterator[Effect | int | Atom]:
     return _effects(_Scope(names, scope.variables + variables, scope.condition), item.items[2])
 
 
-def _changed_number(scope: _Scope, item: Group, head: str) -> int | Atom:
-    """The cost of an action; all other effects on numbers, and what is none, are refused."""
-    names, document = scope.names, scope.names.document
-    if head in _NUMERIC_EFFECTS:
-        conditional = bool(scope.variables) or scope.condition != TRUE
-        return _cost(names, item, conditional=conditional)
-    if head in ("oneof", "probabilistic", "unknown"):
-        raise document.unsupported(f"non-deterministic effect '({head} ..)' is", item)
-    remedy = known(names.predicates, head, "predicate")
-    raise document.fail(f"unknown predicate {echoed(head)} in an effect", item, remedy)
-
-
-def _cost(names: Names, item: Group, *, conditional: bool) -> int | Atom:
-    unsupported = names.document.unsupported
+def _cost(scope: _Scope, item: Group) -> int | Atom:
+    """What an action costs; all other effects on numbers are refused."""
+    names, unsupported = scope.names, scope.names.document.unsupported
     target = item.items[1] if len(item) == 3 else None
-    if item.head != "increase" or not isinstance(target, Group) or target.head != "total-cost":
-        raise unsupported(f"numeric effect '({item.head} ..)' is", item)
-    if conditional:
+    if not isinstance(target, Group) or target.head != "total-cost":
+        raise names.unknown("predicate", item, names.predicates)
+    if scope.variables or scope.condition != TRUE:
         raise unsupported("a cost that depends on a condition is", item)
     amount = item.items[2]
-    if isinstance(amount, Token):
-        return _constant_cost(names, item, amount)
-    if amount.head not in names.functions:
+    if isinstance(amount, Group):
         if amount.head in ("+", "-", "*", "/"):
             raise unsupported("arithmetic in an action cost is", amount)
-        raise names.unknown("function", amount, names.functions)
-    return Atom(amount.head, names.arguments(amount, names.functions[amount.head], "function"))
-
-
-def _constant_cost(names: Names, item: Group, amount: Token) -> int:
+        return names.function(amount)
     if not NUMBER.match(amount.text):
-        raise names.document.fail(
-            f"expected a number, found {echoed(amount.text)}",
-            amount,
-            "As in (increase (total-cost) 3), or with a function declared in (:functions ..).",
-        )
+        remedy = "As in (increase (total-cost) 3), or with a function of (:functions ..)."
+        what = f"expected a number, found {echoed(amount.text)}"
+        raise names.document.fail(what, amount, remedy)
     # Costs that are too large are refused where costs are used.
     value = min(float(amount.text), 2.0 * MAX_COST)
     if value < 0 or value % 1 != 0:
-        what = f"action cost {amount.text} (whole numbers from 0 only) is"
-        raise names.document.unsupported(what, item)
+        raise unsupported(f"action cost {amount.text} (whole numbers from 0 only) is", item)
     return int(value)
 
 
 def _atom(names: Names, item: Group) -> Atom:
+    if item.head not in names.predicates:
+        raise names.unknown("predicate", item, names.predicates)
     args = names.arguments(item, names.predicates[item.head], "predicate")
     names.check_arguments(item)
     return Atom(item.head, args)

@@ -7,13 +7,26 @@ from collections.abc import Collection, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 
-from planners.pddl.lifted import Domain, Signatures, Variable, have_common
+from planners.pddl.lifted import Atom, Domain, Signatures, Variable, have_common
 from planners.pddl.sexpr import Document, Expression, Group, Token
-from planners.system.errors import BadInput, note
+from planners.system.errors import BadInput, Unsupported, note
 from planners.system.messages import echoed, visible
 
 #: Characters of a wrong name that are compared with the declared names.
 _LONGEST_COMPARED = 200
+#: What stands in conditions or effects of PDDL that is not supported, by the word it begins with.
+_FEATURES = {
+    **dict.fromkeys(("<", "<=", ">", ">="), "numeric condition '({} ..)'"),
+    **dict.fromkeys(
+        ("assign", "increase", "decrease", "scale-up", "scale-down"), "numeric effect '({} ..)'"
+    ),
+    **dict.fromkeys(
+        ("always", "sometime", "within", "at-most-once", "sometime-after", "hold-after"),
+        "trajectory constraint '({} ..)'",
+    ),
+    **dict.fromkeys(("oneof", "probabilistic", "unknown"), "non-deterministic effect '({} ..)'"),
+    "preference": "a preference",
+}
 #: Arguments in an example.
 _LETTERS = tuple("abcdefghij")
 #: Characters of a name in an example.
@@ -156,12 +169,8 @@ class Names:
                 what = f"a numeric or object fluent ({item.head} ..) inside a formula is"
                 remedy = "coordlang reads functions only in '(increase (total-cost) ..)'."
                 raise self.document.unsupported(what, item, remedy)
-            raise self.document.fail(
-                "expected a variable or an object, found a list",
-                item,
-                "Arguments are names: atoms are not nested, and no list of arguments is in "
-                "parentheses of its own.",
-            )
+            remedy = "Arguments are names: atoms are not nested."
+            raise self.document.fail("expected a variable or an object, found a list", item, remedy)
         if item.text.startswith("?"):
             if item.text not in self.variables:
                 remedy = known(self.variables, item.text, "variable")
@@ -195,8 +204,19 @@ class Names:
                     "swapped, or is a type missing there?",
                 )
 
-    def unknown(self, what: str, item: Group, declared: Iterable[str]) -> BadInput:
+    def function(self, item: Group) -> Atom:
+        """The term of a declared function, or of ``total-cost``."""
+        if item.head not in self.functions and item.head != "total-cost":
+            raise self.unknown("function", item, self.functions)
+        arities = self.functions.get(item.head, {len(item) - 1})
+        return Atom(item.head, self.arguments(item, arities, "function"))
+
+    def unknown(self, what: str, item: Group, declared: Iterable[str]) -> BadInput | Unsupported:
         """The error for a list whose head is no ``what`` that is declared."""
+        timed = item.head == "at" and any(is_token(part, "end", "start") for part in item)
+        feature = _FEATURES.get("within" if timed else item.head)
+        if feature is not None:
+            return self.document.unsupported(f"{feature.format(item.head)} is", item)
         remedy = known(declared, item.head, what)
         return self.document.fail(f"unknown {what} {echoed(item.head)}", item, remedy)
 

@@ -90,25 +90,19 @@ def _read_init(names: Names, item: Group, init: set[Atom], values: dict[Atom, fl
 
 def _refuse_other_states(document: Document, item: Group) -> None:
     """Raise `Unsupported` for what is said of a later state or of one of several states."""
-    if item.head == "at" and len(item) == 3 and isinstance(item.items[2], Group):
-        remedy = "coordlang reads classical PDDL: list what is true at the start."
-        raise document.unsupported("timed initial literals are", item, remedy)
-    second = item.items[1] if len(item) > 1 else None
-    if item.head in ("oneof", "unknown", "or") and isinstance(second, Group):
-        remedy = "coordlang reads problems with one initial state, known to all robots."
-        what = f"an uncertain initial state '({item.head} ..)' is"
-        raise document.unsupported(what, item, remedy)
+    if any(isinstance(part, Group) for part in item.items[1:]):
+        if item.head == "at":
+            raise document.unsupported("timed initial literals are", item)
+        if item.head in ("oneof", "unknown", "or"):
+            what = f"an uncertain initial state '({item.head} ..)' is"
+            raise document.unsupported(what, item)
 
 
 def _read_value(names: Names, item: Group, values: dict[Atom, float]) -> None:
     document = names.document
-    function = document.group(item.items[1], "a function in parentheses")
+    function = names.function(document.group(item.items[1], "a function in parentheses"))
     number = item.items[2]
-    if function.head not in names.functions and function.head != "total-cost":
-        raise names.unknown("function", function, names.functions)
     if not isinstance(number, Token) or not NUMBER.match(number.text):
         what, remedy = "a function value that is no number is", "As in (= (distance a b) 3)."
         raise document.unsupported(what, item, remedy)
-    arities = names.functions.get(function.head, {len(function) - 1})
-    args = names.arguments(function, arities, "function")
-    values[Atom(function.head, args)] = float(number.text)
+    values[function] = float(number.text)

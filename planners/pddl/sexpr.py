@@ -24,9 +24,6 @@ MAX_DEPTH = 200
 #: What begins the comments that are read: they say a robot's part of a joint action.
 SUBACTION = "subaction"
 
-#: A byte that is not UTF-8, as Python's ``surrogateescape`` decodes it.
-_NOT_DECODED = re.compile("[\udc80-\udcff]")
-
 #: A character that no name may hold, and that separates no names.
 _UNSEEN_IN_NAME = re.compile(rf"(?!\s){UNSEEN.pattern}")
 
@@ -186,22 +183,18 @@ def read_source(path: str | Path) -> Source:
 def _with_old_comments(data: bytes, name: str) -> str:
     """The text of a file that is not UTF-8 in its comments only, as old benchmark files are.
 
-    Bytes there that are not UTF-8 are read as Latin-1.  Raises `BadInput` for such bytes elsewhere.
+    It is read as Latin-1.  Raises `BadInput` for a byte beyond ASCII elsewhere.
     """
     if b"\0" in data:
-        raise BadInput(
-            "this is a binary file, not PDDL text",
-            position=Position(name),
-            remedy=_NO_PDDL,
-        )
-    # Such a byte b is chr(0xdc00 + b) here, so that it comes back as it was.
-    text = data.decode("utf-8-sig", "surrogateescape")
+        what = "this is a binary file, not PDDL text"
+        raise BadInput(what, position=Position(name), remedy=_NO_PDDL)
+    # As Latin-1 a byte is a character, so that an offset in the text is one in the data.
+    text = data.decode("latin-1")
     for match in _TOKEN.finditer(text):
-        if match[0][0] != ";" and (wrong := _NOT_DECODED.search(match[0])):
-            offset = match.start() + wrong.start()
-            read = len(data) - len(text[offset:].encode("utf-8", "surrogateescape"))
-            raise not_utf8(data, read, Source(name, text).position(offset))
-    return _NOT_DECODED.sub(lambda byte: chr(ord(byte[0]) - 0xDC00), text)
+        if match[0][0] != ";" and not match[0].isascii():
+            offset = match.start() + next(n for n, c in enumerate(match[0]) if c > "\x7f")
+            raise not_utf8(data, offset, Source(name, text).position(offset))
+    return text
 
 
 def parse(source: Source) -> Document:

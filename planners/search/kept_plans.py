@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planners.grounding import GroundAction
+from planners.grounding.actions import GroundAction
 from planners.joint.model import FullState, JointModel, PlanningTask
 from planners.parallel.batch import Store, Table, code_hash, digest
 from planners.pddl.formula_tree import formula_text, label

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planners.grounding import GroundAction
+from planners.grounding.actions import GroundAction
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import JointModel
 from planners.joint.tables import Bools, Ints, Rows

@@ -14,7 +14,7 @@ from itertools import combinations
 
 import numpy as np
 
-from planners.grounding import GroundAction
+from planners.grounding.actions import GroundAction
 from planners.joint.composition import ComposingStepper
 from planners.joint.interference import Choices
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask

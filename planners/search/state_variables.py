@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 
-from planners.grounding import GroundAction
+from planners.grounding.actions import GroundAction
 from planners.joint.conditions import split_condition
 from planners.joint.model import JointModel, show
 from planners.joint.tables import Rows

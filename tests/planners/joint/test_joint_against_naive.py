@@ -11,7 +11,8 @@ import pytest
 from hypothesis import Phase, event, given, settings
 from hypothesis import strategies as st
 
-from planners.grounding import idling_schemas, instantiate
+from planners.grounding import instantiate
+from planners.grounding.instantiate import idling_schemas
 from planners.grounding.reachability import reachable_arguments
 from planners.pddl.lifted import Atom, Domain
 from tests.support.joint_twin import built, check_model, twin_of
