@@ -8,21 +8,21 @@ It is then read like any other PDDL.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations_with_replacement
+from itertools import combinations_with_replacement, count
 from typing import Any
 
 from unified_planning.model import InstantaneousAction, OperatorKind, Problem, Variable
 from unified_planning.model.multi_agent import MultiAgentProblem
 from unified_planning.model.problem_kind import FEATURES as ALL_FEATURES
 
-from coordlang.unified.names import AGENT, ProblemNames, is_read, listed, refused
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain
 from planners.pddl.lifted import Problem as PddlProblem
 from planners.pddl.sexpr import Source
-from planners.system.errors import BadInput, UsageError
+from planners.system.errors import BadInput, Unsupported, UsageError
 
 #: Action -> robot -> its part, as in joint-action PDDL: ``{"swap": {"r1": "(move ?a ?b)", "r2":
 #: "(move ?b ?a)"}}``.
@@ -51,6 +51,10 @@ FEATURES = frozenset(
 _METRIC_GROUPS = ("QUALITY_METRICS", "ACTIONS_COST_KIND", "OVERSUBSCRIPTION_KIND")
 _METRICS = {feature for group in _METRIC_GROUPS for feature in ALL_FEATURES[group]}
 
+#: The variable that stands for the acting agent.
+AGENT = "?agent"
+#: What PDDL or its readers take for something of their own.
+_RESERVED = ("and", "or", "not", "imply", "forall", "exists", "when", "either", "object")
 #: Kinds of unified-planning's expressions -> their PDDL operators.
 _OPERATORS = {
     OperatorKind.AND: "and",
@@ -143,32 +147,125 @@ def _check_parameters(problem: Any, subactions: Subactions, concurrency: Concurr
 
 @dataclass(frozen=True, slots=True)
 class _Bound:
-    """A variable that stands for the value of an object fluent: its declaration, and the atom."""
+    """A variable that stands for the value of an object fluent, its type, and the atom."""
 
-    declared: str
+    variable: str
+    kind: str
     atom: str
 
+    @property
+    def declared(self) -> str:
+        """The declaration of the variable."""
+        return f"{self.variable} - {self.kind}"
 
-class _Writer(ProblemNames):
-    """The text, with the names of everything in it."""
+
+class PddlNames:
+    """PDDL names for what a problem names, in whatever words.
+
+    Each thing of a kind (types, predicates, actions, objects, variables) gets one of its own.  What
+    is a PDDL name already, in lower case, is kept unless it is taken.
+    """
+
+    def __init__(self) -> None:
+        self._names: dict[tuple[str, Hashable], str] = {}
+        self._taken: dict[str, set[str]] = {}
+
+    def of(self, kind: str, thing: Hashable, text: str) -> str:
+        """The PDDL name of a thing; ``text`` is what it is called."""
+        if (kind, thing) not in self._names:
+            taken = self._taken.setdefault(kind, {*_RESERVED, "increase", "total-cost"})
+            base = re.sub(r"[^a-z0-9_-]", "_", text.lower()).strip("-") or "x"
+            others = (f"{base}__{number}" for number in count(2))
+            name = next(n for n in others if n not in taken) if base in taken else base
+            self._names[kind, thing] = name
+            taken.add(name)
+        return self._names[kind, thing]
+
+
+class _Writer:
+    """The text, with the names of everything in it.
+
+    Types, objects and agents are named first, so that their names are kept where possible.
+    ``declared`` are the predicates named so far; ``apart``: some action is not for all agents.
+    """
 
     def __init__(self, problem: Any, concurrency: Concurrency) -> None:
-        super().__init__(problem)
-        self.concurrency = concurrency
+        self.problem, self.concurrency, self.names = problem, concurrency, PddlNames()
+        self.values, self.apart = 0, False
+        self.declared: dict[str, str] = {}
+        self.agents: tuple[Any, ...] = tuple(getattr(problem, "agents", ()))
+        self.names.of("variable", None, AGENT[1:])
+        roots = {[*t.ancestors][-1].name for t in problem.user_types}
+        #: The type that PDDL calls object, as unified-planning's PDDL reader makes it.
+        self.root = min(roots) if [root.lower() for root in roots] == ["object"] else None
+        for t in problem.user_types:
+            self.type_name(t)
+        #: The type of all agents.
+        self.agent_type = self.names.of("type", None, "agent") if self.agents else ""
+        for o in problem.all_objects:
+            self.object_name(o)
+        for agent in self.agents:
+            self.agent_name(agent)
+
+    def type_name(self, kind: Any) -> str:
+        """The name of a type of objects."""
+        if not kind.is_user_type():
+            raise refused(f"parameters of type {kind}")
+        return "object" if kind.name == self.root else self.names.of("type", kind.name, kind.name)
+
+    def own_type(self, agent: Any) -> str:
+        """A type for one agent alone, if some action is not for all of them."""
+        if not self.apart:
+            return self.agent_type
+        return self.names.of("type", ("agent", agent.name), f"agent-{agent.name}")
+
+    def object_name(self, thing: Any) -> str:
+        """The name of an object."""
+        return self.names.of("object", thing.name, thing.name)
+
+    def agent_name(self, agent: Any) -> str:
+        """The name of the object that stands for an agent."""
+        return self.names.of("object", ("agent", agent.name), agent.name)
+
+    def variable(self, thing: Any) -> str:
+        """The variable of an action's parameter, or of a quantifier."""
+        text = f"any-{thing.name}" if isinstance(thing, Variable) else thing.name
+        return f"?{self.names.of('variable', (type(thing), thing.name), text)}"
+
+    def declarations(self, things: Iterable[Any]) -> str:
+        """The declarations of parameters, or of a quantifier's variables."""
+        return " ".join(f"{self.variable(v)} - {self.type_name(v.type)}" for v in things)
+
+    def predicate(self, fluent: Any, owner: Any) -> str:
+        """The predicate of a fluent; own fluents of agents with one signature share one."""
+        if not _is_read(fluent):
+            raise refused(f"fluent {fluent.name!r} of type {fluent.type}")
+        types = tuple(self.type_name(p.type) for p in fluent.signature)
+        if fluent.type.is_user_type():
+            types = (*types, self.type_name(fluent.type))
+        name = self.names.of("predicate", (fluent.name, types, owner is not None), fluent.name)
+        if name not in self.declared:
+            whose = [f"?a - {self.agent_type}"] if owner is not None else []
+            args = [f"?x{n} - {t}" for n, t in enumerate(types)]
+            self.declared[name] = _listed(name, *whose, *args)
+        return name
 
     def write(self, subactions: Subactions) -> tuple[str, str, Schemas]:
         """Domain, problem, and what the schemas stand for."""
         shared = self.problem.ma_environment if self.agents else self.problem
-        for fluent in filter(is_read, shared.fluents):
+        for fluent in filter(_is_read, shared.fluents):
             self.predicate(fluent, None)
         if self.agents:
             actions, schemas = self.agent_actions()
         else:
             actions, schemas = self.plain_actions(subactions)
         facts, goals = self.facts(), self.goals()  # they may declare further predicates
+        things = [(self.object_name(o), self.type_name(o.type)) for o in self.problem.all_objects]
+        things += [(self.agent_name(agent), self.own_type(agent)) for agent in self.agents]
+        objects = [f"{name} - {kind}" for name, kind in things]
         sections = [
             _section("(:types", self.type_lines()),
-            _section("(:constants", self.object_lines()),  # constants, as actions may name them
+            _section("(:constants", objects),  # constants, as actions may name them
             _section("(:predicates", self.declared.values()),
         ]
         domain = "\n".join(["(define (domain up)", *sections, *actions, ")\n"])
@@ -183,19 +280,23 @@ class _Writer(ProblemNames):
             goals += [self.text(g, agent) for g in (*agent.public_goals, *agent.private_goals)]
         return goals
 
-    def object_lines(self) -> list[str]:
-        """The objects and agents with their types."""
-        objects = [
-            f"{self.object_name(o)} - {self.type_name(o.type)}" for o in self.problem.all_objects
+    def type_lines(self) -> list[str]:
+        """The declarations of types."""
+        kinds = [
+            (self.type_name(t), self.type_name(t.father) if t.father else "object")
+            for t in self.problem.user_types
         ]
-        return [*objects, *(f"{self.agent_name(a)} - {self.own_type(a)}" for a in self.agents)]
+        kinds += [(self.own_type(agent), self.agent_type) for agent in self.agents if self.apart]
+        if self.agents:
+            kinds.append((self.agent_type, "object"))
+        return [f"{name} - {father}" for name, father in kinds if name != "object"]
 
     def plain_actions(self, subactions: Subactions) -> tuple[list[str], Schemas]:
         """The actions of a problem without agents."""
         actions: list[str] = []
         schemas: Schemas = {}
         for action in self.problem.actions:
-            name = self.actions.of(action.name, action.name)
+            name = self.names.of("action", action.name, action.name)
             parts = subactions.get(action.name, {})
             comments = [f"  ; subaction {robot} {text or 'idle'}" for robot, text in parts.items()]
             actions.append("\n".join([f"(:action {name}", *comments, *self.body(action, None)]))
@@ -214,7 +315,7 @@ class _Writer(ProblemNames):
         by_name = {self.agent_name(agent): agent for agent in self.agents}
         self.apart = any(len(members) < len(self.agents) for members in groups.values())
         for key, members in groups.items():
-            name = self.actions.of(key, key[0])
+            name = self.names.of("action", key, key[0])
             types = list(dict.fromkeys(self.own_type(by_name[str(member)]) for member in members))
             whose = f"(either {' '.join(types)})" if len(types) > 1 else types[0]
             actions.append("\n".join([f"(:action {name}", f"  :agent {AGENT} - {whose}", *key[1:]]))
@@ -229,14 +330,11 @@ class _Writer(ProblemNames):
                 "simulated"
             )
         self.values = 0  # agents' equal actions are equal texts
-        parameters = " ".join(
-            f"{self.parameter(p)} - {self.type_name(p.type)}" for p in action.parameters
-        )
         conditions = [self.text(c, agent, True) for c in (*action.preconditions, *_clashes(action))]
         conditions += [self.concurrency[action.name]] if action.name in self.concurrency else []
         effects = [text for effect in action.effects for text in self.effect(effect, agent)]
         return [
-            f"  :parameters ({parameters})",
+            f"  :parameters ({self.declarations(action.parameters)})",
             f"  :precondition (and {' '.join(conditions)})",
             f"  :effect (and {' '.join(effects)}))",
         ]
@@ -250,20 +348,20 @@ class _Writer(ProblemNames):
         parts = self.parts(effect.fluent, agent, bound, True)
         cases: list[tuple[str, list[str], list[_Bound]]]
         if fluent.type.is_user_type():
-            new, old = self.term(value, agent, bound, True), self.fresh()
-            former = _Bound(f"{old} - {self.type_name(fluent.type)}", listed(*parts, old))
-            cases = [(listed(*parts, new), [], bound)]
-            cases += [(f"(not {former.atom})", [f"(not (= {old} {new}))"], [*bound, former])]
+            new, old = self.term(value, agent, bound, True), self.value(fluent, parts)
+            cases = [(_listed(*parts, new), [], bound)]
+            differs = f"(not (= {old.variable} {new}))"
+            cases += [(f"(not {old.atom})", [differs], [*bound, old])]
         elif value.is_bool_constant():
-            atom = listed(*parts)
+            atom = _listed(*parts)
             cases = [(atom if value.is_true() else f"(not {atom})", [], bound)]
         else:
-            atom, holds = listed(*parts), self.text(value, agent, True)
+            atom, holds = _listed(*parts), self.text(value, agent, True)
             cases = [(atom, [holds], bound), (f"(not {atom})", [f"(not {holds})"], bound)]
         for literal, own, variables in cases:
             conditions = [*(b.atom for b in variables), *when, *own]
             text = f"(when (and {' '.join(conditions)}) {literal})" if conditions else literal
-            declared = [self.variables(effect.forall), *(b.declared for b in variables)]
+            declared = [self.declarations(effect.forall), *(b.declared for b in variables)]
             quantified = " ".join(filter(None, declared))
             yield f"(forall ({quantified}) {text})" if quantified else text
 
@@ -277,7 +375,7 @@ class _Writer(ProblemNames):
                 found.append(self.text(fluent, agent))
             elif value.is_object_exp():
                 parts = self.parts(fluent, agent, [], False)
-                found.append(listed(*parts, self.object_name(value.object())))
+                found.append(_listed(*parts, self.object_name(value.object())))
         return sorted(found)
 
     def text(self, node: Any, agent: Any, inside: bool = False) -> str:
@@ -290,13 +388,13 @@ class _Writer(ProblemNames):
         if node.is_fluent_exp():
             bound: list[_Bound] = []
             parts = self.parts(node, agent, bound, inside)
-            return _with(listed(*parts), bound)
+            return _with(_listed(*parts), bound)
         if node.is_dot():
             return self.text(node.arg(0), self.problem.agent(node.agent()))
         if node.is_equals():
             bound = []
             sides = [self.term(arg, agent, bound, inside) for arg in node.args]
-            return _with(listed("=", *sides), bound)
+            return _with(_listed("=", *sides), bound)
         parts = [self.text(arg, agent, inside) for arg in node.args]
         if node.is_iff():
             return f"(and (imply {parts[0]} {parts[1]}) (imply {parts[1]} {parts[0]}))"
@@ -304,8 +402,8 @@ class _Writer(ProblemNames):
         if operator is None:
             raise refused(f"the expression {node}")
         if node.is_exists() or node.is_forall():
-            parts = [f"({self.variables(node.variables())})", *parts]
-        return listed(operator, *parts)
+            parts = [f"({self.declarations(node.variables())})", *parts]
+        return _listed(operator, *parts)
 
     def parts(self, node: Any, agent: Any, bound: list[_Bound], inside: bool) -> list[str]:
         """The predicate of a fluent and its arguments, without the value of an object fluent.
@@ -319,22 +417,24 @@ class _Writer(ProblemNames):
             args.insert(0, AGENT if inside else self.agent_name(own))
         return [self.predicate(fluent, own), *args]
 
+    def value(self, fluent: Any, parts: Sequence[str]) -> _Bound:
+        """A new variable for the value of an object fluent, of which ``parts`` are the atom's."""
+        self.values += 1
+        name = f"?{self.names.of('variable', self.values, f'value-{self.values}')}"
+        return _Bound(name, self.type_name(fluent.type), _listed(*parts, name))
+
     def term(self, node: Any, agent: Any, bound: list[_Bound], inside: bool) -> str:
         """An object or a variable; for an object fluent a new variable, added to ``bound``."""
         if node.is_object_exp():
             return self.object_name(node.object())
-        if node.is_parameter_exp():
-            return self.parameter(node.parameter())
-        if node.is_variable_exp():
-            return self.variable(node.variable())
+        if node.is_parameter_exp() or node.is_variable_exp():
+            return self.variable(node.parameter() if node.is_parameter_exp() else node.variable())
         if node.is_dot():
             return self.term(node.arg(0), self.problem.agent(node.agent()), bound, False)
         if node.is_fluent_exp() and node.fluent().type.is_user_type():
             parts = self.parts(node, agent, bound, inside)
-            value = self.fresh()
-            kind = self.type_name(node.fluent().type)
-            bound.append(_Bound(f"{value} - {kind}", listed(*parts, value)))
-            return value
+            bound.append(self.value(node.fluent(), parts))
+            return bound[-1].variable
         raise refused(f"the term {node}")
 
 
@@ -374,3 +474,22 @@ def _clashes(action: Any) -> Iterator[Any]:
             clash = new.And(one.condition, when, values)
             variables = (*one.forall, *others)
             yield new.Not(new.Exists(clash, *variables) if variables else clash)
+
+
+def refused(what: str) -> Unsupported:
+    """The error for what is not read."""
+    return Unsupported(
+        what,
+        remedy="coordlang reads Boolean and object fluents over objects, and instantaneous "
+        "actions; docs/unified-planning.md has the list.",
+    )
+
+
+def _is_read(fluent: Any) -> bool:
+    """Whether a fluent has a truth value or an object; another one must not be used."""
+    return bool(fluent.type.is_bool_type() or fluent.type.is_user_type())
+
+
+def _listed(*words: str) -> str:
+    """Words in brackets."""
+    return f"({' '.join(words)})"

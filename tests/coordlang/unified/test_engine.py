@@ -45,10 +45,9 @@ from coordlang.language.sentences import task_sentences
 from coordlang.unified import engine as engine_module
 from coordlang.unified import register
 from coordlang.unified.engine import CoordlangEngine
-from coordlang.unified.names import PddlNames
 from coordlang.unified.options import PLAN_KINDS
 from coordlang.unified.plans import label
-from coordlang.unified.translation import translate
+from coordlang.unified.translation import PddlNames, translate
 from planners.loading import load
 from planners.pddl import read_domain
 from planners.pddl.model_options import ModelOptions
@@ -737,7 +736,7 @@ def test_odd_names() -> None:
     )
     assert sequential_verdicts(problem, plans[0]) == {Validity.VALID}
     names = PddlNames()
-    made = [names.of(n, n) for n in ("x", "X", "?x", "", "-", "object", "x")]
+    made = [names.of("object", n, n) for n in ("x", "X", "?x", "", "-", "object", "x")]
     assert made == ["x", "x__2", "_x", "x__3", "x__4", "object__2", "x"]
 
 
