@@ -14,11 +14,9 @@ matching rules one by one).
 from __future__ import annotations
 
 import re
-import signal
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from math import prod
-from threading import current_thread, main_thread
 from typing import TYPE_CHECKING, Any
 
 from planners.pddl.formula_tree import required_atoms
@@ -26,6 +24,7 @@ from planners.pddl.lifted import Atom, Domain, Formula, Schema, Variable
 from planners.pddl.robots import natural
 from planners.system.errors import CoordlangError, OutOfMemory
 from planners.system.limits import memory_left
+from planners.system.signals import postponed_signals
 
 if TYPE_CHECKING:
     from clingo import Control, Symbol
@@ -155,49 +154,25 @@ def _ground(control: Control) -> None:
     """Ground clingo's program; a signal (Ctrl-C, an alarm) ends it soon.
 
     clingo runs no signal handler, and an exception that a handler raises in one of its callbacks
-    does not leave clingo as it was.  So signals are noted only, until the next ground rule or the
-    next value in a long join (`_interruptible`) ends the work, and their handlers run thereafter.
+    does not leave clingo as it was.  So signals wait until the next ground rule or the next value
+    in a long join (`_interruptible`) ends the work.
     """
     from clingo.backend import Observer
 
-    arrived: list[int] = []
-
     class Watch(Observer):
         def rule(self, choice: bool, head: Sequence[int], body: Sequence[int]) -> None:
-            if arrived:
+            if postponed.arrived:
                 raise _Stopped
 
         def tick(self, value: Symbol) -> Symbol:
-            if arrived:
+            if postponed.arrived:
                 raise _Stopped
             return value
 
     watch = Watch()
     control.register_observer(watch, replace=True)
-    try:
-        with _signals_into(arrived):
-            control.ground([("base", [])], context=watch)
-    except _Stopped:
-        pass
-    finally:
-        for number in arrived:
-            signal.raise_signal(number)
-
-
-@contextmanager
-def _signals_into(arrived: list[int]) -> Iterator[None]:
-    """Note the signals that have a handler in Python; other threads than the main one have none."""
-    if current_thread() is not main_thread():
-        yield
-        return
-    handlers = {n: h for n in signal.valid_signals() if callable(h := signal.getsignal(n))}
-    try:
-        for number in handlers:
-            signal.signal(number, lambda number, _frame: arrived.append(number))
-        yield
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
+    with postponed_signals() as postponed, suppress(_Stopped):
+        control.ground([("base", [])], context=watch)
 
 
 class _Core:

@@ -73,7 +73,10 @@ def parse_domain(source: Source) -> Domain:
     document = parse(source)
     name, sections = read_header(document, "domain")
     types = _read_types(document, sections)
-    signatures = _read_predicates(document, sections, types)
+    predicates = _without_privacy(_entries(sections, ":predicates"))
+    signatures = _read_signatures(document, predicates, types)
+    # "- number" may stand behind functions.
+    functions = [i for i in _entries(sections, ":functions") if isinstance(i, Group)]
     names = Names(document, types, _arities(signatures), signatures)
     constants: dict[str, tuple[str, ...]] = {}
     for section in sections.get(":constants", ()):
@@ -88,7 +91,7 @@ def parse_domain(source: Source) -> Domain:
         )
     names = replace(
         names,
-        functions=_read_functions(document, sections),
+        functions=_arities(_read_signatures(document, functions, types)),
         actions={name: arity_of(names, item) for name, item in actions.items()},
         objects=constants,
     )
@@ -120,12 +123,10 @@ def _read_types(document: Document, sections: Sections) -> dict[str, tuple[str, 
     types: dict[str, tuple[str, ...]] = {}
     offsets: dict[str, Token] = {}
     for section in sections.get(":types", ()):
-        for entry in typed_list(document, section.items[1:], "a type"):
-            name = entry.token.text
-            offsets.setdefault(name, entry.token)
-            parents = tuple(
-                p for p in entry.types if p not in ("object", name) and name != "object"
-            )
+        for token, above in typed_list(document, section.items[1:], "a type"):
+            name = token.text
+            offsets.setdefault(name, token)
+            parents = tuple(p for p in above if p not in ("object", name) and name != "object")
             types[name] = tuple(dict.fromkeys((*types.get(name, ()), *parents)))
             for parent in parents:
                 types.setdefault(parent, ())
@@ -142,22 +143,21 @@ def _read_types(document: Document, sections: Sections) -> dict[str, tuple[str, 
     return types
 
 
-def _read_predicates(
-    document: Document, sections: Sections, types: Mapping[str, object]
+def _read_signatures(
+    document: Document, items: Iterable[Expression], types: Mapping[str, object]
 ) -> Signatures:
-    """The types of arguments; ``object`` for those without a declared type."""
+    """The types of the arguments of predicates or functions; ``object`` for undeclared ones."""
     signatures: Signatures = {}
-    listed = [item for section in sections.get(":predicates", ()) for item in section.items[1:]]
-    for item in _without_privacy(listed):
+    for item in items:
         entry = document.group(item, "a predicate in parentheses")
         if len(entry) == 0:
             remedy = "As in (at ?r - robot ?x - place)."
-            raise document.fail("expected a predicate, found '()'", entry, remedy)
+            raise document.fail("expected a name, found '()'", entry, remedy)
         name = document.token(entry.items[0], "the name of a predicate").text
         if name == "=":  # some domains declare it; it stays the equality of objects
             continue
-        entries = typed_list(document, entry.items[1:], "a variable")
-        own = [frozenset(t if t in types else "object" for t in one.types) for one in entries]
+        listed = typed_list(document, entry.items[1:], "a variable")
+        own = [frozenset(t if t in types else "object" for t in given) for _, given in listed]
         known = signatures.get((name, len(own)), own)
         signatures[name, len(own)] = tuple(a | b for a, b in zip(known, own, strict=True))
     return signatures
@@ -172,15 +172,8 @@ def _without_privacy(items: Iterable[Expression]) -> Iterator[Expression]:
             yield item
 
 
-def _read_functions(document: Document, sections: Sections) -> dict[str, frozenset[int]]:
-    found: list[tuple[str, int]] = []
-    for section in sections.get(":functions", ()):
-        for item in section.items[1:]:
-            if isinstance(item, Token):  # "- number" behind a function
-                continue
-            name = document.token(item.items[0], "the name of a function").text if len(item) else ""
-            found.append((name, len(typed_list(document, item.items[1:], "a variable"))))
-    return _arities(found)
+def _entries(sections: Sections, head: str) -> Iterator[Expression]:
+    return (item for section in sections.get(head, ()) for item in section.items[1:])
 
 
 def _arities(found: Iterable[tuple[str, int]]) -> dict[str, frozenset[int]]:
@@ -242,45 +235,36 @@ def _fields(
 def _parameter_items(
     document: Document, fields: dict[str, tuple[Expression, ...]]
 ) -> tuple[tuple[Expression, ...], str | None]:
-    """The full typed list of parameters, and the agent's name.
+    """The full typed list of parameters, and the agent's name ("" if it has none).
 
     The agent comes first unless it stands among the parameters.
     """
     listed: tuple[Expression, ...] = ()
     if fields.get(":parameters"):
         listed = document.group(fields[":parameters"][0], "a list of parameters").items
-    for number, item in enumerate(listed):
-        if is_token(item, ":agent"):
-            before, behind = listed[:number], listed[number + 1 :]
-            if not behind or not isinstance(behind[0], Token):
-                raise document.fail("expected a variable after ':agent'", item, remedy=_AGENT_FORM)
-            return before + behind, behind[0].text
+    inside = next((n for n, item in enumerate(listed) if is_token(item, ":agent")), None)
+    if inside is not None:
+        before, behind = listed[:inside], listed[inside + 1 :]
+        return before + behind, _first_name(behind)
     if ":agent" not in fields:
         return listed, None
-    variable, declaration = _agent(document, fields[":agent"])
-    if any(is_token(item, variable.text) for item in listed):
-        return listed, variable.text
-    if not declaration:  # an untyped agent must not take the type of the parameters behind it
-        at = variable.offset
-        declaration = (Token("-", at), Token("object", at))
-    if not is_token(declaration[0], "-"):
-        raise document.fail(
-            "expected '- TYPE' or nothing after the agent's variable",
-            declaration[0],
-            remedy=_AGENT_FORM,
-        )
-    return (variable, *declaration, *listed), variable.text
+    clause = fields[":agent"]
+    if len(clause) == 1 and isinstance(clause[0], Group):  # ":agent (?a - robot)"
+        clause = clause[0].items
+    name = _first_name(clause)
+    if any(is_token(item, name) for item in listed):
+        return listed, name
+    if len(clause) == 1:  # an untyped agent must not take the type of the parameters behind it
+        at = clause[0].offset
+        clause = (*clause, Token("-", at), Token("object", at))
+    if clause and not is_token(clause[1], "-"):
+        what = "expected '- TYPE' or nothing after the agent's variable"
+        raise document.fail(what, clause[1], _AGENT_FORM)
+    return clause + listed, name
 
 
-def _agent(
-    document: Document, items: tuple[Expression, ...]
-) -> tuple[Token, tuple[Expression, ...]]:
-    """What stands behind ``:agent``: a variable, and what declares its type."""
-    if len(items) == 1 and isinstance(items[0], Group):  # ":agent (?a - robot)"
-        items = items[0].items
-    if not items or not isinstance(items[0], Token):
-        raise document.fail("expected a variable after ':agent'", document.root, remedy=_AGENT_FORM)
-    return items[0], items[1:]
+def _first_name(items: Sequence[Expression]) -> str:
+    return items[0].text if items and isinstance(items[0], Token) else ""
 
 
 def arity_of(names: Names, item: Group) -> int:
@@ -298,11 +282,8 @@ def read_schema(names: Names, item: Group) -> Schema:
     parameters = names.variables_of(items)
     agent = next((i for i, v in enumerate(parameters) if v.name == agent_name), None)
     if agent_name is not None and agent is None:
-        raise document.fail(
-            f"expected a variable after ':agent', found {echoed(agent_name)}",
-            item,
-            remedy=_AGENT_FORM,
-        )
+        found = f", found {echoed(agent_name)}" if agent_name else ""
+        raise document.fail(f"expected a variable after ':agent'{found}", item, _AGENT_FORM)
     inner = names.with_variables(parameters)
     precondition: Formula = TRUE
     if fields.get(":precondition"):

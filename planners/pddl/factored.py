@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 from planners.pddl.domain import read_domain
 from planners.pddl.lifted import And, Atom, Domain, Formula, Problem, Schema, Variable
 from planners.pddl.problem import read_problem
+from planners.pddl.robots import objects_of
 from planners.pddl.sexpr import Source
 from planners.system.errors import BadInput, Position
 from planners.system.messages import echoed
@@ -89,13 +90,7 @@ def _of_robot(robot: str, domain: Domain, problem: Problem) -> tuple[Domain, Pro
 
 def _agent(robot: str, schema: Schema, domain: Domain, problem: Problem) -> int:
     for number, parameter in enumerate(schema.parameters):
-        wanted = set(parameter.types)
-        fitting = [
-            name
-            for name, types in problem.objects.items()
-            if "object" in wanted or any(domain.supertypes(t) & wanted for t in types)
-        ]
-        if fitting == [robot]:
+        if objects_of(domain, problem, parameter.types) == (robot,):
             return number
     raise BadInput(
         f"action {echoed(schema.name)} has no parameter that can only be {echoed(robot)}",
@@ -185,10 +180,9 @@ def _require_owners(views: list[tuple[Domain, Problem]], robots: list[str]) -> N
     for domain, _ in views:
         for schema in domain.schemas:
             assert schema.agent is not None
-            wanted = set(schema.parameters[schema.agent].types)
+            types = schema.parameters[schema.agent].types
             for robot, (other, problem) in zip(robots, views, strict=True):
-                types = problem.objects[robot]
-                fits = any(other.supertypes(t) & wanted for t in types)
+                fits = robot in objects_of(other, problem, types)
                 if fits and all(s.name != schema.name for s in other.schemas):
                     raise BadInput(
                         f"action {echoed(schema.name)} is for agents such as {echoed(robot)}, "

@@ -50,12 +50,8 @@ def is_token(item: Expression, *texts: str) -> bool:
     return isinstance(item, Token) and item.text in texts
 
 
-@dataclass(frozen=True, slots=True)
-class Typed:
-    """One entry of a typed list."""
-
-    token: Token
-    types: tuple[str, ...]
+#: One entry of a typed list: a name and its types.
+Typed = tuple[Token, tuple[str, ...]]
 
 
 def typed_list(document: Document, items: Sequence[Expression], what: str) -> list[Typed]:
@@ -86,10 +82,10 @@ def typed_list(document: Document, items: Sequence[Expression], what: str) -> li
                 f"no {noun} stands before '- {' '.join(types)}': nothing is declared",
                 position=document.source.position(item.offset),
             )
-        entries += [Typed(name, types) for name in waiting]
+        entries += [(name, types) for name in waiting]
         waiting = []
         at += 2
-    return entries + [Typed(name, ("object",)) for name in waiting]
+    return entries + [(name, ("object",)) for name in waiting]
 
 
 def _types(document: Document, item: Expression) -> tuple[str, ...]:
@@ -140,27 +136,24 @@ class Names:
     def variables_of(self, items: Sequence[Expression]) -> tuple[Variable, ...]:
         """The variables of a typed list; their types must be declared."""
         variables: list[Variable] = []
-        for entry in typed_list(self.document, items, "a variable"):
-            name = entry.token.text
+        for token, types in typed_list(self.document, items, "a variable"):
+            name = token.text
             if not name.startswith("?"):
-                what, remedy = (
-                    f"expected a variable, found {echoed(name)}",
-                    f"Variables start with '?': ?{name}.",
-                )
-                raise self.document.fail(what, entry.token, remedy)
-            self.check_types(entry)
+                what = f"expected a variable, found {echoed(name)}"
+                raise self.document.fail(what, token, f"Variables start with '?': ?{name}.")
+            self.check_types(token, types)
             if any(variable.name == name for variable in variables):
                 what = f"variable {name} is declared twice"
-                raise self.document.fail(what, entry.token, "Give one of the two another name.")
-            variables.append(Variable(name, entry.types))
+                raise self.document.fail(what, token, "Give one of the two another name.")
+            variables.append(Variable(name, types))
         return tuple(variables)
 
-    def check_types(self, entry: Typed) -> None:
-        """Raise `BadInput` if a type of the entry is not declared."""
-        for name in entry.types:
+    def check_types(self, token: Token, types: tuple[str, ...]) -> None:
+        """Raise `BadInput` if a type of a name is not declared."""
+        for name in types:
             if name not in self.types and name != "object":
-                what = f"type {echoed(name)} of {echoed(entry.token.text)} is not declared"
-                raise self.document.fail(what, entry.token, known(self.types, name, "type"))
+                what = f"type {echoed(name)} of {echoed(token.text)} is not declared"
+                raise self.document.fail(what, token, known(self.types, name, "type"))
 
     def term(self, item: Expression) -> str:
         """A variable in scope or a declared object."""
@@ -239,20 +232,20 @@ def read_objects(
     document = names.document
     private = [item for item in items if isinstance(item, Group) and item.head == ":private"]
     entries = typed_list(document, [i for i in items if i not in private], "an object")
-    declared = {entry.token.text for entry in entries}
+    declared = {token.text for token, _ in entries}
     for section in private:
         entries += typed_list(document, _without_owner(section, declared), "an object")
-    for entry in entries:
-        names.check_types(entry)
-        name = entry.token.text
+    for token, types in entries:
+        names.check_types(token, types)
+        name = token.text
         if name.startswith("?"):
             raise document.fail(
                 "a variable cannot be an object",
-                entry.token,
+                token,
                 f"Names of objects have no '?': {visible(name[1:_SHOWN])}.",
             )
         old = into.get(name, ())
-        into[name] = (*old, *(t for t in entry.types if t not in old))
+        into[name] = (*old, *(t for t in types if t not in old))
 
 
 def _without_owner(section: Group, declared: Set[str]) -> Sequence[Expression]:

@@ -236,7 +236,7 @@ def _guessed(domain: Domain, problem: Problem, kind: str) -> tuple[tuple[str, ..
         doubt = "never move or hold anything"
     if doubt:
         what = f"Every action takes objects of type {echoed(kind)}, but they {doubt}"
-        raise _unclear(domain, problem, what, _taken(domain, problem))
+        raise _unclear(domain, problem, what, _inhabited(domain, problem))
     note(
         f"the robots are taken to be {_some(robots)}: every action takes an object of type "
         f"{echoed(kind)}",
@@ -301,35 +301,24 @@ def _some(names: Sequence[str]) -> str:
 
 
 def _kinds(domain: Domain, problem: Problem) -> list[str]:
-    """What can be given as ``--robot-type``.
-
-    The likely types, else all that some action takes, else unary predicates.
-    """
-    unary = sorted(
-        {atom.predicate for atom in static_atoms(domain, problem) if len(atom.args) == 1}
-    )
+    """What can be given as ``--robot-type``: likely types, else all, else unary predicates."""
+    unary = {atom.predicate for atom in static_atoms(domain, problem) if len(atom.args) == 1}
     likely = [kind for kind in ("agent", "robot") if _of_kind(domain, problem, kind)]
-    return likely or _candidates(domain, problem) or _taken(domain, problem) or unary
+    typed = _candidates(domain, problem) or _inhabited(domain, problem)
+    return likely or typed or sorted(unary)
 
 
-def _taken(domain: Domain, problem: Problem) -> list[str]:
-    """The types of which some action takes an object."""
-    taken = [p.types for schema in domain.schemas for p in schema.parameters]
-    return [
-        kind
-        for kind in sorted(domain.types)
-        if objects_of(domain, problem, (kind,))
-        and any(kind in domain.supertypes(t) for own in taken for t in own)
-    ]
+def _inhabited(domain: Domain, problem: Problem) -> list[str]:
+    """The types that have objects."""
+    return [kind for kind in sorted(domain.types) if objects_of(domain, problem, (kind,))]
 
 
 def _candidates(domain: Domain, problem: Problem) -> list[str]:
     """The most specific types of which every action takes an object."""
     found = [
         kind
-        for kind in sorted(domain.types)
-        if objects_of(domain, problem, (kind,))
-        and all(
+        for kind in _inhabited(domain, problem)
+        if all(
             any(all(kind in domain.supertypes(t) for t in p.types) for p in schema.parameters)
             for schema in domain.schemas
         )

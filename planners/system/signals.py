@@ -73,6 +73,11 @@ class Postponed:
         self._heard = False
         self._over = False
 
+    @property
+    def arrived(self) -> bool:
+        """Whether a signal waits."""
+        return bool(self._arrived)
+
     @contextmanager
     def heard(self) -> Iterator[None]:
         """Hear signals in the block, those that have arrived at its beginning.
