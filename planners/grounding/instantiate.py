@@ -16,7 +16,6 @@ from planners.grounding.reachability import reachable_arguments
 from planners.pddl.formula_tree import (
     GroundLeaf,
     conjuncts,
-    free_variables,
     joined,
     label,
     literals,
@@ -54,7 +53,7 @@ Binding = dict[str, str]
 Arguments = tuple[str, ...]
 #: An atom without which an instance of a quantified part is no matter.
 Guard = Atom | StepAtom
-#: A quantified formula, its free variables and its guards (`_Grounder._shape`).
+#: A quantified formula, the variables in it and its guards (`_Grounder._shape`).
 _Shape = tuple[Formula, tuple[str, ...], tuple[Atom, ...], tuple[StepAtom, ...]]
 #: From this many values for the variables on, only subactions that are ever possible are tried.
 _MANY = 1000
@@ -237,7 +236,7 @@ class _Grounder:
         self._literals: dict[Formula, Formula] = {}
         #: The owners of a subaction that a formula names; None for arguments of other types.
         self._acting: dict[tuple[str, tuple[str, ...]], frozenset[int] | None] = {}
-        #: Ground quantified formulas by the values of their free variables: actions share most.
+        #: Ground quantified formulas by the values of variables in them: actions share most.
         self._quantified: dict[tuple[object, ...], Formula] = {}
         #: By the identity of a quantified formula, which is there too so that it stays alive.
         self._shapes: dict[int, _Shape] = {}
@@ -296,8 +295,8 @@ class _Grounder:
     def _quantifier(
         self, f: Forall | Exists, binding: Binding, positive: bool, acting: tuple[int, ...]
     ) -> Formula:
-        _, free, statics, steps = self._shapes.get(id(f)) or self._shape(f)
-        key = id(f), positive, acting, *(binding.get(name) for name in free)
+        _, names, statics, steps = self._shapes.get(id(f)) or self._shape(f)
+        key = id(f), positive, acting, *map(binding.get, names)
         found = self._quantified.get(key)
         if found is None:
             kind = And if isinstance(f, Forall) == positive else Or
@@ -307,14 +306,17 @@ class _Grounder:
         return found
 
     def _shape(self, f: Forall | Exists) -> _Shape:
-        """The variables that a formula has from outside, and its guards.
+        """The variables in a formula, and its guards.
 
         Guards are static atoms and actions that the part requires under ``exists``, and its
         negation under ``forall``: where one of them is false, the instance is no matter.
         """
+        leaves = [leaf for leaf, _ in literals(f)]
+        terms = {t for a in leaves for t in ((a.left, a.right) if isinstance(a, Equal) else a.args)}
+        names = tuple(sorted(term for term in terms if term.startswith("?")))
         part = f.part if isinstance(f, Exists) else negated(f.part)
         steps = tuple(p for p in conjuncts(part) if isinstance(p, StepAtom))
-        found = self._shapes[id(f)] = (f, free_variables(f), self._static_atoms(part), steps)
+        found = self._shapes[id(f)] = (f, names, self._static_atoms(part), steps)
         return found
 
     def _static_atoms(self, f: Formula) -> tuple[Atom, ...]:

@@ -176,36 +176,33 @@ def _ground(control: Control) -> None:
 
 
 class _Core:
-    """The Tarski problem, with names of our own that no user's name can clash with."""
+    """The Tarski problem, with names of our own that no user's name can clash with.
+
+    ``objects`` and ``actions`` are the user's names by those, and the other way round.
+    """
 
     def __init__(self, domain: Domain, objects: dict[str, tuple[str, ...]]) -> None:
         import tarski.fstrips as fs
-        from tarski import language
-        from tarski.syntax import land, top
+        from tarski import language, syntax
 
-        self._fs, self._land, self._top = fs, land, top
-        self._domain = domain
+        self._fs, self._syntax = fs, syntax
         self._lang = language("core", theories=[])
         self._sort = self._lang.Object
         self.problem: Any = fs.create_fstrips_problem(self._lang, "task", "core")
-        self.problem.goal = top
-        self._symbols: dict[tuple[str, int], Any] = {}
-        self._types: dict[tuple[str, ...], Any] = {}
-        self._constants: dict[str, Any] = {}
-        self.objects: dict[str, str] = {}
-        for number, name in enumerate(sorted(objects, key=natural)):
-            symbol = f"o{number}"
-            self._constants[name] = self._lang.constant(symbol, self._sort)
-            self.objects[symbol] = name
+        self.problem.goal = syntax.top
+        self.objects = {f"o{n}": name for n, name in enumerate(sorted(objects, key=natural))}
+        self._constants = {
+            name: self._lang.constant(symbol, self._sort) for symbol, name in self.objects.items()
+        }
         self._object_types = {
             name: frozenset(t for own in types for t in domain.supertypes(own))
             for name, types in objects.items()
         }
+        self._predicates: dict[object, Any] = {}
         self.actions: dict[str, str] = {}
 
     def add_initial(self, atom: Atom) -> None:
-        symbol = self._predicate(atom.predicate, len(atom.args))
-        self.problem.init.add(symbol, *(self._constants[a] for a in atom.args))
+        self.problem.init.add(*self._parts(atom, {}))
 
     def add_action(self, schema: Schema) -> None:
         variables: dict[str, Any] = {}
@@ -219,19 +216,10 @@ class _Core:
             own = self._declare(effect.variables, inner, always=True)
             condition = self._all(effect.condition, inner, own)
             effects.append(self._fs.AddEffect(self._atom(effect.atom, inner), condition))
-        symbol = f"a{len(self.actions)}"
-        self.actions[schema.name] = symbol
+        symbol = self.actions[schema.name] = f"a{len(self.actions)}"
         parameters = [variables[p.name] for p in schema.parameters]
         body = self._all(schema.precondition, variables, typed)
         self.problem.action(symbol, parameters, body, effects)
-
-    def _predicate(self, name: str, arity: int) -> Any:
-        key = (name, arity)
-        if key not in self._symbols:
-            self._symbols[key] = self._lang.predicate(
-                f"p{len(self._symbols)}", *[self._sort] * arity
-            )
-        return self._symbols[key]
 
     def _declare(
         self, variables: Iterable[Variable], into: dict[str, Any], *, always: bool = False
@@ -242,29 +230,37 @@ class _Core:
         """
         atoms = []
         for variable in variables:
-            term = self._lang.variable(f"v{len(into)}", self._sort)
-            into[variable.name] = term
+            term = into[variable.name] = self._lang.variable(f"v{len(into)}", self._sort)
             if always or "object" not in variable.types:
                 atoms.append(self._type(variable.types)(term))
         return atoms
 
+    def _predicate(self, key: object, arity: int) -> Any:
+        if key not in self._predicates:
+            name = f"p{len(self._predicates)}"
+            self._predicates[key] = self._lang.predicate(name, *[self._sort] * arity)
+        return self._predicates[key]
+
     def _type(self, types: tuple[str, ...]) -> Any:
-        key = tuple(sorted(types))
-        if key not in self._types:
-            symbol = self._lang.predicate(f"t{len(self._types)}", self._sort)
-            self._types[key] = symbol
-            for name, own in self._object_types.items():
-                if own & set(key):
-                    self.problem.init.add(symbol, self._constants[name])
-        return self._types[key]
+        """A predicate that is true of the objects of some types."""
+        is_new = types not in self._predicates
+        predicate = self._predicate(types, 1)
+        for name, own in self._object_types.items() if is_new else ():
+            if not own.isdisjoint(types):
+                self.problem.init.add(predicate, self._constants[name])
+        return predicate
+
+    def _parts(self, atom: Atom, variables: dict[str, Any]) -> tuple[Any, ...]:
+        terms = (variables[a] if a[0] == "?" else self._constants[a] for a in atom.args)
+        return (self._predicate((atom.predicate, len(atom.args)), len(atom.args)), *terms)
 
     def _atom(self, atom: Atom, variables: dict[str, Any]) -> Any:
-        symbol = self._predicate(atom.predicate, len(atom.args))
-        return symbol(*(variables[a] if a[0] == "?" else self._constants[a] for a in atom.args))
+        predicate, *terms = self._parts(atom, variables)
+        return predicate(*terms)
 
     def _all(self, formula: Formula, variables: dict[str, Any], atoms: list[Any]) -> Any:
         """The conjunction of the atoms that the formula surely requires, behind others."""
         atoms = atoms + [self._atom(atom, variables) for atom in required_atoms(formula)]
         if not atoms:
-            return self._top
-        return atoms[0] if len(atoms) == 1 else self._land(*atoms, flat=True)
+            return self._syntax.top
+        return atoms[0] if len(atoms) == 1 else self._syntax.land(*atoms, flat=True)

@@ -257,12 +257,9 @@ class JointModel:
 
     def numbers(self, texts: Sequence[str | None]) -> tuple[int, ...] | None:
         """Text as label numbers, or None if some robot has no such subaction."""
-        numbers = []
-        for own, text in zip(self.labels, texts, strict=True):
-            if text is not None and text not in own:
-                return None
-            numbers.append(0 if text is None else own.index(text))
-        return tuple(numbers)
+        found = (self.label_number(robot, text) for robot, text in enumerate(texts))
+        numbers = tuple(number for number in found if number is not None)
+        return numbers if len(numbers) == len(self.labels) else None
 
 
 def show(atom: Atom | StepAtom) -> str:

@@ -74,27 +74,6 @@ def _collect(
         found.append((formula, positive))
 
 
-def free_variables(formula: Formula) -> tuple[str, ...]:
-    """The names of the variables that no quantifier in the formula declares, sorted."""
-
-    def leaf(found: Leaf) -> frozenset[str]:
-        match found:
-            case Atom(_, args) | StepAtom(_, args):
-                return frozenset(arg for arg in args if arg.startswith("?"))
-            case Equal(left, right):
-                return frozenset(arg for arg in (left, right) if arg.startswith("?"))
-        return frozenset()
-
-    def compound(kind: Compound, parts: Iterator[frozenset[str]]) -> frozenset[str]:
-        found: frozenset[str] = frozenset().union(*parts)
-        if isinstance(kind, Forall | Exists):
-            return found - {variable.name for variable in kind.variables}
-        return found
-
-    names: frozenset[str] = fold(formula, leaf, compound)
-    return tuple(sorted(names))
-
-
 def conjuncts(formula: Formula) -> tuple[Formula, ...]:
     """The parts that must all hold; a conjunction among them is taken apart too."""
     if isinstance(formula, And):

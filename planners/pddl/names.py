@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 
 from planners.pddl.lifted import Atom, Domain, Signatures, Variable, have_common
-from planners.pddl.sexpr import Document, Expression, Group, Token
+from planners.pddl.sexpr import SECTIONS, UNSUPPORTED, Document, Expression, Group, Token
 from planners.system.errors import BadInput, Unsupported, note
 from planners.system.messages import echoed, visible
 
@@ -265,25 +265,6 @@ def _without_owner(section: Group, declared: Set[str]) -> Sequence[Expression]:
 #: Keyword -> the sections that it begins, in the order of the file.
 Sections = dict[str, list[Group]]
 
-_UNSUPPORTED = {
-    ":durative-action": "durative actions",
-    ":derived": "derived predicates (axioms)",
-    ":constraints": "trajectory constraints",
-    ":process": "processes (PDDL+)",
-    ":event": "events (PDDL+)",
-}
-
-
-_SECTIONS = {
-    "domain": {
-        *(":requirements", ":types", ":constants", ":predicates", ":functions", ":action"),
-        *(":concurrency-constraint", ":positive-dependence"),
-    },
-    "problem": {
-        *(":domain", ":requirements", ":objects", ":init", ":goal", ":metric", ":length"),
-    },
-}
-
 
 def read_header(document: Document, kind: str) -> tuple[str, Sections]:
     """The name in ``(define (kind name) ..)`` and the sections behind it, by keyword.
@@ -319,12 +300,12 @@ def read_header(document: Document, kind: str) -> tuple[str, Sections]:
 
 def _require_known(document: Document, section: Group, kind: str) -> None:
     head = section.head
-    if head in _UNSUPPORTED:
+    if head in UNSUPPORTED:
         remedy = "coordlang reads classical PDDL with instantaneous actions."
-        raise document.unsupported(f"{_UNSUPPORTED[head]} ({head}) are", section, remedy)
-    if head not in _SECTIONS[kind]:
+        raise document.unsupported(f"{UNSUPPORTED[head]} ({head}) are", section, remedy)
+    if head not in SECTIONS[kind]:
         raise document.fail(
             f"unknown section {echoed(head)} in a {kind}",
             section,
-            "Known here: " + ", ".join(sorted(_SECTIONS[kind])) + ".",
+            "Known here: " + ", ".join(sorted(SECTIONS[kind])) + ".",
         )

@@ -30,11 +30,25 @@ _UNSEEN_IN_NAME = re.compile(rf"(?!\s){UNSEEN.pattern}")
 #: A variable may follow a name without a space, as in ``(aircraft?a)``.
 _TOKEN = re.compile(r";[^\n\r]*|[()]|\?*[^\s();?]+|\?+")
 
-#: Lists that stand directly in ``(define ..)``, and nowhere deeper.
-_SECTIONS = {
-    *(":action", ":constants", ":derived", ":durative-action", ":functions", ":goal", ":init"),
-    *(":metric", ":objects", ":predicates", ":requirements", ":types"),
+#: Lists that stand directly in ``(define ..)``, and nowhere deeper, by the kind of file.
+SECTIONS = {
+    "domain": {
+        *(":requirements", ":types", ":constants", ":predicates", ":functions", ":action"),
+        *(":concurrency-constraint", ":positive-dependence"),
+    },
+    "problem": {
+        *(":domain", ":requirements", ":objects", ":init", ":goal", ":metric", ":length"),
+    },
 }
+#: The same for what is not supported, and what it is.
+UNSUPPORTED = {
+    ":durative-action": "durative actions",
+    ":derived": "derived predicates (axioms)",
+    ":constraints": "trajectory constraints",
+    ":process": "processes (PDDL+)",
+    ":event": "events (PDDL+)",
+}
+_SECTIONS = frozenset().union(*SECTIONS.values(), UNSUPPORTED)
 
 
 def _read_tokens(text: str) -> Iterator[str]:
