@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import combinations, product
 
 import numpy as np
@@ -15,10 +14,9 @@ from planners.joint.conditions import Evaluator, Labels, Operators, speaks_of_st
 from planners.joint.interference import Choices, compatible, conflict
 from planners.joint.model import Options, Stepper, Steps
 from planners.joint.states import StateCodec
-from planners.joint.step_clauses import Clause, StepClauses, Waiting, clauses
-from planners.joint.tables import Bools, Ints, Rows, ranges, spans
-from planners.pddl.formula_tree import conjuncts, formula_text, signed
-from planners.pddl.lifted import Atom, Formula, StepAtom
+from planners.joint.tables import Bools, Ints, Numbers, Rows, ranges, spans
+from planners.pddl.formula_tree import conjuncts, formula_text, joined, signed, substituted
+from planners.pddl.lifted import FALSE, And, Atom, Formula, Or, StepAtom, Truth
 from planners.pddl.model_options import Cost
 from planners.system.errors import BadInput, OutOfMemory, Position
 from planners.system.limits import memory_left, more_memory
@@ -93,12 +91,12 @@ class ComposingStepper(Stepper):
     def _pieces(self, rows: Rows, options: Options | None) -> Iterator[tuple[Ints, Labels]]:
         """At least one piece."""
         chosen = self.choices(rows) if options is None else options
-        possible = [self._possible(robot, rows, *own) for robot, own in enumerate(chosen)]
         sizes = np.ones(len(rows))
-        for own in possible:
-            sizes *= np.diff(own.first)
+        for first, _ in chosen:
+            sizes *= np.diff(first)
+        waits = [own.waits(rows, *its) for own, its in zip(self._robot, chosen, strict=True)]
         for span in list(spans(sizes, self.piece)) or [slice(0, 0)]:
-            yield self._compose(rows, possible, span)
+            yield self._compose(rows, chosen, waits, span)
 
     def choices(self, rows: Rows) -> Options:
         """For each robot the labels whose conditions on the state hold, by state (CSR)."""
@@ -166,47 +164,31 @@ class ComposingStepper(Stepper):
             for a, b in np.argwhere(~self.tables[i, j][np.ix_(mine, theirs)]).tolist():
                 yield i, j, int(mine[a]), int(theirs[b])
 
-    def _possible(self, robot: int, rows: Rows, first: Ints, label: Ints) -> _Options:
-        """One robot's options; those that no choice of the others makes possible are left out."""
-        row = np.repeat(np.arange(len(rows)), np.diff(first))
-        possible, waiting = self._robot[robot].clauses.waiting(rows, row, label)
-        if not possible.all():
-            row, label = row[possible], label[possible]
-            first = np.searchsorted(row, np.arange(len(rows) + 1))
-            waiting = waiting.only(possible)
-        return _Options(first, label, waiting)
-
-    def _compose(self, rows: Rows, options: Sequence[_Options], span: slice) -> tuple[Ints, Labels]:
+    def _compose(
+        self, rows: Rows, options: Options, waits: Sequence[Bools], span: slice
+    ) -> tuple[Ints, Labels]:
         source = np.arange(span.start, span.stop)
-        # By robot, its option and its label in each combination so far.
-        option: list[Ints] = []
-        chosen: list[Ints] = []
-
-        def keep(fits: Bools) -> None:
-            nonlocal source
-            if not fits.all():
-                kept = np.flatnonzero(fits)
-                source = source[kept]
-                option[:] = [own[kept] for own in option]
-                chosen[:] = [own[kept] for own in chosen]
-
-        for j, own in enumerate(options):
-            counts = own.first[source + 1] - own.first[source]
+        # By robot its option in each combination so far.
+        picked: list[Ints] = []
+        for j, (first, own) in enumerate(options):
+            counts = first[source + 1] - first[source]
             self._require_room(int(counts.sum()), j, len(rows[span]))
-            mine = ranges(own.first[source], counts)
+            mine = ranges(first[source], counts)
             each = np.repeat(np.arange(len(source)), counts)
-            source = source[each]
-            option[:] = [*(before[each] for before in option), mine]
-            chosen[:] = [*(before[each] for before in chosen), own.label[mine]]
+            source, picked = source[each], [*(before[each] for before in picked), mine]
             for i in range(j):
-                if (i, j) in self._apart:
-                    keep(self.tables[i, j][chosen[i], chosen[j]])
-        labels = np.stack(chosen, axis=1, dtype=np.int32, casting="same_kind")
+                if (i, j) not in self._apart:
+                    continue
+                fits = self.tables[i, j][options[i][1][picked[i]], own[picked[j]]]
+                if not fits.all():
+                    kept = np.flatnonzero(fits)
+                    source, picked = source[kept], [before[kept] for before in picked]
+        columns = [own[mine] for (_, own), mine in zip(options, picked, strict=True)]
+        labels = np.stack(columns, axis=1, dtype=np.int32, casting="same_kind")
         fits = np.ones(len(source), np.bool_)
         for i, robot in enumerate(self._robot):
-            if len(options[i].waiting.clause):
-                fits &= ~robot.clauses.unmet(options[i].waiting, option[i], labels)
-            robot.drop_unmet(fits, i, rows, source, labels)
+            asking = np.flatnonzero(fits & waits[i][picked[i]])
+            robot.drop_unmet(fits, asking, i, rows, source, labels)
         return (source, labels) if fits.all() else (source[fits], labels[fits])
 
     def _require_room(self, combinations: int, robot: int, states: int) -> None:
@@ -235,20 +217,8 @@ class ComposingStepper(Stepper):
         return (rows[source] & ~deletes) | adds, cost
 
 
-@dataclass(frozen=True, slots=True)
-class _Options:
-    """One robot's labels in a table of states, CSR.
-
-    ``waiting`` are the clauses about the step that each still has to meet.
-    """
-
-    first: Ints
-    label: Ints
-    waiting: Waiting
-
-
 class _Subactions:
-    """One robot's labels as tables: what they do, their ``cost``, and clauses about the step."""
+    """One robot's labels as tables: what they do, their ``cost``, and formulas about the step."""
 
     def __init__(
         self,
@@ -264,30 +234,56 @@ class _Subactions:
         # A shared subaction is paid once, by the first of its owners.
         own = [cost_of(a, cost) if a.owners[0] == robot else 0 for a in actions if a]
         self.cost = np.array([idling_cost, *own], np.int64)
-        of_label: dict[int, list[Clause]] = {}
-        #: Formulas about the step that have too many clauses, by label.
-        self._formulas: dict[int, list[Formula]] = {}
+        #: By label what it asks of the step, and what of the state is enough for that.
+        self._formulas: dict[int, tuple[Formula, Formula]] = {}
         for label, formulas in self.operators.step_formulas.items():
-            for formula in formulas:
-                found = clauses(formula, evaluator, robot, label)
-                if found is None:
-                    self._formulas.setdefault(label, []).append(formula)
-                else:
-                    of_label.setdefault(label, []).extend(found)
-        self.clauses = StepClauses(of_label, len(actions))
-        self._has_formula = np.zeros(len(actions), np.bool_)
-        self._has_formula[list(self._formulas)] = True
+            formula = _known(And(tuple(formulas)), evaluator, robot, label)
+            self._formulas[label] = formula, _enough(formula)
+        self._asks = np.zeros(len(actions), np.bool_)
+        self._asks[list(self._formulas)] = True
 
-    def drop_unmet(self, fits: Bools, robot: int, rows: Rows, source: Ints, labels: Labels) -> None:
-        """Clear ``fits`` where a formula of this robot's subaction about the step is not met."""
-        if not self._formulas:
-            return
-        asks = np.flatnonzero(self._has_formula[labels[:, robot]])
-        own = labels[asks, robot]
-        for label in np.flatnonzero(np.bincount(own)):
-            there = asks[own == label]
-            for formula in self._formulas[int(label)]:
-                fits[there] &= self._evaluator.holds(formula, rows, source[there], labels[there])
+    def waits(self, rows: Rows, first: Ints, label: Ints) -> Bools:
+        """Which options in the states of a table (CSR) depend on what the others choose."""
+        found = self._asks[label]
+        row = np.repeat(np.arange(len(rows)), np.diff(first))
+        for there in _by_value(np.flatnonzero(found), label):
+            _, enough = self._formulas[int(label[there[0]])]
+            found[there] = ~self._evaluator.holds(enough, rows, row[there])
+        return found
+
+    def drop_unmet(
+        self, fits: Bools, asking: Ints, robot: int, rows: Rows, source: Ints, labels: Labels
+    ) -> None:
+        """Clear ``fits`` where a formula about the step is not met, of the items ``asking``."""
+        own = labels[:, robot]
+        for there in _by_value(asking, own):
+            formula, _ = self._formulas[int(own[there[0]])]
+            fits[there] = self._evaluator.holds(formula, rows, source[there], labels[there])
+
+
+def _by_value(items: Ints, values: Numbers) -> list[Ints]:
+    """The items in groups of equal values."""
+    items = items[np.argsort(values[items], kind="stable")]
+    return np.split(items, np.flatnonzero(np.diff(values[items])) + 1) if len(items) else []
+
+
+def _enough(formula: Formula) -> Formula:
+    """What of the state makes a formula in negation normal form true, whatever the step is."""
+    if isinstance(formula, And | Or):
+        return joined(type(formula), map(_enough, formula.parts))
+    return FALSE if isinstance(signed(formula)[0], StepAtom) else formula
+
+
+def _known(formula: Formula, evaluator: Evaluator, robot: int, label: int) -> Formula:
+    """A formula of a robot's subaction about the step, without what is never or always so."""
+
+    def value(leaf: Atom | StepAtom) -> Formula:
+        if isinstance(leaf, Atom):
+            return leaf if leaf in evaluator.facts else FALSE
+        own = evaluator.subactions.get(leaf, (robot, -1))
+        return Truth(own[1] == label) if own[0] == robot else leaf
+
+    return substituted(formula, value)
 
 
 def cost_of(action: GroundAction, cost: Cost) -> int:
