@@ -2,10 +2,11 @@
 """Verification of a partition by definition, in code of its own.
 
 It shares the joint model and the plan spaces with the builders, nothing else.  A violation are n
-plans with one sentence whose mixture is no optimal plan.  They are looked for by walking n plans in
-step (`coordlang.verification.walk`), and where that walk grows, over the sets of what robots can do
-and say (`coordlang.verification.sets`).  Every walk is that of one goal, so of many tasks the goals
-are cut into portions, each a job, and the verdict is that of all portions together.
+plans with one sentence whose mixture is no optimal plan.  At the last node that such plans and
+their mixture share, their steps lead to different nodes, or mix to none of them.  Counting shows
+that most nodes are not of this kind; from the others the sets of what robots can do and say are
+walked (`coordlang.verification.sets`).  A walk is that of one goal, so of many tasks the goals are
+cut into portions, each a job, and the verdict is that of all portions together.
 """
 
 from __future__ import annotations
@@ -21,24 +22,20 @@ from coordlang.language.partition import Partition
 from coordlang.language.sentences import sentence
 from coordlang.required.miscoordination import Miscoordination, describe_failure
 from coordlang.verification.sets import SetWalk
-from coordlang.verification.walk import Grown, Walk
+from planners.joint.tables import Ints, unique_tuples
 from planners.parallel.batch import Batch, Table, digest
 from planners.parallel.workers import Workers
 from planners.search.plan_space import PlanSpace
 from planners.search.portions import PORTION, Source, cut
 from planners.system.limits import reaching
 
-#: Moves, for each node of the plan space, with which a walk of plans is given up.  A node of the
-#: walk over sets takes as long as some hundred moves, and on grids there are a fifth as many.
-GROWTH = 300.0
-
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
     """``holds`` says whether it is a coordination language for these tasks.
 
-    If not, ``witness`` shows one miscoordination.  ``tasks`` were checked with ``nodes`` nodes of
-    the walk.
+    If not, ``witness`` shows one miscoordination.  ``tasks`` were checked with ``nodes`` nodes:
+    those of the plan spaces that have steps to go, and those of the walk over sets.
     """
 
     holds: bool
@@ -47,24 +44,22 @@ class Verdict:
     witness: Miscoordination | None
 
 
-def verify(partition: Partition, spaces: Sequence[PlanSpace], growth: float = GROWTH) -> Verdict:
+def verify(partition: Partition, spaces: Sequence[PlanSpace]) -> Verdict:
     """Check a partition against the definition, for all tasks of ``spaces``.
 
     Every plan has a sentence under a partition, so RC-freeness of the plans of each sentence is all
-    there is to check.  ``growth`` says when walks of plans are given up, and changes only ``nodes``
-    and which violation is shown.
+    there is to check.
     """
     nodes = tasks = 0
     for space in spaces:
-        if not len(space):  # nothing leads to these goals
-            continue
-        word = partition.word_of(space.rows)[space.state]
-        try:
-            goal, walked = Walk(space, word, growth).run()
-        except Grown:
-            goal, walked = SetWalk(space, word).run()
-        nodes += walked
         tasks += len(space.starts)
+        nodes += int((space.layer > 0).sum())
+        parting = parting_nodes(space, partition.word_of(space.rows)[space.state])
+        if not len(parting):
+            continue
+        part = space.with_tasks(parting, np.zeros(len(parting), np.int64))
+        goal, walked = SetWalk(part, partition.word_of(part.rows)[part.state]).run()
+        nodes += walked
         if goal is not None:
             mine = space.goal[space.starts] == goal
             part = space.with_tasks(space.starts[mine], space.second[mine])
@@ -75,6 +70,32 @@ def verify(partition: Partition, spaces: Sequence[PlanSpace], growth: float = GR
             words = tuple(partition.words[number] for number in said)
             return Verdict(False, tasks, nodes + walked, describe_failure(part, trail, words))
     return Verdict(True, tasks, nodes, None)
+
+
+def parting_nodes(space: PlanSpace, word: Ints) -> Ints:
+    """Nodes at which plans that are together may part before their sentences do.
+
+    ``word`` (nodes) are the words; O(edges log edges).  From any other node the edges either all
+    enter words or none does, and those that enter one word lead to one node and are all that their
+    labels mix to: plans that say the same stay together, and with their mixture (Proposition 9 of
+    docs/concepts.md).
+    """
+    sources, targets = space.sources, space.targets()
+    said = np.where(word[targets] != word[sources], word[targets] + 1, 0)
+    bounds = [len(space), int(said.max(initial=0)) + 1]
+    groups, group = unique_tuples(np.column_stack((sources, said)), bounds)
+    mixtures = np.ones(len(groups))
+    for robot in range(space.robots):
+        labels = space.robot_labels(robot)
+        bounds = [max(1, len(groups)), int(labels.max(initial=0)) + 1, max(1, len(space))]
+        own, _ = unique_tuples(np.column_stack((group, labels, targets)), bounds)
+        mixtures *= np.bincount(own[:, 0], minlength=len(groups))
+    # Different edges differ in their labels.
+    is_open = mixtures != np.bincount(group, minlength=len(groups))
+    found: Ints = np.union1d(
+        groups[is_open, 0], np.intersect1d(sources[said == 0], sources[said > 0])
+    )
+    return found
 
 
 def verify_candidates(

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The composition walk over sets: what each robot can do and say, in place of n plans in step.
+"""The composition walk: what each robot can do and say, by sets in place of n plans in step.
 
 Of plan i a mixture has robot i's labels alone, and sentences are compared word by word.  So what
 matters of a plan are its *steps*: the label of robot i, and the word that is entered, if one is.
-`coordlang.verification.walk` carries n plans; this walk carries for each robot the set of the step
-sequences of all plans that began with its steps.  A node is ``(y, ahead_1 .. ahead_n)``: the node
-of the plan space that the mixture has reached, and for each robot the words that it has said while
-some other robot has not, with the set of its steps to come.
+The walk carries for each robot the set of the step sequences of all plans that began with its
+steps.  A node is ``(y, ahead_1 .. ahead_n)``: the node of the plan space that the mixture has
+reached, and for each robot the words that it has said while some other robot has not, with the set
+of its steps to come.
 
 It is cut off where the robots have no sentence in common, and where no choice of label sequences
 can fail from ``y``.  At the step by which a mixture fails labels cease to matter: it is a violation
@@ -20,13 +20,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from itertools import pairwise
+from math import prod
 from typing import Any
 
 import numpy as np
 
 from coordlang.required.miscoordination import Trail
-from coordlang.verification.walk import numbered
-from planners.joint.tables import Bools, Ints, ranges, unique_tuples
+from planners.joint.tables import Ints
 from planners.search.edge_index import EdgeTrees
 from planners.search.plan_space import PlanSpace
 from planners.system.limits import reaching
@@ -117,82 +117,6 @@ class SequenceSets:
         return True, [pair for pair, answer in zip(below, known, strict=True) if answer is None]
 
 
-class Continuations:
-    """The continuations of every robot at the nodes of a plan space, and where mixtures fail.
-
-    A *continuation* of robot i at a node is the sequence of its labels on some optimal plan from
-    there.  If those of robot i at ``x_i`` are continuations at ``y``, for all robots, and no
-    mixture of plans from ``y`` fails, then no mixture of plans from ``x_1 .. x_n`` fails from ``y``
-    (Proposition 12 of docs/concepts.md).
-
-    ``of`` (robots, nodes) are numbers of ``sets``.  ``fails`` (nodes) says from which nodes some
-    mixture of plans is no optimal plan: those from which a node is reached where either the robots'
-    first labels have more combinations than there are edges, or a robot may go on, after the label
-    of an edge, in a way that this edge does not allow, but another one with that label does.
-    O(edges log edges), and the work of the sets.
-    """
-
-    def __init__(self, space: PlanSpace) -> None:
-        self.sets = SequenceSets()
-        self.of: Ints = np.full((space.robots, len(space)), _EMPTY, np.int64)
-        self._combinations = np.ones(len(space))
-        self._loses = np.zeros(len(space), np.bool_)
-
-        def so_far() -> str:
-            return f"{len(self.sets):,} sets of what robots can still do"
-
-        with reaching(so_far, space.model.smaller("smaller tasks")):
-            for robot in range(space.robots):
-                self._fill(space, robot)
-        # Different edges differ in their labels.
-        here = self._combinations > np.maximum(1, space.out_degrees)
-        self.fails: Bools = space.ancestors(here | self._loses)
-
-    def _fill(self, space: PlanSpace, robot: int) -> None:
-        """One robot's continuations, goals first."""
-        mine = self.of[robot]
-        labels = int(space.robot_labels(robot).max(initial=0)) + 1
-        for below in space.edges_by_layer():
-            low, high = int(below.source[0]), int(below.source[-1]) + 1
-            table = np.column_stack(
-                (below.source - low, space.robot_labels(robot, below.edges), mine[below.target])
-            )
-            rows, _ = unique_tuples(table, [high - low, labels, len(self.sets)])
-            fresh = np.ones(len(rows), np.bool_)
-            fresh[1:] = (rows[1:, :2] != rows[:-1, :2]).any(axis=1)
-            moves, move = rows[fresh], np.cumsum(fresh) - 1
-            several = np.bincount(move) > 1
-            moves[several, 2] = self._unions(move, rows[:, 2], several)
-            self._loses[low + rows[rows[:, 2] != moves[move, 2], 0]] = True
-            mine[low:high] = self._sets(moves, high - low, labels)
-            self._combinations[low:high] *= np.bincount(moves[:, 0])
-
-    def _unions(self, move: Ints, member: Ints, several: Bools) -> Ints:
-        """The unions for the moves that have several members."""
-        rows = several[move]
-        owner = (np.cumsum(several) - 1)[move[rows]]
-        pairs = np.column_stack((owner, member[rows]))
-        kind, some = numbered(np.zeros(int(several.sum()), np.int64), pairs, [len(self.sets)])
-        unions = [self.sets.union(tuple(own)) for own in _lists(pairs[:, 0], pairs[:, 1], some)]
-        return np.array(unions, np.int64)[kind]
-
-    def _sets(self, moves: Ints, nodes: int, labels: int) -> Ints:
-        """The set of each node of a layer, by its moves (node, label, what follows)."""
-        kind, some = numbered(np.zeros(nodes, np.int64), moves, [labels, len(self.sets)])
-        sets = [
-            self.sets.number(map(tuple, own)) for own in _lists(moves[:, 0], moves[:, 1:], some)
-        ]
-        return np.array(sets, np.int64)[kind]
-
-
-def _lists(owner: Ints, entries: Ints, some: Ints) -> list[list]:  # type: ignore[type-arg]
-    """The entries of some owners, as lists; ``owner`` is ascending."""
-    first = np.searchsorted(owner, some)
-    counts = np.searchsorted(owner, some, side="right") - first
-    listed = entries[ranges(first, counts)].tolist()
-    return [listed[start:end] for start, end in pairwise([0, *np.cumsum(counts).tolist()])]
-
-
 #: Words, one after another.
 Words = tuple[int, ...]
 #: What each robot has said that some other has not, and the set of steps that may follow.
@@ -280,17 +204,22 @@ class SetWalk:
         self._base = int(word.max(initial=0)) + 2
         self._labels: list[list[int]] = space.labels.tolist()
         self._targets: list[int] = space.targets().tolist()
-        continuations = Continuations(space)
-        #: Label sequences; of each node every robot's set, and whether some mixture fails.
-        self._sequences, self._fails = continuations.sets, continuations.fails.tolist()
-        self._optimal = list(zip(*continuations.of.tolist(), strict=True))
-        self._steps, self._sentences = SequenceSets(), SentenceSets()
+        self._sequences, self._steps = SequenceSets(), SequenceSets()
+        self._sentences = SentenceSets()
         #: Of each set of steps its sentences, and its label sequences.
-        self._said, self._done = [self._sentences.silence], [0]
+        self._said, self._done = [self._sentences.silence], [_EMPTY]
         self._saying: dict[tuple[int, int], int] = {}
         self._edges = EdgeTrees(space)
-        self._of = self._sets_of_nodes()
-        self._look_at_sets()
+
+        def so_far() -> str:
+            return f"{len(self._steps):,} sets of what robots can do and say"
+
+        with reaching(so_far, space.model.smaller("smaller tasks")):
+            self._of = self._sets_of_nodes()
+            self._look_at_sets()
+            #: Of each node every robot's label sequences, and whether some mixture of them fails.
+            self._optimal = [tuple(self._done[own] for own in sets) for sets in self._of]
+            self._fails = self._failing_nodes()
 
     # ---- sets of steps
 
@@ -304,6 +233,28 @@ class SetWalk:
                     own[robot].setdefault(self._step(robot, node, edge), set()).add(below)
             of.append(tuple(_united(self._steps, moves) for moves in own))
         return of
+
+    def _failing_nodes(self) -> list[bool]:
+        """Whether some mixture of the plans from each node is no optimal plan, whatever is said.
+
+        It is if the robots' first labels have more combinations than there are edges, which differ
+        in their labels; if some robot may go on, after the label of an edge, in a way that this
+        edge does not allow; or if a mixture fails from where an edge leads.
+        """
+        fails: list[bool] = []
+        for node, own in enumerate(self._optimal):
+            moves, edges = (
+                [self._sequences.moves[number] for number in own],
+                self._space.out_edges(node),
+            )
+
+            def goes_wrong(edge: int, moves: Sequence[dict[int, int]] = moves) -> bool:
+                after = tuple(m[label] for m, label in zip(moves, self._labels[edge], strict=True))
+                target = self._targets[edge]
+                return fails[target] or after != self._optimal[target]
+
+            fails.append(prod(map(len, moves)) > len(edges) or any(map(goes_wrong, edges)))
+        return fails
 
     def _step(self, robot: int, node: int, edge: int) -> int:
         """A robot's label on an edge out of a node and the word entered, as one number."""
