@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from functools import cache
-from itertools import islice
+from itertools import islice, product
 from random import Random
 
 import numpy as np
@@ -16,10 +16,11 @@ from coordlang.language.partition import Partition
 from coordlang.required.choices import Choices
 from coordlang.required.divergences import DivergenceSearch, first_differences
 from coordlang.required.miscoordination import Miscoordination, inseparable, miscoordination
-from coordlang.verification.by_definition import verify
+from coordlang.verification.by_definition import parting_nodes, verify
 from planners.pddl.model_options import ModelOptions
 from tests.support import naive
 from tests.support.candidates import listed, small_candidates
+from tests.support.random_spaces import random_spaces, runs
 from tests.support.texts import parsed
 
 #: (robots, plans of one task that the twin lists at most, models)
@@ -111,6 +112,27 @@ def check_witness(candidates: Candidates, table: Partition, witness: Miscoordina
             if len({naive.sentence([word[s] for s in states]) for states in passed}) == 1:
                 return
     raise AssertionError("no task has these plans with one sentence and a failing mixture")
+
+
+@pytest.mark.parametrize(("robots", "seeds"), runs(60, 30, 30))
+def test_nodes_at_which_plans_may_part(robots: int | None, seeds: range) -> None:
+    """Where edges that do not enter different words differ in where they, or their mixture, lead."""
+    met: Counter[bool] = Counter()
+    random = np.random.default_rng(0)
+    for _, space in random_spaces(seeds, robots, most=200):
+        words = random.integers(1, 4, len(space))
+        found = set(parting_nodes(space, words).tolist())
+        for node in range(len(space)):
+            own = {space.labels_of(e): space.target_of(e) for e in space.out_edges(node)}
+            parts = any(
+                len({words[own[s]] for s in steps if words[own[s]] != words[node]}) < 2
+                and {own[s] for s in steps}
+                != {own.get(tuple(step[robot] for robot, step in enumerate(steps)))}
+                for steps in product(own, repeat=space.robots)
+            )
+            assert (node in found) == parts
+            met[parts] += 1
+    assert min(met[True], met[False]) >= 40
 
 
 def test_sets_of_steps_of_long_plans() -> None:
