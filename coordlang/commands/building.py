@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from itertools import count
@@ -17,7 +18,7 @@ from coordlang.commands.records import BuildPreference, MethodOptions
 from coordlang.commands.witness import witness_data, witness_text
 from coordlang.explanation.simple import simple
 from coordlang.language.candidates import Candidates, require_solvable
-from coordlang.language.partition import Partition, keys_of, read_keys
+from coordlang.language.partition import Partition, read_key
 from coordlang.language.provenance import Guarantee, Tolerance, provenance_of
 from coordlang.language.warping import Clause
 from coordlang.language.words import Language
@@ -325,14 +326,14 @@ class _Old:
 
     @classmethod
     def of(cls, language: Language, candidates: Candidates) -> _Old:
-        _, wrong = read_keys(candidates.model.codec, language.states)
-        if len(wrong):
-            gone = set(wrong.tolist())
-            kept = [item for n, item in enumerate(language.states.items()) if n not in gone]
-            language = replace(language, states=dict(kept))
-        partition = language.partition(candidates.model)
+        kept = {}
+        for key, word in language.states.items():
+            with suppress(BadInput):
+                read_key(candidates.model.codec, key)
+                kept[key] = word
+        partition = replace(language, states=kept).partition(candidates.model)
         listed = find_rows(partition.rows, candidates.rows)
-        return cls(candidates, partition, listed, len(wrong))
+        return cls(candidates, partition, listed, len(language.states) - len(kept))
 
     def words_of(self, states: Sequence[int]) -> dict[int, int]:
         """The word numbers of those states that the language lists."""
@@ -360,7 +361,7 @@ class _Old:
         """The changed states, sorted by their keys."""
         rows = self.candidates.rows[list(result.changed)]
         names = zip(
-            keys_of(self.candidates.model.codec, rows),
+            map(self.candidates.model.codec.key, rows),
             self.partition.word_of(rows).tolist(),
             partition.word_of(rows).tolist(),
             strict=True,

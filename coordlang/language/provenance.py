@@ -12,7 +12,6 @@ from msgspec import Meta
 
 from coordlang.language.candidates import Candidates
 from coordlang.language.listed import task_data
-from coordlang.language.partition import keys_of
 from planners.joint.model import SLACK_LEFT, show
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import MOST_SLACK
@@ -208,7 +207,7 @@ def domain_sha256(domain: Domain) -> str:
 
 def states_sha256(candidates: Candidates) -> str:
     """A hash of the reachable states, by their keys: what all pairs are made of."""
-    keys = sorted(keys_of(candidates.model.codec, candidates.rows))
+    keys = sorted(map(candidates.model.codec.key, candidates.rows))
     return sha256("\n".join(keys).encode()).hexdigest()
 
 

@@ -6,17 +6,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from itertools import islice
 from os import PathLike, fspath
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
-from coordlang.language.partition import Partition, keys_of, read_keys
+from coordlang.language.partition import Partition, read_key
 from coordlang.language.provenance import Guarantee, Provenance, Tolerance, UnknownFailures
 from planners.joint.model import JointModel
-from planners.system.errors import BadInput
-from planners.system.messages import echoed
 from planners.system.notebook import counted, html_table
 
 
@@ -39,7 +36,7 @@ class Language:
     ) -> Language:
         """The language that gives the states of ``model`` the words of a partition."""
         words = partition.words
-        keys = keys_of(model.codec, partition.rows)
+        keys = map(model.codec.key, partition.rows)
         states = zip(keys, (words[word] for word in partition.word.tolist()), strict=True)
         return cls(
             words,
@@ -116,21 +113,7 @@ class Language:
         word = np.fromiter(
             map(number.__getitem__, self.states.values()), np.int64, len(self.states)
         )
-        rows, wrong = read_keys(model.codec, self.states)
-        if len(wrong):
-            _refuse(model, next(islice(self.states, int(wrong[0]), None)))
+        rows = np.zeros((len(self.states), model.codec.width), np.uint64)
+        for state, key in enumerate(self.states):
+            rows[state] = read_key(model.codec, key)
         return Partition.of_table(self.words, rows, word, number[self.default])
-
-
-def _refuse(model: JointModel, key: str) -> NoReturn:
-    try:
-        row = model.codec.parse_key(key)
-    except BadInput as error:
-        raise BadInput(
-            f"the language maps a state that this problem cannot have: {error.what}",
-            remedy="Give the problem that the language was built for.",
-        ) from None
-    raise BadInput(
-        f"{echoed(key)} is no key of a state; it would be {echoed(model.codec.key(row))}",
-        remedy="A key lists the true fluents, sorted, joined by one space.",
-    )

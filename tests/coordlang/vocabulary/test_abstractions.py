@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from coordlang.language.candidates import Candidates
-from coordlang.language.partition import keys_of
 from coordlang.symmetry.group import symmetry_group
 from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
 from planners.joint.tables import Ints
@@ -21,7 +20,7 @@ Cell = tuple[int, int]
 
 def places(candidates: Candidates) -> list[list[Cell]]:
     """Where each robot is, in each state."""
-    keys = keys_of(candidates.model.codec, candidates.rows)
+    keys = [candidates.model.codec.key(row) for row in candidates.rows]
     at = [sorted(re.findall(r"\(at (r\d) c(\d+)-(\d+)\)", key)) for key in keys]
     return [[(int(row), int(column)) for _, row, column in state] for state in at]
 
