@@ -280,40 +280,25 @@ class _Mixing:
         return np.column_stack((state[self._node[sets[:, 0]]], state[self._target[sets]]))
 
     def failing(self, sets: Ints, number: Ints, count: int) -> Bools:
-        """Which of ``count`` sets of states fail in some way; ``number`` says which each set is.
-
-        Those that nothing is known of are looked at one by one at the end.
-        """
-        fails, asked = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
-        choices, size, robots = self._choices, sets.shape[1], self._space.robots
-        given = [way for way in product(range(size), repeat=robots) if len(set(way)) == size]
-        for assigned in given:
+        """Which of ``count`` sets of states fail in some way; ``number`` says which each set is."""
+        fails = np.zeros(count, np.bool_)
+        size, robots = sets.shape[1], self._space.robots
+        for assigned in product(range(size), repeat=robots):
+            if len(set(assigned)) < size:
+                continue
             rows = np.flatnonzero(~fails[number])
-            row, target, chosen, missing = self._mixed(sets[rows][:, assigned])
+            row, nodes, missing = self._mixed(sets[rows][:, assigned])
             fails[number[rows[missing]]] = True
             which = number[rows[row]]
-            for robot in range(robots):
-                left = np.flatnonzero(~fails[which])
-                theirs = choices.of_node[robot, target[left]]
-                lost = ~choices.sets.within_each(chosen[left, robot], theirs)
-                fails[which[left[lost]]] = True
-            asked[which[choices.requires[target]]] = True
-        for assigned in given:
-            rows = np.flatnonzero(asked[number] & ~fails[number])
-            row, target, chosen, _ = self._mixed(sets[rows][:, assigned])
-            open_rows = choices.requires[target]
-            columns = (number[rows[row]], target, chosen)
-            every = (column[open_rows].tolist() for column in columns)
-            for which_set, node, mine in zip(*every, strict=True):
-                if not fails[which_set] and choices.fails(tuple(mine), node):
-                    fails[which_set] = True
+            left = np.flatnonzero(~fails[which])
+            fails[which[left[self._choices.fails_each(nodes[left])]]] = True
         return fails
 
-    def _mixed(self, ways: Ints) -> tuple[Ints, Ints, Ints, Ints]:
+    def _mixed(self, ways: Ints) -> tuple[Ints, Ints, Ints]:
         """The edges that mix the ways given to the robots.
 
-        (numbers of the rows that they are for, their targets, the robots' choices after the nodes
-        that they were given, the rows where an edge is missing).
+        (numbers of the rows that they are for, the nodes that the robots were given and where the
+        edges lead, the rows where an edge is missing).
         """
         row = np.arange(len(ways))
         prefix = self._node[ways[:, 0]]
@@ -327,9 +312,8 @@ class _Mixing:
             prefix = self._index.follow(robot, prefix, labels[own])
             missing.append(row[prefix < 0])
             row, prefix = row[prefix >= 0], prefix[prefix >= 0]
-        following = self._target[ways[row]]
-        chosen = self._choices.of_node[np.arange(following.shape[1]), following]
-        return row, self._space.targets(prefix), chosen, np.concatenate(missing)
+        nodes = np.column_stack((self._target[ways[row]], self._space.targets(prefix)))
+        return row, nodes, np.concatenate(missing)
 
 
 #: Pairs of a goal and a state, times robots, from which on symmetries are looked for: below, what

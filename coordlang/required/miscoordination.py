@@ -8,9 +8,11 @@ node have different labels, so no more mixed actions are looked at than it has e
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -25,8 +27,11 @@ from planners.system.limits import reaching
 
 #: The labels of all robots in one joint step.
 Labels = tuple[int, ...]
-#: Nodes ``(D_1 .. D_n, y)`` from which some mixture fails, and the mixed labels on a way to them.
-_Failing = dict[tuple[int, ...], tuple[Labels, ...]]
+#: A node of a walk: what the plans may still do, and where their mixture is.
+_Node = tuple[Any, int]
+#: How a walk came to a node: the way before, the mixed labels and what the plans may do after them;
+#: at the beginning the number of a node of the plan space.
+_Way = int | tuple["_Way", Labels, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +42,48 @@ class Trail:
     edges: tuple[tuple[int, ...], ...]
 
 
-# ---- any plans
+def _first_break(
+    space: PlanSpace,
+    begin: Iterable[_Node],
+    steps: Callable[[Any], Iterable[tuple[Labels, Any]]],
+    can_fail: Callable[[Any, int], bool],
+) -> tuple[int, list[tuple[Labels, Any]]] | None:
+    """Where a walk begins that ends with a mixture that breaks, and its steps; None if none does.
+
+    Breadth first; it begins at some nodes.  ``steps`` are for what plans may do the mixed labels,
+    each with what they may do then; where no mixture ``can_fail`` it goes no further.
+    """
+    begins: dict[int, dict[_Node, _Way]] = defaultdict(dict)
+    for node in begin:
+        begins[int(space.layer[node[1]])][node] = node[1]
+    below: dict[_Node, _Way] = {}
+    layer = walked = 0
+
+    def so_far() -> str:
+        return f"{walked:,} nodes walked to the first break of a mixture, {layer} steps left"
+
+    with reaching(so_far, space.model.smaller("smaller tasks")):
+        for layer in range(len(space.layers) - 1, 0, -1):
+            here, below = {**below, **begins[layer]}, {}
+            walked += len(here)
+            for (ahead, y), way in here.items():
+                edges = space.out_edges(y)
+                targets = {space.labels_of(edge): space.target_of(edge) for edge in edges}
+                for mixed, after in steps(ahead):
+                    target = targets.get(mixed)
+                    if target is None:
+                        return _steps_of((way, mixed, after))
+                    if (after, target) not in below and can_fail(after, target):
+                        below[after, target] = way, mixed, after
+    return None
+
+
+def _steps_of(way: _Way) -> tuple[int, list[tuple[Labels, Any]]]:
+    found: list[tuple[Labels, Any]] = []
+    while not isinstance(way, int):
+        way, mixed, after = way
+        found.append((mixed, after))
+    return way, found[::-1]
 
 
 def earliest_witness(choices: Choices, start: int) -> Trail:
@@ -45,49 +91,23 @@ def earliest_witness(choices: Choices, start: int) -> Trail:
 
     As many robots as is easily possible follow the same plan.
     """
-    labels = _earliest_labels(choices, start)
     space = choices.space
+
+    def steps(chosen: tuple[int, ...]) -> Iterator[tuple[Labels, tuple[int, ...]]]:
+        moves = [choices.sets.moves(number) for number in chosen]
+        for labels in product(*moves):
+            yield labels, tuple(own[label] for own, label in zip(moves, labels, strict=True))
+
+    begin = tuple(choices.of_node[:, start].tolist()), start
+    found = _first_break(space, [begin], steps, choices.fails)
+    assert found is not None, "the node requires coordination"
+    labels = [mixed for mixed, _ in found[1]]
 
     def plan_of(robots: Sequence[int]) -> list[int] | None:
         return space.path_of_robots(start, robots, [[step[r] for r in robots] for step in labels])
 
     plans = _shared_plans(space.robots, plan_of)
     return Trail(start, tuple(zip(*(plan[: len(labels)] for plan in plans), strict=True)))
-
-
-def _earliest_labels(choices: Choices, start: int) -> list[Labels]:
-    """The mixed labels, step by step, of a failing choice that breaks earliest; the last breaks."""
-    layer: _Failing = {(*choices.of_node[:, start].tolist(), start): ()}
-    steps = 0
-
-    def so_far() -> str:
-        return (
-            f"{steps} of {int(choices.space.layer[start])} steps to the first break of a mixture, "
-            f"{len(layer):,} nodes"
-        )
-
-    with reaching(so_far, choices.space.model.smaller("smaller tasks")):
-        while True:
-            layer, broken = _steps_of_choices(choices, layer)
-            if broken is not None:
-                return broken
-            steps += 1
-
-
-def _steps_of_choices(choices: Choices, layer: _Failing) -> tuple[_Failing, list[Labels] | None]:
-    """The failing choices one step on; or none, and the labels up to the first break."""
-    below: _Failing = {}
-    for (*chosen, node), path in layer.items():
-        moves = [choices.sets.moves(number) for number in chosen]
-        edges = choices.edges_of(node)
-        for labels in product(*moves):
-            target = edges.get(labels)
-            if target is None:
-                return {}, [*path, labels]
-            after = tuple(own[label] for own, label in zip(moves, labels, strict=True))
-            if (*after, target) not in below and choices.fails(after, target):
-                below[*after, target] = (*path, labels)
-    return below, None
 
 
 def _shared_plans(
@@ -113,39 +133,49 @@ def _shared_plans(
 
 # ---- plans through the same states
 
-#: Edges that join the same two nodes: plans through the same states choose among them freely.
-_Bundle = list[int]
-#: A node ``(x, y)`` of the walk: where the plans are, and where their mixture is.
-_Pair = tuple[int, int]
-#: How the walk came to a node: the way before, and what the plans and their mixture did; at the
-#: beginning the number of a node of the plan space.
-_Way = int | tuple["_Way", _Bundle, Labels]
-
 
 def witness_in_same_states(space: PlanSpace) -> Trail | None:
     """Plans of some task that pass through the same states and yet introduce RC, or None.
 
-    While all mixtures of the edges between two states are edges between them, the mixture is where
-    the plans are.  So the walk begins only where some are not; O(nodes of a layer) for each node in
-    the worst case.
+    Plans through the same states choose freely among the edges between two of them.  While all
+    mixtures of these are such edges, the mixture is where the plans are.  So the walk begins only
+    where some are not; O(nodes of a layer) for each node in the worst case.
     """
-    leaking = np.flatnonzero(_leaks(space))
-    arriving: dict[_Pair, _Way] = {}
-    steps = nodes = 0
 
-    def so_far() -> str:
-        return f"{steps} of {len(space.layers) - 1} steps along equal states, {nodes:,} nodes"
+    def steps(x: int) -> Iterator[tuple[Labels, int]]:
+        joining: dict[int, list[Labels]] = {}
+        for edge in space.out_edges(x):
+            joining.setdefault(space.target_of(edge), []).append(space.labels_of(edge))
+        for target in sorted(joining):
+            own = (sorted(set(labels)) for labels in zip(*joining[target], strict=True))
+            yield from ((mixed, target) for mixed in product(*own))
 
-    with reaching(so_far, space.model.smaller("smaller tasks")):
-        for layer in range(len(space.layers) - 1, 0, -1) if len(leaking) else ():
-            here = leaking[space.layer[leaking] == layer].tolist()
-            ways = {pair: arriving[pair] for pair in sorted(arriving)}
-            ways.update(((node, node), node) for node in here)
-            steps, nodes = steps + 1, nodes + len(ways)
-            arriving, broken = _steps_in_same_states(space, ways)
-            if broken is not None:
-                return _trail_in_same_states(space, broken)
-    return None
+    leaking = np.flatnonzero(_leaks(space)).tolist()
+    begin = ((node, node) for node in leaking)
+    found = _first_break(space, begin, steps, lambda x, y: x != y)
+    if found is None:
+        return None
+    node, mixture = found
+
+    def plan_of(robots: Sequence[int]) -> list[int] | None:
+        path, at = [], node
+        for mixed, target in mixture:
+            own = (
+                edge
+                for edge in space.out_edges(at)
+                if space.target_of(edge) == target
+                and all(space.labels_of(edge)[r] == mixed[r] for r in robots)
+            )
+            if (edge := next(own, None)) is None:
+                return None
+            path.append(edge)
+            at = target
+        return path
+
+    plans = _shared_plans(space.robots, plan_of)
+    start, before = way_to(space, node)
+    shared = [(edge,) * space.robots for edge in before]
+    return Trail(start, (*shared, *zip(*plans, strict=True)))
 
 
 def _leaks(space: PlanSpace) -> Bools:
@@ -166,51 +196,7 @@ def _leaks(space: PlanSpace) -> Bools:
     return found
 
 
-def _steps_in_same_states(
-    space: PlanSpace, ways: Mapping[_Pair, _Way]
-) -> tuple[dict[_Pair, _Way], _Way | None]:
-    """The nodes off the diagonal one step on, and the first mixture that breaks, if any does."""
-    below: dict[_Pair, _Way] = {}
-    for (x, y), way in ways.items():
-        bundles: dict[int, _Bundle] = {}
-        for edge in space.out_edges(x):
-            bundles.setdefault(space.target_of(edge), []).append(edge)
-        targets = {space.labels_of(edge): space.target_of(edge) for edge in space.out_edges(y)}
-        for target in sorted(bundles):
-            labels = zip(*map(space.labels_of, bundles[target]), strict=True)
-            for mixed in product(*(sorted(set(own)) for own in labels)):
-                longer = (way, bundles[target], mixed)
-                if mixed not in targets:
-                    return {}, longer
-                if targets[mixed] != target:
-                    below.setdefault((target, targets[mixed]), longer)
-    return below, None
-
-
-def _trail_in_same_states(space: PlanSpace, way: _Way) -> Trail:
-    """The plans behind a break: from a start to where the mixture leaves them, and on."""
-    steps: list[tuple[_Bundle, Labels]] = []
-    while not isinstance(way, int):
-        way, edges, mixed = way
-        steps.insert(0, (edges, mixed))
-    start, before = _way_to(space, way)
-
-    def plan_of(robots: Sequence[int]) -> list[int] | None:
-        path = []
-        for edges, mixed in steps:
-            labels = [mixed[r] for r in robots]
-            own = (e for e in edges if [space.labels_of(e)[r] for r in robots] == labels)
-            if (edge := next(own, None)) is None:
-                return None
-            path.append(edge)
-        return path
-
-    plans = _shared_plans(space.robots, plan_of)
-    shared = [(edge,) * space.robots for edge in before]
-    return Trail(start, (*shared, *zip(*plans, strict=True)))
-
-
-def _way_to(space: PlanSpace, node: int) -> tuple[int, list[int]]:
+def way_to(space: PlanSpace, node: int) -> tuple[int, list[int]]:
     """The nearest start of a task on whose plans a node lies, and the edges from it to the node."""
     leads = space.ancestors(np.array([node]))
     starts = space.starts[leads[space.starts]]

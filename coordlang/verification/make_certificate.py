@@ -11,6 +11,7 @@ import numpy as np
 from coordlang.language.candidates import Candidates
 from coordlang.language.listed import goal_text
 from coordlang.language.warping import Clause, pair, warping_path
+from coordlang.required.miscoordination import way_to
 from coordlang.verification.certificate_file import (
     Certificate,
     Reason,
@@ -22,7 +23,6 @@ from coordlang.vocabulary.clauses import without_implied
 from coordlang.vocabulary.job import Evidence
 from coordlang.vocabulary.sat import PartitionProblem, Undecided, satisfiable
 from planners.joint.states import split_atoms
-from planners.search.plan_space import PlanSpace
 from planners.search.sat import sat_solver
 
 #: Conflicts, of one partition on the way to a core and of its last reduction, after which it is
@@ -48,7 +48,7 @@ def _reason(candidates: Candidates, clause: Clause, evidence: Evidence) -> Reaso
     """The plans behind a clause, from a candidate task's start on, with their warping paths."""
     space, example, symmetry = evidence.space, evidence.example, evidence.symmetry
     model = candidates.model
-    start, prefix = _way_to(space, example.start)
+    start, prefix = way_to(space, example.start)
     before = space.state[space.nodes_on(start, prefix)[:-1]].tolist()
     init = model.codec.decode(space.rows[space.state[start]])
     goal = split_atoms(goal_text(model, space.goals[space.goal[start]]))
@@ -69,18 +69,6 @@ def _reason(candidates: Candidates, clause: Clause, evidence: Evidence) -> Reaso
         assert cells is not None, "the clause was made from warping paths of these plans"
         paths.append(WarpingPath((robots[0], robot), cells))
     return Reason(init, goal, [plans[robots.index(n)] for n in range(len(robots))], paths)
-
-
-def _way_to(space: PlanSpace, node: int) -> tuple[int, list[int]]:
-    """A path to a node of the plan space: (the node of a task's start, edges)."""
-    starts = set(space.starts.tolist())
-    sources, targets = space.sources, space.targets()
-    edges: list[int] = []
-    while node not in starts:
-        edge = int(np.flatnonzero(targets == node)[0])
-        edges.append(edge)
-        node = int(sources[edge])
-    return node, edges[::-1]
 
 
 # ---- few clauses that still refute
