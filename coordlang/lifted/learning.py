@@ -11,7 +11,7 @@ from.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
@@ -30,7 +30,7 @@ from coordlang.sites.coordinates import Point
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.verification.by_definition import verify_candidates
 from coordlang.vocabulary.refuter import Refuter
-from coordlang.vocabulary.sat import PartitionProblem, Undecided, satisfiable
+from coordlang.vocabulary.sat import PartitionProblem, Undecided, at_most, satisfiable
 from planners.joint.tables import Bools, Ints
 from planners.parallel.workers import Workers
 from planners.search.sat import sat_solver
@@ -94,34 +94,12 @@ def _lightest(
     weights: Sequence[int], clauses: Sequence[Sequence[int]], bound: int
 ) -> list[int] | None:
     """Members with at most a total weight, by position; None if there are none."""
-    with sat_solver("cadical153", [*_at_most(weights, bound), *clauses]) as solver:
+    weighted = [var for var, weight in enumerate(weights, 1) for _ in range(weight)]
+    light, _ = at_most(weighted, bound, len(weights))
+    with sat_solver("cadical153", [*light, *clauses]) as solver:
         if not satisfiable(solver):
             return None
         return [var - 1 for var in solver.get_model() if 0 < var <= len(weights)]
-
-
-def _at_most(weights: Sequence[int], bound: int) -> Iterator[list[int]]:
-    """Clauses by which members weigh at most so much together, as a sequential weighted counter.
-
-    Variable 1 + k is member k; ``count(k, j)``: the members up to k weigh at least 1 + j.
-    """
-
-    def count(member: int, number: int) -> int:
-        return len(weights) + 1 + member * bound + number
-
-    for member, weight in enumerate(weights):
-        if member:
-            for number in range(bound):
-                yield [-count(member - 1, number), count(member, number)]
-        if weight > bound:
-            yield [-member - 1]
-            continue
-        yield from ([-member - 1, count(member, number)] for number in range(weight))
-        if not member:
-            continue
-        for number in range(bound - weight):
-            yield [-member - 1, -count(member - 1, number), count(member, number + weight)]
-        yield [-member - 1, -count(member - 1, bound - weight)]
 
 
 #: Conflicts that the solver may spend on one partition.
