@@ -22,11 +22,11 @@ from coordlang.language.warping import Clause, pair
 from coordlang.symmetry.graph import LARGEST_GRAPH, Renaming, automorphism_generators, joined_order
 from planners.grounding.actions import GroundAction
 from planners.joint.model import FullState, Goal
-from planners.joint.tables import Ints, find_rows
+from planners.joint.states import StateCodec
+from planners.joint.tables import Ints, Rows, find_rows, unique_tuples
 from planners.pddl.formula_tree import Compound, Leaf, fold
 from planners.pddl.lifted import Atom, StepAtom
 from planners.pddl.robots import natural
-from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 
 #: Elements of the largest group that is used, the identity among them: each multiplies the clauses.
@@ -51,7 +51,7 @@ class Symmetry:
 
     def text(self, text: str) -> str:
         """The image of an atom, a formula or a subaction, as text with single spaces."""
-        return re.sub(r"(?<= )[^ ()]+", lambda match: self.renaming.get(match[0], match[0]), text)
+        return _renamed(self.renaming, text)
 
     def robot(self, robots: Sequence[str], number: int) -> int:
         """The number of the robot that robot ``number`` goes to."""
@@ -65,6 +65,23 @@ class Symmetry:
         for number, text in enumerate(texts):
             image[self.robot(robots, number)] = self.text(text) if text is not None else None
         return tuple(image)
+
+
+def _renamed(renaming: Renaming, text: str) -> str:
+    return re.sub(r"(?<= )[^ ()]+", lambda match: renaming.get(match[0], match[0]), text)
+
+
+def _images(renaming: Renaming, codec: StateCodec, rows: Rows) -> Rows | None:
+    """The images of a table of states; None if a fact that is true in one goes to none."""
+    images = np.zeros_like(rows)
+    for fact, text in enumerate(codec.facts.texts):
+        true = codec.column(rows, fact)
+        if true.any():
+            image = codec.facts.number_of(_renamed(renaming, text))
+            if image is None:
+                return None
+            codec.set(images, true, [image])
+    return images
 
 
 @dataclass(frozen=True)
@@ -177,10 +194,10 @@ class _Check:
         image = _Image(renaming, self._model.codec.facts.atoms)
         if not self._keeps_robots(renaming) or not self._keeps_actions(image):
             return None
-        states = self._states_under(image)
-        if states is None or self._tasks_under(image, states) != self._tasks:
+        rows = _images(renaming, self._model.codec, self._rows)
+        if rows is None or (states := find_rows(self._rows, rows)).min(initial=0) < 0:
             return None
-        return states
+        return states if self._tasks_under(image, states) == self._tasks else None
 
     def _keeps_robots(self, renaming: Renaming) -> bool:
         """Whether robots go to robots whose idling costs as much; joint actions name them."""
@@ -199,19 +216,6 @@ class _Check:
             == image.action(action, owner)
             for action in self._model.actions
         )
-
-    def _states_under(self, image: _Image) -> Ints | None:
-        """Where the states of the table go; None if one goes to what is no state of it."""
-        codec = self._model.codec
-        number: dict[Atom | StepAtom, int] = {a: n for n, a in enumerate(codec.facts.atoms)}
-        rows = np.zeros_like(self._rows)
-        for atom, fact in number.items():
-            to = number.get(image.atom(atom))
-            if to is None:
-                return None
-            codec.set(rows, codec.column(self._rows, fact), [to])
-        states = find_rows(self._rows, rows)
-        return states if (states >= 0).all() else None
 
     def _tasks_under(self, image: _Image, states: Ints) -> set[tuple[int, Hashable]]:
         """Where the tasks go, as pairs of a state number and a goal."""
@@ -287,70 +291,44 @@ class _Part:
     """What renamings of a part are checked on."""
 
     def __init__(self, space: PlanSpace, end: Ints) -> None:
-        self._space, self._end = space, end
+        self._space = space
         self._states = np.unique(space.state)
-        self._index = EdgeIndex.of(space)
-        self._goal_of = np.full(len(space.rows), -1)
-        self._goal_of[end[end >= 0]] = np.flatnonzero(end >= 0)
-        codes = space.state * len(end) + space.goal
-        self._order = np.argsort(codes)
-        self._ordered = codes[self._order]
-        facts = space.model.codec.facts
-        self._number = {text: number for number, text in enumerate(facts.texts)}
+        target = space.state[space.target]
+        source, goal = space.state[space.sources], end[space.goal[space.sources]]
+        #: (edges, 3) the states that an edge leads from and to, and the state that its goal is.
+        self._ends = np.column_stack((source, target, goal))
+        labels = [space.robot_labels(robot) for robot in range(space.robots)]
+        self._edges = self._table(self._ends, labels)
+
+    def _table(self, ends: Ints, labels: Sequence[Ints]) -> Ints:
+        """Edges, sorted, each once."""
+        bounds = [len(self._space.rows)] * 3 + [len(own) for own in self._space.model.labels]
+        return unique_tuples(np.column_stack((ends, *labels)), bounds)[0]
 
     def symmetry(self, renaming: Renaming) -> Symmetry | None:
-        """The renaming with where it takes states; None if it is no symmetry of the part."""
-        robots = self._space.model.robots
+        """The renaming with where it takes states; None if it is no symmetry of the part.
+
+        It is one if its states go to different states of it, and its edges to its edges, with the
+        images of labels and to those of goals.
+        """
+        space = self._space
+        robots = space.model.robots
         if {renaming.get(robot, robot) for robot in robots} != set(robots):
             return None
-        states = self._states_under(Symmetry(renaming, self._states))
-        if states is None:
+        rows = _images(renaming, space.model.codec, space.rows[self._states])
+        if rows is None:
             return None
-        symmetry = Symmetry(renaming, states)
-        return symmetry if self._keeps_edges(symmetry) else None
-
-    def _states_under(self, symmetry: Symmetry) -> Ints | None:
-        """Where the states go; None if not all go to different states of the part."""
-        space, codec = self._space, self._space.model.codec
-        rows = space.rows[self._states]
-        images = np.zeros_like(rows)
-        for text, number in self._number.items():
-            true = codec.column(rows, number)
-            if true.any():
-                image = self._number.get(symmetry.text(text))
-                if image is None:
-                    return None
-                codec.set(images, true, [image])
-        found = find_rows(space.rows, images)
+        found = find_rows(space.rows, rows)
         if not np.array_equal(np.sort(found), self._states):
             return None
         states = np.arange(len(space.rows))
         states[self._states] = found
-        return states
-
-    def _keeps_edges(self, symmetry: Symmetry) -> bool:
-        """Whether edges go to different edges, with the images of labels and to those of goals."""
-        space = self._space
-        nodes = self._nodes_under(symmetry.states)
+        symmetry = Symmetry(renaming, states)
         labels = self._labels_under(symmetry)
-        if nodes is None or labels is None:
-            return False
-        edge = nodes[space.sources]
-        for robot in range(space.robots):
-            edge = self._index.follow(robot, edge, labels[robot])
-        alike = (edge >= 0).all() and (space.target[edge] == nodes[space.target]).all()
-        return bool(alike and len(np.unique(edge)) == len(edge))
-
-    def _nodes_under(self, states: Ints) -> Ints | None:
-        """Where the nodes go, None if one goes to none."""
-        space = self._space
-        goal = np.where(self._end >= 0, self._goal_of[states[self._end]], -1)[space.goal]
-        codes = states[space.state] * len(self._end) + goal
-        found = np.minimum(np.searchsorted(self._ordered, codes), len(codes) - 1)
-        if not (np.array_equal(self._ordered[found], codes) and (goal >= 0).all()):
+        if labels is None:
             return None
-        nodes: Ints = self._order[found]
-        return nodes
+        edges = self._table(states[self._ends], labels)
+        return symmetry if np.array_equal(edges, self._edges) else None
 
     def _labels_under(self, symmetry: Symmetry) -> Sequence[Ints] | None:
         """The label of each robot on the image of each edge; None if it has no such label."""
