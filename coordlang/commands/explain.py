@@ -126,7 +126,7 @@ class Explanation(InTask):
         Raises `OutOfMemory` beyond 100,000 sentences.
         """
         used = self.used
-        return tuple(task_sentences(used.space, used.task, used.partition))
+        return tuple(task_sentences(used.space, used.task, used.partition, used.plans_with))
 
     @property
     def sentences(self) -> tuple[TaskSentence, ...]:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import compress
 
@@ -51,21 +51,23 @@ class TaskSentence:
         return iter(self.words)
 
 
-def task_sentences(space: PlanSpace, task: int, partition: Partition) -> list[TaskSentence]:
+def task_sentences(
+    space: PlanSpace,
+    task: int,
+    partition: Partition,
+    plans_with: Callable[[Sentence], PlanSpace],
+) -> list[TaskSentence]:
     """All sentences of a task, those that leave most plans open first.
 
-    O(edges * sentences).  Raises `OutOfMemory` beyond 100,000 sentences.
+    ``plans_with`` gives the plans with a sentence.  O(edges * sentences).  Raises `OutOfMemory`
+    beyond 100,000 sentences.
     """
     word = partition.word_of(space.rows)[space.state]
     start = int(space.starts[task])
-    below = sentence_counts(space, word, start=start, most_of_node=_MOST)
+    said = sentence_counts(space, word, start=start, most_of_node=_MOST)[start]
     result = [
-        TaskSentence(
-            tuple(partition.words[w] for w in words),
-            plans,
-            _choices(space, start, word.tolist(), below, words),
-        )
-        for words, plans in below[start].items()
+        TaskSentence(tuple(partition.words[w] for w in words), plans, _choices(plans_with(words)))
+        for words, plans in said.items()
     ]
     return sorted(result, key=lambda s: (-s.plans, s.words))
 
@@ -128,33 +130,13 @@ def _check_limits(of_node: int, most_of_node: int | None, steps: int, most: int 
         )
 
 
-def _choices(
-    space: PlanSpace,
-    start: int,
-    word: list[int],
-    below: dict[int, Counter[Sentence]],
-    words: Sentence,
-) -> tuple[tuple[tuple[str | None, ...], ...], ...]:
-    """What each robot may do in each step, over all plans with a sentence."""
-    model = space.model
-    layer = {(start, words)}
-    steps = []
-    while layer and space.layer[next(iter(layer))[0]] > 0:
-        used: list[set[int]] = [set() for _ in model.robots]
-        following = set()
-        for node, rest in layer:
-            for edge in space.out_edges(node):
-                target = space.target_of(edge)
-                after = rest if word[target] == word[node] else rest[1:]
-                if below[target].get(after):
-                    following.add((target, after))
-                    for own, label in zip(used, space.labels_of(edge), strict=True):
-                        own.add(label)
-        steps.append(
-            tuple(
-                tuple(model.label_text(robot, label) for label in sorted(own))
-                for robot, own in enumerate(used)
-            )
+def _choices(plans: PlanSpace) -> tuple[tuple[tuple[str | None, ...], ...], ...]:
+    """What each robot does in each step of some plans."""
+    steps = [
+        tuple(
+            tuple(plans.model.label_text(robot, label) for label in np.unique(labels).tolist())
+            for robot, labels in enumerate(plans.labels[edges.edges].T)
         )
-        layer = following
-    return tuple(steps)
+        for edges in plans.edges_by_layer()
+    ]
+    return tuple(reversed(steps))
