@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from statistics import mean
 from typing import Any
 
 from coordlang.commands.inputs import Arguments, extended, public
@@ -14,7 +15,7 @@ from coordlang.commands.records import CoordinationOptions
 from coordlang.commands.terminal import note_single_robot, show_answer
 from coordlang.commands.witness import witness_data, witness_text
 from coordlang.language.provenance import percent
-from coordlang.required.failure import Failures, mean
+from coordlang.required.failure import Failures
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.required.task_answers import TaskAnswer, answers
 from planners.search.plan_file import json_count

@@ -20,13 +20,14 @@ interleavings of others' moves does not matter.
 from __future__ import annotations
 
 from bisect import bisect
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import accumulate
 from math import gcd, prod
 from random import Random
+from statistics import mean
 from typing import Any
 
 import numpy as np
@@ -166,17 +167,6 @@ def failure_of_sentence(
     (parts,) = FailureCount(fits, None, sets, most).by_sentence({begin})[begin].values()
     size, good = FailureCount(space, None, sets, most).good_of(parts, start)
     return 1 - Fraction(good, size**space.robots)
-
-
-def mean(values: Sequence[Fraction]) -> Fraction:
-    """The mean of exact numbers; those with one denominator are added first."""
-    numerators: Counter[int] = Counter()
-    for value in values:
-        numerators[value.denominator] += value.numerator
-    total = sum(
-        (Fraction(numerators[below], below) for below in sorted(numerators)), start=Fraction(0)
-    )
-    return total / len(values)
 
 
 #: Plans from a node with one sentence: for each robot how many of them have each of its sequences.
