@@ -68,7 +68,8 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any
     write_certificate(built.certificate(), certificate)
     plans = Plans.of(candidates.spaces[0])
     task = next(languages_in_tasks(built.language, candidates))
-    (words, *_) = (task.words_of(s.words) for s in task_sentences(task.space, 0, task.partition))
+    sentences = task_sentences(task.space, 0, task.partition, task.plans_with)
+    words = task.words_of(sentences[0].words)
     texts = {
         "language": language_bytes(built.language).decode(),
         "tasks": tasks_text([ListedTask(("(at r1 a)", "(at r2 b)"), ("(at r1 b)",))]),

@@ -469,7 +469,8 @@ def test_a_sentence_leaves_exactly_its_plans() -> None:
     task_language = next(languages_in_tasks(language, candidates))
     everything = sorted(str(steps_of(found, plan)) for plan in all_plans(problem))
     listed = []
-    sentences = task_sentences(task_language.space, 0, task_language.partition)
+    used = task_language
+    sentences = task_sentences(used.space, 0, used.partition, used.plans_with)
     assert len(sentences) > 1
     for sentence in sentences:
         text = " ".join(sentence.words)
