@@ -46,7 +46,7 @@ from planners.joint.model import NO_FACT
 from planners.joint.tables import Ints, Rows, find_rows
 from planners.parallel.workers import Workers
 from planners.search.portions import require_room
-from planners.system.errors import OutOfMemory, Refuted, UsageError
+from planners.system.errors import BadInput, OutOfMemory, Refuted, UsageError
 from planners.system.limits import little_time_after, run_until_stopped, start_clock, time_left
 from planners.system.notebook import Presented, counted
 from planners.system.options import record_from
