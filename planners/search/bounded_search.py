@@ -13,13 +13,13 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from planners.joint.model import Goal, JointModel, Options, PlanningTask, Steps
-from planners.joint.tables import Ints, Rows
+from planners.joint.tables import Ints, Rows, unique_rows
 from planners.search.exact_bound import ExactBound, exact_bound
 from planners.search.goals import FAR, searched
 from planners.search.heuristics import Heuristic
 from planners.search.layers import Edges, StateTable, grown, joined_edges
 from planners.search.optimal_states import OptimalStates
-from planners.search.reachable import PieceSizes
+from planners.search.reachable import PieceSizes, Space
 from planners.search.state_variables import StateVariable
 from planners.system.errors import ProvedImpossible
 
@@ -170,6 +170,31 @@ class BoundedSearch:
             self.edges.append(edges)
             self.states.append(new)
         return _MET
+
+    def space(self) -> Space:
+        """The states of the last round that lead to the goal, with the joint steps between them."""
+        leads = np.zeros(len(self.table), np.bool_)
+        leads[self.states[-1]] = self._model.holds(
+            self._task.goal, self.table.rows(self.states[-1])
+        )
+        kept: list[Edges] = []
+        while self.edges:
+            below = self.edges.pop()  # they are many, and not needed again
+            kept.append(below.only(leads[below.target]))
+            leads[kept[-1].source] = True
+        edges = joined_edges(kept, len(self._model.robots))
+        states = np.flatnonzero(leads)
+        rows, number = unique_rows(self.table.rows(states))
+        of_state = np.zeros(len(self.table), np.int64)
+        of_state[states] = number
+        return Space.of(
+            self._model,
+            rows,
+            of_state[edges.source],
+            of_state[edges.target],
+            edges.labels.astype(np.int32),
+            edges.cost.astype(np.int64),
+        )
 
     @property
     def _probe(self) -> int:

@@ -20,7 +20,6 @@ from planners.search.bounded_search import BoundedSearch
 from planners.search.exact_bound import SMALLER
 from planners.search.goals import searched
 from planners.search.heuristics import search_heuristic
-from planners.search.layers import Edges, joined_edges
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, PieceSizes, Space
 from planners.search.slack import explore_within, require_rest, seeing, seen_rows
@@ -67,52 +66,9 @@ def search_with_effort(
         variables = state_variables(model, task.init)
         chosen = search_heuristic(heuristic, model, task, variables)
     forward = BoundedSearch(model, task, chosen, variables, pieces)
-    with (
-        closing(forward),
-        reaching(forward.so_far, SMALLER),
-    ):
+    with closing(forward), reaching(forward.so_far, SMALLER):
         forward.run()
-        return _backward(model, task, forward), forward
-
-
-def _backward(model: JointModel, task: PlanningTask, forward: BoundedSearch) -> PlanSpace:
-    """Keep the edges that lead to the goal in time and at least cost, from the last layer back."""
-    table, last = forward.table, forward.states[-1]
-    value = np.full(len(table), _FAR)
-    value[last[model.holds(task.goal, table.rows(last))]] = 0
-    kept: list[Edges] = []
-    while forward.edges:
-        below = forward.edges.pop()  # they are many, and not needed again
-        below = below.only(value[below.target] < _FAR)
-        through = value[below.target] + below.cost
-        np.minimum.at(value, below.source, through)
-        kept.append(below.only(through == value[below.source]))
-    edges = joined_edges(kept, len(model.robots))
-    layer = np.full(len(table), -1)
-    for depth, states in enumerate(reversed(forward.states)):
-        layer[states] = depth
-    alive = np.flatnonzero(value < _FAR)
-    rows, state = unique_rows(table.rows(alive))
-    order = np.lexsort((state, layer[alive]))
-    alive, state = alive[order], state[order]
-    node = np.full(len(table), -1)
-    node[alive] = np.arange(len(alive))
-    source = node[edges.source]
-    by_source = np.argsort(source, kind="stable")
-    return PlanSpace(
-        model=model,
-        rows=rows,
-        state=state,
-        goal=np.zeros(len(alive), np.int64),
-        layer=layer[alive],
-        first=np.searchsorted(source[by_source], np.arange(len(alive) + 1)),
-        target=node[edges.target[by_source]],
-        labels=edges.labels[by_source].astype(np.int32),
-        cost=edges.cost[by_source].astype(np.int64),
-        goals=(task.goal,),
-        starts=node[forward.states[0]],
-        second=value[forward.states[0]],
-    ).reduced()
+        return _batch(forward.space(), [(task.goal, task.init[None, :])]), forward
 
 
 def joined(spaces: Sequence[PlanSpace]) -> PlanSpace:

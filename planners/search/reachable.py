@@ -53,6 +53,15 @@ class Space:
     labels: Labels
     cost: Ints
 
+    @classmethod
+    def of(
+        cls, model: JointModel, rows: Rows, source: Ints, target: Ints, labels: Labels, cost: Ints
+    ) -> Space:
+        """A space of joint steps that need not be sorted by the state that they lead out of."""
+        order = np.argsort(source, kind="stable")
+        first = np.searchsorted(source[order], np.arange(len(rows) + 1))
+        return cls(model, rows, first, target[order], labels[order], cost[order])
+
     def __len__(self) -> int:
         return len(self.rows)
 
@@ -132,16 +141,12 @@ class Exploration:
             ]
         )
         target = np.concatenate([find_rows(seen, s.result) for s in self._steps])
-        order = np.argsort(source, kind="stable")
-        order = order[target[order] >= 0]
-        return Space(
-            model=self._model,
-            rows=seen,
-            first=np.searchsorted(source[order], np.arange(len(seen) + 1)),
-            target=target[order],
-            labels=np.concatenate([s.labels for s in self._steps])[order],
-            cost=np.concatenate([s.cost for s in self._steps])[order],
+        kept = target >= 0
+        labels, cost = (
+            np.concatenate([getattr(s, field) for s in self._steps])[kept]
+            for field in ("labels", "cost")
         )
+        return Space.of(self._model, seen, source[kept], target[kept], labels, cost)
 
 
 def explore(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> Space:
