@@ -179,11 +179,7 @@ class _Sums:
                 own = self._plans.counter(self._times.pop(literal))
             self._assume(own, place + 1)
         if len(core) > 1:
-            together = self._plans.counter(core)
-            place = 1
-            while place < len(together) and self._plans.must(together[place]):
-                place += 1
-            self._assume(together, place)
+            self._assume(self._plans.counter(core), 1)
 
     def _assume(self, sums: Literals, place: int) -> None:
         """Assume that no more than this many of some literals hold."""
@@ -223,7 +219,7 @@ def _least_cost(plans: FixedPlans, model: JointModel, task: PlanningTask) -> Lit
 def _disjoint(plans: FixedPlans, assumed: set[int]) -> Iterator[Literals]:
     """Cores without a common literal, until what is assumed besides holds."""
     while not plans.holds([-literal for literal in sorted(assumed)]):
-        core = _smaller(plans, plans.core(assumed))
+        core = plans.core(assumed)
         assumed -= set(core)
         yield core
 
@@ -242,15 +238,3 @@ def _kinds(model: JointModel, task: PlanningTask) -> list[str]:
 
     known = [about(robot) for robot in model.robots]
     return [model.robots[known.index(own)] for own in known]
-
-
-def _smaller(plans: FixedPlans, core: Literals) -> Literals:
-    """A core that is no larger: what is needed of it, asked again while that helps."""
-    while len(core) > 1:
-        answer = plans.holds([-literal for literal in core])
-        assert not answer, "a core was refuted"
-        again = plans.core(core)
-        if len(again) >= len(core):
-            break
-        core = again
-    return core

@@ -16,11 +16,10 @@ import numpy as np
 
 from planners.grounding.actions import GroundAction
 from planners.joint.composition import ComposingStepper
-from planners.joint.interference import Choices
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask
 from planners.joint.step_clauses import Clause, clauses
 from planners.joint.tables import Ints, Rows
-from planners.pddl.formula_tree import Leaf, negated
+from planners.pddl.formula_tree import negated
 from planners.pddl.lifted import TRUE, Formula
 from planners.search.mutexes import mutexes
 from planners.search.questions import FixedPlans, Literals
@@ -105,8 +104,6 @@ class _Builder:
         #: Per fact the literals that make it true in the next state, and false.
         self._adders: list[Literals] = [[] for _ in range(self._facts)]
         self._deleters: list[Literals] = [[] for _ in range(self._facts)]
-        self._choices = [Choices(own) for own in stepper.labelled]
-        self._touched: dict[tuple[int, str], dict[Leaf, Ints]] = {}
         #: Per robot and some of its labels, as bytes, the variable that they imply.
         self._implied: dict[tuple[int, bytes], int] = {}
 
@@ -177,46 +174,13 @@ class _Builder:
         return fires
 
     def _apart(self, i: int, j: int) -> None:
-        """Labels that may not share a step: first fact by fact, as far as facts say why.
-
-        Of the others those that exclude the same ones are one class.
-        """
-        apart = ~self._stepper.tables[i, j]
-        left = apart.copy()
-        for mine, theirs in self._meeting(i, j):
-            block = np.ix_(mine, theirs)
-            if np.count_nonzero(left[block]) > 1 and apart[block].all():
-                self.clauses.append((-self._one_of(i, mine), -self._one_of(j, theirs)))
-                left[block] = False
-        rows, row_class = np.unique(left, axis=0, return_inverse=True)
+        """Labels that may not share a step; those that exclude the same ones are one class."""
+        rows, row_class = np.unique(~self._stepper.tables[i, j], axis=0, return_inverse=True)
         columns, column_class = np.unique(rows, axis=1, return_inverse=True)
         for one, other in np.argwhere(columns).tolist():
             mine = np.flatnonzero(row_class.reshape(-1) == one)
             theirs = np.flatnonzero(column_class.reshape(-1) == other)
             self.clauses.append((-self._one_of(i, mine), -self._one_of(j, theirs)))
-
-    def _meeting(self, i: int, j: int) -> Iterator[tuple[Ints, Ints]]:
-        """Labels of two robots of which one makes a fact what the other needs it not to be."""
-        for one, other in (("deletes", "keeps"), ("adds", "requires_false")):
-            for first, second in ((one, other), (other, one)):
-                rows, columns = self._touching(i, first), self._touching(j, second)
-                for fact in rows:
-                    if fact in columns:
-                        yield rows[fact], columns[fact]
-
-    def _touching(self, robot: int, field: str) -> dict[Leaf, Ints]:
-        """Per fact the labels in whose footprint it is; "keeps": needed to be true, or added."""
-        if (robot, field) not in self._touched:
-            choices = self._choices[robot]
-            fields = ("requires_true", "adds") if field == "keeps" else (field,)
-            found: dict[Leaf, set[int]] = {}
-            for labels in map(choices.labels, fields):
-                for fact, own in labels.items():
-                    found.setdefault(fact, set()).update(own)
-            self._touched[robot, field] = {
-                fact: np.array(sorted(found[fact])) for fact in sorted(found, key=str)
-            }
-        return self._touched[robot, field]
 
     def _one_of(self, robot: int, labels: Ints) -> int:
         """A variable that is implied by each of a robot's labels."""

@@ -14,7 +14,6 @@ import numpy as np
 from planners.joint.tables import Ints, ranges
 from planners.search.sat import (
     SolverName,
-    propagates,
     sat_solver,
     simplified,
     solve_slice,
@@ -146,10 +145,6 @@ class FixedPlans:
             if answer is not None:
                 return answer
             self.spend(effort)
-
-    def must(self, literal: int) -> bool:
-        """Whether a literal must be true, where that is seen by unit propagation."""
-        return not propagates(self._solver, [-literal])
 
     def labels_chosen(self) -> Plan:
         """The robots' labels in the plan that the last answer found."""

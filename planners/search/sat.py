@@ -46,12 +46,6 @@ def solve_slice(solver: Any, conflicts: int, assumptions: Sequence[int] = ()) ->
     return None if answer is None else bool(answer)
 
 
-def propagates(solver: Any, assumptions: Sequence[int]) -> bool:
-    """Whether unit propagation meets no conflict; signals are heard as by `solve_slice`."""
-    good, _ = solver.propagate(assumptions=list(assumptions))
-    return bool(good)
-
-
 def simplified(clauses: array[int], kept: Sequence[int]) -> list[list[int]]:
     """Clauses that allow the same values of the kept variables, mostly over far fewer variables.
 
