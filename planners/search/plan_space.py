@@ -336,36 +336,25 @@ class PlanSpace:
         none of the ``ends`` (of the last layer's nodes; default: all) is left out; some path must
         lead there.
         """
-        alive = [np.ones(len(layers[-1]), np.bool_) if ends is None else ends]
-        for nodes_above, step in zip(reversed(layers[:-1]), reversed(steps), strict=True):
-            here = np.zeros(len(nodes_above), np.bool_)
-            here[step.source[alive[-1][step.target]]] = True
-            alive.append(here)
-        nodes = [of[keep] for of, keep in zip(reversed(layers), alive, strict=True)]
-        offsets = np.cumsum([0, *(len(n) for n in nodes)])
-        numbers = [np.cumsum(keep) - 1 + low for keep, low in zip(alive, offsets, strict=False)]
-        sources, targets, edges = [_none()], [_none()], [_none()]
-        for step, ((below, low), (above, high)) in zip(
-            reversed(steps), pairwise(zip(alive, numbers, strict=True)), strict=True
-        ):
-            kept = below[step.target] & above[step.source]
-            sources.append(high[step.source[kept]])
-            targets.append(low[step.target[kept]])
-            edges.append(step.edge[kept])
-        node, edge = np.concatenate(nodes), np.concatenate(edges)
-        return replace(
+        node = np.concatenate(layers[::-1])
+        begins = np.cumsum([0, *map(len, layers[::-1])])[-2::-1]
+        parts = [
+            (step.source + above, step.target + below, step.edge)
+            for step, (above, below) in zip(steps, pairwise(begins), strict=True)
+        ]
+        nothing = (np.zeros(0, np.int64),) * 3
+        source, target, edge = map(np.concatenate, zip(nothing, *reversed(parts), strict=True))
+        whole = replace(
             space,
             state=space.state[node],
             goal=space.goal[node],
             layer=space.layer[node],
-            first=np.searchsorted(np.concatenate(sources), np.arange(len(node) + 1)),
-            target=np.concatenate(targets),
+            first=np.searchsorted(source, np.arange(len(node) + 1)),
+            target=target,
             labels=space.labels[edge],
             cost=space.cost[edge],
             starts=np.array([len(node) - 1]),
             second=space.second[[task]],
         )
-
-
-def _none() -> Ints:
-    return np.zeros(0, np.int64)
+        lasts = np.arange(len(layers[-1]))
+        return whole._cut(whole.ancestors(lasts if ends is None else lasts[ends]))
