@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import permutations, product
 
 from planners.grounding.actions import GroundAction
 from planners.joint.model import JointModel
-from planners.pddl.formula_tree import forbidden_steps, literals
-from planners.pddl.lifted import And, Atom, Equal, Formula, Not, Or, StepAtom, Truth
+from planners.pddl.formula_tree import GroundLeaf, forbidden_steps, literals, substituted
+from planners.pddl.lifted import FALSE, Atom, Equal, Formula, StepAtom, Truth
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,8 +96,17 @@ def clashes(actions: Sequence[GroundAction]) -> tuple[frozenset[int], ...]:
     step neither write nor read.
     """
     number = {StepAtom(a.schema, a.args): n for n, a in enumerate(actions)}
-    linked, forbidden = _linked(actions, number), _forbidden(actions, number)
-    special = _decided_by_each_other(actions, number)
+
+    def naming(named: Callable[[GroundAction], Set[object]]) -> _Pairs:
+        return {
+            frozenset((n, number[step]))
+            for n, action in enumerate(actions)
+            for step in number.keys() & named(action)
+        }
+
+    linked = naming(lambda a: a.links | {leaf for leaf, positive in _conditions(a) if positive})
+    # The condition of an effect of one names the other: what can happen depends on both.
+    special = naming(lambda a: {leaf for e in a.effects for leaf, _ in literals(e.condition)})
     pairs = _contrary([_with_effects(action) for action in actions], linked) - special
     both = frozenset((0, 1))
     for pair in special:
@@ -105,74 +114,46 @@ def clashes(actions: Sequence[GroundAction]) -> tuple[frozenset[int], ...]:
         alone = [_with_effects(action, *two) for action in two]
         if both in _contrary(alone, {both} if pair in linked else set()):
             pairs.add(pair)
-    pairs |= forbidden
+    pairs |= naming(lambda a: set(forbidden_steps(a.precondition)))
     found: list[set[int]] = [set() for _ in actions]
     for pair in pairs:
-        if len(pair) == 2:
-            first, second = pair
-            found[first].add(second)
-            found[second].add(first)
+        for one, other in permutations(pair, 2):
+            found[one].add(other)
     return tuple(frozenset(others) for others in found)
 
 
 def _contrary(actions: Sequence[GroundAction], linked: _Pairs) -> _Pairs:
-    """Pairs of which one writes the contrary of what the other writes, or reads unless linked."""
-    writers, readers = _writers(actions), _readers(actions)
+    """Pairs of which one writes the contrary of what the other writes, or reads unless linked.
+
+    An action that makes an atom true and false makes it true.
+    """
+    writers: dict[_Literal, set[int]] = defaultdict(set)
+    readers: dict[_Literal, set[int]] = defaultdict(set)
+    for number, action in enumerate(actions):
+        adds = {effect.atom for effect in action.effects if effect.adds}
+        for effect in action.effects:
+            if effect.adds or effect.atom not in adds:
+                writers[effect.atom, effect.adds].add(number)
+        for leaf, positive in _conditions(action):
+            if isinstance(leaf, Atom):
+                readers[leaf, positive].add(number)
     pairs: _Pairs = set()
     for (atom, value), changing in writers.items():
-        pairs |= _pairs(changing, writers.get((atom, not value), set()))
-        pairs |= _pairs(changing, readers.get((atom, not value), set())) - linked
+        contrary = atom, not value
+        pairs.update(map(frozenset, product(changing, writers.get(contrary, ()))))
+        pairs |= set(map(frozenset, product(changing, readers.get(contrary, ())))) - linked
     return pairs
-
-
-def _decided_by_each_other(
-    actions: Sequence[GroundAction], number: Mapping[StepAtom, int]
-) -> _Pairs:
-    """Pairs of which the condition of an effect of one names the other."""
-    return {
-        frozenset((n, number[leaf]))
-        for n, action in enumerate(actions)
-        for effect in action.effects
-        for leaf, _ in literals(effect.condition)
-        if isinstance(leaf, StepAtom) and number.get(leaf, n) != n
-    }
 
 
 def _with_effects(action: GroundAction, *step: GroundAction) -> GroundAction:
     """The action with those effects only that may happen with these, and itself, in the step."""
     there = {StepAtom(a.schema, a.args) for a in (action, *step)}
-    kept = tuple(e for e in action.effects if _may_hold(e.condition, there))
+
+    def value(leaf: GroundLeaf) -> Formula:
+        return Truth(leaf in there) if isinstance(leaf, StepAtom) else leaf
+
+    kept = tuple(e for e in action.effects if substituted(e.condition, value) != FALSE)
     return replace(action, effects=kept)
-
-
-def _may_hold(condition: Formula, there: set[StepAtom], positive: bool = True) -> bool:
-    """Whether a condition, or its negation, holds in some state: facts may be as they have to."""
-    match condition:
-        case Truth(value):
-            return value == positive
-        case StepAtom():
-            return (condition in there) == positive
-        case Not(part):
-            return _may_hold(part, there, not positive)
-        case And(parts) | Or(parts):
-            each = (_may_hold(part, there, positive) for part in parts)
-            return all(each) if isinstance(condition, And) == positive else any(each)
-    return True
-
-
-def _pairs(some: Iterable[int], others: Iterable[int]) -> _Pairs:
-    return {frozenset(pair) for pair in product(some, others)}
-
-
-def _writers(actions: Sequence[GroundAction]) -> dict[_Literal, set[int]]:
-    """Which actions make an atom true or false; one that does both makes it true."""
-    found: dict[_Literal, set[int]] = defaultdict(set)
-    for number, action in enumerate(actions):
-        adds = {effect.atom for effect in action.effects if effect.adds}
-        for effect in action.effects:
-            if effect.adds or effect.atom not in adds:
-                found[effect.atom, effect.adds].add(number)
-    return found
 
 
 def _conditions(action: GroundAction) -> Iterator[tuple[Atom | StepAtom, bool]]:
@@ -181,33 +162,3 @@ def _conditions(action: GroundAction) -> Iterator[tuple[Atom | StepAtom, bool]]:
         for leaf, positive in literals(condition):
             assert not isinstance(leaf, Equal), "an equality in a ground formula"
             yield leaf, positive
-
-
-def _readers(actions: Sequence[GroundAction]) -> dict[_Literal, set[int]]:
-    """Which actions read that an atom is true or false."""
-    found: dict[_Literal, set[int]] = defaultdict(set)
-    for number, action in enumerate(actions):
-        for leaf, positive in _conditions(action):
-            if isinstance(leaf, Atom):
-                found[leaf, positive].add(number)
-    return found
-
-
-def _linked(actions: Sequence[GroundAction], number: Mapping[StepAtom, int]) -> _Pairs:
-    """Pairs of which one names the other in a positive formula or in the network."""
-    found: _Pairs = set()
-    for n, action in enumerate(actions):
-        named = {leaf for leaf, positive in _conditions(action) if positive}
-        for step in number.keys() & (named | action.links):
-            found.add(frozenset((n, number[step])))
-    return found
-
-
-def _forbidden(actions: Sequence[GroundAction], number: Mapping[StepAtom, int]) -> _Pairs:
-    """Pairs of which one's precondition forbids the other."""
-    return {
-        frozenset((n, number[step]))
-        for n, action in enumerate(actions)
-        for step in forbidden_steps(action.precondition)
-        if step in number
-    }
