@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
+from planners.grounding import GroundAction
 from planners.joint.conditions import split_condition
 from planners.joint.model import FullState, Goal, JointModel, show
 from planners.joint.tables import Ints, Rows
 from planners.pddl.formula_tree import required_atoms
-from planners.pddl.lifted import Formula
+from planners.pddl.lifted import TRUE, Formula
 
 #: The value of a state from which the goal is proved unreachable.
 FAR = 2**30
@@ -29,23 +31,58 @@ def goal_facts(model: JointModel, goal: Goal) -> frozenset[int]:
     return frozenset(index[atom] for atom in required_atoms(goal) if atom in index)
 
 
-def ways_to_facts(model: JointModel) -> Iterator[tuple[frozenset[int], int]]:
-    """Every (facts that must be true, fact that becomes true) of the ground actions.
+@dataclass(frozen=True, slots=True)
+class FactsOf:
+    """What a ground action reads and writes, as facts by number, as far as that is certain.
 
-    Negative literals are left out.
+    It ``needs`` facts to be true, and in any case ``adds`` some and ``deletes`` others; each of the
+    ``conditional`` effects is (facts that must be true besides, the fact, whether it is added).
     """
-    known = model.codec.facts.index
+
+    needs: frozenset[int]
+    adds: frozenset[int]
+    deletes: frozenset[int]
+    conditional: tuple[tuple[frozenset[int], int, bool], ...]
+
+    @classmethod
+    def of(cls, model: JointModel, action: GroundAction) -> FactsOf:
+        """Those of an action; facts that are never true are left out."""
+        known = model.codec.facts.index
+        effects = [effect for effect in action.effects if effect.atom in known]
+        certain = [effect for effect in effects if effect.condition == TRUE]
+        adds = frozenset(known[effect.atom] for effect in certain if effect.adds)
+        return cls(
+            _positive(model, action.precondition),
+            adds,
+            frozenset(known[effect.atom] for effect in certain if not effect.adds) - adds,
+            tuple(
+                (_positive(model, effect.condition), known[effect.atom], effect.adds)
+                for effect in effects
+                if effect.condition != TRUE
+            ),
+        )
+
+    def ways(self) -> Iterator[tuple[frozenset[int], frozenset[int]]]:
+        """Every (facts that must be true, facts that become true together)."""
+        if self.adds:
+            yield self.needs, self.adds
+        for needs, fact, adds in self.conditional:
+            if adds:
+                yield self.needs | needs, frozenset((fact,))
+
+
+def ways_to_facts(model: JointModel) -> Iterator[tuple[frozenset[int], int]]:
+    """Every (facts that must be true, fact that becomes true) of the ground actions."""
     for action in model.actions:
-        needs = positive_facts(model, action.precondition)
-        for effect in action.effects:
-            if effect.adds and effect.atom in known:
-                yield frozenset(needs | positive_facts(model, effect.condition)), known[effect.atom]
+        for needs, added in FactsOf.of(model, action).ways():
+            for fact in sorted(added):
+                yield needs, fact
 
 
-def positive_facts(model: JointModel, formula: Formula) -> set[int]:
+def _positive(model: JointModel, formula: Formula) -> frozenset[int]:
     """The facts that single literals of a condition need to be true."""
     literals, _ = split_condition(formula, model.evaluator)
-    return {fact for fact, positive in literals if positive}
+    return frozenset(fact for fact, positive in literals if positive)
 
 
 def searched(model: JointModel, goal: Goal, seen: Rows, left_out: int = 0) -> str:

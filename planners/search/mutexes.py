@@ -9,18 +9,15 @@ what others do) is left out, so every pair that is found is right, and not all o
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planners.grounding.actions import GroundAction
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import JointModel
 from planners.joint.tables import Bools, Ints, Rows
-from planners.pddl.lifted import TRUE
-from planners.search.goals import positive_facts
+from planners.search.goals import FactsOf
 from planners.search.graphs import csgraph
 from planners.system.errors import OutOfMemory
 
@@ -83,19 +80,20 @@ class _Ways:
         for robot, own in enumerate(stepper.labelled):
             for label, action in enumerate(own):
                 if action is not None:
-                    ways = list(_ways_of(model, action))
-                    found += ways
-                    who += [(robot, label)] * len(ways)
+                    read = FactsOf.of(model, action)
+                    for needs, adds in read.ways():
+                        found.append((sorted(needs), sorted(adds), sorted(read.deletes)))
+                        who.append((robot, label))
         facts = len(model.codec.facts)
-        needs, adds, deletes = ([way[k] for way in found] for k in range(3))
+        needed, added, deleted = ([way[k] for way in found] for k in range(3))
         staying = [[fact] for fact in range(facts)]
         owners = np.array(who, np.int64).reshape(-1, 2)
         return cls(
             owners[:, 0],
             owners[:, 1],
-            _table(needs + staying, facts),
-            _table(adds + staying, facts),
-            _table(deletes, facts).toarray() > 0,
+            _table(needed + staying, facts),
+            _table(added + staying, facts),
+            _table(deleted, facts).toarray() > 0,
         )
 
     def close(self, may: Bools, together: Bools, block: int) -> None:
@@ -113,27 +111,6 @@ class _Ways:
                 both = together[ways] & (apart == 0) & possible
                 found = (self.adds[ways].T @ both.astype(np.float32)) @ self.adds > 0
                 may |= found | found.T
-
-
-def _ways_of(
-    model: JointModel, action: GroundAction
-) -> Iterator[tuple[list[int], list[int], list[int]]]:
-    """What is needed, added and deleted, as far as it is certain: all at once, or conditionally."""
-    index = model.codec.facts.index
-    known = [effect for effect in action.effects if effect.atom in index]
-    certain = [effect for effect in known if effect.condition == TRUE]
-    added = {index[effect.atom] for effect in certain if effect.adds}
-    lost = sorted({index[effect.atom] for effect in certain if not effect.adds} - added)
-    needed = positive_facts(model, action.precondition)
-    if added:
-        yield sorted(needed), sorted(added), lost
-    for effect in known:
-        if effect.adds and effect.condition != TRUE:
-            yield (
-                sorted(needed | positive_facts(model, effect.condition)),
-                [index[effect.atom]],
-                lost,
-            )
 
 
 def _together(model: JointModel, ways: _Ways) -> Bools:

@@ -16,11 +16,11 @@ from dataclasses import dataclass
 from itertools import combinations, product
 
 from planners.grounding.actions import GroundAction
-from planners.joint.conditions import split_condition
 from planners.joint.model import JointModel, show
 from planners.joint.tables import Rows
 from planners.pddl.formula_tree import literals
-from planners.pddl.lifted import TRUE, Atom, Domain, Problem, StepAtom
+from planners.pddl.lifted import Atom, Domain, Problem, StepAtom
+from planners.search.goals import FactsOf
 from planners.system.errors import note
 
 #: Predicates, each with a position of the object, that facts of one variable may have.
@@ -38,21 +38,6 @@ class StateVariable:
 
     facts: tuple[int, ...]
     changes: Mapping[int, tuple[tuple[int, ...], int]]
-
-
-@dataclass(frozen=True, slots=True)
-class _Touch:
-    """What an action does to facts, by number, and which robots choose it together.
-
-    ``linked``: it may share a step with actions that interfere with it.
-    """
-
-    owners: frozenset[int]
-    needs: frozenset[int]
-    adds: frozenset[int]
-    deletes: frozenset[int]
-    conditional: frozenset[int]
-    linked: bool
 
 
 def state_variables(model: JointModel, init: Rows) -> list[StateVariable]:
@@ -76,7 +61,7 @@ def counted_groups(
     ``wanted`` says how many of their facts may be true at the start: 1 is a state variable.
     """
     true = set(model.codec.true_facts(model.codec.facts_part(init)))
-    touches: dict[int, _Touch] = {}
+    read: dict[int, FactsOf] = {}
     touching: dict[Atom, list[int]] = defaultdict(list)
     for number, action in enumerate(model.actions):
         for atom in {effect.atom for effect in action.effects}:
@@ -86,32 +71,20 @@ def counted_groups(
         atoms = [model.codec.facts.atoms[fact] for fact in facts]
         own = sorted({number for atom in atoms for number in touching.get(atom, ())})
         for number in own:
-            if number not in touches:
-                touches[number] = _touch(model, model.actions[number])
-        changes = _changes(facts, [(number, touches[number]) for number in own])
-        if changes is not None:
+            if number not in read:
+                read[number] = FactsOf.of(model, model.actions[number])
+        changes = _changes(facts, {number: read[number] for number in own})
+        if changes is not None and _one_at_a_time([model.actions[number] for number in changes]):
             found.append(StateVariable(tuple(sorted(facts)), changes))
     return found
 
 
-def _touch(model: JointModel, action: GroundAction) -> _Touch:
-    index = model.codec.facts.index
-    known, _ = split_condition(action.precondition, model.evaluator)
-    effects = [e for e in action.effects if e.atom in index]
-    certain = [e for e in effects if e.condition == TRUE]
-    adds = frozenset(index[e.atom] for e in certain if e.adds)
-    return _Touch(
-        owners=frozenset(action.owners),
-        needs=frozenset(fact for fact, positive in known if positive),
-        adds=adds,
-        deletes=frozenset(index[e.atom] for e in certain if not e.adds) - adds,
-        conditional=frozenset(index[e.atom] for e in effects if e.condition != TRUE),
-        linked=bool(action.links)
-        or any(
-            positive and isinstance(leaf, StepAtom)
-            for condition in (action.precondition, *(e.condition for e in action.effects))
-            for leaf, positive in literals(condition)
-        ),
+def _is_linked(action: GroundAction) -> bool:
+    """Whether an action may share a step with actions that interfere with it."""
+    return bool(action.links) or any(
+        positive and isinstance(leaf, StepAtom)
+        for condition in (action.precondition, *(e.condition for e in action.effects))
+        for leaf, positive in literals(condition)
     )
 
 
@@ -138,14 +111,13 @@ def _candidates(
 
 
 def _changes(
-    facts: frozenset[int], touches: Sequence[tuple[int, _Touch]]
+    facts: frozenset[int], read: Mapping[int, FactsOf]
 ) -> dict[int, tuple[tuple[int, ...], int]] | None:
-    """What the actions do to a group; None if it may stop to have exactly one true fact."""
+    """What actions do to a group; None if it may stop to have exactly one true fact."""
     changes: dict[int, tuple[tuple[int, ...], int]] = {}
-    changing: list[_Touch] = []
-    for number, touch in touches:
-        adds, deletes, needs = touch.adds & facts, touch.deletes & facts, touch.needs & facts
-        if touch.conditional & facts or len(adds) > 1:
+    for number, own in read.items():
+        adds, deletes, needs = own.adds & facts, own.deletes & facts, own.needs & facts
+        if any(fact in facts for _, fact, _ in own.conditional) or len(adds) > 1:
             return None
         if not adds:
             if deletes:
@@ -157,12 +129,16 @@ def _changes(
             return None
         if lost:
             changes[number] = (tuple(sorted(lost)), value)
-            changing.append(touch)
-    # Of two actions of one robot a joint step has one; of two robots', none that interfere.
-    same_robot = changing and frozenset.intersection(*(touch.owners for touch in changing))
-    if not same_robot and any(touch.linked for touch in changing):
-        return None
     return changes
+
+
+def _one_at_a_time(actions: Sequence[GroundAction]) -> bool:
+    """Whether a joint step has one of these at most, which interfere with each other.
+
+    Of two actions of one robot it has one; of two robots' none that interfere, if none is linked.
+    """
+    same_robot = actions and frozenset.intersection(*(frozenset(a.owners) for a in actions))
+    return bool(same_robot) or not any(map(_is_linked, actions))
 
 
 # ---- a robot in two places
