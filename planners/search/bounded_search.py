@@ -14,11 +14,10 @@ import numpy as np
 
 from planners.joint.model import Goal, JointModel, Options, PlanningTask, Steps
 from planners.joint.tables import Ints, Rows, unique_rows
-from planners.search.exact_bound import ExactBound, exact_bound
+from planners.search.exact_bound import ExactBound, OptimalStates, exact_bound
 from planners.search.goals import FAR, searched
 from planners.search.heuristics import Heuristic
 from planners.search.layers import Edges, StateTable, grown, joined_edges
-from planners.search.optimal_states import OptimalStates
 from planners.search.reachable import PieceSizes, Space
 from planners.search.state_variables import StateVariable
 from planners.system.errors import ProvedImpossible
