@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from planners.grounding import GroundAction
+from planners.grounding.actions import GroundAction
 from planners.joint.conditions import split_condition
 from planners.joint.model import FullState, Goal, JointModel, show
 from planners.joint.tables import Ints, Rows
