@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import reduce
 from itertools import pairwise
 from math import prod
 from typing import Any
@@ -364,11 +363,19 @@ class SetWalk:
 
     def _common(self, ahead: _Ahead) -> tuple[Words, int | None]:
         """What the robot that is ahead of all has said, and what all can say after it."""
-        said = max((words for words, _ in ahead), key=len)
-        if any(said[: len(words)] != words for words, _ in ahead):
-            return said, None
-        rests = [self._sentences.after(said[len(words) :], self._said[own]) for words, own in ahead]
-        return said, reduce(self._sentences.common, rests)
+        said: Words = ()
+        for words, _ in ahead:
+            if len(words) > len(said):
+                said = words
+        common: int | None = None
+        for robot, (words, own) in enumerate(ahead):
+            if said[: len(words)] != words:
+                return said, None
+            rest = self._sentences.after(said[len(words) :], self._said[own])
+            common = self._sentences.common(common, rest) if robot else rest
+            if common is None:
+                break
+        return said, common
 
     def _moves(self, node: int, ahead: _Ahead) -> Iterator[tuple[Steps, _Ahead, int | None]]:
         """Steps after which the robots have a sentence in common, and what is ahead of them then.
@@ -470,4 +477,4 @@ def _united(sets: SequenceSets, moves: Mapping[int, set[int]]) -> int:
 def _short(ahead: _Ahead) -> _Ahead:
     """The same without the words that all robots have said."""
     said = min(len(words) for words, _ in ahead)
-    return tuple((words[said:], own) for words, own in ahead)
+    return tuple((words[said:], own) for words, own in ahead) if said else ahead
