@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import os
+import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -10,6 +13,22 @@ import pytest
 from coordlang.commands.main import run
 from tests.support.command import Command, Outcome
 from tests.support.domains import DOMAINS
+
+# Some 150 processes are started, each of which would compile the packages again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems() -> None:
+    """Let hypothesis draw nothing that stands in files of the packages.
+
+    Reading them takes five seconds in each process, and each change of the code gives other examples.
+    """
+    from hypothesis.internal.conjecture import providers
+
+    if hasattr(providers, "_get_local_constants"):
+        providers._get_local_constants = lambda: providers._local_constants
 
 
 @pytest.fixture(autouse=True)
@@ -35,7 +54,15 @@ def t_map() -> tuple[Path, Path]:
 
 
 @pytest.fixture
-def language(coordlang: Command, t_map: tuple[Path, Path], tmp_path: Path) -> Path:
+def language(t_map: tuple[Path, Path], tmp_path: Path) -> Path:
     path = tmp_path / "language.json"
-    assert coordlang("build", *t_map, "--tasks", "all", "--method", "greedy", "-o", path).code == 0
+    path.write_bytes(_greedy(*t_map))
     return path
+
+
+@cache
+def _greedy(domain: Path, problem: Path) -> bytes:
+    from coordlang import build
+    from coordlang.language.file import to_bytes
+
+    return to_bytes(build(domain, problem, tasks="all", method="greedy").language)

@@ -257,7 +257,14 @@ SIGNALS = (signal.SIGKILL, signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 LEFT = re.compile(r"[a-z0-9_]{8}|\.[^/]{1,16}\.[a-z0-9_]{8}|coordlang-[a-z0-9_]{8}(/.*)?|\.lock")
 
 
-@pytest.mark.parametrize("name", WRITING)
+#: They write as others do.
+ALIKE = ("ground", "understand", "choices", "inspect")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=[pytest.mark.thorough] if n in ALIKE else []) for n in WRITING],
+)
 def test_kills(name: str, tmp_path: Path, said: dict[str, list[str]]) -> None:
     """A signal at a random moment, or when something in the folder changes."""
     stage, choice = Stage(name, tmp_path, said), random.Random(name)

@@ -192,7 +192,7 @@ def test_numbers_of_a_language_and_its_certificate(coordlang: Command, tmp_path:
         text = file.read_text()
         numbers = [*re.finditer(r"(?<=[ :\[])\d+(?=[,\n\]}])", text)]
         for number in numbers[:: 1 + len(numbers) // 5]:
-            for value in ("9" * 5_000, f"-{'9' * 5_000}", '"x"', "1e999", "0.5"):
+            for value in ("9" * 5_000, f"-{'9' * 5_000}", "1e999"):
                 file.write_text(text[: number.start()] + value + text[number.end() :])
                 for command in commands:
                     ended = coordlang(*command)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Outputs: known to be unwritable before the work; a language and its certificate belong together."""
+"""Outputs: names, permissions and pipes; a language and its certificate belong together."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from coordlang.language.file import read_language
 from coordlang.verification.certificate_file import read_certificate
 from coordlang.vocabulary.loop import Budget
 from coordlang.vocabulary.minimal import MinimalSearch
-from planners.system.errors import OutOfTime, UsageError
+from planners.system.errors import OutOfTime
 from planners.system.writing import write_atomically
 from tests.support.command import Command, in_shell
 from tests.support.domains import DOMAINS
@@ -26,62 +26,12 @@ CELLS = [DOMAINS / "three-cells" / name for name in ("domain.pddl", "problem.pdd
 BUILD = ("build", *CELLS, "--method", "minimal")
 #: The longest name of a file.
 NAME_MAX = os.pathconf("/", "PC_NAME_MAX")
-LONG = "x" * (NAME_MAX + 1)
 
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-FILES = [(*BUILD, "-o", "l.json", "--certificate"), None]
-FOLDERS = [("export", "l", *CELLS, "w0", "-o"), ("inspect", *CELLS, "--write")]
-UNWRITABLE = {
-    "": "its name is empty",
-    "newdir/": "this names a folder, and there is none",
-    "newdir/.": "this names a folder, and there is none",
-    "plan/": "this names a folder, and there is none",
-    LONG: "File name too long",
-    "loop": "Too many levels of symbolic links",
-    "readonly": "the file is read-only",
-    "link-to-readonly": "the file is read-only",
-}
-
-
-@pytest.mark.parametrize(
-    ("command", "output"),
-    [
-        *((command, output) for command in FILES for output in UNWRITABLE),
-        *((cmd, out) for cmd in (*FOLDERS, ("domains", "--copy", "grid")) for out in ("", LONG)),
-    ],
-)
-def test_what_cannot_be_written_is_refused_before_the_work(
-    command: tuple[object, ...] | None,
-    output: str,
-    coordlang: Command,
-    here: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """None: by the library."""
-    monkeypatch.setattr("coordlang.commands.inputs.read_domain", lambda *_: pytest.fail("no work"))
-    Path("plan").write_text("")
-    Path("loop").symlink_to("loop")
-    Path("readonly").write_text("precious")
-    Path("readonly").chmod(0o444)
-    Path("link-to-readonly").symlink_to("readonly")
-    before = sorted(here.rglob("*"))
-    said = f"cannot be written: {UNWRITABLE[output]}"
-    if command is None:
-        with pytest.raises(UsageError, match=said):
-            write_atomically(output, b"new")
-    else:
-        outcome = coordlang(*command, output)
-        assert (outcome.code, outcome.out) == (2, "")
-        named = f"{command[-1]} {output} {said}\n  Name a file" if command in FILES else "written"
-        assert named in outcome.err
-    assert sorted(here.rglob("*")) == before
-    assert Path("readonly").read_text() == "precious"
 
 
 @pytest.mark.parametrize("letter", ["x", "\N{LATIN SMALL LETTER E WITH ACUTE}", "\N{ROBOT FACE}"])

@@ -74,9 +74,10 @@ def small_candidates(
     ``plans`` of one task are listed at most, 0: any number; ``separable``: no plans are inseparable.
     """
     for seed in count():
-        domain, problem, options = random_model(seed, robots)
+        found = _random(seed, robots)
+        if found is None:
+            continue
         with suppress(ProvedImpossible, naive.TooLarge):
-            found = (all_pairs if seed % 3 else from_problems)(domain, [problem], options)
             if not 0 < found.count <= tasks or states_of(found.spaces) > states:
                 continue
             if separable and any(inseparable(space) is not None for space in found.spaces):
@@ -84,6 +85,16 @@ def small_candidates(
             if plans:
                 list(listed(found, plans))
             yield seed, found
+
+
+@cache
+def _random(seed: int, robots: int) -> Candidates | None:
+    """Made once in a process, for many files; None where nothing can be done."""
+    domain, problem, options = random_model(seed, robots)
+    try:
+        return (all_pairs if seed % 3 else from_problems)(domain, [problem], options)
+    except ProvedImpossible:
+        return None
 
 
 def listed(

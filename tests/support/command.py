@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+import os
+import pty
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
 
@@ -33,6 +36,27 @@ main()
 def own_process(*arguments: object) -> list[str]:
     """The program and arguments that run ``coordlang ..`` as a process of its own."""
     return [sys.executable, "-c", _MAIN, *map(str, arguments)]
+
+
+def on_a_terminal(
+    command: list[str],
+    heard: Callable[[str, subprocess.Popen[str]], object] = lambda _said, _process: None,
+    environment: Mapping[str, str] = {},
+) -> Outcome:
+    """Run a command whose stderr is a terminal; ``heard`` is told all that it got, piece by piece."""
+    terminal, end = pty.openpty()
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=end, text=True, env={**os.environ, **environment}
+    )
+    os.close(end)
+    said = b""
+    with suppress(OSError):  # nobody has the other end of the terminal any more
+        while piece := os.read(terminal, 4096):
+            said += piece
+            heard(said.decode(errors="replace"), process)
+    os.close(terminal)
+    out, _ = process.communicate(timeout=60)
+    return Outcome(process.returncode, out, said.decode())
 
 
 def in_shell(script: str, *arguments: object, before: str = "") -> subprocess.CompletedProcess[str]:

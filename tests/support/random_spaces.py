@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import lru_cache
 from random import Random
 from typing import Any, get_args
 
@@ -31,13 +32,23 @@ from tests.support.texts import parsed
 MOST = {2: 3_000, 3: 250, 4: 60}
 
 
-def candidates_of(seed: int, robots: int) -> Candidates:
+@lru_cache(500)
+def candidates_of(seed: int, robots: int | None) -> Candidates | None:
+    """Those of a seed, of any kind if ``robots`` is None; None where they are refused.
+
+    Many files use the same ones, which are made once in a process.
+    """
     random = Random(seed)
-    domain, problem, options = random_model(seed, robots)
-    options = replace(options, remember_actions=random.random() < 0.3)
-    if random.random() < 0.5:
-        return from_problems(domain, [problem], options)
-    return all_pairs(domain, [problem], options)
+    try:
+        if robots is None:
+            domain, problem, options = of_any_kind(seed, random)
+        else:
+            domain, problem, options = random_model(seed, robots)
+            options = replace(options, remember_actions=random.random() < 0.3)
+        make = from_problems if random.random() < (0.5 if robots else 0.3) else all_pairs
+        return make(domain, [problem], options)
+    except (ProvedImpossible, BadInput):
+        return None
 
 
 def of_any_kind(seed: int, random: Random) -> tuple[Domain, Problem, ModelOptions]:
@@ -45,12 +56,6 @@ def of_any_kind(seed: int, random: Random) -> tuple[Domain, Problem, ModelOption
     text = random_pddl(seed, random.choice(["agent", "plain", "joint"]))
     options = ModelOptions(unowned=text.unowned, remember_actions=random.random() < 0.3)
     return (*parsed(text.domain, text.problem), options)
-
-
-def candidates_of_kinds(seed: int) -> Candidates:
-    random = Random(seed)
-    domain, problem, options = of_any_kind(seed, random)
-    return (from_problems if random.random() < 0.3 else all_pairs)(domain, [problem], options)
 
 
 def random_instance(seed: int, cost: Cost | None = None) -> PlanningInstance | None:
@@ -91,9 +96,8 @@ def random_spaces(
     ``most`` None: as many as the walk is waited for; ``robots`` None: models of any kind.
     """
     for seed in seeds:
-        try:
-            found = candidates_of(seed, robots) if robots else candidates_of_kinds(seed)
-        except (ProvedImpossible, BadInput):
+        found = candidates_of(seed, robots)
+        if found is None:
             continue
         for space in found.spaces:
             if 0 < len(space) <= (MOST.get(space.robots, 0) if most is None else most):

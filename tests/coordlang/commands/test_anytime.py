@@ -4,17 +4,14 @@
 from __future__ import annotations
 
 import json
-import os
-import pty
 import signal
 import subprocess
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
 from coordlang.language.file import read_language
-from tests.support.command import own_process
+from tests.support.command import Outcome, on_a_terminal, own_process
 from tests.support.domains import DOMAINS
 
 HANDOVER = DOMAINS / "handover"
@@ -29,26 +26,16 @@ HARD = [
 ]
 
 
-def stopped(number: signal.Signals, *arguments: str) -> tuple[int, str, str]:
-    """Build, and send the signal once the first language is found: exit code, stdout, stderr.
+def stopped(number: signal.Signals, *arguments: str) -> Outcome:
+    """Build, and send the signal once the first language is found: the progress tells when."""
+    sent: list[int] = []
 
-    Its stderr is a terminal, for the progress tells when that is.
-    """
-    terminal, end = pty.openpty()
-    process = subprocess.Popen(
-        own_process("build", *HARD, *arguments), stdout=subprocess.PIPE, stderr=end, text=True
-    )
-    os.close(end)
-    said, sent = "", False
-    with suppress(OSError):  # nobody has the other end of the terminal any more
-        while piece := os.read(terminal, 4096):
-            said += piece.decode()
-            if not sent and " needed: round " in said:
-                process.send_signal(number)
-                sent = True
-    os.close(terminal)
-    out, _ = process.communicate(timeout=60)
-    return process.returncode, out, said
+    def heard(said: str, process: subprocess.Popen[str]) -> None:
+        if not sent and " needed: round " in said:
+            process.send_signal(number)
+            sent.append(number)
+
+    return on_a_terminal(own_process("build", *HARD, *arguments), heard)
 
 
 @pytest.mark.parametrize(
@@ -63,10 +50,10 @@ def test_the_best_language_is_written(
     number: signal.Signals, arguments: list[str], code: int, said: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "language.json"
-    ended, out, told = stopped(number, "-o", str(path), "--json", *arguments)
-    assert ended == code, told
-    assert f"{said}language so far is written" in told
-    assert json.loads(out)["proved_minimal"] is False
+    ended = stopped(number, "-o", str(path), "--json", *arguments)
+    assert ended.code == code, ended
+    assert f"{said}language so far is written" in ended.err
+    assert json.loads(ended.out)["proved_minimal"] is False
     guarantee = read_language(path).guarantee
     assert guarantee.method == "minimal"
     assert 2 <= guarantee.lower_bound < guarantee.size

@@ -6,12 +6,16 @@ each other.
 from __future__ import annotations
 
 import json
+import os
+import shlex
 import shutil
 from pathlib import Path
 
 import pytest
 
 import coordlang as door
+from planners.system.errors import UsageError
+from planners.system.writing import write_atomically
 from tests.coordlang.commands.conftest import Shell
 from tests.support.domains import DOMAINS
 
@@ -97,22 +101,50 @@ TO_FILE = [
 ]
 
 
+TO_FOLDER = [f"{EXPORT} -o", "inspect d.pddl p.pddl --write", "domains --copy grid"]
+LONG = "x" * (os.pathconf("/", "PC_NAME_MAX") + 1)
+UNWRITABLE = {
+    "no/x": "there is no folder no",
+    "plan/x": "there is no folder plan",
+    "in": "Is a directory",
+    "": "its name is empty",
+    "new/": "this names a folder, and there is none",
+    "new/.": "this names a folder, and there is none",
+    "plan/": "this names a folder, and there is none",
+    LONG: "File name too long",
+    "loop": "Too many levels of symbolic links",
+    "readonly": "the file is read-only",
+    "link": "the file is read-only",
+}
+
+
 @pytest.mark.parametrize(
-    ("line", "place", "reason"),
+    ("line", "place"),
     [
-        *((line, "no/x", "there is no folder no") for line in TO_FILE),
-        (TO_FILE[0], "plan/x", "there is no folder plan"),
-        (TO_FILE[0], "in", "Is a directory"),
+        *((line, "no/x") for line in TO_FILE),
+        *((TO_FILE[1], place) for place in UNWRITABLE),
+        *((line, place) for line in TO_FOLDER for place in ("", LONG)),
     ],
 )
 def test_the_place_is_looked_at_before_the_work(
-    line: str, place: str, reason: str, here: Shell, monkeypatch: pytest.MonkeyPatch
+    line: str, place: str, here: Shell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
         "coordlang.commands.inputs.read_domain", lambda *_: pytest.fail("no work before")
     )
-    said = f"{line.split()[-1]} {place} cannot be written: {reason}\n  Name a file"
-    here(f"{line} {place}", 2, said)
+    Path("loop").symlink_to("loop")
+    Path("readonly").write_text("precious")
+    Path("readonly").chmod(0o444)
+    Path("link").symlink_to("readonly")
+    before = sorted(Path().rglob("*"))
+    reason = f"cannot be written: {UNWRITABLE[place]}"
+    said = f"{line.split()[-1]} {place} {reason}\n  Name a file"
+    outcome = here(f"{line} {shlex.quote(place)}", 2, "written" if line in TO_FOLDER else said)
+    assert outcome.out == ""
+    with pytest.raises(UsageError, match=reason):
+        write_atomically(place, b"new")
+    assert sorted(Path().rglob("*")) == before
+    assert Path("readonly").read_text() == "precious"
 
 
 @pytest.mark.parametrize("line", [f"{BUILD} -o x.json --certificate", VERIFY])

@@ -11,16 +11,17 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.command import Outcome
 from tests.support.domains import ROOT
+from tests.support.forks import fork_command
 
 
-def completed(shell: str, line: str, **more: str) -> subprocess.CompletedProcess[str]:
+def completed(shell: str, line: str, **more: str) -> Outcome:
     """What is said to the last word of the line."""
     words = line.split(" ")
     last = words[-1] if shell == "fish" else str(len(words) - 1)
-    env = dict(os.environ, PYTHONPATH=str(ROOT), COMP_WORDS=line, COMP_CWORD=last, **more)
-    command = [sys.executable, "-m", "coordlang"]
-    return subprocess.run(command, env=env, text=True, capture_output=True)
+    asked = dict(COMP_WORDS=line, COMP_CWORD=last, **more)
+    return fork_command(before=lambda: os.environ.update(asked)).join()
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
@@ -31,10 +32,10 @@ def test_completion(shell: str) -> None:
         ("coordlang build --method m", ("minimal",), "greedy"),
         ("coordlang inspect dom", ("file",), "plans"),
     ):
-        out = completed(shell, line, _COORDLANG_COMPLETE=f"{shell}_complete").stdout
+        out = completed(shell, line, _COORDLANG_COMPLETE=f"{shell}_complete").out
         assert all(word in out for word in there), (line, out)
         assert absent not in out
-    script = completed(shell, "", _COORDLANG_COMPLETE=f"{shell}_source").stdout
+    script = completed(shell, "", _COORDLANG_COMPLETE=f"{shell}_source").out
     assert f"_COORDLANG_COMPLETE={shell}_complete" in script
 
 
@@ -53,4 +54,4 @@ _coordlang_completion coordlang; echo "${COMPREPLY[@]}"; complete -p coordlang >
 
 
 def test_an_unknown_shell() -> None:
-    assert completed("bash", "", _COORDLANG_COMPLETE="tcsh_source").returncode == 2
+    assert completed("bash", "", _COORDLANG_COMPLETE="tcsh_source").code == 2

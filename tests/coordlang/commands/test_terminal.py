@@ -4,15 +4,13 @@
 from __future__ import annotations
 
 import io
-import os
-import pty
 import re
-import subprocess
 import sys
 
 import pytest
 
 from coordlang.commands import terminal
+from tests.support.command import on_a_terminal
 from tests.support.domains import ROOT
 
 CODE = """
@@ -28,30 +26,15 @@ print("answer")
 """
 
 
-def on_a_terminal(code: str, **environment: str) -> tuple[str, str]:
+def run(code: str, **environment: str) -> tuple[str, str]:
     """Run code with a terminal as stderr: (stdout, what the terminal got)."""
-    main, other = pty.openpty()
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm", **environment}
-    child = subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=other, env=environment
-    )
-    os.close(other)
-    shown = b""
-    while True:
-        try:
-            part = os.read(main, 10_000)
-        except OSError:
-            break
-        if not part:
-            break
-        shown += part
-    out, _ = child.communicate()
-    os.close(main)
-    return out.decode(), shown.decode()
+    given = {"PYTHONPATH": str(ROOT), "TERM": "xterm", **environment}
+    ended = on_a_terminal([sys.executable, "-c", code], environment=given)
+    return ended.out, ended.err
 
 
 def test_progress_on_a_terminal() -> None:
-    out, shown = on_a_terminal(CODE)
+    out, shown = run(CODE)
     assert out == "answer\n"
     assert "first thing .." in shown
     assert "[second] thing .." in shown
@@ -71,7 +54,7 @@ def test_how_far_the_work_got() -> None:
         "    with reaching(lambda: f'{layers[-1]} states', 'less'):\n"
         "        time.sleep(0.5)\n"
     )
-    _, shown = on_a_terminal(code)
+    _, shown = run(code)
     assert "searching: the whole .. 0 s" in shown
     done = re.findall(r"searching: (\d+) states .. \d s", shown)
     assert any(int(number) > 10 for number in done)
@@ -80,7 +63,7 @@ def test_how_far_the_work_got() -> None:
 
 @pytest.mark.thorough
 def test_no_colour() -> None:
-    _, shown = on_a_terminal(CODE, NO_COLOR="1")
+    _, shown = run(CODE, NO_COLOR="1")
     assert "first thing .." in shown
     assert "\x1b[3" not in shown  # cursor movements are no colours
 
@@ -88,7 +71,7 @@ def test_no_colour() -> None:
 def test_short_work_shows_nothing() -> None:
     code = "from coordlang.commands import terminal\nwith terminal.working('x') as say: say('y')\n"
     code += "import sys; print('rich' in sys.modules)"
-    assert on_a_terminal(code) == ("False\n", "")
+    assert run(code) == ("False\n", "")
 
 
 def test_no_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -109,5 +92,5 @@ def test_an_error_ends_the_spinner() -> None:
         "except ValueError as error:\n"
         "    print(error, file=sys.stderr)\n"
     )
-    _, shown = on_a_terminal(code)
+    _, shown = run(code)
     assert shown.rstrip().endswith("broken")

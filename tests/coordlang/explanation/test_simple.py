@@ -10,7 +10,7 @@ from itertools import product
 
 import pytest
 
-from coordlang.commands.building import build_language
+from coordlang.commands.building import Built, build_language
 from coordlang.explanation.simple import _Search, simple
 from coordlang.explanation.variables import valuation
 from coordlang.explanation.words import mapped_states
@@ -78,9 +78,8 @@ def length(word: Assignment, states: list[int], shortest: dict[int, Lengths]) ->
 def by_trying_all(number: int) -> tuple[Lengths, list[int], dict[int, Lengths]]:
     """The shortest formulas of any smallest language of a small world."""
     candidates = small_worlds(6)[number]
-    job = build_language(candidates, "minimal").job
-    size = build_language(candidates, "minimal").language.guarantee.size
-    states = list(job.states)
+    built = build_language(candidates, "minimal")
+    size, states = built.language.guarantee.size, list(built.job.states)
     found = valuation(candidates.model, candidates.rows[states])
     sizes = [len(variable.values) for variable in found.variables]
     shortest = shortest_formulas([tuple(row) for row in found.value.tolist()], sizes)
@@ -106,10 +105,14 @@ def test_shortest_by_trying_all(number: int) -> None:
     assert built.language.guarantee.proved_minimal
 
 
+@cache
+def two_rows() -> Built:
+    return build_language(all_tasks("grid", "gw2-2x3"), "minimal")
+
+
 @pytest.mark.parametrize("phase", ["_decide", "_limit_fewer"])
 def test_stopped_searches_return_languages(phase: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    candidates = all_tasks("grid", "gw2-2x3")
-    built = build_language(candidates, "minimal")
+    candidates, built = all_tasks("grid", "gw2-2x3"), two_rows()
     word = built.language.partition(candidates.model).word_of(candidates.rows).tolist()
     found = Outcome({s: word[s] for s in built.job.states}, 5)
     checked: list[Assignment] = []
@@ -127,8 +130,7 @@ def test_stopped_searches_return_languages(phase: str, monkeypatch: pytest.Monke
 
 def test_a_search_gives_up() -> None:
     """With no conflicts to spend: the formulas that there were, and a bound that is true."""
-    candidates = all_tasks("grid", "gw2-2x3")
-    built = build_language(candidates, "minimal")
+    candidates, built = all_tasks("grid", "gw2-2x3"), two_rows()
     mapped = mapped_states(built.language, candidates.model)
     found = Outcome(dict(zip(built.job.states, mapped.word.tolist(), strict=True)), 5)
     outcome = simple(built.job, found, conflicts=0)

@@ -86,7 +86,7 @@ def test_processes_and_kept_jobs_change_nothing(tmp_path: Path) -> None:
     candidates = all_tasks("grid", "gw1-2x2")
     whole = differences(candidates, HERE, portion=60.0)
     kept = replace(EAGER, kept=Store(tmp_path / "kept", say=pytest.fail))
-    for workers in (EAGER, kept, kept):
+    for workers in (kept, kept):
         again = differences(candidates, workers, portion=60.0)
         assert repr(again) == repr(whole)
     partition = Partition.of_states(candidates.rows, words(whole, 0))

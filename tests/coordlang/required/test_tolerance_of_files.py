@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import json
 from fractions import Fraction
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import coordlang as library
+from coordlang.language.file import to_bytes
 from coordlang.language.provenance import percent
 from coordlang.required.failure import failures_under
 from tests.support.command import Command
@@ -22,11 +23,14 @@ SQUARE = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "gw1-2x2.pddl"
 SILENCE = {"failure_mean": 5 / 66, "failure_worst": 0.5}
 
 
+@cache
+def built() -> bytes:
+    return to_bytes(library.build(*SQUARE, tasks="all", method="greedy").language)
+
+
 def silent(path: Path, tolerance: dict[str, float] | None) -> Path:
     """One word for all states."""
-    language = library.build(*SQUARE, tasks="all", method="greedy").language
-    language.save(path)
-    data: dict[str, Any] = json.loads(path.read_text())
+    data: dict[str, Any] = json.loads(built())
     data |= {"words": ["w0"], "states": dict.fromkeys(data["states"], "w0"), "default": "w0"}
     data["guarantee"] = {
         "method": "by hand",

@@ -70,7 +70,7 @@ def goes(space: PlanSpace, node: int, found: Miscoordination) -> bool:
     )
 
 
-@pytest.mark.parametrize(("robots", "seeds"), runs(90, 40, 25))
+@pytest.mark.parametrize(("robots", "seeds"), runs(70, 35, 20))
 def test_breaks_equal_the_walk(robots: int | None, seeds: range) -> None:
     answers: Counter[tuple[str, bool]] = Counter()
     for candidates, space in random_spaces(seeds, robots):

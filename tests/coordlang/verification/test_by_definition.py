@@ -25,9 +25,9 @@ from tests.support.texts import parsed
 
 #: (robots, plans of one task that the twin lists at most, models)
 SIZES = [
-    (2, 60, 80),
-    (3, 14, 80),
-    (4, 7, 12),
+    (2, 60, 50),
+    (3, 14, 50),
+    (4, 7, 10),
     pytest.param(2, 60, 600, marks=pytest.mark.slow),
     pytest.param(3, 14, 600, marks=pytest.mark.slow),
     pytest.param(4, 7, 200, marks=pytest.mark.slow),
@@ -136,8 +136,8 @@ def test_nodes_at_which_plans_may_part(robots: int | None, seeds: range) -> None
 
 
 def test_sets_of_steps_of_long_plans() -> None:
-    """Nothing recurses: three robots go 1,200 steps, and each has two ways to begin."""
-    last = 1_200
+    """Nothing recurses: three robots go 1,050 steps, and each has two ways to begin."""
+    last = 1_050
     robots = "".join(f"(at r{k} c0)" for k in range(3))
     steps = "".join(f"(next c{n} c{n + 1})" for n in range(last))
     domain, problem = parsed(

@@ -152,8 +152,8 @@ FAMILIES: dict[str, Callable[[int], PlanningInstance | None]] = {
 @pytest.mark.parametrize(
     ("family", "seeds"),
     [
-        ("any", range(60)),
-        ("threes", range(40)),
+        ("any", range(40)),
+        ("threes", range(26)),
         ("rooms", range(22)),
         pytest.param("any", range(10_000, 12_000), marks=pytest.mark.slow),
         pytest.param("threes", range(10_000, 10_800), marks=pytest.mark.slow),
