@@ -23,8 +23,8 @@ from planners.joint.tables import Ints
 
 #: Comparisons of clauses to find which are implied.
 _COMPARISONS = 1_000_000
-#: Shares of the moves that change the words of an orbit, and that exchange two states' words.
-_ORBITS, _EXCHANGES = 0.2, 0.2
+#: Share of the moves that change the words of an orbit.
+_ORBITS = 0.2
 #: Values that are equal but for rounding.
 EQUAL = 1e-9
 #: What a move counts as, in plans measured.
@@ -285,11 +285,11 @@ class Annealing:
         return {state: word + (word >= self.word[state])}
 
     def _random_change(self) -> dict[int, int]:
-        """New words: for one state, for the states that a symmetry takes one to, or for two."""
-        kind, state = self._random.random(), self._random.choice(self._movable)
-        if kind < _ORBITS and self._permutations:
+        """A new word for one state, or for the states that a symmetry takes one to."""
+        state = self._random.choice(self._movable)
+        if self._permutations and self._random.random() < _ORBITS:
             return self._one_word_for_orbit(state)
-        return self._exchange(state) if kind > 1 - _EXCHANGES else self._another_word(state)
+        return self._another_word(state)
 
     def _one_word_for_orbit(self, state: int) -> dict[int, int]:
         to = self._random.choice(self._permutations)
@@ -300,15 +300,3 @@ class Annealing:
                 change[image] = word
             image = to[image]
         return change
-
-    def _exchange(self, state: int) -> dict[int, int]:
-        """Two states exchange their words; both are in a clause, if the first one is in any."""
-        clauses = self._constraints.of_state.get(state)
-        others = self._movable
-        if clauses:
-            pairs = self._constraints.pairs[self._random.choice(clauses)]
-            others = [s for pair in pairs for s in pair if s in self._states]
-        other = self._random.choice(others) if others else state
-        if self.word[other] == self.word[state]:
-            return self._another_word(state)
-        return {state: int(self.word[other]), other: int(self.word[state])}

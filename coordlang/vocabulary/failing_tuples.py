@@ -149,15 +149,13 @@ class FailingTuples:
             Longer tuples are left out once there are so many.
         """
         found: list[Agreeing] = []
-        looked_at = self._images if images is None else images
-        words = np.stack([word[to] for to in looked_at])
         for length, table in sorted(self._tables.items()):
             if sum(len(shorter.rows) for shorter in found) >= enough:
                 break
-            image, row = agreeing_rows(words, table.by_step)
-            numbers, first = np.unique(image, return_index=True)
-            for number, rows in zip(numbers.tolist(), np.split(row, first[1:]), strict=False):
-                found.append(Agreeing(length, looked_at[number], rows))
+            for to in self._images if images is None else images:
+                rows = np.flatnonzero(agree(word[to], table.by_step))
+                if len(rows):
+                    found.append(Agreeing(length, to, rows))
         return found
 
     def codes(
@@ -265,44 +263,6 @@ def _keys(states: Ints) -> Ints:
         code ^= code >> np.uint64(29)
     key: Ints = (code.sum(axis=1, dtype=np.uint64) * _MULTIPLIER).view(np.int64)
     return key
-
-
-def agreeing_rows(words: Ints, by_step: Ints) -> tuple[Ints, Ints]:
-    """The tuples all of whose sequences have one sentence under some partition; rarely others.
-
-    Most have two sequences that part at once, on their first step or their last one.
-
-    Parameters
-    ----------
-    words
-        (partitions, states) the word of each state number.
-    by_step
-        (length, robots, tuples) the states; the sequences of a tuple begin in one state.
-
-    Returns
-    -------
-    tuple[Ints, Ints]
-        The partitions, in order, and the rows of the tuples.
-    """
-    states, words = words.shape[1], words.astype(np.int32)
-    beside = words.take(by_step[1], axis=1).swapaxes(0, 1)
-    partition, rows = np.nonzero(_part_later(words.take(by_step[0, 0], axis=1), beside))
-    flat, of_partition = words.ravel(), partition * states
-    end, before = (flat.take(by_step[step].take(rows, axis=1) + of_partition) for step in (-1, -2))
-    kept = (end == end[0]).all(axis=0) & _part_later(end[0], before)
-    partition, rows = partition[kept], rows[kept]
-    of_one = agree(flat, by_step.take(rows, axis=2) + partition * states)
-    return partition[of_one], rows[of_one]
-
-
-def _part_later(shared: Ints, beside: Ints) -> Bools:
-    """Whether sequences from a shared word may agree, by their words (robots, ..) beside it.
-
-    Of two sequences that agree one stays in the word, or both go on to the same one.
-    """
-    still = beside == shared
-    later: Bools = ((beside == beside[0]) | still | still[0]).all(axis=0)
-    return later
 
 
 def agree(word: Ints, by_step: Ints) -> Bools:

@@ -13,8 +13,6 @@ NO_LEAD = 0
 PARTED = -1
 #: In place of a word where a plan goes on in the word where it is.
 NO_WORD = -1
-#: Combinations of leads and words up to which those that are asked for are marked in a table.
-_LARGEST_TABLE = 4_000_000
 
 
 class Leads:
@@ -35,24 +33,12 @@ class Leads:
         """
         words = int(max(first.max(initial=NO_WORD), second.max(initial=NO_WORD))) + 2
         codes = (lead * words + (first + 1)) * words + (second + 1)
-        most = len(self._leads) * words * words
-        if most > _LARGEST_TABLE:
-            different, inverse = np.unique(codes, return_inverse=True)
-            sorted_out: Ints = self._each(different, words)[inverse.reshape(-1)]
-            return sorted_out
-        asked = np.zeros(most, np.bool_)
-        asked[codes] = True
-        different = np.flatnonzero(asked)
-        answers = np.zeros(most, np.int64)
-        answers[different] = self._each(different, words)
-        found: Ints = answers[codes]
+        different, of_code = np.unique(codes, return_inverse=True)
+        leads, entered = np.divmod(different, words * words)
+        mine, theirs = np.divmod(entered, words)
+        rows = zip(leads.tolist(), (mine - 1).tolist(), (theirs - 1).tolist(), strict=True)
+        found: Ints = np.array([self._one(row) for row in rows], np.int64)[of_code.reshape(-1)]
         return found
-
-    def _each(self, codes: Ints, words: int) -> Ints:
-        lead, entered = np.divmod(codes, words * words)
-        first, second = np.divmod(entered, words)
-        rows = zip(lead.tolist(), (first - 1).tolist(), (second - 1).tolist(), strict=True)
-        return np.array([self._one(row) for row in rows], np.int64)
 
     def _one(self, key: tuple[int, int, int]) -> int:
         known = self._after.get(key)

@@ -251,11 +251,13 @@ class MinimalSearch:
 
         False if the budget was not enough.
         """
-        if size > self.lower and not self._is_one_task and self._finds_tied(size, budget.rounds):
-            return True
+        is_last = size == self.lower == self.upper - 1
+        if not self._is_one_task and (size > self.lower or is_last):
+            if self._finds_tied(size, budget.rounds):
+                return True
         if self._find_or_refute(size, budget):
             return True
-        return size == self.lower == self.upper - 1 and self._finds_tied(size, budget.rounds)
+        return self._is_one_task and is_last and self._finds_tied(size, budget.rounds)
 
     def _find_or_refute(self, size: int, budget: Budget) -> bool:
         """`decide` among all partitions."""
