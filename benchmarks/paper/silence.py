@@ -20,11 +20,10 @@ from coordlang.commands.building import Making, build_language, job_for_few_word
 from coordlang.language.candidates import Candidates
 from coordlang.language.provenance import percent
 from coordlang.language.sentences import sentence_counts
-from coordlang.required.divergences import required_nodes
 from coordlang.required.miscoordination import Inseparable
 from coordlang.vocabulary.annealing import AnnealingSettings
 from coordlang.vocabulary.few_words import few_words
-from coordlang.vocabulary.flexibility_bound import bits_bounds
+from coordlang.vocabulary.flexibility_bound import largest_boxes
 from coordlang.vocabulary.job import Assignment
 from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
@@ -61,14 +60,25 @@ def curve(world: World, seed: int, most: int = _MOST) -> Result:
     """How often robots fail with 1, 2, .. words, at most so many, and what is said with them."""
     candidates = world.candidates()
     spaces = list(candidates.spaces)
-    bounds = bits_bounds(spaces, [required_nodes(space) for space in spaces])
     return {
         "robots": len(candidates.model.robots),
         "tasks": candidates.count,
         "plan_bits": round(fmean(plan_bits(spaces)), 4),
-        "least_bits": round(float(bounds.mean()), 4),
+        "least_bits": round(fmean(bits_bounds(spaces)), 4),
         "points": list(_points(candidates, spaces, seed, most)),
     }
+
+
+def bits_bounds(spaces: Sequence[PlanSpace]) -> list[float]:
+    """For each task a lower bound on the bits that must be said, so that no mixture fails.
+
+    A plan in a set of n_s of N plans takes ``log2(N / n_s)`` bits, and n_s is at most the size of
+    its largest box (Proposition 26 of docs/concepts.md); 0 where there are too many plans.
+    """
+    return [
+        0.0 if sizes is None else fmean(log2(count / size) for size in sizes)
+        for count, sizes in largest_boxes(spaces)
+    ]
 
 
 def _points(

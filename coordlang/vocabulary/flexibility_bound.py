@@ -20,94 +20,43 @@ from dataclasses import dataclass
 import numpy as np
 
 from coordlang.language.flexibility import MANY, Floats
+from coordlang.required.divergences import required_nodes
 from planners.joint.states import bits
-from planners.joint.tables import Bools
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, counts
 
-#: Plans of a task up to which its boxes are looked at.
-MOST_PLANS = 3_000
-#: Boxes that cannot grow, of one task and one division, that are looked at.
-MOST_BOXES = 5_000
+#: Plans of a task up to which its boxes are looked at, and boxes that cannot grow, of one task and
+#: one division of the robots.
+_PLANS, _BOXES = 3_000, 5_000
 
 
-def flexibility_bounds(
-    spaces: Sequence[PlanSpace],
-    requires: Sequence[Bools],
-    *,
-    most_plans: int = MOST_PLANS,
-    most_boxes: int = MOST_BOXES,
-) -> Floats:
-    """For each task an upper bound on E = sum_s n_s^2 / N under any language.
+def largest_boxes(spaces: Sequence[PlanSpace]) -> Iterator[tuple[int, list[int] | None]]:
+    """For each task the number of its plans and, of each, the size of its largest box.
+
+    No sizes (None) where no coordination is required, or there are too many plans; no less than the
+    size where there are too many boxes.
+    """
+    for space in spaces:
+        counted, required = counts(space), required_nodes(space)
+        for start in space.starts.tolist():
+            plans = Plans(space, start, counted)
+            is_unbounded = not required[start] or plans.count > _PLANS
+            yield plans.count, None if is_unbounded else _box_sizes(list(plans))
+
+
+def flexibility_bounds(spaces: Sequence[PlanSpace]) -> Floats:
+    """(tasks) an upper bound on E = sum_s n_s^2 / N under any language.
 
     N where the task does not require coordination.
-
-    Parameters
-    ----------
-    spaces
-        The plan spaces of the tasks.
-    requires
-        For each space, of which nodes coordination is required
-        (`coordlang.required.divergences.required_nodes`).
-    most_plans
-        A task with more plans is bounded by their number.
-    most_boxes
-        Where there are more boxes a plan is bounded by the rows and columns that it can share.
-
-    Returns
-    -------
-    Floats
-        (tasks), in the order of the spaces.
     """
     bounds = [
         float(min(count, MANY)) if sizes is None else float(sum(sizes) / count)
-        for count, sizes in _boxes_by_task(spaces, requires, most_plans, most_boxes)
+        for count, sizes in largest_boxes(spaces)
     ]
     return np.array(bounds, np.float64)
 
 
-def bits_bounds(
-    spaces: Sequence[PlanSpace],
-    requires: Sequence[Bools],
-    *,
-    most_plans: int = MOST_PLANS,
-    most_boxes: int = MOST_BOXES,
-) -> Floats:
-    """For each task a lower bound on the bits that must be said, so that no mixture fails.
-
-    The entropy of the sentence that is said of a plan drawn uniformly, under any division of the
-    task's plans into sets that mix freely, whether words of states can make it or not: a plan in a
-    set of n_s plans takes ``log2(N / n_s)`` bits, and n_s is at most the size of its largest box
-    (Proposition 26 of docs/concepts.md).
-
-    Parameters
-    ----------
-    spaces, requires, most_plans, most_boxes
-        As in `flexibility_bounds`; the bound of a task with more plans is 0.
-    """
-    bounds = [
-        0.0 if sizes is None else float(np.log2(count / np.array(sizes, np.float64)).mean())
-        for count, sizes in _boxes_by_task(spaces, requires, most_plans, most_boxes)
-    ]
-    return np.array(bounds, np.float64)
-
-
-def _boxes_by_task(
-    spaces: Sequence[PlanSpace], requires: Sequence[Bools], most_plans: int, most_boxes: int
-) -> Iterator[tuple[int, list[int] | None]]:
-    """For each task the number of its plans and, of each, the size of its largest box.
-
-    No sizes (None) where no coordination is required, or there are too many plans.
-    """
-    for space, required in zip(spaces, requires, strict=True):
-        counted = counts(space)
-        for start in space.starts.tolist():
-            plans = Plans(space, start, counted)
-            is_unbounded = not required[start] or plans.count > most_plans
-            yield plans.count, None if is_unbounded else _box_sizes(list(plans), most_boxes)
-
-
-def _box_sizes(plans: Sequence[Plan], most_boxes: int) -> list[int]:
+def _box_sizes(plans: Sequence[Plan]) -> list[int]:
     """For each plan the size of the largest box with it.
 
     Of all divisions of the robots the least size counts.
@@ -115,7 +64,7 @@ def _box_sizes(plans: Sequence[Plan], most_boxes: int) -> list[int]:
     robots = len(plans[0][0])
     # With two robots both divisions are one table.
     divisions = range(robots) if robots > 2 else range(1)
-    sizes = [_Table.of(plans, robot).box_sizes(most_boxes) for robot in divisions]
+    sizes = [_Table.of(plans, robot).box_sizes() for robot in divisions]
     return list(map(min, zip(*sizes, strict=True)))
 
 
@@ -145,9 +94,9 @@ class _Table:
             rows[row] |= 1 << column
         return cls(cells, rows)
 
-    def box_sizes(self, most_boxes: int) -> list[int]:
+    def box_sizes(self) -> list[int]:
         """For each plan the size of the largest box with it; no less where there are many boxes."""
-        maximal = _intersections(self.rows, most_boxes)
+        maximal = _intersections(self.rows)
         if maximal is None:
             return self._shared()
         boxes = [
@@ -177,15 +126,15 @@ class _Table:
         return sizes
 
 
-def _intersections(rows: Iterable[int], most: int) -> set[int] | None:
+def _intersections(rows: Iterable[int]) -> set[int] | None:
     """All intersections of rows but the empty one: the column sets of boxes that cannot grow.
 
-    None if there are more than ``most``.
+    None if there are too many.
     """
     found: set[int] = set()
     for row in sorted(set(rows)):
         found |= {row & other for other in found} | {row}
-        if len(found) > most:
+        if len(found) > _BOXES:
             return None
     found.discard(0)
     return found

@@ -15,7 +15,6 @@ from random import Random
 import numpy as np
 
 from coordlang.language.flexibility import Flexibility, Floats, flexibility
-from coordlang.required.divergences import required_nodes
 from coordlang.required.plan_table import plan_table
 from coordlang.vocabulary.annealing import Annealing, AnnealingSettings, Constraints, Measure
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
@@ -100,7 +99,7 @@ class _Search:
         """Anneal until the bound is reached, or it does not pay any more."""
         job, words = self._job, self._found.size
         spaces = job.candidates.spaces
-        self._bound = flexibility_bounds(spaces, [required_nodes(space) for space in spaces])
+        self._bound = flexibility_bounds(spaces)
         if words < 2 or _is_met(self._bound, _measured(job, self.best)):
             return
         self._languages = languages = self._languages or Languages.of(job)

@@ -252,9 +252,9 @@ class MinimalSearch:
         False if the budget was not enough.
         """
         is_last = size == self.lower == self.upper - 1
-        if not self._is_one_task and (size > self.lower or is_last):
-            if self._finds_tied(size, budget.rounds):
-                return True
+        ties_first = not self._is_one_task and (is_last or size > self.lower)
+        if ties_first and self._finds_tied(size, budget.rounds):
+            return True
         if self._find_or_refute(size, budget):
             return True
         return self._is_one_task and is_last and self._finds_tied(size, budget.rounds)

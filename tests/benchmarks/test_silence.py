@@ -15,8 +15,6 @@ from benchmarks.paper import silence
 from benchmarks.paper.recipe import Record, Settings
 from benchmarks.paper.silence import plan_bits, sentence_bits
 from benchmarks.paper.suite import WORLDS
-from coordlang.required.divergences import required_nodes
-from coordlang.vocabulary.flexibility_bound import bits_bounds
 from planners.search.plans import Plan
 from tests.support import naive
 from tests.support.candidates import listed, on_graph
@@ -64,7 +62,7 @@ def test_no_division_into_sets_that_mix_takes_fewer_bits(robots: int) -> None:
         candidates = on_graph(seed, robots)
         if candidates is None:
             continue
-        bounds = bits_bounds(candidates.spaces, [required_nodes(s) for s in candidates.spaces])
+        bounds = silence.bits_bounds(candidates.spaces)
         for bound, (_, _, plans, _) in zip(bounds, listed(candidates), strict=True):
             if not 1 < len(plans) <= 6:
                 continue

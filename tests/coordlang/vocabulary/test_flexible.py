@@ -170,7 +170,7 @@ def test_bounds_are_the_largest_sets_that_mix(robots: int) -> None:
         if candidates is None:
             continue
         requires = [required_nodes(space) for space in candidates.spaces]
-        bounds = flexibility_bounds(candidates.spaces, requires)
+        bounds = flexibility_bounds(candidates.spaces)
         for bound, (space, task, plans, _) in zip(bounds, listed(candidates), strict=True):
             if len(plans) > 8:
                 continue
