@@ -18,12 +18,14 @@ import numpy as np
 from coordlang.required.choices import Choices
 from coordlang.required.composition_walk import FAILED, Moves, can_fail, move_counts, moves
 from coordlang.vocabulary.counterexamples import Counterexamples
-from coordlang.vocabulary.leads import NO_LEAD, NO_WORD, PARTED, Leads
 from coordlang.vocabulary.sat import Undecided
 from planners.joint.tables import Bools, Ints, unique_tuples
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 
+#: The lead of two sentences that are alike, what follows where they part, and in place of a word
+#: where a plan goes on in the word where it is.
+_NO_LEAD, _PARTED, _NO_WORD = 0, -1, -1
 #: Where no way leads to a violation; some steps may be added to it.
 _FAR = np.iinfo(np.int64).max // 4
 #: Random ways to a violation that are taken from one start at most.
@@ -150,9 +152,9 @@ class _Walk:
         self._choices, self._index, self._at_once = choices, index, at_once
         self._space = choices.space
         before, after = word[self._space.sources], word[self._space.targets()]
-        #: (edges): the word that a plan enters, `NO_WORD` where it goes on in its word.
-        self._entered = np.where(before == after, NO_WORD, after)
-        self._leads = Leads()
+        #: (edges): the word that a plan enters, `_NO_WORD` where it goes on in its word.
+        self._entered = np.where(before == after, _NO_WORD, after)
+        self._leads = _Leads()
 
     def layers(self) -> list[_Layer]:
         """The nodes: ``layers[k]`` has k joint steps to go."""
@@ -214,7 +216,7 @@ class _Walk:
         for other in range(1, robots):
             before = nodes[move.source[kept], robots + other]
             lead = self._leads.after(before, first, self._entered[move.edges[kept, other]])
-            agree = lead != PARTED
+            agree = lead != _PARTED
             kept, first = kept[agree], first[agree]
             leads = [known[agree] for known in (*leads, lead)]
         return kept, self._space.targets(move.edges[kept]), np.column_stack(leads)
@@ -230,7 +232,7 @@ def _backward(space: PlanSpace, layers: list[_Layer]) -> None:
     """Set ``best`` and ``choice`` of each node, goals first."""
     robots = space.robots
     goal = layers[0]
-    bad = (goal.nodes[:, robots] == len(space)) & (goal.nodes[:, robots + 1 :] == NO_LEAD).all(
+    bad = (goal.nodes[:, robots] == len(space)) & (goal.nodes[:, robots + 1 :] == _NO_LEAD).all(
         axis=1
     )
     goal.best = np.where(bad, 0, _FAR)
@@ -257,7 +259,7 @@ def _retrace(
     starts = [np.zeros((0, 3), np.int64)]
     for number, layer in enumerate(layers[1:], 1):
         x = layer.nodes[:, : robots + 1]
-        diagonal = (x == x[:, :1]).all(axis=1) & (layer.nodes[:, robots + 1 :] == NO_LEAD).all(
+        diagonal = (x == x[:, :1]).all(axis=1) & (layer.nodes[:, robots + 1 :] == _NO_LEAD).all(
             axis=1
         )
         hit = np.flatnonzero(diagonal & (layer.best < _FAR))
@@ -297,3 +299,55 @@ def _follow(
     states[:, :, 0] = space.state[start][:, None]
     states[:, :, 1:] = space.state[space.targets(edges)].transpose(0, 2, 1)
     return Counterexamples(start, edges, states)
+
+
+class _Leads:
+    """Leads: the words by which one plan's sentence is ahead of another's, numbered as met.
+
+    A lead is which of two plans is ahead, 1 or 2, and the words; `_NO_LEAD` is (0, no words).
+    """
+
+    def __init__(self) -> None:
+        self._leads: list[tuple[int, tuple[int, ...]]] = [(0, ())]
+        self._number = {self._leads[_NO_LEAD]: _NO_LEAD}
+        self._after: dict[tuple[int, int, int], int] = {}
+
+    def after(self, lead: Ints, first: Ints, second: Ints) -> Ints:
+        """The leads when the plans enter words ``first`` and ``second``, or `_NO_WORD`.
+
+        `_PARTED` where their sentences part.  One entry for each of ``lead``.
+        """
+        words = int(max(first.max(initial=_NO_WORD), second.max(initial=_NO_WORD))) + 2
+        codes = (lead * words + (first + 1)) * words + (second + 1)
+        different, of_code = np.unique(codes, return_inverse=True)
+        leads, entered = np.divmod(different, words * words)
+        mine, theirs = np.divmod(entered, words)
+        rows = zip(leads.tolist(), (mine - 1).tolist(), (theirs - 1).tolist(), strict=True)
+        found: Ints = np.array([self._one(row) for row in rows], np.int64)[of_code.reshape(-1)]
+        return found
+
+    def _one(self, key: tuple[int, int, int]) -> int:
+        known = self._after.get(key)
+        if known is None:
+            known = self._after[key] = self._between(*key)
+        return known
+
+    def _between(self, lead: int, first: int, second: int) -> int:
+        """The number of the lead when the plans enter these words."""
+        ahead, words = self._leads[lead]
+        mine = _entered(words if ahead == 1 else (), first)
+        theirs = _entered(words if ahead == 2 else (), second)
+        shared = min(len(mine), len(theirs))
+        if mine[:shared] != theirs[:shared]:
+            return _PARTED
+        if len(mine) == len(theirs):
+            return _NO_LEAD
+        rest = (1, mine[shared:]) if len(mine) > shared else (2, theirs[shared:])
+        if rest not in self._number:
+            self._number[rest] = len(self._leads)
+            self._leads.append(rest)
+        return self._number[rest]
+
+
+def _entered(words: tuple[int, ...], word: int) -> tuple[int, ...]:
+    return words if word == _NO_WORD else (*words, word)
