@@ -51,13 +51,18 @@ def verify(partition: Partition, spaces: Sequence[PlanSpace]) -> Verdict:
     there is to check.
     """
     nodes = tasks = 0
+
+    def so_far() -> str:
+        return f"{tasks:,} tasks"
+
     for space in spaces:
         tasks += len(space.starts)
         nodes += int((space.layer > 0).sum())
-        parting = parting_nodes(space, partition.word_of(space.rows)[space.state])
-        if not len(parting):
-            continue
-        part = space.with_tasks(parting, np.zeros(len(parting), np.int64))
+        with reaching(so_far, space.model.smaller("smaller or fewer tasks")):
+            parting = parting_nodes(space, partition.word_of(space.rows)[space.state])
+            if not len(parting):
+                continue
+            part = space.with_tasks(parting, np.zeros(len(parting), np.int64))
         goal, walked = SetWalk(part, partition.word_of(part.rows)[part.state]).run()
         nodes += walked
         if goal is not None:

@@ -18,6 +18,8 @@ from planners.system.errors import BadInput, Position, Unsupported
 from planners.system.files import not_utf8, read_stored_bytes, require_seen
 from planners.system.messages import UNSEEN, echoed
 
+#: A byte that is not UTF-8, as Python's ``surrogateescape`` decodes it.
+_NOT_DECODED = re.compile("[\udc80-\udcff]")
 #: Deeper nesting than this is refused: no domain needs it, and the passes behind recurse.
 MAX_DEPTH = 200
 
@@ -197,18 +199,19 @@ def read_source(path: str | Path) -> Source:
 def _with_old_comments(data: bytes, name: str) -> str:
     """The text of a file that is not UTF-8 in its comments only, as old benchmark files are.
 
-    It is read as Latin-1.  Raises `BadInput` for a byte beyond ASCII elsewhere.
+    Bytes there that are not UTF-8 are read as Latin-1.  Raises `BadInput` for such bytes elsewhere.
     """
     if b"\0" in data:
         what = "this is a binary file, not PDDL text"
         raise BadInput(what, position=Position(name), remedy=_NO_PDDL)
-    # As Latin-1 a byte is a character, so that an offset in the text is one in the data.
-    text = data.decode("latin-1")
+    # Such a byte b is chr(0xdc00 + b) here, so that it comes back as it was.
+    text = data.decode("utf-8-sig", "surrogateescape")
     for match in _TOKEN.finditer(text):
-        if match[0][0] != ";" and not match[0].isascii():
-            offset = match.start() + next(n for n, c in enumerate(match[0]) if c > "\x7f")
-            raise not_utf8(data, offset, Source(name, text).position(offset))
-    return text
+        if match[0][0] != ";" and (wrong := _NOT_DECODED.search(match[0])):
+            offset = match.start() + wrong.start()
+            read = len(data) - len(text[offset:].encode("utf-8", "surrogateescape"))
+            raise not_utf8(data, read, Source(name, text).position(offset))
+    return _NOT_DECODED.sub(lambda byte: chr(ord(byte[0]) - 0xDC00), text)
 
 
 def parse(source: Source) -> Document:

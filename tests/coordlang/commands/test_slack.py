@@ -123,7 +123,7 @@ def test_what_refuses(shell: Shell, made: Path) -> None:
 def test_coordination_and_few_words_within_slack(shell: Shell) -> None:
     """A file may say both: how often robots fail, and within which slack they do not."""
     said = "18 plans within slack 1, of at most 3 steps; coordination is required"
-    shell("coordination SQUARE --slack 1", 0, said)
+    assert said in " ".join(shell("coordination SQUARE --slack 1").out.split())
     (task,) = json.loads(shell("coordination SQUARE --slack 1 --json").out)["tasks"]
     assert (task["makespan"], task["slack"]) == (2, 1)
     for sees in ("", "--words-see-slack"):
