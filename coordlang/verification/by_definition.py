@@ -59,19 +59,19 @@ def verify(partition: Partition, spaces: Sequence[PlanSpace]) -> Verdict:
         tasks += len(space.starts)
         nodes += int((space.layer > 0).sum())
         with reaching(so_far, space.model.smaller("smaller or fewer tasks")):
-            parting = parting_nodes(space, partition.word_of(space.rows)[space.state])
+            word = partition.word_of(space.rows)  # of each state, in every part of the space
+            parting = parting_nodes(space, word[space.state])
             if not len(parting):
                 continue
             part = space.with_tasks(parting, np.zeros(len(parting), np.int64))
-        goal, walked = SetWalk(part, partition.word_of(part.rows)[part.state]).run()
+        goal, walked = SetWalk(part, word[part.state]).run()
         nodes += walked
         if goal is not None:
             mine = space.goal[space.starts] == goal
             part = space.with_tasks(space.starts[mine], space.second[mine])
-            word = partition.word_of(part.rows)[part.state]
-            trail, walked = SetWalk(part, word).violation()
+            trail, walked = SetWalk(part, word[part.state]).violation()
             first_plan = part.nodes_on(trail.start, [step[0] for step in trail.edges])
-            said = sentence(int(word[node]) for node in first_plan)
+            said = sentence(int(word[part.state[node]]) for node in first_plan)
             words = tuple(partition.words[number] for number in said)
             return Verdict(False, tasks, nodes + walked, describe_failure(part, trail, words))
     return Verdict(True, tasks, nodes, None)

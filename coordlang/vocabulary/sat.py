@@ -28,7 +28,8 @@ class PartitionProblem:
     solver
         A solver of python-sat, by name.
     named
-        Whether words are named in the order of the states; not if `tie` says which is which.
+        Whether words are named in the order of the states: proofs are shorter, and partitions are
+        harder to find.
     """
 
     def __init__(
@@ -50,11 +51,6 @@ class PartitionProblem:
             self._one_word(variables)
         if named:
             self._name_words_in_order()
-
-    def tie(self, state: int, other: int, words: Sequence[int]) -> None:
-        """Let one state have the word ``words[w]`` where another has word ``w``."""
-        for own, word in zip(self._word[state], words, strict=True):
-            self._solver.add_clause([-own, self._word[other][word]])
 
     def prefer(self, kept: Mapping[int, int]) -> None:
         """Try first to give these states these words; not with CaDiCaL."""

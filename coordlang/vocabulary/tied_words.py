@@ -43,7 +43,7 @@ class TiedWords:
     Attributes
     ----------
     conflicts
-        Those of the solvers so far.
+        Those of the solvers so far on kinds that stayed undecided.
     """
 
     def __init__(self, job: Job, languages: Languages) -> None:

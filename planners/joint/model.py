@@ -76,7 +76,7 @@ class Steps:
 
 
 class Stepper(ABC):
-    """What composes joint steps: `planners.joint.composition` or `planners.joint.composition`.
+    """What composes joint steps, or reads whole ones: see `planners.joint.composition`.
 
     What is not abstract is said of robots that neither do joint actions nor ever interfere.
     """
