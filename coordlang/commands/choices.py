@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from coordlang.commands.inputs import Arguments, InTask, public
-from coordlang.commands.layout import alike, columns, fitted, named
+from coordlang.commands.layout import alike, columns, fitted
 from coordlang.commands.records import ChoicesOptions, File
 from coordlang.commands.terminal import REFUTED, covered_code, echo, line_width, write
 from coordlang.commands.witness import witness_text
@@ -31,7 +31,7 @@ from planners.pddl.model_options import names_in
 from planners.search.plan_file import json_count
 from planners.search.plans import Plans
 from planners.system.errors import Refuted, UsageError, note
-from planners.system.notebook import counted
+from planners.system.notebook import counted, named
 from planners.system.writing import write_atomically
 
 #: Additions that are made to count how often choices fail, some seconds of work.

@@ -44,12 +44,6 @@ def fitted(text: str, width: int) -> str:
     return "\n".join(lines)
 
 
-def named(robots: Sequence[str]) -> str:
-    """Robots by name: ``r1, r2 and r5``."""
-    *others, last = robots
-    return f"{', '.join(others)} and {last}" if others else last
-
-
 def alike(items: Sequence[object]) -> Iterator[list[int]]:
     """Positions of equal items, grouped; groups in the order of their first positions."""
     left = list(range(len(items)))

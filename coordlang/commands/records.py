@@ -19,20 +19,17 @@ import click
 from planners.pddl.model_options import ModelOptions
 from planners.search import HeuristicName, SearchHeuristic
 from planners.system.errors import UsageError, note
-from planners.system.options import group, option
+from planners.system.options import cli_option, group, option
 
 if TYPE_CHECKING:
     from coordlang.language.listed import ListedTask
     from coordlang.language.words import Language
     from coordlang.lifted.language import LiftedLanguage
     from coordlang.verification.certificate_file import Certificate
-    from planners.loading import PlanningInstance
     from planners.parallel.workers import Workers
-    from planners.pddl.lifted import Domain, Problem
+    from planners.pddl.lifted import Problem
 
 File = str | PathLike[str]
-#: A domain file, a parsed domain, or domain and problems together (`coordlang.load`).
-DomainSource = Union[File, "Domain", "PlanningInstance"]
 ProblemSource = Union[File, "Problem"]
 #: ``"all"``, a task file, its data, or tasks: each with ``init`` and ``goal``, lists of PDDL texts.
 TasksSource = Union[File, Mapping[str, Any], "Sequence[ListedTask | Mapping[str, Any]]"]
@@ -44,7 +41,7 @@ CoordinatesSource = File | Mapping[str, tuple[float, float]]
 SentenceSource = str | Iterable[str]
 
 #: What the command line has not where plans take no slack, or a language file says how much.
-NO_SLACK = ("slack", "words_see_slack")
+NO_SLACK = "slack words_see_slack"
 #: Plans that are listed where no number is given.
 DEFAULT_MAX = 10
 
@@ -75,13 +72,11 @@ class OutputFile(NamedTuple):
 class Limits:
     """What bounds the work of a command."""
 
-    time_limit: float | None = option(
-        None, "Stop after this long (exit 23).", "SECONDS", only="cli"
+    time_limit: float | None = cli_option(None, "Stop after this long (exit 23).", "SECONDS")
+    memory_limit: str | None = cli_option(
+        None, "Stop before using more, as in 4G (exit 22); none: no limit.", "SIZE"
     )
-    memory_limit: str | None = option(
-        None, "Stop before using more, as in 4G (exit 22); none: no limit.", "SIZE", only="cli"
-    )
-    debug: bool = option(False, "Show tracebacks.", only="cli")
+    debug: bool = cli_option(False, "Show tracebacks.")
 
     def __post_init__(self) -> None:
         if self.time_limit is not None and not self.time_limit > 0:
@@ -117,24 +112,23 @@ class CommandOptions:
     keeps_plans: ClassVar[bool] = True
     alone: ClassVar[str | None] = None
 
-    no_cache: bool = option(False, "Search anew: read no plans that were found before.", only="cli")
+    no_cache: bool = cli_option(False, "Search anew: read no plans that were found before.")
     limits: Limits = group(Limits)
 
 
 def json_option() -> Any:
     """The field of an options record for ``--json``."""
-    return option(False, "One JSON object.", names=("--json",), only="cli")
+    return cli_option(False, "One JSON object.", names="--json")
 
 
 def form_option(default: str, help: str) -> Any:
     """The field of an options record for ``--format``."""
-    return option(default, help, names=("--format",), only="cli")
+    return cli_option(default, help, names="--format")
 
 
 def output_option(help: str, metavar: str = "FILE", default: Any = None, **more: Any) -> Any:
     """The field ``output`` of an options record for ``-o``; ``-`` is stdout."""
-    names = ("-o", "--output")
-    return option(default, help, metavar, names=names, only="cli", is_output=True, **more)
+    return cli_option(default, help, metavar, names="-o --output", is_output=True, **more)
 
 
 def result_option(what: str, metavar: str = "FILE") -> Any:
@@ -182,10 +176,10 @@ class Jobs:
 
     jobs: int | None = option(None, "Processes (default: one for each core).", "N", least=1)
     scheduler: str | PathLike[str] | None = option(
-        None, "Do the work on this Dask cluster instead.", "ADDRESS|FILE", without=("jobs",)
+        None, "Do the work on this Dask cluster instead.", "ADDRESS|FILE", without="jobs"
     )
     resume: str | PathLike[str] | None = option(
-        None, "Keep finished jobs here, and go on.", "DIR", is_output=True, files=(".table",)
+        None, "Keep finished jobs here, and go on.", "DIR", is_output=True, files=".table"
     )
 
     def opened(self) -> AbstractContextManager[Workers]:
@@ -201,31 +195,25 @@ class Jobs:
 class Listing:
     """Which plans are listed: the first ``most`` ones, or ``sample`` drawn ones."""
 
-    only_count: bool = option(
-        False,
-        "Print the number of plans only.",
-        names=("--count",),
-        only="cli",
-        without=("most", "sample", "form=dot"),
+    only_count: bool = cli_option(
+        False, "Print the number of plans only.", names="--count", without="most sample form=dot"
     )
-    most: int | None = option(
+    most: int | None = cli_option(
         None,
         f"List so many plans (default: {DEFAULT_MAX}).",
         "N",
-        names=("--max",),
+        names="--max",
         least=0,
-        only="cli",
-        without=("form=dot",),
+        without="form=dot",
     )
-    sample: int | None = option(
+    sample: int | None = cli_option(
         None,
         "Draw N plans uniformly instead of the first ones.",
         "N",
         least=1,
-        only="cli",
-        without=("most", "form=dot"),
+        without="most form=dot",
     )
-    seed: int = option(0, "Seed of --sample.", only="cli", needs=("sample",))
+    seed: int = cli_option(0, "Seed of --sample.", needs="sample")
 
 
 #: How words are found: a key of `coordlang.vocabulary.METHODS`.
@@ -248,16 +236,16 @@ class MethodOptions:
         "best: thousands of conflicts that its solver may spend.",
         "N",
         least=0,
-        needs=("method", "best"),
+        needs="method best",
     )
     seed: int = option(0, "Seed of all random choices.", least=0)
     alpha_only: bool = option(
-        False, "separating: part plans where they differ first.", needs=("method", "separating")
+        False, "separating: part plans where they differ first.", needs="method separating"
     )
     prefer: BuildPreference | None = option(
         None,
         "flexible: many plans are left open.  simple: short formulas.",
-        needs=("method", "best", "minimal", "exhaustive"),
+        needs="method best minimal exhaustive",
     )
 
 
@@ -289,7 +277,7 @@ class PlansOptions(AnswerOptions):
     )
     form: Literal["ipc", "json"] = form_option("ipc", "How plans are written.")
     listing: Listing = group(Listing)
-    source: Source = group(Source, without=("words_see_slack",))
+    source: Source = group(Source, without="words_see_slack")
 
 
 @dataclass(frozen=True, slots=True)
@@ -311,7 +299,7 @@ class CoordinationOptions(AnswerOptions):
     takes = "DOMAIN PROBLEMS..."
 
     work: Jobs = group(Jobs)
-    source: Source = group(Source, without=("words_see_slack",))
+    source: Source = group(Source, without="words_see_slack")
 
 
 @dataclass(frozen=True, slots=True)
@@ -346,19 +334,19 @@ class BuildOptions(AnswerOptions):
         "At most K words, under which robots fail least often.",
         "K",
         least=1,
-        without=("method", "alpha_only", "prefer", "certificate", "start"),
+        without="method alpha_only prefer certificate start",
     )
-    worst: bool = option(False, "With --words: least often in the worst task.", needs=("words",))
+    worst: bool = option(False, "With --words: least often in the worst task.", needs="words")
     start: LanguageSource | None = option(
         None,
         "Repair this language: few states change their word.",
         "LANGUAGE",
-        without=("method", "alpha_only", "prefer"),
+        without="method alpha_only prefer",
     )
     unsolvable: Literal["fail", "skip"] = option("fail", "What to do with tasks without plans.")
     output: str = result_option("The language file (.json, .json.gz)", "LANGUAGE")
-    certificate: str | None = option(
-        None, "Also write why fewer words do not suffice.", "FILE", only="cli", is_output=True
+    certificate: str | None = cli_option(
+        None, "Also write why fewer words do not suffice.", "FILE", is_output=True
     )
     work: Jobs = group(Jobs)
     source: Source = group(Source)
@@ -380,13 +368,12 @@ class VerifyOptions(AnswerOptions):
     certificate: CertificateSource | None = option(
         None, "Also check why fewer words do not suffice.", "FILE"
     )
-    dimacs: str | None = option(
+    dimacs: str | None = cli_option(
         None,
         "With --certificate: write the formula that was refuted.",
         "FILE",
-        only="cli",
         is_output=True,
-        needs=("certificate",),
+        needs="certificate",
     )
     work: Jobs = group(Jobs)
 
@@ -402,7 +389,7 @@ class LiftOptions(AnswerOptions):
 
     tasks: Literal["all"] | None = option(None, "Tasks: every pair of reachable states.")
     check: Sequence[ProblemSource] = option(
-        (), "Verify on this problem, too, or learn from it.", "PROBLEM", without=("factored",)
+        (), "Verify on this problem, too, or learn from it.", "PROBLEM", without="factored"
     )
     complexity: int = option(8, "Leave out features that are more complex.", least=1)
     prefer: Literal["features", "words"] | None = option(
@@ -435,7 +422,7 @@ class GroundOptions(PlanningOptions):
     tasks: TasksSource | None = option(
         "all", "Tasks: every pair of reachable states, a file's, the problem's.", "all|FILE|own"
     )
-    verified: bool = option(True, "Do not verify it here.", names=("--unverified",))
+    verified: bool = option(True, "Do not verify it here.", names="--unverified")
     coordinates: CoordinatesSource | None = coordinates_option()
     jobs: int | None = option(None, "Processes that verify (default: the cores).", "N", least=1)
     output: str = result_option("The language file (.json, .json.gz)", "LANGUAGE")
@@ -459,14 +446,13 @@ class UnderstandOptions(AnswerOptions):
 
     listing: Listing = group(Listing)
     form: Literal["ipc", "json", "dot"] = form_option("ipc", "dot: drawn as one DAG.")
-    nodes: int | None = option(
+    nodes: int | None = cli_option(
         None,
         f"Cut the DAG to about N nodes (default for dot: {NODES_DRAWN}).",
         "N",
         least=1,
-        only="cli",
-        needs=("form", "dot", "json"),
-        without=("only_count",),
+        needs="form dot json",
+        without="only_count",
     )
     output: str | None = output_option("Write to this file instead of stdout.")
 
@@ -498,11 +484,11 @@ class ChoicesOptions(AnswerOptions):
 
     robot: str | Sequence[str] = option((), "Whose choices; may be repeated (default: all).", "R")
     check: bool = option(False, "Walk every combination: is each an optimal plan?")
-    history: tuple[str, ...] = option((), "A step that it did; or idle.", "SUBACTION", only="cli")
-    visit: tuple[str, ...] = option((), "Detour: this becomes true.", "ATOM", only="cli")
-    avoid: tuple[str, ...] = option((), "Detour: this is false from now on.", "ATOM", only="cli")
-    do: tuple[str, ...] = option((), "Detour: it does this; * is any text.", "PATTERN", only="cli")
-    never: tuple[str, ...] = option((), "Detour: it never does this.", "PATTERN", only="cli")
+    history: tuple[str, ...] = cli_option((), "A step that it did; or idle.", "SUBACTION")
+    visit: tuple[str, ...] = cli_option((), "Detour: this becomes true.", "ATOM")
+    avoid: tuple[str, ...] = cli_option((), "Detour: this is false from now on.", "ATOM")
+    do: tuple[str, ...] = cli_option((), "Detour: it does this; * is any text.", "PATTERN")
+    never: tuple[str, ...] = cli_option((), "Detour: it never does this.", "PATTERN")
     form: Literal["text", "json", "dot"] = form_option("text", "How they are shown.")
     output: str | None = output_option("Write to this file instead of stdout.")
 
@@ -516,9 +502,9 @@ class SimulateOptions(AnswerOptions):
     alone = "replay"
 
     sentence: SentenceSource | None = option(
-        None, "What robots have agreed on.", "SENTENCE", without=("without", "plan")
+        None, "What robots have agreed on.", "SENTENCE", without="without plan"
     )
-    without: bool = option(False, "Each follows an optimal plan of its own.", without=("plan",))
+    without: bool = option(False, "Each follows an optimal plan of its own.", without="plan")
     plan: bool = option(False, "All follow one whole plan.")
     runs: int = option(1, "How many runs.", "N", least=1)
     seed: int = option(0, "Of the first run; the next ones follow.", least=0)
@@ -526,15 +512,15 @@ class SimulateOptions(AnswerOptions):
     cell: float = option(1.0, "How far apart neighbouring cells are.", "METRES")
     radius: float | None = option(None, "Of a robot (default: a fifth of --cell).", "METRES")
     noise: float = option(0.1, "The standard deviation of what wheels do.", "SHARE")
-    lidar: bool = option(True, "Robots do not look ahead.", names=("--no-lidar",))
+    lidar: bool = option(True, "Robots do not look ahead.", names="--no-lidar")
     human: str | None = option(None, "Somebody whom only lidars see.", "PLACE|random|walking")
     visit: Sequence[str] = option((), "After STEP it wants to visit PLACE.", "ROBOT:STEP:PLACE")
     coordinates: CoordinatesSource | None = coordinates_option()
     output: tuple[str, ...] = output_option(
         "The record (.json), or one run (.gif, .mp4, .png).", default=()
     )
-    shown: int | None = option(None, "Of the run that -o shows.", "SEED", only="cli")
-    replay: str | None = option(None, "Only read and show this record.", "RECORD", only="cli")
+    shown: int | None = cli_option(None, "Of the run that -o shows.", "SEED")
+    replay: str | None = cli_option(None, "Only read and show this record.", "RECORD")
 
     def __post_init__(self) -> None:
         from coordlang.commands.simulate import kind_of
@@ -560,13 +546,13 @@ class ExportOptions(AnswerOptions):
         "Beyond N joint actions robots choose one by one.",
         "N",
         least=0,
-        needs=("to", "pddl"),
+        needs="to pddl",
     )
     for_planner: Literal["fd", "kstar", "pyperplan"] = option(
-        "fd", "Who reads the PDDL.", names=("--for",), needs=("to", "pddl")
+        "fd", "Who reads the PDDL.", names="--for", needs="to pddl"
     )
-    translate_plan: str | None = option(
-        None, "Only translate a plan of what is exported.", "FILE", only="cli", needs=("to", "pddl")
+    translate_plan: str | None = cli_option(
+        None, "Only translate a plan of what is exported.", "FILE", needs="to pddl"
     )
 
     @property
@@ -585,7 +571,7 @@ class ExplainOptions(AnswerOptions):
 
     task: bool = option(False, "What each sentence of PROBLEM's task asks of each robot.")
     sentence: SentenceSource | None = option(
-        None, "With --task: this sentence only.", "WORDS", needs=("task",)
+        None, "With --task: this sentence only.", "WORDS", needs="task"
     )
     formula_per_word: bool = option(False, "A formula of its own for every word.")
 
@@ -601,7 +587,7 @@ class ReportOptions(PlanningOptions):
     tasks_shown: int = option(30, "Show at most this many tasks.", "N", least=1)
     coordinates: str | None = coordinates_option()
     run: str | None = option(None, "Also play these runs of simulate.", "RUN.json")
-    planviz: bool = option(False, "Also write a plan for PlanViz.", without=("output=-",))
+    planviz: bool = option(False, "Also write a plan for PlanViz.", without="output=-")
     seed: int = option(0, "Draws the tasks.")
 
     def __post_init__(self) -> None:
@@ -627,13 +613,13 @@ class DomainsOptions(CommandOptions):
     keeps_plans = False
 
     copy: tuple[str, str] | None = option(
-        None, "Copy this domain, or all, into DIR/NAME.", "NAME|all DIR", without=("map",)
+        None, "Copy this domain, or all, into DIR/NAME.", "NAME|all DIR", without="map"
     )
-    map: str | None = option(None, "A map of movingai.com.", "FILE.map", needs=("scen",))
-    scen: str | None = option(None, "Who starts and goes where.", "FILE.scen", needs=("agents",))
-    agents: int | None = option(None, "The first K robots of the scenario.", "K", needs=("output",))
+    map: str | None = option(None, "A map of movingai.com.", "FILE.map", needs="scen")
+    scen: str | None = option(None, "Who starts and goes where.", "FILE.scen", needs="agents")
+    agents: int | None = option(None, "The first K robots of the scenario.", "K", needs="output")
     output: str | None = option(
-        None, "The folder for a map's domain and problem.", "DIR", names=("-o",), needs=("map",)
+        None, "The folder for a map's domain and problem.", "DIR", names="-o", needs="map"
     )
     as_json: bool = json_option()
 

@@ -11,7 +11,7 @@ from typing import Any
 from coordlang.explanation.demands import RobotPart, SentenceDemands, WordChange
 from coordlang.explanation.words import Cover, Literal, MappedStates, Term, WordDescriptions
 from planners.joint.model import show
-from planners.system.notebook import counted
+from planners.system.notebook import counted, named
 
 #: Terms of one formula, and alternatives of one choice, that are written out.
 _TERMS = 12
@@ -191,17 +191,16 @@ def _cause(change: WordChange) -> str:
     """Who brings the change about."""
     if not change.robots:
         return "whatever the robots do"
-    *others, last = change.robots
-    if not others:
+    if len(change.robots) == 1:
         ways = [own or "waiting" for (own,), _ in change.ways]
-        return f"{last} decides it by {_alternatives(ways)}"
+        return f"{change.robots[0]} decides it by {_alternatives(ways)}"
     ways = [
         " and ".join(
             f"{name} {own or 'wait'}" for name, own in zip(change.robots, does, strict=True)
         )
         for does, _ in change.ways
     ]
-    return f"{', '.join(others)} and {last} decide it together: {_alternatives(ways, '; or ')}"
+    return f"{named(change.robots)} decide it together: {_alternatives(ways, '; or ')}"
 
 
 def demands_data(demands: SentenceDemands) -> dict[str, Any]:

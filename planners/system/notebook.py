@@ -48,6 +48,12 @@ def counted(number: int, noun: str) -> str:
     return f"{number:,} {noun}{'s' * (number != 1)}"
 
 
+def named(names: Sequence[str], between: str = "and") -> str:
+    """Names as text: ``r1, r2 and r5``."""
+    *others, last = names
+    return f"{', '.join(others)} {between} {last}" if others else last
+
+
 def _row(cell: str, texts: Sequence[str]) -> str:
     return f"<tr>{''.join(f'<{cell}>{escape(text)}</{cell}>' for text in texts)}</tr>"
 

@@ -12,11 +12,12 @@ import difflib
 import inspect
 import sys
 import types
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import Field, dataclass, field, fields, replace
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
 from planners.system.errors import UsageError
+from planners.system.notebook import named
 
 Record = TypeVar("Record")
 
@@ -65,16 +66,27 @@ class Option:
 
 
 def option(default: object, help: str, metavar: str | None = None, **more: Any) -> Any:
-    """A field of an options record; ``more`` are attributes of `Option`."""
-    return field(default=default, metadata={"option": Option(help, metavar, **more)})
+    """A field of an options record.
+
+    ``more`` are attributes of `Option`, of which several names may be one text.
+    """
+    read: dict[str, Any] = {k: tuple(v.split()) if type(v) is str else v for k, v in more.items()}
+    return field(default=default, metadata={"option": Option(help, metavar, **read)})
 
 
-def group(record: type[object], without: tuple[str, ...] = ()) -> Any:
+def cli_option(default: object, help: str, metavar: str | None = None, **more: Any) -> Any:
+    """An `option` that only the command line has."""
+    made = option(default, help, metavar, **more)
+    return field(default=default, metadata={"option": replace(made.metadata["option"], only="cli")})
+
+
+def group(record: type[object], without: str = "") -> Any:
     """A field of an options record that holds another one, whose options are given like its own.
 
     The command line has no options ``without``.
     """
-    return field(default_factory=record, metadata={"group": record, "without": without})
+    hidden = without.split()
+    return field(default_factory=record, metadata={"group": record, "without": hidden})
 
 
 def options_of(record: type[object]) -> Iterator[Option]:
@@ -172,14 +184,8 @@ def _refuse_contradictions(known: Mapping[str, Option], values: Mapping[str, obj
             remedy = f"Add {' '.join(filter(None, added))}."
         belongs = f"{said} belongs to {needed.spelling}"
         if accepted:
-            belongs += f" {_either(accepted)}"
+            belongs += f" {named(accepted, 'or')}"
         raise UsageError(belongs, remedy=remedy)
-
-
-def _either(values: Sequence[str]) -> str:
-    """Values as text: ``a, b or c``."""
-    *others, last = values
-    return f"{', '.join(others)} or {last}" if others else last
 
 
 def _check(given: Option, value: object) -> None:
@@ -187,7 +193,7 @@ def _check(given: Option, value: object) -> None:
     if given.values and value not in given.values:
         raise UsageError(
             f"{given.spelling} {value}: there is no such value",
-            remedy=f"Say {_either(given.values)}.",
+            remedy=f"Say {named(given.values, 'or')}.",
         )
     if given.kind is bool and not isinstance(value, bool):
         raise UsageError(
