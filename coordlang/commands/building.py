@@ -3,16 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import count
 from math import inf
 from time import perf_counter
 from typing import Any
-
-import numpy as np
 
 from coordlang.commands.records import BuildPreference, MethodOptions
 from coordlang.commands.witness import witness_data, witness_text
@@ -20,7 +19,6 @@ from coordlang.explanation.simple import simple
 from coordlang.language.candidates import Candidates, require_solvable
 from coordlang.language.partition import Partition, read_key
 from coordlang.language.provenance import Guarantee, Tolerance, provenance_of
-from coordlang.language.warping import Clause
 from coordlang.language.words import Language
 from coordlang.required.divergences import (
     FirstDifferences,
@@ -39,11 +37,10 @@ from coordlang.vocabulary.few_words import FewWords, few_words
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.greedy import first_language
 from coordlang.vocabulary.hidden_slack import hidden_differences
-from coordlang.vocabulary.job import Assignment, Evidence
+from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.minimal import refuting_clauses
-from coordlang.vocabulary.repair import Repair, repair
+from coordlang.vocabulary.repair import repair
 from planners.joint.model import NO_FACT
-from planners.joint.tables import Ints, Rows, find_rows
 from planners.parallel.workers import Workers
 from planners.search.portions import require_room
 from planners.system.errors import BadInput, OutOfMemory, Refuted, UsageError
@@ -90,7 +87,7 @@ def build_language(
     if words is not None:
         return _few_words(making, words, worst=worst, seed=options.seed)
     if start is not None:
-        return repair_language(making, start, options)
+        return repair_language(making, start, options.seed)
     if candidates.model.hides_slack and method in ("greedy", "separating"):
         raise UsageError(
             f"--method {method} parts plans where their states first differ, and with slack they "
@@ -184,35 +181,36 @@ def job_for_few_words(making: Making, seed: int = 0) -> Job:
     return replace(job, incumbent=first_language(job))
 
 
-def repair_language(making: Making, start: Language, options: MethodOptions) -> Built:
+def repair_language(making: Making, start: Language, seed: int) -> Built:
     """Change the words of as few states as makes a language serve candidate tasks.
 
     The result is verified by definition.  States that are on no plan of the candidate tasks keep
     their words.
     """
-    job = making.job(MethodOptions(seed=options.seed))
+    job = making.job(MethodOptions(seed=seed))
     making.note("coordination")
     old = _Old.of(start, making.candidates)
-    words = old.words_of(job.states)
+    known, number = old.language, {word: n for n, word in enumerate(old.language.words)}
+    words = {s: number[known.states[k]] for s, k in old.keys(job.states) if k in known.states}
     making.progress("verifying the old language")
-    partition = old.partition
+    partition = known.partition(making.candidates.model)
     verdict = making.verdict(partition)
     making.note("verify")
     repaired = Repaired(verdict.witness, new_states=len(job.states) - len(words), gone=old.gone)
-    # What the old file claims of fewer words is not believed: the bound is the job's.
-    outcome = Outcome(words, job.lower_bound)
     if verdict.holds:
         making.verified.append((words, partition, verdict))
-        return making.built(job, outcome, REPAIR, repaired=repaired)
-    making.partition_of = old.repaired
-    result = repair(job, words, len(partition.words), partition.default)
+        # What the old file claims of fewer words is not believed: the bound is the job's.
+        return making.built(job, Outcome(words, job.lower_bound), REPAIR, repaired=repaired)
+    making.partition_of = old.partition
+    result = repair(job, words, len(number), number[known.default])
     making.note("repair")
     now = old.repaired(result.partition)
+    changed = sorted(key for _, key in old.keys(result.changed))
     repaired = replace(
         repaired,
-        changed=old.changes(result, now),
+        changed=tuple(ChangedState(key, known.states[key], now.states[key]) for key in changed),
         changes_bound=result.changes_bound,
-        new_words=tuple(w for w in now.words if w not in partition.words),
+        new_words=tuple(word for word in now.words if word not in number),
         new_words_bound=result.new_words_bound,
     )
     outcome = Outcome(result.partition, job.lower_bound, result.figures, result.stopped)
@@ -287,11 +285,12 @@ class Making:
 
         Words that were not verified are none.
         """
-        verified = (own for own in self.verified if own[0] is found.partition)
-        unverified = Verdict(False, self.candidates.count, 0, None)
-        _, partition, verdict = next(
-            verified, (None, self.partition_of(found.partition), unverified)
-        )
+        of_found = (own for own in self.verified if own[0] is found.partition)
+        if (verified := next(of_found, None)) is not None:
+            _, partition, verdict = verified
+        else:
+            partition = self.partition_of(found.partition)
+            verdict = Verdict(False, self.candidates.count, 0, None)
         guarantee = Guarantee.of(method, len(partition.words), found.lower_bound, verdict.holds)
         provenance = provenance_of(self.candidates, guarantee, {"program": "coordlang"})
         if not verdict.holds:
@@ -299,29 +298,18 @@ class Making:
             tolerance = more["failures"].tolerance or Tolerance()
             provenance = replace(provenance, tolerance=replace(tolerance, slack=slack))
         language = Language.of(partition, self.candidates.model, provenance)
-        return Built(
-            language,
-            job,
-            verdict,
-            found.figures,
-            self.seconds,
-            found.stopped,
-            found.refuting,
-            **more,
-        )
+        return Built(language, job, verdict, found, self.seconds, **more)
 
 
 @dataclass(frozen=True, slots=True)
 class _Old:
-    """The old words in the model of the candidate tasks.
+    """The words of a language to repair, of those of its states that are some of this model.
 
-    ``listed`` (states) is the place of each candidate state in ``partition``, -1 where it has none.
-    ``gone`` of the language's states are none of this model.
+    So many of its states are ``gone``.
     """
 
+    language: Language
     candidates: Candidates
-    partition: Partition
-    listed: Ints
     gone: int
 
     @classmethod
@@ -331,43 +319,29 @@ class _Old:
             with suppress(BadInput):
                 read_key(candidates.model.codec, key)
                 kept[key] = word
-        partition = replace(language, states=kept).partition(candidates.model)
-        listed = find_rows(partition.rows, candidates.rows)
-        return cls(candidates, partition, listed, len(language.states) - len(kept))
+        gone = len(language.states) - len(kept)
+        return cls(replace(language, states=kept), candidates, gone)
 
-    def words_of(self, states: Sequence[int]) -> dict[int, int]:
-        """The word numbers of those states that the language lists."""
-        places = self.listed[list(states)].tolist()
-        word = self.partition.word.tolist()
-        return {s: word[p] for s, p in zip(states, places, strict=True) if p >= 0}
+    def keys(self, states: Iterable[int]) -> Iterator[tuple[int, str]]:
+        """Candidate states with their keys."""
+        rows, codec = self.candidates.rows, self.candidates.model.codec
+        return ((state, codec.key(rows[state])) for state in states)
 
-    def repaired(self, assignment: Assignment) -> Partition:
-        """The partition with other words of some states; words without states are left out."""
-        states = sorted(assignment)
-        fresh = self.listed[states] < 0
-        rows: Rows = np.concatenate((self.partition.rows, self.candidates.rows[states][fresh]))
-        given = np.array([assignment[state] for state in states], np.int64)
-        word = np.concatenate((self.partition.word, given[fresh]))
-        word[self.listed[states][~fresh]] = given[~fresh]
-        used, number = np.unique(word, return_inverse=True)
-        kept, old, default = used.tolist(), self.partition.words, self.partition.default
-        new = (name for name in (f"w{n}" for n in count()) if name not in old)
-        names = tuple(old[word] if word < len(old) else next(new) for word in kept)
-        most = int(np.bincount(number).argmax())
-        default = kept.index(default) if default in kept else most
-        return Partition.of_table(names, rows, number.reshape(-1), default)
+    def repaired(self, assignment: Assignment) -> Language:
+        """The language with other words of some states; words without states are left out."""
+        old, names = self.language, dict(enumerate(self.language.words))
+        new = (name for name in (f"w{n}" for n in count()) if name not in old.words)
+        names |= zip(sorted({*assignment.values()} - names.keys()), new, strict=False)
+        said = {key: names[assignment[n]] for n, key in self.keys(assignment)}
+        states = {**old.states, **said}
+        sizes = Counter(states.values())
+        words = tuple(word for word in names.values() if sizes[word])
+        default = old.default if sizes[old.default] else max(words, key=sizes.__getitem__)
+        return replace(old, words=words, states=states, default=default)
 
-    def changes(self, result: Repair, partition: Partition) -> tuple[ChangedState, ...]:
-        """The changed states, sorted by their keys."""
-        rows = self.candidates.rows[list(result.changed)]
-        names = zip(
-            map(self.candidates.model.codec.key, rows),
-            self.partition.word_of(rows).tolist(),
-            partition.word_of(rows).tolist(),
-            strict=True,
-        )
-        old, new = self.partition.words, partition.words
-        return tuple(ChangedState(key, old[was], new[now]) for key, was, now in sorted(names))
+    def partition(self, assignment: Assignment) -> Partition:
+        """`repaired`, over the states of the model."""
+        return self.repaired(assignment).partition(self.candidates.model)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -375,20 +349,17 @@ class Built(Presented):
     """A language, verified by definition, and how it was made.
 
     With a limit on the words it may be none: ``failures`` says how often robots then fail, and
-    ``few_words`` how it was found.  ``job`` is what words were looked for; ``figures`` are the
-    method's own, ``seconds`` the time by phase; ``stopped`` is the error that ended the method
-    before its proof was complete; by the clauses ``refuting`` the lower bound was proved.
-    ``repaired`` says what became of the language that it started from, ``fewest`` how many tasks
-    would require coordination with the fewest actions only; the time limit ends at ``deadline``.
+    ``few_words`` how it was found.  ``job`` is what words were looked for, ``outcome`` what the
+    method found, ``seconds`` the time by phase.  ``repaired`` says what became of the language that
+    it started from, ``fewest`` how many tasks would require coordination with the fewest actions
+    only; the time limit ends at ``deadline``.
     """
 
     language: Language
     job: Job
     verdict: Verdict
-    figures: Mapping[str, float]
+    outcome: Outcome
     seconds: Mapping[str, float]
-    stopped: BaseException | None = None
-    refuting: Mapping[Clause, Evidence] = field(default_factory=dict)
     failures: Failures = NONE
     repaired: Repaired | None = None
     few_words: FewWords | None = None
@@ -400,6 +371,16 @@ class Built(Presented):
     def candidates(self) -> Candidates:
         """The candidate tasks."""
         return self.job.candidates
+
+    @property
+    def figures(self) -> Mapping[str, float]:
+        """The figures of the method."""
+        return self.outcome.figures
+
+    @property
+    def stopped(self) -> BaseException | None:
+        """The error that ended the method before its proof was complete, None if it was not."""
+        return self.outcome.stopped
 
     @property
     def guarantee(self) -> Guarantee:
@@ -425,7 +406,7 @@ class Built(Presented):
         bound: a solver has erred.
         """
         refuted = self.guarantee.lower_bound - 1
-        evidence = self.refuting or (refuting_clauses(self.job, refuted) if refuted else {})
+        evidence = self.outcome.refuting or (refuting_clauses(self.job, refuted) if refuted else {})
         proof = certify(self.candidates, evidence, refuted)
         try:
             check_certificate(proof, self.candidates)
