@@ -22,7 +22,7 @@ from coordlang.sites.coordinates import Point
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import OutOfMemory, Position
-from planners.system.notebook import counted
+from planners.system.notebook import counted, named
 
 #: What a page has at most, in bytes.
 LARGEST = 5_000_000
@@ -65,24 +65,28 @@ def make_report(
     language, ``simulated`` are runs to be played.  Raises `OutOfMemory` if the page of a single
     task would be too large, and what `coordlang.report.shown.select_tasks` raises.
     """
+    position = position or Position("the language file")
     selection = select_tasks(language, domain, problems, tasks_shown, seed, options, position)
     model = selection.tasks[0].language.model
-    lifted = lifted_words(
-        language,
-        domain,
-        problems[0],
-        model,
-        coordinates or {},
-        position or Position("the language file"),
-    )
+    lifted = lifted_words(language, domain, problems[0], model, coordinates or {}, position)
     rows, in_order = word_rows(language, model, lifted)
-    features = lifted.data()["features"] if lifted else ()
-    words = {"words": rows, "in_order": in_order, "features": features}
+    shown: dict[str, Any] = {
+        "language": language,
+        "domain": domain.name,
+        "sha256": domain_sha256(domain),
+        "problems": [problem.name for problem in problems],
+        "words": rows,
+        "in_order": in_order,
+        "features": lifted.data()["features"] if lifted else (),
+        "seed": seed,
+    }
     while True:
         data = page_data(language, selection, seed, coordinates, most_places)
         if simulated is not None:
             data["simulated"] = simulated_data(simulated)
-        html = _render(language, domain, problems, data, words, seed, simulated)
+            number = len(data["simulated"]["runs"])
+            shown["simulated"] = summary(simulated, number, data["kept"]["one"])
+        html = _render(shown, data)
         if len(html) <= largest:
             candidates = int(language.provenance.tasks.get("count", 0))
             return Report(html, len(selection.tasks), candidates, selection.tasks[0].language)
@@ -95,46 +99,30 @@ def make_report(
         selection = replace(selection, tasks=half, complete=False)
 
 
-def _render(
-    language: Language,
-    domain: Domain,
-    problems: Sequence[Problem],
-    data: Mapping[str, Any],
-    words: Mapping[str, Any],
-    seed: int,
-    simulated: SimulationRecord | None,
-) -> bytes:
+def _render(shown: Mapping[str, Any], data: Mapping[str, Any]) -> bytes:
     import jinja2
     from markupsafe import Markup
 
     here = files("coordlang.report")
-    *others, last = language.provenance.robots
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
     template = environment.from_string((here / "template.html").read_text("utf-8"))
     return template.render(
+        simulated=None,
         version=version("coordlang"),
-        domain=domain.name,
-        subtitle=problems[0].name if len(problems) == 1 and problems[0].name != domain.name else "",
-        robots=" and ".join(part for part in (", ".join(others), last) if part),
-        **words,
-        all_listed=language.provenance.tasks.get("kind") == "all",
-        terms_open=_TERMS_OPEN if len(language.words) <= _FEW_WORDS else 1,
-        figures=_figures(language, data["kept"]["plans"]),
-        kept=data["kept"],
-        may_fail=language.may_fail,
-        warning=language.tolerance.warning if language.tolerance else None,
-        slack=language.tolerance.slack if language.tolerance else None,
-        simulated=simulated
-        and summary(simulated, len(data["simulated"]["runs"]), data["kept"]["one"]),
-        about=_about(language, domain, problems, data, seed),
+        terms_open=_TERMS_OPEN if len(shown["words"]) <= _FEW_WORDS else 1,
         formula=_formula,
         counted=counted,
+        named=named,
         number="{:,}".format,
+        percent=percent,
         css=Markup((here / "page.css").read_text("utf-8")),
         js=Markup(_script()),
+        kept=data["kept"],
+        checked=[task["verified"] for task in data["tasks"]],
         data=Markup(_json(data)),
+        **shown,
     ).encode()
 
 
@@ -155,47 +143,6 @@ def _json(data: Mapping[str, Any]) -> str:
     """JSON that may stand in a script element."""
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False)
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
-
-
-def _figures(language: Language, plans: str) -> list[tuple[str, str, str]]:
-    g, tolerance = language.guarantee, language.tolerance
-    kind = {"all": "all pairs of states", "problems": "of the problems", "file": "of a task file"}
-    figures = [
-        ("Words", f"{g.size:,}", g.claim),
-        (
-            "Tasks",
-            f"{int(language.provenance.tasks.get('count', 0)):,}",
-            kind.get(str(language.provenance.tasks.get("kind")), ""),
-        ),
-        ("States", f"{len(language.states):,}", f"on {plans} of these tasks"),
-    ]
-    if tolerance is not None and tolerance.failure_mean is not None:
-        share = percent(tolerance.failure_mean)
-        figures.append(("Failures", share, "on average over the tasks, its file says"))
-    return figures
-
-
-def _about(
-    language: Language,
-    domain: Domain,
-    problems: Sequence[Problem],
-    data: Mapping[str, Any],
-    seed: int,
-) -> list[tuple[str, str]]:
-    model = language.provenance.model
-    checked = [task["verified"] for task in data["tasks"]]
-    return [
-        ("Program", f"coordlang {version('coordlang')}"),
-        ("Problems", ", ".join(problem.name for problem in problems)),
-        ("Optimal means", str(model.get("cost", "makespan"))),
-        ("Domain, SHA-256", domain_sha256(domain)[:16]),
-        ("Last actions are part of the state", "yes" if model.get("remember_actions") else "no"),
-        (
-            "Tasks of this page verified anew",
-            f"{sum(v is not None for v in checked)} of {len(checked)}",
-        ),
-        ("Seed of the drawn tasks", str(seed)),
-    ]
 
 
 def _formula(text: str) -> Any:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from coordlang.language.provenance import domain_sha256
-from coordlang.simulation.record import RunRecord, SimulationRecord, event_text
+from coordlang.simulation.record import RunRecord, SimulationRecord, StepRecord, event_text
 from planners.joint.model import own_text
 from planners.pddl.lifted import Domain
 from planners.system.errors import BadInput, Position
@@ -64,17 +64,8 @@ def simulated_data(record: SimulationRecord) -> dict[str, Any]:
         if shown and poses > MOST_POSES:
             break
         shown.append(_run(found, record.robots))
-    return {
-        "robots": record.robots,
-        "makespan": record.makespan,
-        "interval": record.interval,
-        "cell": record.cell,
-        "radius": record.radius,
-        "places": record.places,
-        "walls": record.walls,
-        "goals": record.goals,
-        "runs": shown,
-    }
+    floor = "robots makespan interval cell radius places walls goals".split()
+    return {**{name: getattr(record, name) for name in floor}, "runs": shown}
 
 
 def _run(found: RunRecord, robots: Sequence[str]) -> dict[str, Any]:
@@ -90,15 +81,7 @@ def _run(found: RunRecord, robots: Sequence[str]) -> dict[str, Any]:
         ],
         "human": [[round(x, 2), round(y, 2)] for x, y in found.human],
         "steps": [
-            [
-                [
-                    step.begin,
-                    step.end,
-                    own_text(step.subaction, robot) if step.subaction else "idles",
-                ]
-                for step in found.steps
-                if step.robot == robot
-            ]
+            [[step.begin, step.end, _does(step)] for step in found.steps if step.robot == robot]
             for robot in robots
         ],
         "events": [
@@ -106,3 +89,7 @@ def _run(found: RunRecord, robots: Sequence[str]) -> dict[str, Any]:
             for event in found.events
         ],
     }
+
+
+def _does(step: StepRecord) -> str:
+    return own_text(step.subaction, step.robot) if step.subaction else "idles"

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
@@ -72,7 +71,7 @@ class Tables:
 def task_data(shown: ShownTask, tables: Tables, seed: int) -> dict[str, Any]:
     """Return a task as JSON data, with states and labels as numbers into ``tables``."""
     language, space = shown.language, shown.language.space
-    graph = plan_graph(language, seed)
+    part = drawn_part(language, seed)
     sentences, total = shown_sentences(language, seed)
     verdict = _verdict(language)
     violation = verdict.witness if verdict else None  # plans of one sentence that miscoordinate
@@ -88,17 +87,13 @@ def task_data(shown: ShownTask, tables: Tables, seed: int) -> dict[str, Any]:
         "steps": makespan,
         "second": second if language.model.cost != "makespan" else None,
         "plans": str(counts(space)[language.start]),
-        "complete": graph.complete,
+        "complete": part is space,
         "all_nodes": len(space),
         "all_edges": len(space.target),
-        **_graph_data(language, graph, tables),
+        **_graph_data(part, tables),
         "sentences": [
-            {
-                "words": list(one.words),
-                "plans": str(one.plans),
-                "own": [None if number is None else str(number) for number in one.own],
-            }
-            for one in sentences
+            {"words": list(words), "plans": str(plans), "own": _own_counts(language, words)}
+            for words, plans in sentences
         ],
         "all_sentences": total,
         "witness": _witness_data(language, shown.witness, tables),
@@ -131,26 +126,30 @@ def _failure(language: TaskLanguage, word: Ints | None) -> float | None:
     return float(found.mean)
 
 
-def _graph_data(language: TaskLanguage, graph: Graph, tables: Tables) -> dict[str, Any]:
-    """The nodes of a graph, and its edges as a CSR table: ``first``, ``target``, ``labels``."""
-    space, model = language.space, language.model
-    makespan, _ = space.cost_of(language.task)
-    number = np.full(len(space), -1)
-    number[graph.nodes] = np.arange(len(graph.nodes))
-    source = number[space.sources[graph.edges]]
-    keys = [model.codec.key(space.rows[state]) for state in space.state[graph.nodes].tolist()]
+def _graph_data(part: PlanSpace, tables: Tables) -> dict[str, Any]:
+    """Nodes by step, then by their place in its column; edges as a CSR table.
+
+    The table is ``first``, ``target`` and ``labels``, the edges of a node in the order of labels.
+    """
+    model, steps = part.model, int(part.layer[-1])
+    by_step = part.reordered(np.argsort(steps - part.layer, kind="stable"))
+    sizes = np.bincount(steps - part.layer).tolist()
+    ends = zip(by_step.sources.tolist(), by_step.target.tolist(), strict=True)
+    order = np.array(layer_orders(sizes, list(ends)))
+    drawn = by_step.reordered(np.lexsort((order, steps - by_step.layer)))
+    keys = [model.codec.key(drawn.rows[state]) for state in drawn.state.tolist()]
     return {
         "nodes": {
             "state": [tables.state(key) for key in keys],
-            "step": (makespan - space.layer[graph.nodes]).tolist(),
-            "order": list(graph.order),
+            "step": (steps - drawn.layer).tolist(),
+            "order": [place for size in sizes for place in range(size)],
         },
-        "first": np.searchsorted(source, np.arange(len(graph.nodes) + 1)).tolist(),
-        "target": number[space.targets(graph.edges)].tolist(),
+        "first": drawn.first.tolist(),
+        "target": drawn.target.tolist(),
         "labels": [
             [
                 tables.label(robot, model.label_text(robot, label))
-                for label in space.robot_labels(robot, graph.edges).tolist()
+                for label in drawn.robot_labels(robot).tolist()
             ]
             for robot in range(len(model.robots))
         ],
@@ -223,56 +222,15 @@ def _title(starts: Mapping[str, str], goals: Mapping[str, str], others: list[str
 # ---- plans and sentences
 
 
-@dataclass(frozen=True, slots=True)
-class Graph:
-    """A part of a plan space whose nodes and edges all lie on plans of the part.
-
-    ``nodes`` are sorted by step and by ``order`` (nodes), the place in the step's column; ``edges``
-    by source in ``nodes`` and labels; ``complete``: it is the whole plan space.
-    """
-
-    nodes: Ints
-    order: tuple[int, ...]
-    edges: Ints
-    complete: bool
-
-
-@dataclass(frozen=True, slots=True)
-class ShownSentence:
-    """A sentence with the exact number of plans that it leaves open.
-
-    ``own`` are the numbers of the robots' own subplans in these (None: too many to count).
-    """
-
-    words: Sentence
-    plans: int
-    own: tuple[int | None, ...]
-
-
-def plan_graph(language: TaskLanguage, seed: int, most: int = EDGES) -> Graph:
-    """Return the plans of a task as a graph of at most ``most`` edges.
-
-    Of a larger plan space it holds the plans drawn with ``seed``.
-    """
+def drawn_part(language: TaskLanguage, seed: int, most: int = EDGES) -> PlanSpace:
+    """Return the plan space of a task; of one of more than ``most`` edges plans drawn of it."""
     space = language.space
-    complete = len(space.target) <= most
-    edges = np.arange(len(space.target))
-    if not complete:
-        drawn = {edge for path in _drawn_paths(language, seed, most) for edge in path}
-        edges = np.array(sorted(drawn), np.int64)
-    source, target = space.sources[edges], space.targets(edges)
-    nodes = np.unique(np.concatenate((source, target, [language.start])))
-    makespan = int(space.layer[language.start])
-    nodes = nodes[np.argsort(makespan - space.layer[nodes], kind="stable")]
-    step = makespan - space.layer[nodes]
-    number = np.full(len(space), -1)
-    number[nodes] = np.arange(len(nodes))
-    sizes = np.bincount(step, minlength=makespan + 1).tolist()
-    ends = zip(number[source].tolist(), number[target].tolist(), strict=True)
-    order = np.array(layer_orders(sizes, list(ends)))
-    by_step = np.lexsort((order, step))
-    _, out = space.edges_from(nodes[by_step])
-    return Graph(nodes[by_step], tuple(order[by_step].tolist()), out[np.isin(out, edges)], complete)
+    if len(space.target) <= most:
+        return space
+    kept = np.zeros(len(space.target), np.bool_)
+    for path in _drawn_paths(language, seed, most):
+        kept[path] = True
+    return space.along(kept)
 
 
 def _drawn_paths(language: TaskLanguage, seed: int, most: int) -> list[list[int]]:
@@ -290,11 +248,11 @@ def _drawn_paths(language: TaskLanguage, seed: int, most: int) -> list[list[int]
 
 def shown_sentences(
     language: TaskLanguage, seed: int, most: int = EDGES
-) -> tuple[list[ShownSentence], int | None]:
-    """Return the task's sentences that leave most plans open, and the number of all sentences.
+) -> tuple[list[tuple[Sentence, int]], int | None]:
+    """Return the task's sentences that leave most plans open, with the exact numbers of these.
 
-    If there are too many to count them all (then it is None), or more than ``most`` edges, those of
-    the drawn plans are compared.
+    And the number of all sentences.  If there are too many to count them all (then it is None), or
+    more than ``most`` edges, those of the drawn plans are compared.
     """
     found: dict[Sentence, int] | None = None
     if len(language.space.target) <= most:
@@ -311,17 +269,16 @@ def shown_sentences(
         drawn = dict.fromkeys(sentence(words.tolist()) for words in passed)
         some = islice(drawn, SENTENCES)
         found = {words: Plans.of(language.plans_with(words)).count for words in some}
-    listed = []
-    for words, number in sorted(found.items(), key=lambda entry: (-entry[1], entry[0]))[:SENTENCES]:
-        open_plans = language.plans_with(words)
-        own = tuple(_own_count(open_plans, robot) for robot in range(len(language.model.robots)))
-        listed.append(ShownSentence(words, number, own))
-    return listed, total
+    return sorted(found.items(), key=lambda entry: (-entry[1], entry[0]))[:SENTENCES], total
 
 
-def _own_count(open_plans: PlanSpace, robot: int) -> int | None:
-    """Count a robot's own subplans in these plans; None if that is too much work."""
-    try:
-        return determinise(open_plans, robot, most=_SUBSETS).count
-    except OutOfMemory:
-        return None
+def _own_counts(language: TaskLanguage, words: Sentence) -> list[str | None]:
+    """The numbers of the robots' own subplans under a sentence; None for too many to count."""
+    found: list[str | None] = []
+    open_plans = language.plans_with(words)
+    for robot in range(len(language.model.robots)):
+        try:
+            found.append(str(determinise(open_plans, robot, most=_SUBSETS).count))
+        except OutOfMemory:
+            found.append(None)
+    return found

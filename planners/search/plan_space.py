@@ -269,12 +269,16 @@ class PlanSpace:
             value[below.source] = np.iinfo(np.int64).max
             np.minimum.at(value, below.source, through)
             kept[below.edges] = through == value[below.source]
+        return self.along(kept)
+
+    def along(self, edges: Bools) -> PlanSpace:
+        """The part of the graph that paths over these edges (a mask) reach from the starts."""
         fewer = replace(
             self,
-            first=np.concatenate(([0], np.cumsum(kept)))[self.first],
-            target=self.target[kept],
-            labels=self.labels[kept],
-            cost=self.cost[kept],
+            first=np.concatenate(([0], np.cumsum(edges)))[self.first],
+            target=self.target[edges],
+            labels=self.labels[edges],
+            cost=self.cost[edges],
         )
         return fewer.reduced()
 

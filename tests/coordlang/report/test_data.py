@@ -8,6 +8,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+import numpy as np
 import pytest
 
 import coordlang as door
@@ -128,22 +129,19 @@ def test_random_models() -> None:
 
 def test_large_tasks_are_drawn() -> None:
     spoken = language_in_task(*make_language("grid", "three-robots-3x3", None))
-    whole = page_task.plan_graph(spoken, 0)
-    exact = {s.words: s.plans for s in page_task.shown_sentences(spoken, 0)[0]}
-    part = page_task.plan_graph(spoken, 0, most=60)
-    assert whole.complete
-    assert not part.complete
-    assert 10 < len(part.edges) <= 60
-    space, nodes = spoken.space, set(part.nodes.tolist())
-    sources, targets = space.sources[part.edges].tolist(), space.target[part.edges].tolist()
+    exact = dict(page_task.shown_sentences(spoken, 0)[0])
+    part = page_task.drawn_part(spoken, 0, most=60)
+    assert page_task.drawn_part(spoken, 0) is spoken.space
+    assert 10 < len(part.target) <= 60
     # Every node but the start is led to, and every node but the goal's leads on: each way is a
     # whole plan.
-    assert set(targets) | {spoken.start} == nodes
-    assert set(sources) | {n for n in nodes if space.layer[n] == 0} == nodes
+    nodes, (start,) = set(range(len(part))), part.starts.tolist()
+    assert set(part.target.tolist()) | {start} == nodes
+    assert set(part.sources.tolist()) | set(np.flatnonzero(part.layer == 0).tolist()) == nodes
     drawn, total = page_task.shown_sentences(spoken, 0, most=60)
     assert total is None
     assert drawn
-    assert all(exact.get(s.words, s.plans) == s.plans for s in drawn)
+    assert all(exact.get(words, plans) == plans for words, plans in drawn)
 
 
 def test_selection() -> None:
