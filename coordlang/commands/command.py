@@ -7,7 +7,7 @@ A command calls the Python function of its name and shows the result; nothing el
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from importlib import import_module
 from pathlib import Path
@@ -36,62 +36,70 @@ def command_of(name: str, record: type[CommandOptions]) -> click.Command:
     `coordlang.commands.inputs.public`, and ``show_NAME``, which gets the result and the options,
     writes, and returns the exit code, None for 0.
     """
-    on_cli = [each for each in options_of(record) if each.only != "python"]
-    if not record.keeps_plans:
-        on_cli = [each for each in on_cli if each.name != "no_cache"]
-    named = {each.name: each for each in on_cli}
+    hidden = () if record.keeps_plans else ("no_cache",)
+    on_cli = {o.name: o for o in options_of(record) if o.only != "python" and o.name not in hidden}
 
     def called(arguments: tuple[str, ...] = (), **values: object) -> int | None:
         context = click.get_current_context()
         said = click.core.ParameterSource.COMMANDLINE
         given = {k: v for k, v in values.items() if context.get_parameter_source(k) is said}
-        is_factored, read = given.get("factored") is not None, {}
-        if record.alone is None or record.alone not in given:
-            read = positional(record.takes, arguments, is_factored=is_factored)
-        elif arguments or is_factored:
-            instead = f"{named[record.alone].spelling} {named[record.alone].metavar} alone"
-            raise click.UsageError(f"expected {instead}, without {record.takes}")
-        files = [(each, given[each.name]) for each in on_cli if each.name in given]
-        if given.get("as_json") and "form" in named:
-            if (form := given.get("form", "json")) != "json":
-                short = "--json is short for --format json"
-                raise click.UsageError(f"{short}: leave out --format {form}")
-            given["form"] = "json"
+        read = _positional(record, arguments, given, on_cli)
+        if given.get("as_json") and "form" in on_cli:
+            given["form"] = _json_form(given.get("form", "json"))
         module = import_module(f"coordlang.commands.{record.module or name}")
         options = record_from(record, given, name, on_cli=True)
         is_kept = record.keeps_plans and not options.no_cache
         cache = _keeping() if is_kept else nullcontext()
         with limited(options.limits), cache, _said(given.get("resume")):
             with working(record.doing) as context.meta[SAYING]:
+                files = [(each, given[each.name]) for each in on_cli.values() if each.name in given]
                 check_outputs(*_files(arguments, files, options))
                 result = getattr(module, name).with_record(options, **read)
             shown: int | None = getattr(module, f"show_{name}")(result, options)
             return shown
 
     argument = click.Argument(["arguments"], nargs=-1, type=FILE, metavar=record.takes)
-    params = [*([argument] if record.takes else []), *map(_click_option, on_cli)]
+    params = [*([argument] if record.takes else []), *map(_click_option, on_cli.values())]
     return click.Command(name, params=params, callback=called, help=record.__doc__)
 
 
-def positional(takes: str, given: tuple[str, ...], *, is_factored: bool) -> dict[str, object]:
+def _json_form(form: object) -> object:
+    """What ``--json`` makes of a ``--format``; `click.UsageError` for another one."""
+    if form != "json":
+        short = "--json is short for --format json"
+        raise click.UsageError(f"{short}: leave out --format {form}")
+    return form
+
+
+def _positional(
+    record: type[CommandOptions],
+    arguments: tuple[str, ...],
+    given: Mapping[str, object],
+    options: Mapping[str, Option],
+) -> dict[str, object]:
     """The arguments that are given, by what usage calls them; those of ``PROBLEMS...`` as a tuple.
 
     One in brackets may be left out.  ``--factored`` stands for DOMAIN and PROBLEM.  Raises
     `click.UsageError` for too few or too many.
     """
+    takes, is_factored = record.takes, given.get("factored") is not None
+    if record.alone is not None and record.alone in given:
+        if arguments or is_factored:
+            alone = options[record.alone]
+            instead = f"{alone.spelling} {alone.metavar} alone"
+            raise click.UsageError(f"expected {instead}, without {takes}")
+        return {}
     names = takes.split()
     asked = [name for name in names if not (is_factored and name in _PDDL)]
     least = sum(not name.startswith("[") for name in asked)
     is_open = "PROBLEMS..." in asked
-    if len(given) < least or (len(given) > len(asked) and not is_open):
-        instead = ""
-        if "DOMAIN" in names:
-            without = "them" if all(name in _PDDL for name in names) else "DOMAIN PROBLEM"
-            instead = f", or --factored DIR without {without}"
+    if len(arguments) < least or (len(arguments) > len(asked) and not is_open):
+        without = "them" if set(names) <= set(_PDDL) else "DOMAIN PROBLEM"
+        instead = f", or --factored DIR without {without}" if "DOMAIN" in names else ""
         raise click.UsageError(f"expected {takes}{instead}")
-    read: dict[str, object] = dict(zip(asked, given, strict=False))
+    read: dict[str, object] = dict(zip(asked, arguments, strict=False))
     if is_open:
-        read["PROBLEMS..."] = given[len(asked) - 1 :]
+        read["PROBLEMS..."] = arguments[len(asked) - 1 :]
     return {name.strip("[]"): value for name, value in read.items()}
 
 
@@ -143,23 +151,28 @@ def _files(
     """
     outputs: list[OutputFile] = []
     read = [*arguments, *(str(Path(path).parent / "coordinates.json") for path in arguments)]
+    makes_folder = getattr(options, "writes_folder", True)
     for each, value in given:
         paths = [*map(str, value)] if isinstance(value, tuple) else [str(value)]
-        if each.name == "factored":
+        if each.is_output:
+            outputs += _outputs(each, paths, each.files if makes_folder else ())
+        elif each.name == "factored":
             read += map(str, Path(paths[0]).glob("*.pddl"))
-        elif not each.is_output and _names_file(each):
+        elif _names_file(each):
             read += paths
-        for number, path in enumerate(paths if each.is_output else (), 1):
-            spelling = each.spelling if len(paths) == 1 else f"{each.spelling} {number}"
-            if each.name != "output" and path == "-":
-                raise UsageError(f"{spelling} -: this cannot go to stdout", remedy="Name a file.")
-            if not each.files or not getattr(options, "writes_folder", True):
-                outputs.append(OutputFile(spelling, path))
-                continue
-            for file in each.files:
-                place = os.path.join(path, file) if path else ""
-                outputs.append(OutputFile(spelling, place, makes_folder=True))
     return outputs, read
+
+
+def _outputs(option: Option, paths: list[str], files: Sequence[str]) -> Iterator[OutputFile]:
+    """The files of an option that names files, or folders for some ``files``."""
+    for number, path in enumerate(paths, 1):
+        spelling = option.spelling if len(paths) == 1 else f"{option.spelling} {number}"
+        if option.name != "output" and path == "-":
+            raise UsageError(f"{spelling} -: this cannot go to stdout", remedy="Name a file.")
+        if not files:
+            yield OutputFile(spelling, path)
+        for file in files:
+            yield OutputFile(spelling, os.path.join(path, file) if path else "", makes_folder=True)
 
 
 def check_outputs(outputs: Iterable[OutputFile], inputs: Iterable[str]) -> None:

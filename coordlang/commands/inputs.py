@@ -95,10 +95,17 @@ class Arguments:
     values: Mapping[str, Any] = field(default_factory=dict)
 
     @property
+    def loaded(self) -> PlanningInstance | None:
+        """The result of `load` that stands for the domain, None for a domain."""
+        domain = self.values.get("DOMAIN")
+        return domain if isinstance(domain, PlanningInstance) else None
+
+    @property
     def problems(self) -> list[given.ProblemSource]:
-        """The problems that are given."""
+        """The problems that are given, else those of `load`."""
         found = [*self.values.get("PROBLEMS...", ()), self.values.get("PROBLEM")]
-        return [problem for problem in found if problem is not None]
+        named = [problem for problem in found if problem is not None]
+        return named or (list(self.loaded.problems) if self.loaded else [])
 
     def needed(self, word: str) -> Any:
         """An argument that must be given; `UsageError` if it is not."""
@@ -113,40 +120,45 @@ class Arguments:
 
         Raises `UsageError` for too few or too many of them.
         """
-        domain, problems, source = self.values.get("DOMAIN"), self.problems, self.source
-        is_single = "PROBLEMS..." not in self.takes
-        if source.factored is not None:
+        domain, problems, loaded = self.values.get("DOMAIN"), self.problems, self.loaded
+        if self.source.factored is not None:
             if domain is not None or problems:
                 raise UsageError(
                     "--factored names all files", remedy="Leave out domain and problem."
                 )
-            factored, problem = read_factored(fspath(source.factored))
-            return PlanningInput(factored, [problem], source)
-        if isinstance(domain, PlanningInstance):
-            if source.given:
-                raise UsageError(
-                    "the model options of a loaded domain are fixed",
-                    remedy="Give them to coordlang.load.",
-                )
-            # A language must have been built with the same options; its robots may be named there
-            # alone.
-            fixed = _FIXED | ({"robots"} if domain.options.names else set())
-            source = Source(None, domain.options, fixed)
-            problems, domain = problems or [*domain.problems], domain.domain
+            factored, problem = read_factored(fspath(self.source.factored))
+            return PlanningInput(factored, [problem], self.source)
+        is_single = "PROBLEMS..." not in self.takes
         if domain is None or not problems or (is_single and len(problems) > 1):
             wanted = "one problem" if is_single else "problems"
             raise UsageError(
                 f"expected a domain and {wanted}, or --factored without them",
                 remedy="Give both as files or parsed objects, or factored=DIR.",
             )
+        if loaded is not None:
+            domain = loaded.domain
         lifted = domain if isinstance(domain, Domain) else read_domain(fspath(domain))
         found = [p if isinstance(p, Problem) else read_problem(fspath(p), lifted) for p in problems]
-        return PlanningInput(lifted, found, source)
+        return PlanningInput(lifted, found, self._source())
+
+    def _source(self) -> Source:
+        """How files are read; a result of `load` says that itself."""
+        if self.loaded is None:
+            return self.source
+        if self.source.given:
+            raise UsageError(
+                "the model options of a loaded domain are fixed",
+                remedy="Give them to coordlang.load.",
+            )
+        # A language must have been built with the same options; its robots may be named there
+        # alone.
+        options = self.loaded.options
+        return Source(None, options, _FIXED | ({"robots"} if options.names else set()))
 
     def instance(self) -> PlanningInstance:
         """Read the joint model and the task of one problem."""
-        loaded = self.values.get("DOMAIN")
-        if isinstance(loaded, PlanningInstance) and self.source == Source() and not self.problems:
+        loaded = self.loaded
+        if loaded and self.source == Source() and self.problems == list(loaded.problems):
             return loaded
         return self.read().instance()
 

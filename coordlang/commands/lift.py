@@ -41,7 +41,6 @@ from coordlang.lifted.notation import english, formula
 from coordlang.lifted.world import States, World
 from coordlang.sites.coordinates import Point
 from coordlang.verification.by_definition import verify_candidates
-from planners.loading import PlanningInstance
 from planners.parallel.workers import Workers
 from planners.system.errors import (
     BadInput,
@@ -118,10 +117,8 @@ def lift(files: Arguments, options: LiftOptions) -> Lifted:
     The problems need not have the same objects, but the same robots.  Raises `ProvedImpossible` if
     no features up to this complexity suffice.
     """
-    check, problems, loaded = options.check, files.problems, files.values.get("DOMAIN")
-    if isinstance(loaded, PlanningInstance):
-        problems = problems or [*loaded.problems]
-    given: list[Any] = [*problems, *check] if options.source.factored is None else [None]
+    check, is_factored = options.check, options.source.factored is not None
+    given: list[Any] = [None] if is_factored else [*files.problems, *check]
     every = [_instance(files, problem, options) for problem in given]
     if not every:
         raise UsageError("there is no problem to learn from", remedy="Name one or more.")

@@ -64,7 +64,7 @@ def simulated_data(record: SimulationRecord) -> dict[str, Any]:
         if shown and poses > MOST_POSES:
             break
         shown.append(_run(found, record.robots))
-    floor = "robots makespan interval cell radius places walls goals".split()
+    floor = ["robots", "makespan", "interval", "cell", "radius", "places", "walls", "goals"]
     return {**{name: getattr(record, name) for name in floor}, "runs": shown}
 
 
