@@ -17,12 +17,11 @@ from coordlang.commands.inputs import Arguments, PlanningInput, note_size, publi
 from coordlang.commands.records import EFFORT, BuildOptions, LanguageSource
 from coordlang.commands.terminal import (
     UNPROVED,
-    code_of_interrupt,
     echo,
+    ended_early,
     note_single_robot,
     say,
     tell,
-    why_stopped,
     working,
 )
 from coordlang.language.candidates import Candidates
@@ -213,15 +212,12 @@ def _exit_code(
     proved, exact = built.guarantee.proved_minimal, built.guarantee.method in EXACT
     stopped = ended or built.stopped
     if isinstance(stopped, KeyboardInterrupt):
-        tell(f"interrupted; {_written(built, output, certificate)}")
-        return code_of_interrupt(stopped)
-    if stopped is not None:
-        reason = why_stopped(stopped)
-        if certificate and isinstance(stopped, OutOfTime) and stopped is built.stopped:
-            reason += ", a part of it kept for the certificate"
-        short_of = "" if proved and exact else ", without proof"
-        best = "language" if built.few_words is None else "partition into words"
-        tell(f"{reason}; the best {best} so far is written{short_of}")
+        return ended_early(stopped, _written(built, output, certificate))
+    is_kept = certificate and isinstance(stopped, OutOfTime) and stopped is built.stopped
+    short_of = "" if proved and exact else ", without proof"
+    best = "language" if built.few_words is None else "partition into words"
+    what = f"the best {best} so far is written{short_of}"
+    ended_early(stopped, what, ", a part of it kept for the certificate" if is_kept else "")
     is_short = not proved or ended is not None if exact else stopped is not None
     return UNPROVED if is_short else 0
 

@@ -116,27 +116,19 @@ def covered_code(found: Any) -> int:
     return REFUTED
 
 
-def why_stopped(stopped: BaseException) -> str:
-    """What ended work whose best result is kept, in one line."""
-    if isinstance(stopped, KeyboardInterrupt):
-        return "interrupted"
-    return str(stopped).splitlines()[0] if str(stopped) else "out of memory"
-
-
-def code_of_interrupt(stopped: KeyboardInterrupt) -> int:
-    """The exit code after an interrupt, by the keyboard or by a signal, as a shell reports it."""
-    return SIGNALS + stopped.number if isinstance(stopped, Interrupted) else INTERRUPTED
-
-
-def ended_early(stopped: BaseException | None, what: str) -> int:
+def ended_early(stopped: BaseException | None, what: str, kept: str = "") -> int:
     """The exit code of work whose best result is kept; says what ended it, and ``what`` there is.
 
-    0 if nothing did.
+    0 if nothing did.  ``kept`` is what the time that was over left.
     """
     if stopped is None:
         return 0
-    tell(f"{why_stopped(stopped)}; {what}")
-    return code_of_interrupt(stopped) if isinstance(stopped, KeyboardInterrupt) else UNPROVED
+    if isinstance(stopped, KeyboardInterrupt):
+        tell(f"interrupted; {what}")
+        return SIGNALS + stopped.number if isinstance(stopped, Interrupted) else INTERRUPTED
+    reason = str(stopped).splitlines()[0] if str(stopped) else "out of memory"
+    tell(f"{reason}{kept}; {what}")
+    return UNPROVED
 
 
 def line_width(*, err: bool = False) -> int:

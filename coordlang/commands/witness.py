@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import msgspec
@@ -49,23 +50,27 @@ def witness_text(witness: Miscoordination) -> str:
     lines = [f"  task: {witness.task}"]
     if is_sparse:
         lines.append("  robots that idle in a step are left out")
-    reached = None
-    for group in alike(list(zip(witness.plans, witness.states, strict=True))):
-        follow = "follows" if len(group) == 1 else "follow"
-        lines.append(f"  {named([robots[n] for n in group])} {follow} this {witness.kind}:")
-        lines += (step_line(n, step) for n, step in enumerate(witness.plans[group[0]], 1))
-        state = witness.states[group[0]][-1] or NO_FACT
-        is_known = len(state) > WIDTH - 20 and state == reached
-        lines.append(f"         reaches {'the same state' if is_known else state}")
-        reached = state
+    lines += _plan_lines(witness, step_line)
     lines.append("  together they do:")
-    before = None
-    for number, (step, state) in enumerate(zip(witness.mixture, witness.mixed_states, strict=True)):
-        lines.append(f"    {_state_text(before, state)}")
-        before = state
+    states = witness.mixed_states
+    for number, (step, before) in enumerate(zip(witness.mixture, (None, *states), strict=False)):
+        lines.append(f"    {_state_text(before, states[number])}")
         lines.append(step_line(number + 1, step) + _MARK * (number == witness.step))
     lines.append(f"  step {witness.step + 1} breaks: {witness.reason}")
     return "\n".join(lines)
+
+
+def _plan_lines(witness: Miscoordination, step_line: Callable[[int, Step], str]) -> Iterator[str]:
+    """The plans that robots follow, each once, and the states that they reach."""
+    reached = None
+    for group in alike(list(zip(witness.plans, witness.states, strict=True))):
+        follow = "follows" if len(group) == 1 else "follow"
+        yield f"  {named([witness.robots[n] for n in group])} {follow} this {witness.kind}:"
+        yield from (step_line(n, step) for n, step in enumerate(witness.plans[group[0]], 1))
+        state = witness.states[group[0]][-1] or NO_FACT
+        is_known = len(state) > WIDTH - 20 and state == reached
+        yield f"         reaches {'the same state' if is_known else state}"
+        reached = state
 
 
 def _state_text(before: str | None, state: str) -> str:

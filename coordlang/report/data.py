@@ -16,13 +16,7 @@ import numpy as np
 
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.text import term_text
-from coordlang.explanation.words import (
-    Cover,
-    LiftedWords,
-    all_covers,
-    describe_words,
-    mapped_states,
-)
+from coordlang.explanation.words import LiftedWords, all_covers, describe_words, mapped_states
 from coordlang.language.words import Language
 from coordlang.report.layout import graph_layout, place_layout, spread
 from coordlang.report.shown import Selection
@@ -117,22 +111,23 @@ def word_rows(
     ``examples``), and ``rest`` says that the formula is "every other state".  ``lifted`` has the
     formulas of words that are functions of features.
     """
-    rules: Sequence[tuple[str, Cover | None]] = [(word, None) for word in language.words]
-    in_order = False
-    explained = lifted is None and 0 < len(language.states) <= _STATES_EXPLAINED
-    if explained:
+    terms_of: dict[str, Sequence[str] | None] = dict.fromkeys(language.words)
+    others, in_order = set[str](), False
+    if lifted:
+        terms_of |= {word: lifted.terms.get(word, ()) for word in language.words}
+    elif 0 < len(language.states) <= _STATES_EXPLAINED:
         mapped = mapped_states(language, model)
-        descriptions = describe_words(mapped, all_covers(mapped))
-        rules, in_order = descriptions.rules, descriptions.in_order
+        described = describe_words(mapped, all_covers(mapped))
+        others, in_order = (
+            {word for word, cover in described.rules if not cover},
+            described.in_order,
+        )
+        covers = {word: cover.terms if cover else () for word, cover in described.rules}
+        terms_of = {word: [*map(term_text, terms)] for word, terms in covers.items()}
     sizes = language.sizes()
     largest = max(sizes.values(), default=1) or 1
     rows = []
-    for word, cover in rules:
-        terms: Sequence[str] | None = [] if explained else None
-        if lifted:
-            terms = lifted.terms.get(word, ())
-        elif cover:
-            terms = list(map(term_text, cover.terms))
+    for word, terms in terms_of.items():
         states = (key for key, own in language.states.items() if own == word)
         rows.append(
             {
@@ -141,7 +136,7 @@ def word_rows(
                 "size": sizes[word],
                 "share": round(100 * sizes[word] / largest, 1),
                 "default": word == language.default,
-                "rest": explained and cover is None,
+                "rest": word in others,
                 "terms": None if terms is None else list(terms[:_TERMS]),
                 "more_terms": max(0, len(terms or ()) - _TERMS),
                 "examples": [*islice(states, _EXAMPLES)] if terms is None else [],

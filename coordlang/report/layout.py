@@ -40,11 +40,8 @@ def place_layout(
     names: Sequence[str], links: Sequence[tuple[str, str]], known: Mapping[str, Point] | None = None
 ) -> Layout:
     """Place named places: by ``known`` coordinates of all of them, else by names, else by links."""
-    if known is not None and all(name in known for name in names):
-        points: Mapping[str, Point] | None = known
-    else:
-        points = from_names(names, links)
-    if points is not None:
+    is_known = known is not None and all(name in known for name in names)
+    if points := known if is_known else from_names(names, links):
         found = {name: points[name] for name in names}
         return Layout(found, _is_grid(list(found.values())))
     number = {name: k for k, name in enumerate(names)}

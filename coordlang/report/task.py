@@ -115,15 +115,9 @@ def _failure(language: TaskLanguage, word: Ints | None) -> float | None:
 
     ``word`` has the word number of each node; None: without a word.
     """
-    space = language.space
-    alone = space.with_tasks(space.starts[[language.task]], space.second[[language.task]])
-    kept = space.descendants(space.starts[[language.task]])
-    words = None if word is None else word[kept]
-    try:
-        found = failure_probability([alone], [words], _ADDITIONS)
-    except TooManyToCount:
-        return None
-    return float(found.mean)
+    with suppress(TooManyToCount):
+        return float(failure_probability([language.space], [word], _ADDITIONS).mean)
+    return None
 
 
 def _graph_data(part: PlanSpace, tables: Tables) -> dict[str, Any]:
