@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+from contextlib import nullcontext
 from dataclasses import asdict, replace
 from importlib.metadata import version
 from os import PathLike, fspath
@@ -36,6 +37,7 @@ from planners.system.errors import OutOfTime, ProvedImpossible, UsageError
 from planners.system.limits import run_until_stopped, start_clock, stop_clock, time_left
 from planners.system.messages import visible
 from planners.system.notebook import counted
+from planners.system.signals import postponed_signals
 from planners.system.writing import is_device, remove_file
 
 #: Share of the time that a search leaves for its certificate.
@@ -137,40 +139,45 @@ def show_build(built: Built, options: BuildOptions) -> int:
     for name in built.candidates.skipped:
         tell(f"left out, it has no plan: {name}")
     note_single_robot(built.candidates.model.robots)
-    proof, unproved = _certificate(built) if certificate else (None, None)
+    proof, stopped = _certificate(built) if certificate else (None, None)
     stop_clock()  # the work is done; from here on it is saved
-    stopped = _save(built, output, certificate) or unproved
+    may_block = output == "-" or any(map(is_device, filter(None, (output, certificate))))
     try:
-        if certificate and proof is not None and stopped is None:
-            _write_certificate(built, proof, output, certificate)
-        to_stderr = output == "-"
-        if options.as_json and not to_stderr:
+        with nullcontext() if may_block else postponed_signals():
+            _save(built, proof, output, certificate)
+        if options.as_json and output != "-":
             echo(json.dumps(built.data()))
         else:
-            place = "stdout" if to_stderr else visible(output)
-            echo(f"{built.text()}\nwritten to {place}", err=to_stderr, fit=True)
+            place = "stdout" if output == "-" else visible(output)
+            echo(f"{built.text()}\nwritten to {place}", err=output == "-", fit=True)
     except KeyboardInterrupt as error:
+        if may_block:
+            raise  # it may be that a part of it is written
         stopped = error
     return _exit_code(built, output, certificate, stopped)
 
 
-def _save(built: Built, output: str, certificate: str | None) -> BaseException | None:
-    """Write the language in place of the one before, whose certificate goes with it.
+def _save(built: Built, proof: Certificate | None, output: str, certificate: str | None) -> None:
+    """Write the language in place of the one before, whose certificate goes with it, and its own.
 
-    An interrupt is returned; it loses nothing.
+    An error of the certificate says that the language is written.
     """
     if output == "-":
         remove_file(certificate)
         echo(to_bytes(built.language).decode(), nl=False)
-        return None
+    else:
+        write_language(built.language, output, outdated=certificate)
+    if certificate is None or proof is None:
+        return
     try:
-        write_language(built.language, output, outdated=certificate)
-    except KeyboardInterrupt as error:
-        if is_device(output):
-            raise  # part of it may be out: no second time
-        write_language(built.language, output, outdated=certificate)
-        return error
-    return None
+        write_certificate(proof, certificate)
+    except UsageError as error:
+        error.reached = _written(built, output)
+        raise
+    if not built.guarantee.proved_minimal:
+        bound = counted(built.guarantee.lower_bound, "word")
+        least = f"not that {built.guarantee.size:,} are the fewest"
+        tell(f"the certificate proves a lower bound of {bound}, {least}")
 
 
 def _certificate(built: Built) -> tuple[Certificate | None, BaseException | None]:
@@ -191,18 +198,6 @@ def _certificate(built: Built) -> tuple[Certificate | None, BaseException | None
     if stopped is not None and not isinstance(stopped, KeyboardInterrupt):
         tell("no certificate is written: there was no time or memory left for it")
     return (None if stopped else proofs[0]), stopped
-
-
-def _write_certificate(built: Built, proof: Certificate, output: str, path: str) -> None:
-    try:
-        write_certificate(proof, path)
-    except UsageError as error:
-        error.reached = _written(built, output)
-        raise
-    if not built.guarantee.proved_minimal:
-        bound = counted(built.guarantee.lower_bound, "word")
-        least = f"not that {built.guarantee.size:,} are the fewest"
-        tell(f"the certificate proves a lower bound of {bound}, {least}")
 
 
 def _exit_code(
