@@ -16,7 +16,7 @@ from coordlang.language.provenance import domain_sha256, percent
 from coordlang.language.words import Language
 from coordlang.report.data import MOST_PLACES, page_data, word_rows
 from coordlang.report.shown import select_tasks
-from coordlang.report.simulated import simulated_data, summary
+from coordlang.report.simulated import simulated_data
 from coordlang.simulation.record import SimulationRecord
 from coordlang.sites.coordinates import Point
 from planners.pddl.lifted import Domain, Problem
@@ -79,13 +79,12 @@ def make_report(
         "in_order": in_order,
         "features": lifted.data()["features"] if lifted else (),
         "seed": seed,
+        "simulated": simulated,
     }
     while True:
         data = page_data(language, selection, seed, coordinates, most_places)
         if simulated is not None:
             data["simulated"] = simulated_data(simulated)
-            number = len(data["simulated"]["runs"])
-            shown["simulated"] = summary(simulated, number, data["kept"]["one"])
         html = _render(shown, data)
         if len(html) <= largest:
             candidates = int(language.provenance.tasks.get("count", 0))
@@ -109,7 +108,6 @@ def _render(shown: Mapping[str, Any], data: Mapping[str, Any]) -> bytes:
     )
     template = environment.from_string((here / "template.html").read_text("utf-8"))
     return template.render(
-        simulated=None,
         version=version("coordlang"),
         terms_open=_TERMS_OPEN if len(shown["words"]) <= _FEW_WORDS else 1,
         formula=_formula,
@@ -120,6 +118,7 @@ def _render(shown: Mapping[str, Any], data: Mapping[str, Any]) -> bytes:
         css=Markup((here / "page.css").read_text("utf-8")),
         js=Markup(_script()),
         kept=data["kept"],
+        runs_shown=len(data["simulated"]["runs"]) if "simulated" in data else 0,
         checked=[task["verified"] for task in data["tasks"]],
         data=Markup(_json(data)),
         **shown,

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 from random import Random
 
 from coordlang.execution.task_language import TaskLanguage, language_in_task
-from coordlang.language.listed import goal_text, planning_task
+from coordlang.language.candidates import describe
+from coordlang.language.listed import planning_task
 from coordlang.language.recorded import recorded_list
 from coordlang.language.words import Language
 from coordlang.required.miscoordination import Miscoordination, miscoordination
@@ -81,7 +82,7 @@ def select_tasks(
         _examined(p.name, language_in_task(language, domain, p, options, position))
         for p in problems
     ]
-    known = {_identity(task.language) for task in given}
+    known = {describe(task.language.space, task.language.task) for task in given}
     room = number - len(given)
     requiring: list[ShownTask] = []
     others: list[ShownTask] = []
@@ -92,8 +93,8 @@ def select_tasks(
         if enough or examined >= _TRIES * room:
             complete = False
             break
-        if (identity := _identity(candidate)) not in known:
-            known.add(identity)
+        if (text := describe(candidate.space, candidate.task)) not in known:
+            known.add(text)
             task = _examined(None, candidate)
             (others if task.witness is None else requiring).append(task)
     kept = [*requiring[: max(round(room * _REQUIRING), room - len(others))], *others][:room]
@@ -107,13 +108,6 @@ def _examined(name: str | None, language: TaskLanguage) -> ShownTask:
         return ShownTask(name, language, miscoordination(language.space, language.task), True)
     except OutOfMemory:
         return ShownTask(name, language, None, False)
-
-
-def _identity(language: TaskLanguage) -> tuple[str, str]:
-    """The initial state and the goal of a task, as text."""
-    space = language.space
-    init = space.model.codec.key(space.rows[space.state[language.start]])
-    return init, goal_text(space.model, space.goals[0])
 
 
 def _candidates(

@@ -15,17 +15,6 @@ from planners.system.errors import BadInput, Position
 #: Poses of all robots in all runs that a page holds; at least one run is in it.
 MOST_POSES = 20_000
 
-_AGREED = {
-    "sentence": "All robots know the sentence {sentence}, and each draws its own choices under it.",
-    "plan": "All robots follow one whole plan.",
-    "nothing": "Nothing is agreed: each robot follows {one} of its own.",
-}
-_STEPS = {
-    "clock": "A common clock begins the joint steps",
-    "barrier": "Before each joint step robots wait until all have done the one before",
-    "word": "Robots wait for each other before each word only",
-}
-
 
 def require_of(record: SimulationRecord, domain: Domain, position: Position) -> None:
     """Raise `BadInput` if runs are of another domain, or if there are none."""
@@ -36,19 +25,6 @@ def require_of(record: SimulationRecord, domain: Domain, position: Position) -> 
         wrong, remedy = "there is no run in this record", "Make one with `coordlang simulate`."
     if wrong:
         raise BadInput(wrong, position=position, remedy=remedy)
-
-
-def summary(record: SimulationRecord, shown: int, one: str = "an optimal plan") -> str:
-    """Return what stands above the player of runs, of which so many are in the page.
-
-    ``one`` is what a plan is called: an optimal one, or one within the slack.
-    """
-    agreed = _AGREED[record.agreement].format(sentence=record.sentence, one=one)
-    some = "" if shown == len(record.runs) else f" The first {shown} of {len(record.runs)} runs."
-    return (
-        f"{agreed} {_STEPS[record.step]}; noise {100 * record.noise:g} %, discs of "
-        f"{record.radius:g} m, cells of {record.cell:g} m. Task: {record.task}.{some}"
-    )
 
 
 def simulated_data(record: SimulationRecord) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import pytest
 
 from coordlang.report import simulated
 from coordlang.report.page import Report, make_report
-from coordlang.report.simulated import simulated_data, summary
+from coordlang.report.simulated import simulated_data
 from coordlang.simulation.record import SimulationRecord, to_bytes
 from coordlang.simulation.simulator import Settings
 from tests.coordlang.report.conftest import Opened, Opener, make_language
@@ -87,8 +87,14 @@ def test_a_page_holds_some_runs_of_many(monkeypatch: pytest.MonkeyPatch) -> None
     one = sum(map(len, record.runs[0].poses.values()))
     monkeypatch.setattr(simulated, "MOST_POSES", one)
     assert len(simulated_data(record)["runs"]) == 1
-    assert "The first 1 of 2 runs." in summary(record, 1)
-    assert "first" not in summary(record, 2)
+    said = (
+        b"Nothing is agreed: each robot follows an optimal plan of its own. A common clock begins"
+    )
+    some = page_of(record).html
+    assert said in some
+    assert b"The first 1 of 2 runs.</p>" in some
+    monkeypatch.setattr(simulated, "MOST_POSES", 10 * one)
+    assert b" of 2 runs." not in page_of(record).html
     monkeypatch.setattr(simulated, "MOST_POSES", 0)
     assert len(simulated_data(record)["runs"]) == 1, "one at least"
 
