@@ -12,7 +12,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Union
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Union, dataclass_transform
 
 import click
 
@@ -96,14 +96,15 @@ class Limits:
         return int(float(match[1]) * 1024 ** " kmgt".index(match[2] or " "))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass_transform(frozen_default=True)
+@dataclass(frozen=True)
 class CommandOptions:
     """What a command can be asked for; the docstring of each record is the command's ``--help``.
 
-    The command ``takes`` arguments as the usage line shows them, and none where the option
-    ``alone`` is given.  A terminal shows what it is ``doing``.  Its function is in the ``module``
-    of its name, unless another one is named, and searches no task again that was searched before
-    if it ``keeps_plans``.
+    Each record that is made of this one is a frozen dataclass.  The command ``takes`` arguments as
+    the usage line shows them, and none where the option ``alone`` is given.  A terminal shows what
+    it is ``doing``.  Its function is in the ``module`` of its name, unless another one is named,
+    and searches no task again that was searched before if it ``keeps_plans``.
     """
 
     takes: ClassVar[str] = ""
@@ -114,6 +115,11 @@ class CommandOptions:
 
     no_cache: bool = cli_option(False, "Search anew: read no plans that were found before.")
     limits: Limits = group(Limits)
+
+    def __init_subclass__(cls, **said: str | bool) -> None:
+        for name, value in said.items():
+            setattr(cls, name, value)
+        dataclass(frozen=True)(cls)
 
 
 def json_option() -> Any:
@@ -156,14 +162,12 @@ class Source:
     given: frozenset[str] = frozenset()
 
 
-@dataclass(frozen=True, slots=True)
 class PlanningOptions(CommandOptions):
     """What a command can be asked for that reads a domain and problems."""
 
     source: Source = group(Source, without=NO_SLACK)
 
 
-@dataclass(frozen=True, slots=True)
 class AnswerOptions(PlanningOptions):
     """The same, of one whose answer can be JSON."""
 
@@ -249,13 +253,10 @@ class MethodOptions:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class InspectOptions(AnswerOptions):
+class InspectOptions(
+    AnswerOptions, takes="DOMAIN PROBLEM", doing="reading and grounding", keeps_plans=False
+):
     """Show what was understood of a domain: robots, subactions, constraints."""
-
-    takes = "DOMAIN PROBLEM"
-    doing = "reading and grounding"
-    keeps_plans = False
 
     states: bool = option(False, "Also count the reachable joint states and steps.")
     write: File | None = option(
@@ -263,14 +264,11 @@ class InspectOptions(AnswerOptions):
     )
 
 
-@dataclass(frozen=True, slots=True)
-class PlansOptions(AnswerOptions):
+class PlansOptions(AnswerOptions, takes="DOMAIN PROBLEM"):
     """Count, list or sample all optimal plans of a task.
 
     With --slack B those that take at most B steps more, too.
     """
-
-    takes = "DOMAIN PROBLEM"
 
     heuristic: SearchHeuristic = option(
         "auto", "What the search is bounded by; the plans are the same."
@@ -280,50 +278,41 @@ class PlansOptions(AnswerOptions):
     source: Source = group(Source, without="words_see_slack")
 
 
-@dataclass(frozen=True, slots=True)
-class CheckOptions(AnswerOptions):
+class CheckOptions(
+    AnswerOptions, takes="DOMAIN PROBLEM", doing="solving the task twice", keeps_plans=False
+):
     """Compare our optimal cost with Fast Downward's.
 
     Exit 0: equal.  1: they differ.  11: both prove that there is no plan.
     """
 
-    takes = "DOMAIN PROBLEM"
-    doing = "solving the task twice"
-    keeps_plans = False
 
-
-@dataclass(frozen=True, slots=True)
-class CoordinationOptions(AnswerOptions):
+class CoordinationOptions(AnswerOptions, takes="DOMAIN PROBLEMS..."):
     """Decide which tasks require coordination, with a miscoordination shown."""
-
-    takes = "DOMAIN PROBLEMS..."
 
     work: Jobs = group(Jobs)
     source: Source = group(Source, without="words_see_slack")
 
 
-@dataclass(frozen=True, slots=True)
-class TasksOptions(AnswerOptions):
+class TasksOptions(
+    AnswerOptions,
+    takes="DOMAIN PROBLEM",
+    module="domains",
+    doing="reading and grounding",
+    keeps_plans=False,
+):
     """Write a task file: PROBLEM with other starts and goals; ? in a PATTERN is any name."""
-
-    takes = "DOMAIN PROBLEM"
-    module = "domains"
-    doing = "reading and grounding"
-    keeps_plans = False
 
     start: tuple[str, ...] = option((), "Atoms of which starts have others.", "PATTERN")
     goal: tuple[str, ...] = option((), "Each goal has one atom like this.", "PATTERN")
     output: str = result_option("The task file")
 
 
-@dataclass(frozen=True, slots=True)
-class BuildOptions(AnswerOptions):
+class BuildOptions(AnswerOptions, takes="DOMAIN PROBLEMS..."):
     """Build a coordination language and verify it.
 
     Exit 0: written, with the proof that the method promises.  3: without it (a limit was hit).
     """
-
-    takes = "DOMAIN PROBLEMS..."
 
     tasks: TasksSource | None = option(
         None, "Tasks: every pair of reachable states, or a task file.", "all|FILE"
@@ -352,15 +341,13 @@ class BuildOptions(AnswerOptions):
     source: Source = group(Source)
 
 
-@dataclass(frozen=True, slots=True)
-class VerifyOptions(AnswerOptions):
+class VerifyOptions(
+    AnswerOptions, takes="LANGUAGE DOMAIN PROBLEMS...", doing="verifying by definition"
+):
     """Check by definition that LANGUAGE is a coordination language.
 
     Exit 0: it is, or robots fail as rarely as its file claims.  1: neither.
     """
-
-    takes = "LANGUAGE DOMAIN PROBLEMS..."
-    doing = "verifying by definition"
 
     tasks: TasksSource | None = option(
         None, "Check these tasks, not those that the file records.", "all|FILE"
@@ -378,14 +365,11 @@ class VerifyOptions(AnswerOptions):
     work: Jobs = group(Jobs)
 
 
-@dataclass(frozen=True, slots=True)
-class LiftOptions(AnswerOptions):
+class LiftOptions(AnswerOptions, takes="DOMAIN PROBLEMS..."):
     """Learn words as functions of features of states, for all PROBLEMS at once.
 
     Exit 0: written.  3: written, but a limit ended the search.  11: no features suffice.
     """
-
-    takes = "DOMAIN PROBLEMS..."
 
     tasks: Literal["all"] | None = option(None, "Tasks: every pair of reachable states.")
     check: Sequence[ProblemSource] = option(
@@ -408,16 +392,12 @@ class LiftOptions(AnswerOptions):
             )
 
 
-@dataclass(frozen=True, slots=True)
-class GroundOptions(PlanningOptions):
+class GroundOptions(PlanningOptions, takes="LIFTED DOMAIN PROBLEM", module="lift"):
     """Write the language file of one problem from a lifted language.
 
     Exit 0: written, and verified unless --unverified.  1: refuted, and nothing is written.  3:
     written, but the memory did not suffice to verify it.
     """
-
-    takes = "LIFTED DOMAIN PROBLEM"
-    module = "lift"
 
     tasks: TasksSource | None = option(
         "all", "Tasks: every pair of reachable states, a file's, the problem's.", "all|FILE|own"
@@ -428,21 +408,17 @@ class GroundOptions(PlanningOptions):
     output: str = result_option("The language file (.json, .json.gz)", "LANGUAGE")
 
 
-@dataclass(frozen=True, slots=True)
-class SayOptions(AnswerOptions):
+class SayOptions(AnswerOptions, takes="LANGUAGE DOMAIN PROBLEM PLAN", module="sentences"):
     """Print the sentence of an optimal plan, or of each plan of a file, one a line."""
 
-    takes = "LANGUAGE DOMAIN PROBLEM PLAN"
-    module = "sentences"
 
-
-@dataclass(frozen=True, slots=True)
-class UnderstandOptions(AnswerOptions):
+class UnderstandOptions(
+    AnswerOptions,
+    takes="LANGUAGE DOMAIN PROBLEM SENTENCE",
+    module="sentences",
+    doing="finding the plans with the sentence",
+):
     """Count, list, sample or draw the optimal plans that a SENTENCE ("w1 w0") leaves open."""
-
-    takes = "LANGUAGE DOMAIN PROBLEM SENTENCE"
-    module = "sentences"
-    doing = "finding the plans with the sentence"
 
     listing: Listing = group(Listing)
     form: Literal["ipc", "json", "dot"] = form_option("ipc", "dot: drawn as one DAG.")
@@ -457,13 +433,13 @@ class UnderstandOptions(AnswerOptions):
     output: str | None = output_option("Write to this file instead of stdout.")
 
 
-@dataclass(frozen=True, slots=True)
-class PlanOptions(AnswerOptions):
+class PlanOptions(
+    AnswerOptions,
+    takes="LANGUAGE DOMAIN PROBLEM [SENTENCE]",
+    module="sentences",
+    doing="searching for a plan",
+):
     """Find one optimal plan under SENTENCE ("w1 w0"), or under the best sentence (--prefer)."""
-
-    takes = "LANGUAGE DOMAIN PROBLEM [SENTENCE]"
-    module = "sentences"
-    doing = "searching for a plan"
 
     prefer: str | Sequence[str] = option(
         (), 'shortest, most-plans, first:ROBOT or avoid:"(ATOM)".', "PREFERENCE"
@@ -472,15 +448,13 @@ class PlanOptions(AnswerOptions):
     form: Literal["ipc", "json", "plansys2"] = form_option("ipc", "How the plan is written.")
 
 
-@dataclass(frozen=True, slots=True)
-class ChoicesOptions(AnswerOptions):
+class ChoicesOptions(
+    AnswerOptions, takes="LANGUAGE DOMAIN PROBLEM SENTENCE", doing="finding the robots' choices"
+):
     """Show what each robot may do under SENTENCE ("w1 w0"), whatever the others choose.
 
     With --history and detours: what one robot may do next, and whether it may make them all.
     """
-
-    takes = "LANGUAGE DOMAIN PROBLEM SENTENCE"
-    doing = "finding the robots' choices"
 
     robot: str | Sequence[str] = option((), "Whose choices; may be repeated (default: all).", "R")
     check: bool = option(False, "Walk every combination: is each an optimal plan?")
@@ -493,13 +467,10 @@ class ChoicesOptions(AnswerOptions):
     output: str | None = output_option("Write to this file instead of stdout.")
 
 
-@dataclass(frozen=True, slots=True)
-class SimulateOptions(AnswerOptions):
+class SimulateOptions(
+    AnswerOptions, takes="LANGUAGE DOMAIN PROBLEM", doing="simulating", alone="replay"
+):
     """Let robots with wheels do a task in a simulator (`pip install 'coordlang[sim]'`)."""
-
-    takes = "LANGUAGE DOMAIN PROBLEM"
-    doing = "simulating"
-    alone = "replay"
 
     sentence: SentenceSource | None = option(
         None, "What robots have agreed on.", "SENTENCE", without="without plan"
@@ -529,15 +500,13 @@ class SimulateOptions(AnswerOptions):
             kind_of(path)
 
 
-@dataclass(frozen=True, slots=True)
-class ExportOptions(AnswerOptions):
+class ExportOptions(
+    AnswerOptions, takes="LANGUAGE DOMAIN PROBLEM SENTENCE", doing="compiling the task"
+):
     """Write a task under SENTENCE ("w1 w0") as PDDL, LTLf or behaviour trees.
 
     Exit 1: no plan fits, or the language does not cover the task and guarantees nothing for it.
     """
-
-    takes = "LANGUAGE DOMAIN PROBLEM SENTENCE"
-    doing = "compiling the task"
 
     to: Target = option("pddl", "A problem, a temporal formula, or behaviour trees.")
     output: str | None = output_option("pddl: a folder; else a file.", "PATH", files=WRITTEN)
@@ -562,12 +531,10 @@ class ExportOptions(AnswerOptions):
         return self.to == "pddl" and not is_text
 
 
-@dataclass(frozen=True, slots=True)
-class ExplainOptions(AnswerOptions):
+class ExplainOptions(
+    AnswerOptions, takes="LANGUAGE DOMAIN PROBLEM", doing="finding formulas of the words"
+):
     """Show a language: words as formulas, sentences of a task."""
-
-    takes = "LANGUAGE DOMAIN PROBLEM"
-    doing = "finding formulas of the words"
 
     task: bool = option(False, "What each sentence of PROBLEM's task asks of each robot.")
     sentence: SentenceSource | None = option(
@@ -576,12 +543,8 @@ class ExplainOptions(AnswerOptions):
     formula_per_word: bool = option(False, "A formula of its own for every word.")
 
 
-@dataclass(frozen=True, slots=True)
-class ReportOptions(PlanningOptions):
+class ReportOptions(PlanningOptions, takes="LANGUAGE DOMAIN PROBLEMS...", doing="drawing the page"):
     """Write a page that shows a language: words, sentences, plans played."""
-
-    takes = "LANGUAGE DOMAIN PROBLEMS..."
-    doing = "drawing the page"
 
     output: str = result_option("The HTML file", "PAGE")
     tasks_shown: int = option(30, "Show at most this many tasks.", "N", least=1)
@@ -605,12 +568,8 @@ class ReportOptions(PlanningOptions):
         return [OutputFile("--planviz", path) for path in paths]
 
 
-@dataclass(frozen=True, slots=True)
-class DomainsOptions(CommandOptions):
+class DomainsOptions(CommandOptions, doing="copying", keeps_plans=False):
     """List or copy the domains that come with coordlang, or write a map as PDDL."""
-
-    doing = "copying"
-    keeps_plans = False
 
     copy: tuple[str, str] | None = option(
         None, "Copy this domain, or all, into DIR/NAME.", "NAME|all DIR", without="map"
