@@ -82,25 +82,29 @@ def _positional(
     One in brackets may be left out.  ``--factored`` stands for DOMAIN and PROBLEM.  Raises
     `click.UsageError` for too few or too many.
     """
-    takes, is_factored = record.takes, given.get("factored") is not None
-    if record.alone is not None and record.alone in given:
-        if arguments or is_factored:
-            alone = options[record.alone]
-            instead = f"{alone.spelling} {alone.metavar} alone"
-            raise click.UsageError(f"expected {instead}, without {takes}")
-        return {}
-    names = takes.split()
+    is_factored = given.get("factored") is not None
+    alone = options[record.alone] if record.alone in given else None
+    names = [] if alone else record.takes.split()
     asked = [name for name in names if not (is_factored and name in _PDDL)]
     least = sum(not name.startswith("[") for name in asked)
     is_open = "PROBLEMS..." in asked
-    if len(arguments) < least or (len(arguments) > len(asked) and not is_open):
-        without = "them" if set(names) <= set(_PDDL) else "DOMAIN PROBLEM"
-        instead = f", or --factored DIR without {without}" if "DOMAIN" in names else ""
-        raise click.UsageError(f"expected {takes}{instead}")
+    fits = least <= len(arguments) and (is_open or len(arguments) <= len(asked))
+    if not fits or (alone and is_factored):
+        raise click.UsageError(f"expected {_usage(record.takes, alone)}")
     read: dict[str, object] = dict(zip(asked, arguments, strict=False))
     if is_open:
         read["PROBLEMS..."] = arguments[len(asked) - 1 :]
     return {name.strip("[]"): value for name, value in read.items()}
+
+
+def _usage(takes: str, alone: Option | None) -> str:
+    """What arguments there should be."""
+    if alone is not None:
+        return f"{alone.spelling} {alone.metavar} alone, without {takes}"
+    if "DOMAIN" not in takes:
+        return takes
+    without = "them" if set(takes.split()) <= set(_PDDL) else "DOMAIN PROBLEM"
+    return f"{takes}, or --factored DIR without {without}"
 
 
 @contextmanager
@@ -185,7 +189,7 @@ def check_outputs(outputs: Iterable[OutputFile], inputs: Iterable[str]) -> None:
     read = [path for path in inputs if path != "-" and os.path.isfile(path)]
     written: dict[str, str] = {}
     for option, path, makes_folder in outputs:
-        if path is None or path == "-":
+        if path == "-":
             continue
         what, remedy = "", "Give the output another name."
         if reason := why_unwritable(path, makes_folder=makes_folder):

@@ -53,7 +53,7 @@ def public(
     for name, word in word_of.items():
         is_many = word == "PROBLEMS..."
         # What a command can do without its function can, too.
-        is_needed = word == words[0] != "DOMAIN" and getattr(record, "alone", None) is None
+        is_needed = word == words[0] != "DOMAIN" and not getattr(record, "alone", "")
         default = of.empty if is_needed or is_many else None
         how = of.VAR_POSITIONAL if is_many else of.POSITIONAL_OR_KEYWORD
         parameters.append(of(name, how, default=default))

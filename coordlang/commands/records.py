@@ -57,14 +57,13 @@ Target = Literal["pddl", "ltlf", "bt"]
 
 
 class OutputFile(NamedTuple):
-    """A file that is written: the option that names it, and its path.
+    """A file that is written, and the option that names it; ``-`` is stdout and not looked at.
 
-    None is no file, ``-`` is stdout and not looked at.  ``makes_folder``: its folder is made where
-    it is missing.
+    ``makes_folder``: its folder is made where it is missing.
     """
 
     option: str
-    path: str | None
+    path: str
     makes_folder: bool = False
 
 
@@ -111,7 +110,7 @@ class CommandOptions:
     doing: ClassVar[str] = "finding all optimal plans"
     module: ClassVar[str | None] = None
     keeps_plans: ClassVar[bool] = True
-    alone: ClassVar[str | None] = None
+    alone: ClassVar[str] = ""
 
     no_cache: bool = cli_option(False, "Search anew: read no plans that were found before.")
     limits: Limits = group(Limits)
