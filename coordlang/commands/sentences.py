@@ -136,14 +136,13 @@ def understand(files: Arguments, options: UnderstandOptions) -> SentencePlans:
 def show_understand(found: SentencePlans, options: UnderstandOptions) -> int:
     """Print, write or draw the plans."""
     if options.form == "dot":
-        nodes = options.nodes or NODES_DRAWN
-        write(found.dot(nodes), options.output)
-        if cut := cut_note(found.dag(nodes)):
+        dag = found.dag(options.nodes or NODES_DRAWN)
+        write(plans_dot(dag), options.output)
+        if cut := cut_note(dag):
             note(f"{cut}; --nodes N draws more")
     else:
         is_drawn = options.form == "json" and not options.listing.only_count
-        dag = found.dag(options.nodes) if is_drawn else None
-        data = partial(found.data_with, graph=dag)
+        data = partial(found.data_with, graph=found.dag(options.nodes) if is_drawn else None)
         show_listed(found, options, data, "plans", options.output)
     return covered_code(found)
 
