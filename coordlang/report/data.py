@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import islice
+from itertools import chain, islice
 from typing import Any
 
 import numpy as np
@@ -57,21 +57,17 @@ def page_data(
     first = selection.tasks[0].language
     model = first.model
     tables = Tables(model, first.partition)
-    listed = sorted(language.states)  # as the first states, unless they are too many
-    atoms = len(split_atoms(listed[0])) * len(listed) if listed else 0
-    if len(listed) > _STATES_LISTED or atoms > _ATOMS_LISTED:
-        listed = []
-    for key in listed:
+    listed = _listed(language)
+    for key in listed:  # they are the first states
         tables.state(key)
     tasks = [task_data(shown, tables, seed) for shown in selection.tasks]
     states = [model.codec.decode(row) for row in tables.rows]
     world = find_world(model, states)
     if not 1 < len(world.places) <= most_places:  # no map: atoms are text
         world = replace(world, places=(), links=(), roles={})
-    facts = sorted({fact for state in states for fact in state})
-    number = {fact: k for k, fact in enumerate(facts)}
+    number = {fact: k for k, fact in enumerate(sorted(set(chain.from_iterable(states))))}
     for task, shown in zip(tasks, selection.tasks, strict=True):
-        task.update(task_summary(shown.language, world))
+        task |= task_summary(shown.language, world)
     return {
         "robots": list(model.robots),
         "kept": {
@@ -83,7 +79,7 @@ def page_data(
         "words": [{"name": word} for word in language.words],
         "things": list(world.things),
         **_map(world, known),
-        "facts": [{"text": fact, "role": _role(fact, world)} for fact in facts],
+        "facts": [{"text": fact, "role": _role(fact, world)} for fact in number],
         "labels": [
             [_label(model, world, robot, text) for text in own]
             for robot, own in enumerate(tables.labels)
@@ -100,6 +96,13 @@ def page_data(
             "complete": selection.complete,
         },
     }
+
+
+def _listed(language: Language) -> list[str]:
+    """The states of a language, by their keys, unless they are too many."""
+    listed = sorted(language.states)
+    atoms = len(split_atoms(listed[0])) * len(listed) if listed else 0
+    return listed if len(listed) <= _STATES_LISTED and atoms <= _ATOMS_LISTED else []
 
 
 def word_rows(
