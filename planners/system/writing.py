@@ -31,15 +31,13 @@ def why_unwritable(path: str | Path, *, makes_folder: bool = False) -> str | Non
     if not text:
         return "its name is empty"
     try:
-        found = os.stat(text)
-    except (FileNotFoundError, NotADirectoryError):
-        found = None
-    except OSError as error:
-        return error.strerror
-    try:
-        return _why_not_replaced(text, found) if found else _why_not_made(text, makes_folder)
+        with suppress(FileNotFoundError, NotADirectoryError):
+            return _why_not_replaced(text, os.stat(text).st_mode)
+        return _why_not_made(text, makes_folder)
     except FileNotFoundError:  # relative to no folder
         return "the working directory has been removed"
+    except OSError as error:
+        return error.strerror
 
 
 def is_device(path: str | Path) -> bool:
@@ -71,7 +69,8 @@ def write_atomically(path: str | Path, data: bytes, *, outdated: str | Path | No
             return
         target = Path(os.path.realpath(path))
         with postponed_signals(), _written_beside(target, data) as beside:
-            _replace(target, beside, outdated)
+            remove_file(outdated)
+            os.replace(beside, target)
     except BrokenPipeError:
         raise
     except OSError as error:
@@ -106,8 +105,8 @@ def write_texts(folder: str | Path, texts: Mapping[str, str]) -> None:
 def copy_folders(folders: Sequence[str | Path], target: str | Path) -> None:
     """Copy folders with all files in them into one, which is made if it is missing.
 
-    They are copied beside, and then renamed: all of them are there, and whole, or none.  Signals
-    wait until that is done.  Raises `UsageError` if one cannot be written, or is there already.
+    They are copied beside, and then renamed, so that what is there is whole.  Signals wait until
+    that is done.  Raises `UsageError` if one cannot be written, or is there already.
     """
     into = Path(target)
     try:
@@ -115,37 +114,25 @@ def copy_folders(folders: Sequence[str | Path], target: str | Path) -> None:
             into.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryDirectory(prefix=".coordlang.", dir=into) as beside:
                 for folder in map(Path, folders):
-                    shutil.copytree(folder, Path(beside, folder.name), copy_function=_copy_file)
-                done: list[Path] = []
-                try:
-                    for copy in sorted(Path(beside).iterdir()):
-                        os.rename(copy, into / copy.name)
-                        done.append(copy)
-                except OSError:
-                    for copy in done:
-                        os.rename(into / copy.name, copy)
-                    raise
+                    shutil.copytree(folder, Path(beside, folder.name))
+                for folder in map(Path, folders):
+                    os.rename(Path(beside, folder.name), into / folder.name)
     except shutil.Error as error:  # of many files; the first says why
         raise _cannot(into, error.args[0][0][2]) from None
     except OSError as error:
         raise _cannot(into, error.strerror or str(error)) from None
 
 
-def _copy_file(source: str, copy: str) -> None:
-    """Write a file again, to the disk."""
-    with open(copy, "wb") as file:
-        file.write(Path(source).read_bytes())
-        file.flush()
-        os.fsync(file.fileno())
-
-
 @contextmanager
-def _written_beside(target: Path, data: bytes) -> Iterator[str]:
+def _written_beside(target: Path, data: bytes) -> Iterator[Path]:
     """Write a temporary file beside a target, to the disk; it is gone after the block.
 
-    Its permissions are those of the target, or of any new file.
+    Its permissions are those of the target, or of any new file; until it is written only the owner
+    may read it if the target exists.
     """
-    handle, beside = _temporary(target)
+    beside = target.parent / f".{target.name[:_REPEATED]}.{secrets.token_hex(4)}"
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+    handle = os.open(beside, flags, 0o600 if target.exists() else 0o666)
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(data)
@@ -155,34 +142,7 @@ def _written_beside(target: Path, data: bytes) -> Iterator[str]:
             os.fsync(file.fileno())
         yield beside
     finally:
-        with suppress(FileNotFoundError):
-            os.unlink(beside)
-
-
-def _temporary(target: Path) -> tuple[int, str]:
-    """A new file beside a target, open; only the owner may read it if the target exists."""
-    beside = target.parent / f".{target.name[:_REPEATED]}.{secrets.token_hex(4)}"
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
-    return os.open(beside, flags, 0o600 if target.exists() else 0o666), str(beside)
-
-
-def _replace(target: Path, beside: str, outdated: str | Path | None) -> None:
-    """Rename a file to its target; what is outdated by it goes first, and stays if that fails."""
-    if outdated is None or not os.path.isfile(outdated):
-        os.replace(beside, target)
-        return
-    old = Path(os.path.realpath(outdated))
-    handle, aside = _temporary(old)
-    os.close(handle)
-    try:
-        os.replace(old, aside)
-        os.replace(beside, target)
-    finally:
-        failed = os.path.exists(beside)
-        if failed and not old.exists():
-            os.replace(aside, old)
-        else:
-            os.unlink(aside)
+        beside.unlink(missing_ok=True)
 
 
 def _cannot(path: str | Path, reason: str) -> UsageError:
@@ -192,15 +152,13 @@ def _cannot(path: str | Path, reason: str) -> UsageError:
     )
 
 
-def _why_not_replaced(text: str, found: os.stat_result) -> str | None:
+def _why_not_replaced(text: str, mode: int) -> str | None:
     """Why a file that exists is not replaced, or a device not written to; None if it can be."""
-    if stat.S_ISDIR(found.st_mode):
+    if stat.S_ISDIR(mode):
         return os.strerror(errno.EISDIR)
-    if stat.S_ISSOCK(found.st_mode):
-        return os.strerror(errno.ENXIO)
-    if not stat.S_ISREG(found.st_mode):
+    if not stat.S_ISREG(mode):
         return _denied(text, os.W_OK)
-    if not found.st_mode & 0o222:  # asked of the file itself: the superuser may write to any
+    if not mode & 0o222:  # asked of the file itself: the superuser may write to any
         return "the file is read-only"
     return _denied(text, os.W_OK) or _denied(_folder(text), os.W_OK | os.X_OK)
 
