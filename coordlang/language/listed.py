@@ -142,9 +142,9 @@ def _read_text(domain: Domain, problem: Problem, text: str, position: Position |
             raise BadInput(
                 "expected one PDDL literal", remedy="As in (at r1 a) or (not (at r1 a))."
             )
-        document = parse(Source(position.file if position else "task", parts[0]))
-        names = replace(Names.of(document, domain), functions={}, objects=problem.objects)
-        return read_formula(names, names.document.root)
+        root = parse(Source(position.file if position else "task", parts[0]))
+        names = replace(Names.of(domain), functions={}, objects=problem.objects)
+        return read_formula(names, root)
     except BadInput as error:
         raise BadInput(f"{text}: {error.what}", position=position, remedy=error.remedy) from None
 

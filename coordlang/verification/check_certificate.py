@@ -211,7 +211,7 @@ class _Tasks:
 
 def _canonical(goal: Iterable[str]) -> object:
     """Literals in a form in which their order does not count."""
-    return frozenset(_tree(parse(Source("goal", text)).root) for text in goal)
+    return frozenset(_tree(parse(Source("goal", text))) for text in goal)
 
 
 def _tree(node: Expression) -> object:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import count
 
 from planners.pddl.lifted import (
@@ -22,8 +22,8 @@ from planners.pddl.lifted import (
     StepAtom,
     Variable,
 )
-from planners.pddl.names import Names
-from planners.pddl.sexpr import Expression, Group, Token
+from planners.pddl.names import Names, unknown
+from planners.pddl.sexpr import Expression, Group
 from planners.system.messages import echoed
 
 #: How PDDL writes a number.
@@ -38,10 +38,10 @@ def read_formula(names: Names, item: Expression) -> Formula:
     ``(name ..)`` is an atom when ``name`` is a declared predicate, else a literal about the same
     joint step when it is an action.  Raises `BadInput` or `Unsupported` with the place.
     """
-    item = names.document.group(item, "a formula in parentheses")
+    item = item.group("a formula in parentheses")
     if len(item) == 0:
         return TRUE
-    head = names.document.token(item.items[0], "a predicate, 'and', 'or', 'not', ..").text
+    head = item.items[0].token("a predicate, 'and', 'or', 'not', ..").text
     if head in names.predicates:
         return _atom(names, item)
     match head:
@@ -55,149 +55,136 @@ def read_formula(names: Names, item: Expression) -> Formula:
             condition, conclusion = _parts(names, item, 2)
             return Or((Not(condition), conclusion))
         case "forall" | "exists":
-            return _quantified(names, item)
+            _expect(item, 2)
+            variables = names.read_variables(item.items[1])
+            part = read_formula(names.with_variables(variables), item.items[2])
+            return (Forall if head == "forall" else Exists)(variables, part)
         case "=":
             return _equal(names, item)
     if head in names.actions:
         return StepAtom(head, names.arguments(item, [names.actions[head]], "action"))
-    raise names.unknown("predicate", item, names.predicates)
+    raise unknown("predicate", item, names.predicates)
 
 
 def _parts(names: Names, item: Group, number: int | None = None) -> tuple[Formula, ...]:
     if number is not None:
-        _expect(names, item, number)
+        _expect(item, number)
     return tuple(read_formula(names, part) for part in item.items[1:])
 
 
-def _quantified(names: Names, item: Group) -> Formula:
-    _expect(names, item, 2)
-    variables = names.read_variables(item.items[1])
-    part = read_formula(names.with_variables(variables), item.items[2])
-    return Forall(variables, part) if item.head == "forall" else Exists(variables, part)
-
-
 def _equal(names: Names, item: Group) -> Formula:
-    _expect(names, item, 2)
+    _expect(item, 2)
     left, right = item.items[1:]
     for side in (left, right):
         if isinstance(side, Group) or (NUMBER.match(side.text) and side.text not in names.objects):
-            raise names.document.unsupported("numeric condition '(= ..)' is", item)
+            raise item.unsupported("numeric condition '(= ..)' is")
     return Equal(names.term(left), names.term(right))
 
 
 def read_effects(names: Names, item: Expression) -> tuple[tuple[Effect, ...], int | Atom | None]:
     """The literal effects, flattened, and the term of ``(increase (total-cost) ..)``, if any."""
-    found = [*_effects(_Scope(names), item)]
+    found = [*_effects(names, item)]
     costs = [part for part in found if not isinstance(part, Effect)]
     if len(costs) > 1:
         remedy = "Keep one '(increase (total-cost) N)'."
-        raise names.document.fail("total-cost is increased twice in one action", item, remedy)
+        raise item.fail("total-cost is increased twice in one action", remedy)
     effects = tuple(part for part in found if isinstance(part, Effect))
     return effects, costs[0] if costs else None
 
 
-@dataclass(frozen=True, slots=True)
-class _Scope:
-    """Where an effect stands: under which universal variables, and on which condition."""
+def _effects(
+    names: Names,
+    item: Expression,
+    variables: tuple[Variable, ...] = (),
+    condition: Formula = TRUE,
+) -> Iterator[Effect | int | Atom]:
+    """The literals of an effect, and the terms that it adds to the cost.
 
-    names: Names
-    variables: tuple[Variable, ...] = ()
-    condition: Formula = TRUE
-
-    def effect(self, item: Group, adds: bool) -> Effect:
-        return Effect(_atom(self.names, item), adds, self.condition, self.variables)
-
-
-def _effects(scope: _Scope, item: Expression) -> Iterator[Effect | int | Atom]:
-    """The literals of an effect, and the terms that it adds to the cost."""
-    names, document = scope.names, scope.names.document
-    item = document.group(item, "an effect in parentheses")
+    It stands under universal ``variables``, and on a ``condition``.
+    """
+    item = item.group("an effect in parentheses")
     if len(item) == 0:
         return
-    head = document.token(item.items[0], "a predicate, 'and', 'not', 'when', ..").text
+    head = item.items[0].token("a predicate, 'and', 'not', 'when', ..").text
     if head in names.predicates:
-        yield scope.effect(item, True)
+        yield Effect(_atom(names, item), True, condition, variables)
         return
     match head:
         case "and":
             for part in item.items[1:]:
-                yield from _effects(scope, part)
+                yield from _effects(names, part, variables, condition)
         case "not":
-            _expect(names, item, 1)
-            yield scope.effect(document.group(item.items[1], "an atom in parentheses"), False)
+            _expect(item, 1)
+            atom = _atom(names, item.items[1].group("an atom in parentheses"))
+            yield Effect(atom, False, condition, variables)
         case "when":
-            _expect(names, item, 2)
-            condition = read_formula(names, item.items[1])
-            if scope.condition != TRUE:
-                condition = And((scope.condition, condition))
-            yield from _effects(replace(scope, condition=condition), item.items[2])
+            _expect(item, 2)
+            own = read_formula(names, item.items[1])
+            both = own if condition == TRUE else And((condition, own))
+            yield from _effects(names, item.items[2], variables, both)
         case "forall":
-            yield from _forall(scope, item)
+            _expect(item, 2)
+            item = _without_shadows(names, item)
+            inner = names.read_variables(item.items[1])
+            names = names.with_variables(inner)
+            yield from _effects(names, item.items[2], variables + inner, condition)
         case "increase":
-            yield _cost(scope, item)
+            yield _cost(names, item, bool(variables) or condition != TRUE)
         case _:
-            raise names.unknown("predicate", item, names.predicates)
+            raise unknown("predicate", item, names.predicates)
 
 
-def _forall(scope: _Scope, item: Group) -> Iterator[Effect | int | Atom]:
-    names = scope.names
-    _expect(names, item, 2)
-    variables = names.read_variables(item.items[1])
-    # An inner variable may shadow an outer one: give it a name of its own.
-    taken = {v.name for v in scope.variables} | set(names.variables)
-    clash = next((v.name for v in variables if v.name in taken), None)
-    if clash:
-        fresh = next(new for n in count(1) if (new := f"{clash}.{n}") not in taken)
-        return _effects(scope, _rename(item, clash, fresh))
-    names = names.with_variables(variables)
-    return _effects(_Scope(names, scope.variables + variables, scope.condition), item.items[2])
+def _without_shadows(names: Names, item: Group) -> Group:
+    """A ``forall`` in which a variable that would shadow an outer one has a name of its own."""
+    for name in [variable.name for variable in names.read_variables(item.items[1])]:
+        if name in names.variables:
+            fresh = (f"{name}.{n}" for n in count(1))
+            item = _rename(item, name, next(new for new in fresh if new not in names.variables))
+    return item
 
 
-def _cost(scope: _Scope, item: Group) -> int | Atom:
+def _cost(names: Names, item: Group, is_conditional: bool) -> int | Atom:
     """What an action costs; all other effects on numbers are refused."""
-    names, unsupported = scope.names, scope.names.document.unsupported
     target = item.items[1] if len(item) == 3 else None
     if not isinstance(target, Group) or target.head != "total-cost":
-        raise names.unknown("predicate", item, names.predicates)
-    if scope.variables or scope.condition != TRUE:
-        raise unsupported("a cost that depends on a condition is", item)
+        raise unknown("predicate", item, names.predicates)
+    if is_conditional:
+        raise item.unsupported("a cost that depends on a condition is")
     amount = item.items[2]
     if isinstance(amount, Group):
         if amount.head in ("+", "-", "*", "/"):
-            raise unsupported("arithmetic in an action cost is", amount)
+            raise amount.unsupported("arithmetic in an action cost is")
         return names.function(amount)
     if not NUMBER.match(amount.text):
         remedy = "As in (increase (total-cost) 3), or with a function of (:functions ..)."
-        what = f"expected a number, found {echoed(amount.text)}"
-        raise names.document.fail(what, amount, remedy)
+        raise amount.fail(f"expected a number, found {echoed(amount.text)}", remedy)
     # Costs that are too large are refused where costs are used.
     value = min(float(amount.text), 2.0 * MAX_COST)
     if value < 0 or value % 1 != 0:
-        raise unsupported(f"action cost {amount.text} (whole numbers from 0 only) is", item)
+        raise item.unsupported(f"action cost {amount.text} (whole numbers from 0 only) is")
     return int(value)
 
 
 def _atom(names: Names, item: Group) -> Atom:
     if item.head not in names.predicates:
-        raise names.unknown("predicate", item, names.predicates)
+        raise unknown("predicate", item, names.predicates)
     args = names.arguments(item, names.predicates[item.head], "predicate")
     names.check_arguments(item)
     return Atom(item.head, args)
 
 
-def _expect(names: Names, item: Group, count: int) -> None:
+def _expect(item: Group, count: int) -> None:
     if len(item) != count + 1:
-        raise names.document.fail(
+        raise item.fail(
             f"'{item.head}' takes {count} argument{'s' * (count > 1)}, found {len(item) - 1}",
-            item,
             "As in (not (p a)), (= ?x ?y), (when (p a) (q a)), (forall (?x - t) (p ?x)).",
         )
 
 
 def _rename(item: Group, old: str, new: str) -> Group:
     def renamed(part: Expression) -> Expression:
-        if isinstance(part, Token):
-            return Token(new, part.offset) if part.text == old else part
-        return _rename(part, old, new)
+        if isinstance(part, Group):
+            return _rename(part, old, new)
+        return replace(part, text=new) if part.text == old else part
 
-    return Group(tuple(renamed(part) for part in item.items), item.offset, item.end)
+    return replace(item, items=tuple(map(renamed, item.items)))

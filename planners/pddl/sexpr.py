@@ -7,9 +7,8 @@ The reader is iterative, so deep nesting costs an error message and not the stac
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
 from unicodedata import normalize
@@ -71,32 +70,23 @@ _CLASSICAL = "coordlang reads classical PDDL: states of true and false facts."
 _NO_PDDL = "Give a PDDL file: DOMAIN first, then PROBLEM."
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class Source:
     """A text with a name: turns offsets into positions for messages.
 
     ``is_union``: it is that of several files, and ``name`` their folder; it has no lines.
     """
 
-    __slots__ = ("_line_starts", "is_union", "name", "text")
-
-    def __init__(self, name: str, text: str, is_union: bool = False) -> None:
-        self.name = name
-        self.text = text
-        self.is_union = is_union
-        self._line_starts: list[int] | None = None
+    name: str
+    text: str
+    is_union: bool = False
 
     def position(self, offset: int) -> Position:
         """The line and column (from 1) of a character offset."""
         if self.is_union:
             return Position(self.name)
-        if self._line_starts is None:
-            self._line_starts = [0, *(m.end() for m in re.finditer(r"\n", self.text))]
-        line = bisect_right(self._line_starts, offset)
-        return Position(self.name, line, offset - self._line_starts[line - 1] + 1)
-
-    def fail(self, what: str, offset: int, remedy: str) -> BadInput:
-        """An error that points at a character (the caller raises it)."""
-        return BadInput(what, position=self.position(offset), remedy=remedy)
+        line = self.text.count("\n", 0, offset) + 1
+        return Position(self.name, line, offset - self.text.rfind("\n", 0, offset))
 
     def section(self, name: str) -> Position:
         """Where a section such as ``:objects`` begins; the first parenthesis if there is none."""
@@ -118,21 +108,58 @@ class Source:
         return sha256(self.text.encode()).hexdigest()
 
 
+class _Placed:
+    """What stands in a text, and says so in errors (which the caller raises)."""
+
+    __slots__ = ()
+    source: Source
+    offset: int
+
+    @property
+    def position(self) -> Position:
+        """Where it begins."""
+        return self.source.position(self.offset)
+
+    def fail(self, what: str, remedy: str = _COMPARE) -> BadInput:
+        """An error that points here."""
+        return BadInput(what, position=self.position, remedy=remedy)
+
+    def unsupported(self, feature: str, remedy: str = _CLASSICAL) -> Unsupported:
+        """The error for what PDDL has and coordlang has not."""
+        return Unsupported(f"{feature} not supported", position=self.position, remedy=remedy)
+
+    def token(self, what: str) -> Token:
+        """Itself, if it is a single token; `BadInput` says what was expected here."""
+        if isinstance(self, Token):
+            return self
+        remedy = f"Write {what} here, without parentheses."
+        raise self.fail(f"expected {what}, found a list", remedy)
+
+    def group(self, what: str) -> Group:
+        """Itself, if it is a list; `BadInput` says what was expected here."""
+        if isinstance(self, Group):
+            return self
+        found = f"expected {what}, found {echoed(self.token(what).text)}"
+        raise self.fail(found, "Put it in parentheses with all that belongs to it.")
+
+
 @dataclass(frozen=True, slots=True)
-class Token:
+class Token(_Placed):
     """A name, number, keyword or variable in lower case, or a comment without its semicolons."""
 
     text: str
     offset: int
+    source: Source = field(repr=False)
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
-    """A parenthesised list; ``end`` is the offset of its closing parenthesis."""
+class Group(_Placed):
+    """A parenthesised list; a section also has the comments about subactions in it."""
 
     items: tuple[Token | Group, ...]
     offset: int
-    end: int
+    source: Source = field(repr=False)
+    comments: tuple[Token, ...] = ()
 
     @property
     def head(self) -> str:
@@ -147,40 +174,10 @@ class Group:
 
 
 Expression = Token | Group
-#: A list that is not closed yet: where it opens, and what stands in it so far.
-_Open = tuple[int, list[Expression]]
 
 
-@dataclass(frozen=True, slots=True)
-class Document:
-    """The one top-level expression of a PDDL file, with its comments."""
-
-    source: Source
-    root: Group
-    comments: tuple[Token, ...]
-
-    def fail(self, what: str, at: Expression, remedy: str | None = None) -> BadInput:
-        """An error that points at an expression (the caller raises it)."""
-        return self.source.fail(what, at.offset, remedy or _COMPARE)
-
-    def token(self, item: Expression, what: str) -> Token:
-        """``item`` as a single token; `BadInput` says what was expected there."""
-        if isinstance(item, Token):
-            return item
-        remedy = f"Write {what} here, without parentheses."
-        raise self.fail(f"expected {what}, found a list", item, remedy)
-
-    def group(self, item: Expression, what: str) -> Group:
-        """``item`` as a list; `BadInput` says what was expected there."""
-        if isinstance(item, Group):
-            return item
-        remedy = "Put it in parentheses with all that belongs to it."
-        raise self.fail(f"expected {what}, found {echoed(item.text)}", item, remedy)
-
-    def unsupported(self, feature: str, at: Expression, remedy: str = _CLASSICAL) -> Unsupported:
-        """The error for what PDDL has and coordlang has not (the caller raises it)."""
-        position = self.source.position(at.offset)
-        return Unsupported(f"{feature} not supported", position=position, remedy=remedy)
+#: A list that is not closed yet: where it opens, what stands in it so far, and its comments.
+_Open = tuple[int, list[Expression], list[Token]]
 
 
 def read_source(path: str | Path) -> Source:
@@ -214,7 +211,7 @@ def _with_old_comments(data: bytes, name: str) -> str:
     return _NOT_DECODED.sub(lambda byte: chr(ord(byte[0]) - 0xDC00), text)
 
 
-def parse(source: Source) -> Document:
+def parse(source: Source) -> Group:
     """Read the one top-level expression of ``source``.
 
     Raises `BadInput` for unbalanced parentheses, a section in another one (where a parenthesis is
@@ -222,32 +219,33 @@ def parse(source: Source) -> Document:
     `planners.system.messages.UNSEEN`, or two names that Unicode makes one.
     """
     _require_plain_names(source)
-    comments: list[Token] = []
-    top: list[Group] = []
+    top: Group | None = None
     lists: list[_Open] = []
     for match in _TOKEN.finditer(source.text):
-        text, offset = match[0], match.start()
+        text, offset = match[0].lower(), match.start()
         if text[0] == ";":
-            comments.append(Token(text.lstrip(";").strip().lower(), offset))
-            continue
-        _require_place(source, text, offset, lists, bool(top))
-        if text == "(":
-            lists.append((offset, []))
+            said = text.lstrip(";").strip()
+            if len(lists) > 1 and said.split()[:1] == [SUBACTION]:
+                lists[1][2].append(Token(said, offset, source))
+        elif wrong := _misplaced(source, text, offset, lists, top):
+            raise wrong
+        elif text == "(":
+            lists.append((offset, [], []))
         elif text == ")":
-            start, items = lists.pop()
-            group = Group(tuple(items), start, offset)
+            start, items, comments = lists.pop()
+            group = Group(tuple(items), start, source, tuple(comments))
             if lists:
                 lists[-1][1].append(group)
             else:
-                top.append(group)
+                top = group
         else:
-            lists[-1][1].append(Token(text.lower(), offset))
+            lists[-1][1].append(Token(text, offset, source))
     if lists:
         raise _unclosed(source, lists)
-    if not top:
+    if top is None:
         what = "expected '(define ...', found an empty file"
         raise BadInput(what, position=Position(source.name), remedy=_NO_PDDL)
-    return Document(source, top[0], tuple(comments))
+    return top
 
 
 def _require_plain_names(source: Source) -> None:
@@ -260,49 +258,50 @@ def _require_plain_names(source: Source) -> None:
         return
     names = [(m[0], m.start()) for m in _TOKEN.finditer(source.text) if m[0][0] != ";"]
     for name, offset in names:
-        require_seen(name, source.position(offset))
+        if UNSEEN.search(name):
+            require_seen(name, source.position(offset))
     seen: dict[str, str] = {}
     for name, offset in names:
         other = seen.setdefault(normalize("NFKC", name).casefold(), name)
         if (name.lower(), name.upper()) != (other.lower(), other.upper()):
             what = f"the names {other!a} and {name!a} are one name to Unicode"
-            raise source.fail(what, offset, "Give one of them another name.")
+            raise Token(name, offset, source).fail(what, "Give one of them another name.")
 
 
-def _require_place(
-    source: Source, text: str, offset: int, lists: Sequence[_Open], is_over: bool
-) -> None:
-    """Raise `BadInput` for a token that cannot stand in the lists that are open."""
-    if is_over:
+def _misplaced(
+    source: Source, text: str, offset: int, lists: Sequence[_Open], top: Group | None
+) -> BadInput | None:
+    """The error for a token that cannot stand in the lists that are open."""
+    if top is None and lists and len(lists) < MAX_DEPTH and text not in _SECTIONS:
+        return None
+    here = Token(text, offset, source)
+    if top is not None:
         remedy = "Expected the end of the file: a parenthesis too many before this position?"
-        what = f"unexpected {echoed(text[:40])} after the end of the definition"
-        raise source.fail(what, offset, remedy)
+        return here.fail(f"unexpected {echoed(text)} after the end of the definition", remedy)
     if text == "(":
-        if len(lists) >= MAX_DEPTH:
-            remedy = "Is a ')' missing? No domain needs such nesting."
-            raise source.fail(f"nested more than {MAX_DEPTH} deep", offset, remedy)
-    elif not lists:
-        if text == ")":
-            remedy = "Remove it, or add the '(' that is missing before it."
-            raise source.fail("')' without a '('", offset, remedy)
-        raise source.fail(f"expected '(define ...', found {echoed(text[:40])}", offset, _NO_PDDL)
-    elif text.lower() in _SECTIONS and len(lists) > 2 and not lists[-1][1]:
-        outer, items = lists[1]
-        raise source.fail(
-            f"{text.lower()!r} begins inside of another list: a ')' is missing before it",
-            lists[-1][0],
-            f"'({_first(items)}' opens at {source.position(outer)} and is not closed: "
+        remedy = "Is a ')' missing? No domain needs such nesting."
+        too_deep = len(lists) >= MAX_DEPTH
+        return here.fail(f"nested more than {MAX_DEPTH} deep", remedy) if too_deep else None
+    if not lists and text == ")":
+        remedy = "Remove it, or add the '(' that is missing before it."
+        return here.fail("')' without a '('", remedy)
+    if not lists:
+        return here.fail(f"expected '(define ...', found {echoed(text)}", _NO_PDDL)
+    if text in _SECTIONS and len(lists) > 2 and not lists[-1][1]:
+        start, items, _ = lists[1]
+        return replace(here, offset=lists[-1][0]).fail(
+            f"{text!r} begins inside of another list: a ')' is missing before it",
+            f"'({_first(items)}' opens at {source.position(start)} and is not closed: "
             f"add {len(lists) - 2} ')' before this position.",
         )
+    return None
 
 
 def _unclosed(source: Source, lists: Sequence[_Open]) -> BadInput:
-    start, items = lists[-1]
-    inner = items[-1] if items and isinstance(items[-1], Group) else None
-    last = f", after {source.position(inner.offset)}" if inner else ""
-    return source.fail(
+    start, items, _ = lists[-1]
+    last = f", after {items[-1].position}" if items and isinstance(items[-1], Group) else ""
+    return Token("(", start, source).fail(
         f"the '({_first(items)}' that opens here is never closed",
-        start,
         f"Expected {len(lists)} more ')' before the end of the file{last}.",
     )
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from tests.support.domains import ROOT
 
 FILES = sorted(path for room in ("planners", "coordlang") for path in (ROOT / room).rglob("*.py"))
-#: Calls that make an error of their arguments: `Document.fail` has a remedy of its own.
+#: Calls that make an error of their arguments: `Token.fail` has a remedy of its own.
 BASE = "CoordlangError"
 
 
