@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from planners.pddl.domain import read_domain
-from planners.pddl.lifted import And, Atom, Domain, Formula, Problem, Schema, Variable
+from planners.pddl.formula_tree import label
+from planners.pddl.lifted import And, Atom, Domain, Problem, Schema
 from planners.pddl.problem import read_problem
 from planners.pddl.robots import objects_of
 from planners.pddl.sexpr import Source
@@ -56,7 +57,7 @@ def read_factored(directory: str | Path) -> tuple[Domain, Problem]:
         views.append(_of_robot(robot, domain, read_problem(problems[robot], domain)))
     _require_owners(views, list(domains))
     domain = _join_domains([domain for domain, _ in views], str(directory))
-    return domain, _join_problems([problem for _, problem in views], domain, str(directory))
+    return domain, _join_problems([problem for _, problem in views], str(directory))
 
 
 def _files(folder: Path, kind: str) -> dict[str, Path]:
@@ -119,7 +120,7 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
                     remedy=f"The other one is at {known.position}. Give different actions "
                     "different names.",
                 )
-            schemas[schema.name] = _with_agent_of(known, schema)
+            schemas[schema.name] = _with_types(known, _both(_agent_of(known), _agent_of(schema)))
     return replace(
         first,
         source=_union(name, domains),
@@ -140,14 +141,23 @@ def _union(name: str, files: Sequence[Domain | Problem]) -> Source:
     return Source(name, "\n".join(file.source.text for file in files), is_union=True)
 
 
+def _agent_of(schema: Schema) -> tuple[str, ...]:
+    """The types of the acting robot."""
+    assert schema.acting is not None
+    return schema.acting.types
+
+
+def _with_types(schema: Schema, types: tuple[str, ...]) -> Schema:
+    """The action for agents of these types."""
+    parameters = (replace(p, types=types) if p == schema.acting else p for p in schema.parameters)
+    return replace(schema, parameters=tuple(parameters))
+
+
 def _without_agent(schema: Schema) -> Schema:
     """The action with neither the name nor the type of its agent."""
-    assert schema.agent is not None
-    parameters = list(schema.parameters)
-    own = parameters[schema.agent].name
-    parameters[schema.agent] = Variable(own)
-    changed = replace(schema, parameters=tuple(parameters))
-    found: Schema = _renamed(changed, own, "?")  # no variable of a file has this name
+    assert schema.acting is not None
+    # No variable of a file has this name.
+    found: Schema = _renamed(_with_types(schema, ()), schema.acting.name, "?")
     return found
 
 
@@ -161,35 +171,21 @@ def _renamed(part: Any, old: str, new: str) -> Any:
     return new if part == old else part
 
 
-def _with_agent_of(known: Schema, other: Schema) -> Schema:
-    """The action for the agents of both."""
-    assert known.agent is not None
-    assert other.agent is not None
-    parameters = list(known.parameters)
-    agent = parameters[known.agent]
-    types = _both(agent.types, other.parameters[other.agent].types)
-    parameters[known.agent] = replace(agent, types=types)
-    return replace(known, parameters=tuple(parameters))
-
-
 def _require_owners(views: list[tuple[Domain, Problem]], robots: list[str]) -> None:
     """Raise `BadInput` where the union would give a robot an action that its own file lacks.
 
     A robot does what its agent's type allows: two robots of one type have the same actions.
     """
-    for domain, _ in views:
-        for schema in domain.schemas:
-            assert schema.agent is not None
-            types = schema.parameters[schema.agent].types
-            for robot, (other, problem) in zip(robots, views, strict=True):
-                fits = robot in objects_of(other, problem, types)
-                if fits and all(s.name != schema.name for s in other.schemas):
-                    raise BadInput(
-                        f"action {echoed(schema.name)} is for agents such as {echoed(robot)}, "
-                        f"whose own domain {other.source.name} does not have it",
-                        position=schema.position,
-                        remedy="Give robots with different actions different types.",
-                    )
+    for schema in [schema for domain, _ in views for schema in domain.schemas]:
+        for robot, (other, problem) in zip(robots, views, strict=True):
+            fits = robot in objects_of(other, problem, _agent_of(schema))
+            if fits and all(s.name != schema.name for s in other.schemas):
+                raise BadInput(
+                    f"action {echoed(schema.name)} is for agents such as {echoed(robot)}, "
+                    f"whose own domain {other.source.name} does not have it",
+                    position=schema.position,
+                    remedy="Give robots with different actions different types.",
+                )
 
 
 def _merged(tables: Iterable[Mapping[K, V]], join: Callable[[V, V], V]) -> dict[K, V]:
@@ -205,35 +201,29 @@ def _both(one: tuple[str, ...], other: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*one, *other)))
 
 
-def _join_problems(problems: list[Problem], domain: Domain, name: str) -> Problem:
-    first = problems[0]
-    objects: dict[str, tuple[str, ...]] = {}
-    init: set[Atom] = set()
-    goals: dict[Formula, None] = {}
-    values: dict[Atom, float] = {}
-    for problem in problems:
-        for function, value in problem.values.items():
-            if values.setdefault(function, value) != value:
-                raise BadInput(
-                    f"{function.predicate} {' '.join(function.args)} has another value elsewhere",
-                    position=problem.source.section(":init"),
-                    remedy="Give it one value in all robots' problems.",
-                )
-        for obj, types in problem.objects.items():
-            if objects.setdefault(obj, types) != types:
-                raise BadInput(
-                    f"object {echoed(obj)} has other types elsewhere",
-                    position=problem.source.section(":objects"),
-                    remedy="Declare it with the same type in all robots' problems.",
-                )
-        init |= problem.init
-        goals[problem.goal] = None
-    goal = next(iter(goals)) if len(goals) == 1 else And(tuple(goals))
+def _join_problems(problems: list[Problem], name: str) -> Problem:
+    goals = tuple(dict.fromkeys(problem.goal for problem in problems))
+    objects = _agreed("object", [(problem, problem.objects) for problem in problems])
     return replace(
-        first,
+        problems[0],
         source=_union(name, problems),
         objects=dict(sorted(objects.items())),
-        init=frozenset(init),
-        goal=goal,
-        values=values,
+        init=frozenset().union(*(problem.init for problem in problems)),
+        goal=goals[0] if len(goals) == 1 else And(goals),
+        values=_agreed("value", [(problem, problem.values) for problem in problems]),
     )
+
+
+def _agreed(what: str, tables: Iterable[tuple[Problem, Mapping[K, V]]]) -> dict[K, V]:
+    """One table of all problems; `BadInput` where one says something else of a key."""
+    merged: dict[K, V] = {}
+    for problem, table in tables:
+        for key, value in table.items():
+            if merged.setdefault(key, value) != value:
+                text = label(key.predicate, key.args) if isinstance(key, Atom) else echoed(key)
+                raise BadInput(
+                    f"the {what} {text} is not the same in all robots' problems",
+                    position=problem.source.section(":objects" if what == "object" else ":init"),
+                    remedy="Give it one type, or one value, in all of them.",
+                )
+    return merged

@@ -139,6 +139,11 @@ class Schema:
     cost: int | Atom | None = None
     position: Position | None = field(default=None, compare=False)
 
+    @property
+    def acting(self) -> Variable | None:
+        """The parameter of the acting robot (MA-PDDL)."""
+        return None if self.agent is None else self.parameters[self.agent]
+
 
 @dataclass(frozen=True, slots=True)
 class Constraint:

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
-from planners.pddl.lifted import And, Atom, Domain, Problem, Schema
+from planners.pddl.formula_tree import required_atoms
+from planners.pddl.lifted import Atom, Domain, Formula, Problem, Schema, Variable
 from planners.pddl.model_options import ModelOptions, Unowned
 from planners.system.errors import BadInput, UsageError, note
 from planners.system.messages import echoed
@@ -106,52 +107,47 @@ def find_team(domain: Domain, problem: Problem, choice: ModelOptions) -> Team:
 
 def _found(domain: Domain, problem: Problem, choice: ModelOptions) -> tuple[tuple[str, ...], str]:
     """The robots' names, and how they were found."""
+    kinds = _Kinds(domain, problem)
     declared = _declared(domain, problem)
     if declared is not None:
-        _require_agreement(domain, problem, choice, *declared)
+        _require_agreement(kinds, choice, *declared)
         return declared
     if choice.names:
-        for name in choice.names:
-            if name not in problem.objects:
-                objects = f"Objects: {', '.join(sorted(problem.objects, key=natural))}."
-                if choice.recorded:
-                    what = f"the language file's robot {echoed(name)} is no object of the problem"
-                    raise BadInput(
-                        what, position=problem.source.section(":objects"), remedy=objects
-                    )
-                raise UsageError(f"--robots: there is no object {echoed(name)}", remedy=objects)
+        if missing := [name for name in choice.names if name not in problem.objects]:
+            name, remedy = (
+                missing[0],
+                f"Objects: {', '.join(sorted(problem.objects, key=natural))}.",
+            )
+            if not choice.recorded:
+                raise UsageError(f"--robots: there is no object {echoed(name)}", remedy=remedy)
+            what = f"the language file's robot {echoed(name)} is no object of the problem"
+            raise BadInput(what, position=problem.source.section(":objects"), remedy=remedy)
         return tuple(sorted(set(choice.names), key=natural)), "--robots"
     if choice.robot_type:
-        robots = _of_kind(domain, problem, choice.robot_type)
+        robots = kinds.of(choice.robot_type)
         if not robots:
             raise UsageError(
                 f"--robot-type: nothing has type or predicate {echoed(choice.robot_type)}",
-                remedy=f"Candidates: {', '.join(_kinds(domain, problem)) or 'none'}.",
+                remedy=f"Candidates: {', '.join(kinds.likely()) or 'none'}.",
             )
         return robots, f"--robot-type {choice.robot_type}"
-    return _detect(domain, problem)
+    return _detect(kinds)
 
 
 def _require_agreement(
-    domain: Domain, problem: Problem, choice: ModelOptions, robots: tuple[str, ...], by: str
+    kinds: _Kinds, choice: ModelOptions, robots: tuple[str, ...], by: str
 ) -> None:
     """Raise `UsageError` for robots that are not the domain's, `BadInput` if a file names them."""
-    contradicting = None
-    if choice.recorded and set(choice.names) != set(robots):
-        raise BadInput(
-            f"the language file's robots {', '.join(choice.names)} contradict the domain",
-            position=problem.source.section(":objects"),
-            remedy=f"The robots are {', '.join(robots)} (by {by}).",
-        )
-    if choice.robot_type and set(_of_kind(domain, problem, choice.robot_type)) != set(robots):
-        contradicting = f"--robot-type {choice.robot_type}"
-    elif choice.names and set(choice.names) != set(robots):
-        contradicting = f"--robots {','.join(choice.names)}"
-    if contradicting:
-        raise UsageError(
-            f"{contradicting} contradicts the domain",
-            remedy=f"The robots are {', '.join(robots)} (by {by}).",
-        )
+    given, said = {*choice.names}, f"--robots {','.join(choice.names)}"
+    if choice.robot_type:
+        given, said = {*kinds.of(choice.robot_type)}, f"--robot-type {choice.robot_type}"
+    if given == {*robots} or not (choice.names or choice.robot_type):
+        return
+    remedy = f"The robots are {', '.join(robots)} (by {by})."
+    if choice.recorded:
+        what = f"the language file's robots {', '.join(choice.names)} contradict the domain"
+        raise BadInput(what, position=kinds.problem.source.section(":objects"), remedy=remedy)
+    raise UsageError(f"{said} contradicts the domain", remedy=remedy)
 
 
 def without_idle_environment(team: Team, owners: Iterable[int]) -> Team:
@@ -165,78 +161,114 @@ def _declared(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str] |
     if domain.is_joint_action:
         names = {part.robot for schema in domain.schemas for part in schema.parts}
         return tuple(sorted(names, key=natural)), "subaction comments"
-    acting = [schema for schema in domain.schemas if schema.agent is not None]
-    if not acting:
+    agents = [(s.acting, s.precondition) for s in domain.schemas if s.acting is not None]
+    if not agents:
         return None
-    robots = {name for schema in acting for name in _possible_agents(domain, problem, schema)}
-    types = sorted({t for schema in acting for t in schema.parameters[schema.agent or 0].types})
+    robots = {name for own in agents for name in _possible_agents(domain, problem, *own)}
+    types = sorted({t for agent, _ in agents for t in agent.types})
     return tuple(sorted(robots, key=natural)), f":agent of type {', '.join(types)}"
 
 
-def _possible_agents(domain: Domain, problem: Problem, schema: Schema) -> tuple[str, ...]:
+def _possible_agents(
+    domain: Domain, problem: Problem, agent: Variable, precondition: Formula
+) -> tuple[str, ...]:
     """The objects of the agent's type.
 
     In untyped domains those that its static type predicates hold for.
     """
-    agent = schema.parameters[schema.agent or 0]
     objects = objects_of(domain, problem, agent.types)
     if agent.types != ("object",):
         return objects
     changed = fluent_predicates(domain)
-    parts = (
-        schema.precondition.parts
-        if isinstance(schema.precondition, And)
-        else (schema.precondition,)
-    )
     kinds = {
-        part.predicate
-        for part in parts
-        if isinstance(part, Atom) and part.args == (agent.name,) and part.predicate not in changed
+        atom.predicate
+        for atom in required_atoms(precondition)
+        if atom.args == (agent.name,) and atom.predicate not in changed
     }
     return tuple(o for o in objects if all(Atom(kind, (o,)) in problem.init for kind in kinds))
 
 
-def _of_kind(domain: Domain, problem: Problem, kind: str) -> tuple[str, ...]:
-    """Objects of a type, or those of which a unary predicate of that name is true at the start."""
-    if kind in domain.types:
-        return objects_of(domain, problem, (kind,))
-    names = [a.args[0] for a in problem.init if a.predicate == kind and len(a.args) == 1]
-    return tuple(sorted(names, key=natural))
+@dataclass(frozen=True, slots=True)
+class _Kinds:
+    """What robots may be told by: types, and unary predicates."""
+
+    domain: Domain
+    problem: Problem
+
+    def of(self, kind: str) -> tuple[str, ...]:
+        """Objects of a type, or those of which a predicate of that name is true at the start."""
+        if kind in self.domain.types:
+            return objects_of(self.domain, self.problem, (kind,))
+        names = [a.args[0] for a in self.problem.init if a.predicate == kind and len(a.args) == 1]
+        return tuple(sorted(names, key=natural))
+
+    def likely(self) -> list[str]:
+        """What can be given as ``--robot-type``: likely types, else all, else unary predicates."""
+        static = static_atoms(self.domain, self.problem)
+        unary = {atom.predicate for atom in static if len(atom.args) == 1}
+        named = [kind for kind in ("agent", "robot") if self.of(kind)]
+        return named or self.taken_by_all() or self.inhabited() or sorted(unary)
+
+    def inhabited(self) -> list[str]:
+        """The types that have objects."""
+        return [kind for kind in sorted(self.domain.types) if self.of(kind)]
+
+    def is_one(self, variable: Variable, kind: str) -> bool:
+        """Whether all that a variable stands for is of a type."""
+        return all(kind in self.domain.supertypes(own) for own in variable.types)
+
+    def taken_by_all(self) -> list[str]:
+        """The most specific types of which every action takes an object."""
+        found = [
+            kind
+            for kind in self.inhabited()
+            if all(any(self.is_one(p, kind) for p in s.parameters) for s in self.domain.schemas)
+        ]
+        above = {t for kind in found for t in self.domain.supertypes(kind) - {kind}}
+        return [kind for kind in found if kind not in above]
+
+    def unclear(self, why: str, candidates: Sequence[str]) -> BadInput:
+        """The error for robots that cannot be told, with the candidates and their objects."""
+        listed = "; ".join(f"{kind} ({_some(self.of(kind))})" for kind in candidates)
+        return BadInput(
+            f"which objects are the robots? {why}",
+            position=self.domain.source.section(":types"),
+            remedy="Say --robot-type TYPE or --robots NAME,NAME."
+            + (f" Candidates: {listed}." if listed else ""),
+        )
 
 
-def _detect(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str]:
-    named = {
-        kind: robots for kind in ("robot", "agent") if (robots := _of_kind(domain, problem, kind))
-    }
+def _detect(kinds: _Kinds) -> tuple[tuple[str, ...], str]:
+    named = {kind: robots for kind in ("robot", "agent") if (robots := kinds.of(kind))}
     if len(set(named.values())) == 1:
         kind, robots = next(iter(named.items()))
         return robots, f"type {kind}"
-    candidates = sorted(named) or _candidates(domain, problem)
+    candidates = sorted(named) or kinds.taken_by_all()
     if len(candidates) == 1:
-        return _guessed(domain, problem, candidates[0])
+        return _guessed(kinds, candidates[0])
     why = "Several types could be" if candidates else "No type is taken by every action"
-    raise _unclear(domain, problem, why, candidates or _kinds(domain, problem))
+    raise kinds.unclear(why, candidates or kinds.likely())
 
 
-def _guessed(domain: Domain, problem: Problem, kind: str) -> tuple[tuple[str, ...], str]:
+def _guessed(kinds: _Kinds, kind: str) -> tuple[tuple[str, ...], str]:
     """The objects of the one type that every action takes, with a note.
 
     Raises `BadInput` where they are unlikely to be robots.
     """
-    robots = _of_kind(domain, problem, kind)
-    first = [schema.parameters[0].types for schema in domain.schemas if schema.parameters]
+    domain, robots = kinds.domain, kinds.of(kind)
+    first = [variable for schema in domain.schemas for variable in schema.parameters[:1]]
     doubt = None
-    if len(robots) == len(problem.objects) > 1:
+    if len(robots) == len(kinds.problem.objects) > 1:
         doubt = "are all its objects"
     elif len(robots) > _MOST_GUESSED:
         doubt = f"are {len(robots):,}"
-    elif not any(kind in domain.supertypes(t) for types in first for t in types):
+    elif not any(kind in domain.supertypes(t) for variable in first for t in variable.types):
         doubt = "are never the first argument of an action"
-    elif not _acts(domain, kind):
+    elif not _acts(kinds, kind):
         doubt = "never move or hold anything"
     if doubt:
         what = f"Every action takes objects of type {echoed(kind)}, but they {doubt}"
-        raise _unclear(domain, problem, what, _inhabited(domain, problem))
+        raise kinds.unclear(what, kinds.inhabited())
     note(
         f"the robots are taken to be {_some(robots)}: every action takes an object of type "
         f"{echoed(kind)}",
@@ -246,17 +278,15 @@ def _guessed(domain: Domain, problem: Problem, kind: str) -> tuple[tuple[str, ..
     return robots, f"type {kind}"
 
 
-def _acts(domain: Domain, kind: str) -> bool:
+def _acts(kinds: _Kinds, kind: str) -> bool:
     """Whether objects of a type move or hold something, by actions that take just one of them.
 
     Moving changes another argument of a fact about the object, as (at ?r ?from) to (at ?r ?to).
     Holding adds a fact that has it first, as (holding ?r ?x), which another action deletes.
     """
     changed: dict[bool, set[str]] = {True: set(), False: set()}
-    for schema in domain.schemas:
-        own = [
-            p.name for p in schema.parameters if all(kind in domain.supertypes(t) for t in p.types)
-        ]
+    for schema in kinds.domain.schemas:
+        own = [p.name for p in schema.parameters if kinds.is_one(p, kind)]
         if len(own) != 1:
             continue
         facts = [e for e in schema.effects if own[0] in e.atom.args]
@@ -284,50 +314,9 @@ def _others(atom: Atom, robot: str) -> list[str]:
     return [arg for arg in atom.args if arg.startswith("?") and arg != robot]
 
 
-def _unclear(domain: Domain, problem: Problem, why: str, candidates: Sequence[str]) -> BadInput:
-    """The error for robots that cannot be told, with the candidates and their objects."""
-    listed = "; ".join(f"{kind} ({_some(_of_kind(domain, problem, kind))})" for kind in candidates)
-    return BadInput(
-        f"which objects are the robots? {why}",
-        position=domain.source.section(":types"),
-        remedy="Say --robot-type TYPE or --robots NAME,NAME."
-        + (f" Candidates: {listed}." if listed else ""),
-    )
-
-
 def _some(names: Sequence[str]) -> str:
     shown = ", ".join(names[:_SHOWN])
     return f"{shown} and {len(names) - _SHOWN:,} more" if len(names) > _SHOWN else shown
-
-
-def _kinds(domain: Domain, problem: Problem) -> list[str]:
-    """What can be given as ``--robot-type``: likely types, else all, else unary predicates."""
-    unary = {atom.predicate for atom in static_atoms(domain, problem) if len(atom.args) == 1}
-    likely = [kind for kind in ("agent", "robot") if _of_kind(domain, problem, kind)]
-    typed = _candidates(domain, problem) or _inhabited(domain, problem)
-    return likely or typed or sorted(unary)
-
-
-def _inhabited(domain: Domain, problem: Problem) -> list[str]:
-    """The types that have objects."""
-    return [kind for kind in sorted(domain.types) if objects_of(domain, problem, (kind,))]
-
-
-def _candidates(domain: Domain, problem: Problem) -> list[str]:
-    """The most specific types of which every action takes an object."""
-    found = [
-        kind
-        for kind in _inhabited(domain, problem)
-        if all(
-            any(all(kind in domain.supertypes(t) for t in p.types) for p in schema.parameters)
-            for schema in domain.schemas
-        )
-    ]
-    return [
-        kind
-        for kind in found
-        if not any(other != kind and kind in domain.supertypes(other) for other in found)
-    ]
 
 
 def static_atoms(domain: Domain, problem: Problem) -> frozenset[Atom]:
