@@ -14,7 +14,7 @@ matching rules one by one).
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from contextlib import suppress
 from math import prod
 from typing import TYPE_CHECKING, Any
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from clingo import Control, Symbol
 
 Arguments = tuple[str, ...]
+#: The same by the objects' numbers.
+_Numbers = tuple[int, ...]
 
 #: Combinations of values from which on clingo may look for an instance of a rule for seconds.
 _LONG_JOIN = 10**8
@@ -52,21 +54,25 @@ def reachable_arguments(
     from tarski.reachability import create_reachability_lp
 
     _require_memory(domain, objects)
-    core = _Core(domain, objects)
-    for atom in init:
-        core.add_initial(atom)
+    names = sorted(objects, key=natural)
+    core = _Core(names)
     for schema in domain.schemas:
         core.add_action(schema)
+    for atom in init:
+        core.problem.init.add(*core.atom(atom, {}))
+    for name in names:
+        above = frozenset().union(*map(domain.supertypes, objects[name]))
+        for types in sorted(core.types):
+            if not above.isdisjoint(types):
+                core.problem.init.add(core.predicate(types, 1), core.objects[name])
     program, _ = create_reachability_lp(core.problem)
     found = _least_model([_interruptible(rule, len(objects)) for rule in program.rules])
     return {
-        name: [
-            tuple([core.objects[symbol] for symbol in args])
-            for args in sorted(
-                {*found.get(f"action_{action}", ())}, key=lambda args: [int(o[1:]) for o in args]
-            )
+        schema.name: [
+            tuple([names[number] for number in args])
+            for args in sorted({*found.get(f"action_a{number}", ())})
         ]
-        for name, action in core.actions.items()
+        for number, schema in enumerate(domain.schemas)
     }
 
 
@@ -92,8 +98,8 @@ def _require_memory(domain: Domain, objects: Mapping[str, tuple[str, ...]]) -> N
             )
 
 
-def _least_model(rules: Sequence[str]) -> dict[str, list[Arguments]]:
-    """The argument tuples of each predicate in the least model of a Datalog program."""
+def _least_model(rules: Sequence[str]) -> dict[str, list[_Numbers]]:
+    """The numbers of the arguments of each predicate in the least model of a Datalog program."""
     from clingo import Control
 
     messages: list[str] = []
@@ -110,27 +116,27 @@ def _least_model(rules: Sequence[str]) -> dict[str, list[Arguments]]:
         control.add("base", [], "\n".join(rules))
         _ground(control)
     except RuntimeError as error:
-        said = " ".join((str(error), *messages))
-        raise CoordlangError(
-            f"clingo does not ground the reachability program: {said}",
-            remedy="Install clingo again (`pip install --force-reinstall clingo`).",
-        ) from error
+        raise _failed(" ".join((str(error), *messages))) from error
     atoms = control.symbolic_atoms
     if not any(atoms.by_signature("goal", 0)):
-        raise CoordlangError(
-            "clingo's grounding of the reachability program is not complete",
-            remedy="Install clingo again (`pip install --force-reinstall clingo`).",
-        )
+        raise _failed("its grounding is not complete")
     return {
         predicate: [_arguments(str(atom.symbol)) for atom in atoms.by_signature(predicate, arity)]
         for predicate, arity, _ in atoms.signatures
     }
 
 
-def _arguments(symbol: str) -> Arguments:
-    """The arguments of ``p(o1,o2)``: one call of clingo for all of them."""
+def _failed(said: str) -> CoordlangError:
+    return CoordlangError(
+        f"clingo does not ground the reachability program: {said}",
+        remedy="Install clingo again (`pip install --force-reinstall clingo`).",
+    )
+
+
+def _arguments(symbol: str) -> _Numbers:
+    """The numbers in ``p(o1,o2)``: one call of clingo for all of them."""
     _, _, inner = symbol.partition("(")
-    return tuple(inner[:-1].split(",")) if inner else ()
+    return tuple([int(name[1:]) for name in inner[:-1].split(",")]) if inner else ()
 
 
 def _interruptible(rule: str, objects: int) -> str:
@@ -178,10 +184,10 @@ def _ground(control: Control) -> None:
 class _Core:
     """The Tarski problem, with names of our own that no user's name can clash with.
 
-    ``objects`` and ``actions`` are the user's names by those, and the other way round.
+    Object number 3 of the ``names`` is ``o3``, action number 3 of the domain ``a3``.
     """
 
-    def __init__(self, domain: Domain, objects: dict[str, tuple[str, ...]]) -> None:
+    def __init__(self, names: Sequence[str]) -> None:
         import tarski.fstrips as fs
         from tarski import language, syntax
 
@@ -190,77 +196,53 @@ class _Core:
         self._sort = self._lang.Object
         self.problem: Any = fs.create_fstrips_problem(self._lang, "task", "core")
         self.problem.goal = syntax.top
-        self.objects = {f"o{n}": name for n, name in enumerate(sorted(objects, key=natural))}
-        self._constants = {
-            name: self._lang.constant(symbol, self._sort) for symbol, name in self.objects.items()
-        }
-        self._object_types = {
-            name: frozenset(t for own in types for t in domain.supertypes(own))
-            for name, types in objects.items()
-        }
+        self.objects = {n: self._lang.constant(f"o{i}", self._sort) for i, n in enumerate(names)}
         self._predicates: dict[object, Any] = {}
-        self.actions: dict[str, str] = {}
+        #: The types that some variable is held to.
+        self.types: set[tuple[str, ...]] = set()
 
-    def add_initial(self, atom: Atom) -> None:
-        self.problem.init.add(*self._parts(atom, {}))
-
-    def add_action(self, schema: Schema) -> None:
-        variables: dict[str, Any] = {}
-        typed = self._declare(schema.parameters, variables)
-        effects = []
-        for effect in schema.effects:
-            if not effect.adds:
-                continue
-            # A variable that only the effect has is universal: the program's rule quantifies it.
-            inner = dict(variables)
-            own = self._declare(effect.variables, inner, always=True)
-            condition = self._all(effect.condition, inner, own)
-            effects.append(self._fs.AddEffect(self._atom(effect.atom, inner), condition))
-        symbol = self.actions[schema.name] = f"a{len(self.actions)}"
-        parameters = [variables[p.name] for p in schema.parameters]
-        body = self._all(schema.precondition, variables, typed)
-        self.problem.action(symbol, parameters, body, effects)
-
-    def _declare(
-        self, variables: Iterable[Variable], into: dict[str, Any], *, always: bool = False
-    ) -> list[Any]:
-        """Tarski variables for ours, and the atoms that hold them to their types.
-
-        Tarski itself restricts parameters to objects; other variables need an atom ``always``.
-        """
-        atoms = []
-        for variable in variables:
-            term = into[variable.name] = self._lang.variable(f"v{len(into)}", self._sort)
-            if always or "object" not in variable.types:
-                atoms.append(self._type(variable.types)(term))
-        return atoms
-
-    def _predicate(self, key: object, arity: int) -> Any:
+    def predicate(self, key: object, arity: int) -> Any:
         if key not in self._predicates:
             name = f"p{len(self._predicates)}"
             self._predicates[key] = self._lang.predicate(name, *[self._sort] * arity)
         return self._predicates[key]
 
-    def _type(self, types: tuple[str, ...]) -> Any:
-        """A predicate that is true of the objects of some types."""
-        is_new = types not in self._predicates
-        predicate = self._predicate(types, 1)
-        for name, own in self._object_types.items() if is_new else ():
-            if not own.isdisjoint(types):
-                self.problem.init.add(predicate, self._constants[name])
-        return predicate
+    def atom(self, atom: Atom, variables: Mapping[str, Any]) -> tuple[Any, ...]:
+        """A predicate and its terms."""
+        terms = [variables[a] if a[0] == "?" else self.objects[a] for a in atom.args]
+        return (self.predicate((atom.predicate, len(terms)), len(terms)), *terms)
 
-    def _parts(self, atom: Atom, variables: dict[str, Any]) -> tuple[Any, ...]:
-        terms = (variables[a] if a[0] == "?" else self._constants[a] for a in atom.args)
-        return (self._predicate((atom.predicate, len(atom.args)), len(atom.args)), *terms)
+    def add_action(self, schema: Schema) -> None:
+        variables: dict[str, Any] = {}
+        # Tarski itself restricts parameters to objects; other variables need an atom always.
+        typed = self._declare(schema.parameters, variables, {"object"})
+        effects = []
+        for effect in schema.effects:
+            if effect.adds:
+                # A variable that only the effect has is universal: the rule quantifies it.
+                inner = {**variables}
+                own = self._declare(effect.variables, inner, set())
+                predicate, *terms = self.atom(effect.atom, inner)
+                condition = self._all(effect.condition, inner, own)
+                effects.append(self._fs.AddEffect(predicate(*terms), condition))
+        parameters = [variables[p.name] for p in schema.parameters]
+        body = self._all(schema.precondition, variables, typed)
+        self.problem.action(f"a{len(self.problem.actions)}", parameters, body, effects)
 
-    def _atom(self, atom: Atom, variables: dict[str, Any]) -> Any:
-        predicate, *terms = self._parts(atom, variables)
-        return predicate(*terms)
+    def _declare(
+        self, variables: Sequence[Variable], into: dict[str, Any], known: Set[str]
+    ) -> list[Any]:
+        """Tarski variables for ours, and the atoms that hold them to types that are not known."""
+        for variable in variables:
+            into[variable.name] = self._lang.variable(f"v{len(into)}", self._sort)
+        typed = [variable for variable in variables if known.isdisjoint(variable.types)]
+        self.types.update(variable.types for variable in typed)
+        return [self.predicate(variable.types, 1)(into[variable.name]) for variable in typed]
 
-    def _all(self, formula: Formula, variables: dict[str, Any], atoms: list[Any]) -> Any:
-        """The conjunction of the atoms that the formula surely requires, behind others."""
-        atoms = atoms + [self._atom(atom, variables) for atom in required_atoms(formula)]
-        if not atoms:
-            return self._syntax.top
-        return atoms[0] if len(atoms) == 1 else self._syntax.land(*atoms, flat=True)
+    def _all(self, formula: Formula, variables: Mapping[str, Any], atoms: list[Any]) -> Any:
+        """The conjunction of atoms and of those that the formula surely requires."""
+        found = (self.atom(atom, variables) for atom in required_atoms(formula))
+        atoms = [*atoms, *(predicate(*terms) for predicate, *terms in found)]
+        if len(atoms) < 2:
+            return atoms[0] if atoms else self._syntax.top
+        return self._syntax.land(*atoms, flat=True)
