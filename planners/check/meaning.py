@@ -27,8 +27,6 @@ from planners.pddl.lifted import (
     Variable,
 )
 from planners.pddl.robots import Team, fluent_predicates, objects_of
-from planners.system.errors import BadInput
-from planners.system.messages import echoed
 
 #: The true fluents; what is static comes from the problem.
 State = frozenset[Atom]
@@ -44,7 +42,7 @@ class Moment:
     The state before the step, the subactions of the step, and who acts.
 
     A negative action formula never speaks of the robots in ``acting`` (empty for conditions of
-    effects and goals). ``step`` None leaves the step open, ``state`` None the state: every literal
+    effects and goals).  ``step`` None leaves the step open, ``state`` None the state: every literal
     about it then counts as true.
     """
 
@@ -126,27 +124,16 @@ class Meaning:
                 return (binding.get(left, left) == binding.get(right, right)) == positive
             case Atom(predicate) if predicate not in self._fluents:
                 return (_ground(formula, binding) in self._problem.init) == positive
-            case StepAtom():
-                return self._fixed_step_atom(formula, binding, positive, acting)
-        return None
-
-    def _fixed_step_atom(
-        self, formula: StepAtom, binding: Binding, positive: bool, acting: tuple[int, ...]
-    ) -> bool | None:
-        schema = self._schemas[formula.action]
-        if self._domain.is_joint_action:
-            raise BadInput(
-                f"action {echoed(schema.name)} is used as a formula in a joint-action domain",
-                position=schema.position,
-                remedy="A joint action already says what every robot does: use predicates only.",
-            )
-        args = _ground(formula, binding).args
-        if not all(
-            a in self.objects(p.types) for p, a in zip(schema.parameters, args, strict=True)
-        ):
-            return not positive  # no such subaction exists
-        if not positive and set(self._team.owners(schema, args)) & set(acting):
-            return True  # as if the domain had said "(or (= ?o ?r) (not ..))"
+            case StepAtom(action, args):
+                schema, args = self._schemas[action], _ground(formula, binding).args
+                of_type = (
+                    arg in self.objects(parameter.types)
+                    for parameter, arg in zip(schema.parameters, args, strict=True)
+                )
+                if not all(of_type):
+                    return not positive  # no such subaction exists
+                if not positive and set(self._team.owners(schema, args)) & set(acting):
+                    return True  # as if the domain had said "(or (= ?o ?r) (not ..))"
         return None
 
     def _branches(

@@ -77,62 +77,42 @@ class Rules:
         self.domain, self.problem, self.team = domain, problem, team
         self.meaning = Meaning(domain, problem, team)
         self.schemas = {schema.name: schema for schema in domain.schemas}
-        self.is_joint_action = domain.is_joint_action
         self._instances: dict[str, Instance | str] = {}
         self._touched: dict[tuple[StepAtom, StepAtom | None], Touched] = {}
 
-    @classmethod
-    def of(cls, domain: Domain, problem: Problem, team: Team) -> Rules:
-        """The rules of a problem's joint steps, as the docs write it."""
-        return cls(domain, problem, team)
-
-    def broken_rule(self, state: State, labels: Labels) -> str | None:
-        """The first rule that the step breaks, in words; None for a legal step.
+    def step(self, state: State, labels: Labels) -> State | str:
+        """The state after a joint step, or the first rule that it breaks, in words.
 
         Raises `BadInput` where two applicable joint actions with these subactions have different
         results.
         """
-        if len(labels) != len(self.team.robots):
-            return f"the step has {len(labels)} entries for {len(self.team.robots)} robots"
-        if self.is_joint_action:
-            return self._joint_action(state, labels)[0]
+        robots = self.team.robots
+        if len(labels) != len(robots):
+            return f"the step has {len(labels)} entries for {len(robots)} robots"
+        if self.domain.is_joint_action:
+            return self._joint_action(state, labels)
         chosen: list[Instance | None] = []
-        for robot, label in enumerate(labels):
+        for robot, label in zip(robots, labels, strict=True):
             found = self.instance(label) if label is not None else None
             if isinstance(found, str):
-                return f"{self.team.robots[robot]}: {found}"
+                return f"{robot}: {found}"
             chosen.append(found)
-        together = [a for a in _together(chosen) if not self.is_idling(a.schema)]
+        # A shared subaction stands for all its owners.
+        together = {action.name: action for action in chosen if action}.values()
+        acting = [action for action in together if not self.is_idling(action.schema)]
         return (
             self._wrong_choice(chosen)
             or self._unmet(state, chosen)
-            or self._network(together)
-            or self._interference(together)
+            or self._network(acting)
+            or self._interference(acting)
+            or self._after(state, together)
         )
-
-    def result(self, state: State, labels: Labels) -> State:
-        """The state after a joint step without a `broken_rule`."""
-        if self.is_joint_action:
-            return self._joint_action(state, labels)[1]
-        chosen = _together([self._known(label) if label is not None else None for label in labels])
-        return self._after(state, chosen)
 
     def instance(self, label: str) -> Instance | str:
         """The subaction that a text names, or what is wrong with the text."""
         if label not in self._instances:
             self._instances[label] = self._read(label)
         return self._instances[label]
-
-    def possible(self, state: State, label: str) -> bool:
-        """Whether some step could hold the subaction in a state, by its own precondition."""
-        found = self._known(label)
-        moment = Moment(state, None, found.owners)
-        return self.meaning.holds(found.schema.precondition, found.binding, True, moment)
-
-    def _known(self, label: str) -> Instance:
-        found = self.instance(label)
-        assert isinstance(found, Instance), found
-        return found
 
     def _read(self, label: str) -> Instance | str:
         name, *args = _tokens(label) or [""]
@@ -306,15 +286,19 @@ class Rules:
                         changes[effect.adds].add(ground_atom(effect.atom, binding))
         return (state - changes[False]) | changes[True]
 
-    def _joint_action(self, state: State, labels: Labels) -> tuple[str | None, State]:
-        """What is wrong with these subactions, or None and the state after them."""
-        reason = None
+    def _joint_action(self, state: State, labels: Labels) -> State | str:
+        """The state after the joint action with these subactions, or what is wrong with them."""
+        parts = ", ".join(
+            f"{robot} {label or 'idle'}"
+            for robot, label in zip(self.team.robots, labels, strict=True)
+        )
+        reason = f"no joint action of the domain has the parts {parts}"
         results: dict[State, str] = {}
-        for action in self._whole_actions(labels):
+        for number, action in enumerate(self._whole_actions(labels)):
             formula, moment = action.schema.precondition, Moment(state)
             if self.meaning.holds(formula, action.binding, True, moment):
                 results.setdefault(self._after(state, (action,)), action.text)
-            elif reason is None:
+            elif not number:
                 why = self.meaning.why_not(formula, action.binding, True, moment)
                 reason = f"{action.text} is not applicable: {why}"
         if len(results) > 1:
@@ -325,19 +309,18 @@ class Rules:
                 remedy="The subactions of a joint action must determine what it does: rename one "
                 "of them.",
             )
-        for result in results:
-            return None, result
-        parts = ", ".join(
-            f"{robot} {label or 'idle'}"
-            for robot, label in zip(self.team.robots, labels, strict=True)
-        )
-        return reason or f"no joint action of the domain has the parts {parts}", state
+        return next(iter(results), reason)
 
     def _whole_actions(self, labels: Labels) -> Iterator[Instance]:
         """The type-correct joint actions whose subaction comments read as these labels."""
+        said = _words(None if label is None else _tokens(label) for label in labels)
         for schema in self.domain.schemas:
-            binding = self._match_parts(schema, labels)
-            if binding is None:
+            templates = {part.robot: part.template for part in schema.parts}
+            terms = _words(map(templates.get, self.team.robots))  # a missing line means idle
+            binding = {
+                term: name for term, name in zip(terms, said, strict=False) if term[0] == "?"
+            }
+            if [binding.get(term, term) for term in terms] != said:
                 continue
             domains = [
                 tuple(o for o in self.meaning.objects(p.types) if binding.get(p.name, o) == o)
@@ -345,26 +328,6 @@ class Rules:
             ]
             for args in product(*domains):
                 yield self.bind(schema, args)
-
-    def _match_parts(self, schema: Schema, labels: Labels) -> Binding | None:
-        """The parameters that the labels determine.
-
-        None if the labels are not the schema's parts.
-        """
-        templates = {part.robot: part.template for part in schema.parts}
-        binding: Binding = {}
-        for robot, label in zip(self.team.robots, labels, strict=True):
-            template = templates.get(robot)  # a missing line means idle
-            if template is None and label is None:
-                continue
-            tokens = None if label is None else _tokens(label)
-            if template is None or tokens is None or len(template) != len(tokens):
-                return None
-            for term, name in zip(template, tokens, strict=True):
-                wanted = binding.setdefault(term, name) if term.startswith("?") else term
-                if wanted != name:
-                    return None
-        return binding
 
 
 def _actions_in(formula: Formula) -> set[str]:
@@ -388,6 +351,11 @@ def _tokens(label: str) -> list[str]:
     return label.lower().replace("(", " ").replace(")", " ").split()
 
 
+def _words(parts: Iterable[Sequence[str] | None]) -> list[str]:
+    """The words of all robots' parts one after another; no name is a bracket."""
+    return [word for part in parts for word in (("(",) if part is None else ("(", *part, ")"))]
+
+
 def _outside(
     constraint: Constraint, binding: tuple[str, ...], group: Sequence[Instance]
 ) -> str | None:
@@ -398,8 +366,3 @@ def _outside(
     bounds = f"{constraint.low} to {'any number' if high is None else high}"
     doing = ", ".join(action.text for action in group)
     return f"constraint {constraint.name} {' '.join(binding)} takes {bounds} together: {doing}"
-
-
-def _together(chosen: Iterable[Instance | None]) -> list[Instance]:
-    """The different subactions of a step: a shared one stands for all its owners."""
-    return list({action.name: action for action in chosen if action}.values())

@@ -10,12 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from planners.check.meaning import Moment, State
-from planners.check.rules import Instance, Labels, Rules
+from planners.check.meaning import Moment
+from planners.check.rules import Labels, Rules
 from planners.pddl.lifted import Atom, Domain, Formula, Problem
 from planners.pddl.robots import Team
-
-__all__ = ["Instance", "Labels", "Moment", "Rules", "State", "Verdict", "validate"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,10 +52,10 @@ def validate(
     rules = Rules(domain, problem, team)
     state = rules.meaning.fluents_of(problem.init if init is None else init)
     for number, labels in enumerate(plan):
-        reason = rules.broken_rule(state, labels)
-        if reason is not None:
-            return Verdict(False, len(plan), number, reason)
-        state = rules.result(state, labels)
+        after = rules.step(state, labels)
+        if isinstance(after, str):
+            return Verdict(False, len(plan), number, after)
+        state = after
     wanted = problem.goal if goal is None else goal
     at_end = Moment(state)
     if not rules.meaning.holds(wanted, {}, True, at_end):

@@ -45,7 +45,6 @@ from planners.pddl.lifted import (
 from planners.pddl.robots import Team, fluent_predicates, objects_of, static_atoms
 from planners.system.errors import BadInput, Unsupported
 from planners.system.limits import reaching
-from planners.system.messages import echoed
 
 #: Variable -> the object that it stands for.
 Binding = dict[str, str]
@@ -349,12 +348,6 @@ class _Grounder:
 
     def _owners_named(self, action: str, args: tuple[str, ...]) -> frozenset[int] | None:
         schema = self._schemas[action]
-        if self._domain.is_joint_action:
-            raise BadInput(
-                f"action {echoed(action)} is used as a formula in a joint-action domain",
-                position=schema.position,
-                remedy="A joint action already says what every robot does: use predicates only.",
-            )
         for parameter, arg in zip(schema.parameters, args, strict=True):
             if arg not in self._bindings.objects(parameter.types):
                 return None

@@ -82,7 +82,8 @@ def parse_domain(source: Source) -> Domain:
         if by_name.setdefault(head.name.text, head) is not head:
             what = f"action {echoed(head.name.text)} is declared twice"
             raise head.name.fail(what, "Rename or remove one of them.")
-    names = replace(names, actions={head.name.text: len(head.parameters) for head in heads})
+    if not any(head.item.comments for head in heads):  # a joint action is part of no other one
+        names = replace(names, actions={head.name.text: len(head.parameters) for head in heads})
     schemas = tuple(_read_schema(names, head) for head in heads)
     _check_parts(schemas, heads)
     constraints, dependences = _read_network(names, schemas, sections)

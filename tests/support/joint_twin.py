@@ -9,7 +9,8 @@ from itertools import islice
 
 import pytest
 
-from planners.check.validate import State, validate
+from planners.check.meaning import State
+from planners.check.validate import validate
 from planners.loading import PlanningInstance, task_of
 from planners.pddl.lifted import And, Formula, Not, Problem
 from planners.pddl.model_options import ModelOptions

@@ -15,7 +15,8 @@ from functools import cache
 from itertools import product
 from math import inf, prod
 
-from planners.check.validate import Moment, Rules, State
+from planners.check.meaning import Moment, State
+from planners.check.rules import Rules
 from planners.pddl.lifted import (
     And,
     Domain,
@@ -83,9 +84,9 @@ class Twin:
             if self._budget < 0:
                 raise TooLarge
             self._steps[state] = frozenset(
-                (labels, self.rules.result(state, labels))
+                (labels, after)
                 for labels in product(*options)
-                if self.rules.broken_rule(state, labels) is None
+                if not isinstance(after := self.rules.step(state, labels), str)
             )
         return self._steps[state]
 
@@ -95,7 +96,9 @@ class Twin:
             return True
         found = self.rules.instance(label)
         assert not isinstance(found, str), found
-        return robot in found.owners and self.rules.possible(state, label)
+        formula, moment = found.schema.precondition, Moment(state, None, found.owners)
+        holds = self.rules.meaning.holds(formula, found.binding, True, moment)
+        return robot in found.owners and holds
 
     def reachable(self, limit: int = 10_000) -> list[State]:
         """All states that joint steps lead to, breadth first; `TooLarge` beyond ``limit``."""

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import pytest
 
-from planners.check.rules import Rules
-from planners.check.validate import Labels, Verdict, validate
+from planners.check.rules import Labels, Rules
+from planners.check.validate import Verdict, validate
 from planners.pddl.lifted import And, Atom, Domain, Not, Problem
 from planners.pddl.model_options import ModelOptions, Unowned
 from planners.pddl.robots import Team, find_team
@@ -28,16 +28,16 @@ def world(domain: str, problem: str, unowned: Unowned = "error") -> World:
 
 def one_step(setting: World, *labels: str | None) -> str | None:
     """What is wrong with a joint step from the initial state."""
-    return Rules(*setting).broken_rule(setting[1].init, labels)
+    found = Rules(*setting).step(setting[1].init, labels)
+    return found if isinstance(found, str) else None
 
 
 def after(setting: World, *labels: str | None) -> set[str]:
     """The true fluents after a joint step from the initial state."""
     domain, problem, team = setting
     init = frozenset(a for a in problem.init if a.predicate != "static")
-    rules = Rules(domain, problem, team)
-    assert rules.broken_rule(init, labels) is None
-    state = rules.result(init, labels)
+    state = Rules(domain, problem, team).step(init, labels)
+    assert not isinstance(state, str)
     return {" ".join((a.predicate, *a.args)) for a in state}
 
 
