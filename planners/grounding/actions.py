@@ -8,18 +8,17 @@ and all but the required atoms are left out; so what is said of them is true of 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 
-from planners.pddl.formula_tree import conjuncts, label, required_atoms
+from planners.pddl.formula_tree import conjuncts, label, negated, required_atoms
 from planners.pddl.lifted import (
     And,
     Atom,
     Constraint,
     Domain,
     Formula,
-    Not,
     Or,
     Problem,
     Schema,
@@ -200,7 +199,7 @@ def _bound(
             parts.append(_some(others, constraint.low - 1))
             links |= {atom for own in others for atom in own}
         if constraint.high is not None:
-            parts += _not_more(others, constraint.high)
+            parts += conjuncts(negated(_some(others, constraint.high)))
         for needed, by in domain.dependences:
             if by != name:
                 continue
@@ -226,20 +225,8 @@ def _by_robot(group: Sequence[GroundAction], action: GroundAction) -> list[list[
 
 
 def _some(others: Sequence[list[StepAtom]], number: int) -> Formula:
-    """At least ``number`` robots among the others do one of these."""
+    """At least ``number`` robots among the others do one of these, each one of its own."""
     if number > len(others):  # may be any number, too large for `combinations`
         return Or(())
-    return Or(tuple(part[0] if number == 1 else And(part) for part in _ways(others, number)))
-
-
-def _not_more(others: Sequence[list[StepAtom]], high: int) -> list[Formula]:
-    """No ``high`` robots among the others do one of these (the action itself is one more)."""
-    if high > len(others):
-        return []
-    forbidden = [tuple(map(Not, chosen)) for chosen in _ways(others, high)]
-    return [part[0] if high == 1 else Or(part) for part in forbidden]
-
-
-def _ways(others: Sequence[list[StepAtom]], number: int) -> Iterator[tuple[StepAtom, ...]]:
-    """One action each of so many of the others."""
-    return (chosen for robots in combinations(others, number) for chosen in product(*robots))
+    ways = (way for robots in combinations(others, number) for way in product(*robots))
+    return Or(tuple(way[0] if number == 1 else And(way) for way in ways))
