@@ -7,22 +7,18 @@ Robots, subactions, constraints, interference, fluents.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from planners.grounding.actions import GroundAction
 from planners.grounding.instantiate import idling_schemas
-from planners.joint.interference import footprint
+from planners.joint.interference import Footprint, footprint
 from planners.joint.model import JointModel, show
-from planners.joint.tables import Rows
 from planners.loading import PlanningInstance
 from planners.pddl.formula_tree import formula_text
-from planners.pddl.lifted import (
-    Domain,
-    StepAtom,
-)
+from planners.pddl.lifted import Domain, StepAtom
 from planners.search.search_estimate import SearchEstimate, estimate
 
 #: States in which an example of interference is looked for.
@@ -81,6 +77,10 @@ def inspect(loaded: PlanningInstance) -> Inspection:
     start = model.codec.true_facts(loaded.tasks[0].init)
     idling = idling_schemas(domain)
     acting = {action.schema for action in model.actions}
+    touched = [(action, footprint(action)) for action in model.actions]
+    possible = {atom.predicate for atom in (*model.codec.facts, *model.statics)}
+    idle = "where a joint action says so" if model.is_joint_action else "may idle in every step"
+    rows = np.concatenate(layers)[:_LOOK_AT]
     return Inspection(
         domain=domain.name,
         problem=loaded.problems[0].name,
@@ -90,30 +90,24 @@ def inspect(loaded: PlanningInstance) -> Inspection:
         objects=_objects(loaded),
         subactions=_subactions(model),
         impossible=tuple(s.name for s in domain.schemas if s.name not in acting | idling),
-        idle=_idle(model),
+        idle=dict.fromkeys(model.robots, idle),
         left_out=tuple(sorted(idling)),
         shared=_counted(a.schema for a in model.actions if len(a.owners) > 1 and not a.parts),
         unowned=loaded.options.unowned,
-        step_formulas=_counted(a.schema for a in model.actions if _speaks_of_others(a)),
-        formulas=_formulas(model),
+        step_formulas=_counted(a.schema for a, own in touched if own.partners or own.excluded),
+        formulas=_formulas(model, touched),
         without_effects=tuple(sorted({a.schema for a in model.actions if not a.effects})),
         costs=_costs(domain, model.cost),
         interfering=model.stepper.interfering_pairs(),
-        example=_example(model, layers),
+        example=model.stepper.conflict_in(model.codec.facts_part(rows)),
         fluents=_counted(fact.predicate for fact in model.codec.facts),
         start=_counted(model.codec.facts.atoms[fact].predicate for fact in start),
         statics=_counted(a.predicate for a in model.statics),
-        never=_never_true(domain, model),
+        never=tuple(sorted(set(domain.predicates) - possible)),
         facts=len(model.codec.facts),
         goal=formula_text(loaded.problems[0].goal),
         estimate=found,
     )
-
-
-def _never_true(domain: Domain, model: JointModel) -> tuple[str, ...]:
-    """The predicates that no state can make true."""
-    possible = {atom.predicate for atom in (*model.codec.facts, *model.statics)}
-    return tuple(sorted(set(domain.predicates) - possible))
 
 
 def _style(domain: Domain) -> str:
@@ -136,17 +130,6 @@ def _subactions(model: JointModel) -> dict[str, dict[str, int]]:
     }
 
 
-def _idle(model: JointModel) -> dict[str, str]:
-    if model.is_joint_action:
-        return dict.fromkeys(model.robots, "where a joint action says so")
-    return dict.fromkeys(model.robots, "may idle in every step")
-
-
-def _speaks_of_others(action: GroundAction) -> bool:
-    touched = footprint(action)
-    return bool(touched.partners or touched.excluded)
-
-
 def _objects(loaded: PlanningInstance) -> dict[str, int]:
     """How many objects each type has; untyped ones count as ``object``."""
     domain = loaded.domain
@@ -158,35 +141,24 @@ def _objects(loaded: PlanningInstance) -> dict[str, int]:
     return _counted(t for own in types for t in own)
 
 
-def _formulas(model: JointModel) -> tuple[str, ...]:
+def _formulas(
+    model: JointModel, touched: Iterable[tuple[GroundAction, Footprint]]
+) -> tuple[str, ...]:
     """What the first subaction of each schema with a formula about the step asks of the others."""
     there = {StepAtom(action.schema, action.args) for action in model.actions}
-    found: dict[str, str] = {}
-    for action in model.actions:
-        touched = footprint(action)
-        for kind, others in (("speaks of", touched.partners), ("forbids", touched.excluded)):
-            if others and (key := f"{action.schema} {kind}") not in found:
-                found[key] = (
-                    f"{action.label} {kind} {_some(others & there) or _impossible(others)} in the "
-                    "same step"
-                )
+    found: dict[tuple[str, str], str] = {}
+    for action, own in touched:
+        for kind, others in (("speaks of", own.partners), ("forbids", own.excluded)):
+            if others and (action.schema, kind) not in found:
+                # What no robot has is often a mistake in the domain.
+                named = _some(others & there) or f"{_some(others)}, which no robot can ever do,"
+                found[action.schema, kind] = f"{action.label} {kind} {named} in the same step"
     return tuple(found.values())
 
 
 def _some(atoms: frozenset[StepAtom]) -> str:
     names = sorted(map(show, atoms))
     return ", ".join(names[:2]) + (f" and {len(names) - 2:,} more" if len(names) > 2 else "")
-
-
-def _impossible(atoms: frozenset[StepAtom]) -> str:
-    """Subactions that a formula names and that no robot has: often a mistake in the domain."""
-    return f"{_some(atoms)}, which no robot can ever do,"
-
-
-def _example(model: JointModel, layers: Sequence[Rows]) -> str | None:
-    """Why two subactions interfere that are both possible in some state of the first layers."""
-    rows = np.concatenate(layers)[:_LOOK_AT]
-    return model.stepper.conflict_in(model.codec.facts_part(rows))
 
 
 def _costs(domain: Domain, cost: str) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import replace
+from functools import cache
 from itertools import product
 from math import prod
 
@@ -233,8 +234,7 @@ class _Grounder:
         self._bindings = Bindings(domain, problem, self._statics, reachable)
         #: Every literal once: thousands of actions share what their preconditions have in common.
         self._literals: dict[Formula, Formula] = {}
-        #: The owners of a subaction that a formula names; None for arguments of other types.
-        self._acting: dict[tuple[str, tuple[str, ...]], frozenset[int] | None] = {}
+        self._owners_of = cache(self._owners_named)
         #: Ground quantified formulas by the values of variables in them: actions share most.
         self._quantified: dict[tuple[object, ...], Formula] = {}
         #: By the identity of a quantified formula, which is there too so that it stays alive.
@@ -277,7 +277,10 @@ class _Grounder:
         """
         # Asked for each node of each action: `match` takes longer.
         if isinstance(f, Atom):
-            return self._state_literal(f, binding, positive)
+            atom = Atom(f.predicate, tuple([binding.get(a, a) for a in f.args]))
+            if f.predicate in self._fluents:
+                return self._literal(atom, positive)
+            return TRUE if (atom in self._statics) == positive else FALSE
         if isinstance(f, Not):
             return self.formula(f.part, binding, not positive, acting)
         if isinstance(f, And | Or):
@@ -287,8 +290,11 @@ class _Grounder:
         if isinstance(f, StepAtom):
             values = tuple([binding.get(a, a) for a in f.args])
             return self._step_atom(f.action, values, positive, acting)
-        if isinstance(f, Truth | Equal):
-            return self._state_literal(f, binding, positive)
+        if isinstance(f, Equal):
+            same = binding.get(f.left, f.left) == binding.get(f.right, f.right)
+            return TRUE if same == positive else FALSE
+        if isinstance(f, Truth):
+            return TRUE if f.value == positive else FALSE
         return self._quantifier(f, binding, positive, acting)
 
     def _quantifier(
@@ -322,24 +328,10 @@ class _Grounder:
         """The static atoms among the parts that must all hold."""
         return tuple(a for a in required_atoms(f) if a.predicate not in self._fluents)
 
-    def _state_literal(self, f: Truth | Equal | Atom, binding: Binding, positive: bool) -> Formula:
-        if isinstance(f, Truth):
-            return TRUE if f.value == positive else FALSE
-        if isinstance(f, Equal):
-            same = binding.get(f.left, f.left) == binding.get(f.right, f.right)
-            return TRUE if same == positive else FALSE
-        args = tuple([binding.get(a, a) for a in f.args])
-        if f.predicate not in self._fluents:
-            return TRUE if (Atom(f.predicate, args) in self._statics) == positive else FALSE
-        return self._literal(Atom(f.predicate, args), positive)
-
     def _step_atom(
         self, action: str, args: tuple[str, ...], positive: bool, acting: tuple[int, ...]
     ) -> Formula:
-        key = action, args
-        if key not in self._acting:
-            self._acting[key] = self._owners_named(action, args)
-        owners = self._acting[key]
+        owners = self._owners_of(action, args)
         if owners is None:
             return FALSE if positive else TRUE
         if not positive and not owners.isdisjoint(acting):
@@ -347,6 +339,7 @@ class _Grounder:
         return self._literal(StepAtom(action, args), positive)
 
     def _owners_named(self, action: str, args: tuple[str, ...]) -> frozenset[int] | None:
+        """The owners of a subaction that a formula names; None for arguments of other types."""
         schema = self._schemas[action]
         for parameter, arg in zip(schema.parameters, args, strict=True):
             if arg not in self._bindings.objects(parameter.types):

@@ -29,23 +29,17 @@ class FactTable:
     """
 
     atoms: tuple[Atom, ...]
-    texts: tuple[str, ...] = field(init=False, compare=False)
-    index: dict[Atom, int] = field(init=False, compare=False, repr=False)
-    _number: dict[str, int] = field(init=False, compare=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Number the atoms by their texts."""
-        by_text = {label(atom.predicate, atom.args): atom for atom in self.atoms}
-        texts = tuple(sorted(by_text))
-        object.__setattr__(self, "atoms", tuple(by_text[text] for text in texts))
-        object.__setattr__(self, "texts", texts)
-        object.__setattr__(self, "index", {by_text[text]: n for n, text in enumerate(texts)})
-        object.__setattr__(self, "_number", {text: n for n, text in enumerate(texts)})
+    texts: tuple[str, ...] = field(compare=False)
+    index: dict[Atom, int] = field(compare=False, repr=False)
+    _number: dict[str, int] = field(compare=False, repr=False)
 
     @classmethod
     def of(cls, atoms: Iterable[Atom]) -> FactTable:
         """The table of some atoms, in any order."""
-        return cls(tuple(atoms))
+        found = sorted({label(atom.predicate, atom.args): atom for atom in atoms}.items())
+        index = {atom: number for number, (_, atom) in enumerate(found)}
+        numbers = {text: number for number, (text, _) in enumerate(found)}
+        return cls(tuple(index), tuple(numbers), index, numbers)
 
     def __len__(self) -> int:
         """Count the facts."""
