@@ -8,9 +8,9 @@ and all but the required atoms are left out; so what is said of them is true of 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
-from itertools import combinations, product
+from itertools import combinations, islice, product
 
 from planners.pddl.formula_tree import conjuncts, label, negated, required_atoms
 from planners.pddl.lifted import (
@@ -101,36 +101,36 @@ def impossible_actions(
     acting = {(action.schema, owner) for action in actions for owner in action.owners}
     fluents = fluent_predicates(domain)
     possible = {*starts, *(e.atom for a in actions for e in a.effects if e.adds)}
-    found = []
-    for schema in domain.schemas:
-        for number, robot in enumerate(team.robots):
-            if schema.parts or (schema.name, number) in acting:
-                continue
-            own = [
-                parameter.name
-                for position, parameter in enumerate(schema.parameters)
-                if schema.agent in (None, position)
-                and robot in objects_of(domain, problem, parameter.types)
-            ]
-            lacking = (_lacking(schema, {name: robot}, possible) for name in own)
-            atom = next(filter(None, lacking), None)
-            if atom is not None:
-                found.append(Impossible(schema.name, robot, atom, atom.predicate in fluents))
+    found = [
+        Impossible(schema.name, robot, atom, atom.predicate in fluents)
+        for schema in domain.schemas
+        for number, robot in enumerate(team.robots)
+        if not schema.parts and (schema.name, number) not in acting
+        for atom in islice(_lacking(domain, problem, schema, robot, possible), 1)
+    ]
     return tuple(sorted(found, key=lambda one: any(arg[0] == "?" for arg in one.atom.args)))
 
 
-def _lacking(schema: Schema, binding: dict[str, str], possible: Iterable[Atom]) -> Atom | None:
-    """The first atom of the precondition that no possible atom matches."""
-    for atom in required_atoms(schema.precondition):
-        args = tuple(binding.get(arg, arg) for arg in atom.args)
-        if not any(
-            other.predicate == atom.predicate
-            and len(other.args) == len(args)
-            and all(a[0] == "?" or a == b for a, b in zip(args, other.args, strict=True))
-            for other in possible
-        ):
-            return Atom(atom.predicate, args)
-    return None
+def _lacking(
+    domain: Domain, problem: Problem, schema: Schema, robot: str, possible: Set[Atom]
+) -> Iterator[Atom]:
+    """The atoms of the precondition that no possible atom matches, if the robot acts."""
+    for position, parameter in enumerate(schema.parameters):
+        mine = schema.agent in (None, position)
+        if not mine or robot not in objects_of(domain, problem, parameter.types):
+            continue
+        for atom in required_atoms(schema.precondition):
+            args = tuple(robot if arg == parameter.name else arg for arg in atom.args)
+            wanted = Atom(atom.predicate, args)
+            if not any(_matches(wanted, other) for other in possible):
+                yield wanted
+
+
+def _matches(wanted: Atom, atom: Atom) -> bool:
+    """Whether an atom is the wanted one, whatever its variables stand for."""
+    return (wanted.predicate, len(wanted.args)) == (atom.predicate, len(atom.args)) and all(
+        a[0] == "?" or a == b for a, b in zip(wanted.args, atom.args, strict=True)
+    )
 
 
 #: (constraint, binding of its parameters) -> the ground actions that match.

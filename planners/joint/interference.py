@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 from planners.grounding.actions import GroundAction, GroundEffect
 from planners.pddl.formula_tree import Leaf, forbidden_steps, label, literals, substituted
 from planners.pddl.lifted import FALSE, Atom, Formula, StepAtom, Truth
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,30 +44,31 @@ def footprint(action: GroundAction, step: frozenset[StepAtom] | None = None) -> 
     ``step`` are the subactions of the pair: effects whose condition needs others, or none of these,
     are left out.  None: every effect counts.
     """
-    signs: dict[bool, set[Leaf]] = {True: set(), False: set()}
-    for leaf, positive in literals(action.precondition):
-        signs[positive].add(leaf)
-    partners = {leaf for leaf in signs[True] if isinstance(leaf, StepAtom)}
-    conditional_on: set[StepAtom] = set()
-    effects: list[GroundEffect] = []
+    precondition = literals(action.precondition)
+    required, named, effects = [*precondition], [*precondition], list[GroundEffect]()
     for effect in action.effects:
         found = literals(effect.condition)
-        partners |= {leaf for leaf, positive in found if positive and isinstance(leaf, StepAtom)}
-        conditional_on |= {leaf for leaf, _ in found if isinstance(leaf, StepAtom)}
+        named += found
         if step is None or not found or _can_fire(effect.condition, step):
             effects.append(effect)
-            for leaf, positive in found:
-                signs[positive].add(leaf)
+            required += found
     adds = frozenset([e.atom for e in effects if e.adds])
     return Footprint(
-        requires_true=frozenset([a for a in signs[True] if isinstance(a, Atom)]),
-        requires_false=frozenset([a for a in signs[False] if isinstance(a, Atom)]),
+        requires_true=_leaves(Atom, required, (True,)),
+        requires_false=_leaves(Atom, required, (False,)),
         adds=adds,
         deletes=frozenset([e.atom for e in effects if not e.adds]) - adds,
-        partners=action.links | partners,
+        partners=action.links | _leaves(StepAtom, named, (True,)),
         excluded=frozenset(forbidden_steps(action.precondition)),
-        conditional_on=frozenset(conditional_on),
+        conditional_on=_leaves(StepAtom, named[len(precondition) :], (True, False)),
     )
+
+
+def _leaves(
+    kind: type[T], found: Iterable[tuple[object, bool]], signs: tuple[bool, ...]
+) -> frozenset[T]:
+    """The leaves of a kind and of these signs."""
+    return frozenset([a for a, positive in found if isinstance(a, kind) and positive in signs])
 
 
 def _can_fire(condition: Formula, step: frozenset[StepAtom]) -> bool:
@@ -88,30 +92,20 @@ def conflict(a: GroundAction, b: GroundAction) -> str | None:
     """
     pair = frozenset((_name(a), _name(b)))
     first, second = footprint(a, pair), footprint(b, pair)
-    for one, other, x, y in ((a, b, first, second), (b, a, second, first)):
-        if _name(other) in x.excluded:
+    sides = ((a, first, b, second), (b, second, a, first))
+    for one, own, other, its in sides:
+        if _name(other) in own.excluded:
             return f"{one.label} forbids {other.label} in the same step"
-        if x.deletes & y.adds:
-            return f"{one.label} deletes {_show(x.deletes & y.adds)}, which {other.label} adds"
-    if _linked(a, b, first, second):
-        return None
-    for one, other, x, y in ((a, b, first, second), (b, a, second, first)):
-        if x.deletes & y.requires_true:
-            return (
-                f"{one.label} deletes {_show(x.deletes & y.requires_true)}, "
-                f"which {other.label} needs"
-            )
-        if x.adds & y.requires_false:
-            return (
-                f"{one.label} adds {_show(x.adds & y.requires_false)}, which {other.label} "
-                "needs to be false"
-            )
+        if both := own.deletes & its.adds:
+            return f"{one.label} deletes {_show(both)}, which {other.label} adds"
+    if _name(b) in first.partners or _name(a) in second.partners:
+        return None  # meant to be done together
+    for one, own, other, its in sides:
+        if both := own.deletes & its.requires_true:
+            return f"{one.label} deletes {_show(both)}, which {other.label} needs"
+        if both := own.adds & its.requires_false:
+            return f"{one.label} adds {_show(both)}, which {other.label} needs to be false"
     return None
-
-
-def _linked(a: GroundAction, b: GroundAction, first: Footprint, second: Footprint) -> bool:
-    """Two actions meant to be done together: one names the other in a positive literal."""
-    return _name(b) in first.partners or _name(a) in second.partners
 
 
 def _show(atoms: frozenset[Atom]) -> str:
