@@ -183,24 +183,22 @@ def task_of(model: JointModel, domain: Domain, problem: Problem) -> PlanningTask
 
 
 def _check_same_world(domain: Domain, first: Problem, other: Problem) -> None:
-    remedy = (
-        f"Compared with {first.source.name}: the problems of one model have the same objects "
-        "and statics."
-    )
-    objects, init = other.source.section(":objects"), other.source.section(":init")
-    if first.objects != other.objects:
-        odd = sorted({*first.objects.items()} ^ {*other.objects.items()})[0][0]
-        raise BadInput(
-            f"object {echoed(odd)} is not the same in all problems", position=objects, remedy=remedy
-        )
-    changed = static_atoms(domain, first) ^ static_atoms(domain, other)
-    if changed:
-        odd = min(show(atom) for atom in changed)
-        raise BadInput(
-            f"static fact {odd} is not the same in all problems", position=init, remedy=remedy
-        )
-    if first.values != other.values:
-        raise BadInput("function values differ between the problems", position=init, remedy=remedy)
+    """Raise `BadInput` for problems that differ in more than the start and the goal."""
+    objects = {*first.objects.items()} ^ {*other.objects.items()}
+    values = {*first.values.items()} ^ {*other.values.items()}
+    statics = static_atoms(domain, first) ^ static_atoms(domain, other)
+    for section, odd in (
+        (":objects", [f"object {echoed(name)}" for name, _ in objects]),
+        (":init", [f"static fact {show(atom)}" for atom in statics]),
+        (":init", [f"function value {show(atom)}" for atom, _ in values]),
+    ):
+        if odd:
+            raise BadInput(
+                f"{min(odd)} is not the same in all problems",
+                position=other.source.section(section),
+                remedy=f"Compared with {first.source.name}: the problems of one model have the "
+                "same objects and statics.",
+            )
 
 
 __all__ = ["ModelOptions", "PlanningInstance", "build", "load", "task_of"]

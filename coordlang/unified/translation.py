@@ -255,10 +255,7 @@ class _Writer:
         shared = self.problem.ma_environment if self.agents else self.problem
         for fluent in filter(_is_read, shared.fluents):
             self.predicate(fluent, None)
-        if self.agents:
-            actions, schemas = self.agent_actions()
-        else:
-            actions, schemas = self.plain_actions(subactions)
+        actions, schemas = self.actions(subactions)
         facts, goals = self.facts(), self.goals()  # they may declare further predicates
         things = [(self.object_name(o), self.type_name(o.type)) for o in self.problem.all_objects]
         things += [(self.agent_name(agent), self.own_type(agent)) for agent in self.agents]
@@ -291,34 +288,25 @@ class _Writer:
             kinds.append((self.agent_type, "object"))
         return [f"{name} - {father}" for name, father in kinds if name != "object"]
 
-    def plain_actions(self, subactions: Subactions) -> tuple[list[str], Schemas]:
-        """The actions of a problem without agents."""
-        actions: list[str] = []
-        schemas: Schemas = {}
-        for action in self.problem.actions:
-            name = self.names.of("action", action.name, action.name)
-            parts = subactions.get(action.name, {})
-            comments = [f"  ; subaction {robot} {text or 'idle'}" for robot, text in parts.items()]
-            actions.append("\n".join([f"(:action {name}", *comments, *self.body(action, None)]))
-            schemas[name] = {None: action}
-        return actions, schemas
-
-    def agent_actions(self) -> tuple[list[str], Schemas]:
-        """Equal actions of several agents become one schema."""
+    def actions(self, subactions: Subactions) -> tuple[list[str], Schemas]:
+        """The schemas and what they stand for: equal actions of several agents become one."""
         groups: dict[tuple[str, ...], dict[str | None, Any]] = {}
-        for agent in self.agents:
-            for action in agent.actions:
-                key = (action.name, *self.body(action, agent))
-                groups.setdefault(key, {})[self.agent_name(agent)] = action
+        for agent in self.agents or (None,):
+            for action in (agent or self.problem).actions:
+                parts = subactions.get(action.name, {}).items()
+                comments = [f"  ; subaction {robot} {text or 'idle'}" for robot, text in parts]
+                key = (action.name, *comments, *self.body(action, agent))
+                groups.setdefault(key, {})[agent and self.agent_name(agent)] = action
+        self.apart = any(len(members) < len(self.agents) for members in groups.values())
+        own_types = {self.agent_name(agent): self.own_type(agent) for agent in self.agents}
         actions: list[str] = []
         schemas: Schemas = {}
-        by_name = {self.agent_name(agent): agent for agent in self.agents}
-        self.apart = any(len(members) < len(self.agents) for members in groups.values())
         for key, members in groups.items():
             name = self.names.of("action", key, key[0])
-            types = list(dict.fromkeys(self.own_type(by_name[str(member)]) for member in members))
-            whose = f"(either {' '.join(types)})" if len(types) > 1 else types[0]
-            actions.append("\n".join([f"(:action {name}", f"  :agent {AGENT} - {whose}", *key[1:]]))
+            types = list(dict.fromkeys(own_types[member] for member in members if member))
+            whose = f"(either {' '.join(types)})" if len(types) > 1 else "".join(types)
+            agents = [f"  :agent {AGENT} - {whose}"] if whose else []
+            actions.append("\n".join([f"(:action {name}", *agents, *key[1:]]))
             schemas[name] = members
         return actions, schemas
 
