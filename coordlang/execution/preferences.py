@@ -64,12 +64,12 @@ def goes_first(model: JointModel, robot: str) -> PlanPreference:
     if some other robot goes before r, else 1.  Raises `UsageError` for a robot that the model does
     not have.
     """
-    own = model.robot_number(robot)
-    if own is None:
+    if robot not in model.robots:
         raise UsageError(
             f"--prefer first:{robot}: there is no such robot",
             remedy=f"The robots are {', '.join(model.robots)}.",
         )
+    own = model.robots.index(robot)
     others = tuple(other for other in range(len(model.robots)) if other != own)
     grades = (
         f"{robot} goes first",

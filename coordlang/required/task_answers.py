@@ -15,7 +15,6 @@ from coordlang.language.provenance import percent
 from coordlang.required.choices import Choices, LabelSets
 from coordlang.required.failure import NONE, Failures, failures
 from coordlang.required.miscoordination import Miscoordination, miscoordination
-from planners.joint.composition import cost_of
 from planners.joint.model import JointModel, PlanningTask
 from planners.joint.tables import Ints
 from planners.loading import PlanningInstance
@@ -154,5 +153,5 @@ def _actions(model: JointModel) -> list[Ints]:
         return [np.array([0] + [1] * (len(own) - 1), np.int64) for own in model.labels]
     counts = [dict.fromkeys(own, 0) for own in model.labels]
     for action in model.actions:
-        counts[action.owners[0]][action.label] = cost_of(action, FEWEST)
+        counts[action.owners[0]][action.label] = action.second_cost(FEWEST)
     return [np.array(list(own.values()), np.int64) for own in counts]

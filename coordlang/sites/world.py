@@ -6,6 +6,7 @@ It is found from the actions and the static atoms of the model alone, see `_loca
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from itertools import combinations, permutations
@@ -126,20 +127,18 @@ def _without_ambiguous(
     Of two predicates the one that locates more things is kept: ``(at plane1 city0)``, as said of
     passengers, tells where a plane is, and ``(fuel-level plane1 fl3)`` does not.
     """
-    located: dict[str, set[str]] = {}
-    for atom, (_, thing, _) in roles.values():
-        located.setdefault(atom.predicate, set()).add(thing)
+    pairs = {(atom.predicate, role[1]) for atom, role in roles.values()}
+    located = Counter(predicate for predicate, _ in pairs)
     ambiguous: set[tuple[str, str]] = set()
     for state in states:
         said: dict[str, list[str]] = {}
-        for text in state:
-            if text in roles:
-                atom, (_, thing, _) = roles[text]
-                said.setdefault(thing, []).append(atom.predicate)
+        for atom, role in (roles[text] for text in state if text in roles):
+            said.setdefault(role[1], []).append(atom.predicate)
         for thing, predicates in said.items():
-            number = {predicate: len(located[predicate]) for predicate in predicates}
-            best = [one for one in predicates if number[one] == max(number.values())]
-            ambiguous |= {(thing, one) for one in predicates if len(best) > 1 or one != best[0]}
+            most = max(located[predicate] for predicate in predicates)
+            best = [predicate for predicate in predicates if located[predicate] == most]
+            kept = best if len(best) == 1 else []
+            ambiguous |= {(thing, predicate) for predicate in predicates if predicate not in kept}
     return {
         text: (atom, role)
         for text, (atom, role) in roles.items()

@@ -51,7 +51,7 @@ class Selectors:
 def selectors_of(model: JointModel) -> Selectors:
     """Who selects what in a joint model, at what second cost."""
     actions, number = model.actions, len(model.actions)
-    seconds = tuple(second_cost(model, action) for action in actions)
+    seconds = tuple(action.second_cost(model.cost) for action in actions)
     if model.is_joint_action:
         owners, nothing = ((0,),) * number, (frozenset[int](),) * number
         covered = _covered_by(actions, seconds)
@@ -71,15 +71,6 @@ def _covered_by(
         tuple(groups[action.parts][: groups[action.parts].index(n)])
         for n, action in enumerate(actions)
     )
-
-
-def second_cost(model: JointModel, action: GroundAction) -> int:
-    """The second component of an action's cost (0 under ``makespan``)."""
-    if model.cost == "makespan+cost":
-        return action.cost
-    if model.cost == "makespan":
-        return 0
-    return sum(part is not None for part in action.parts) if model.is_joint_action else 1
 
 
 #: A fact and the value that is written or read.

@@ -24,6 +24,7 @@ from planners.pddl.lifted import (
     Schema,
     StepAtom,
 )
+from planners.pddl.model_options import Cost
 from planners.pddl.robots import Team, fluent_predicates, objects_of
 
 
@@ -59,6 +60,14 @@ class GroundAction:
     def label(self) -> str:
         """The action in PDDL syntax."""
         return label(self.schema, self.args)
+
+    def second_cost(self, cost: Cost) -> int:
+        """The second component of its cost; of a joint action the parts that are not idle count."""
+        if cost == "makespan+cost":
+            return self.cost
+        if cost == "makespan":
+            return 0
+        return sum(part is not None for part in self.parts) if self.parts else 1
 
     def part_of(self, robot: int) -> str | None:
         """The label of a robot in it; None if the robot idles or does not take part."""

@@ -228,7 +228,7 @@ class _Subactions:
         self._evaluator = evaluator
         self.operators = Operators(actions, codec, evaluator)
         # A shared subaction is paid once, by the first of its owners.
-        own = [cost_of(a, cost) if a.owners[0] == robot else 0 for a in actions if a]
+        own = [a.second_cost(cost) if a.owners[0] == robot else 0 for a in actions if a]
         self.cost = np.array([idling_cost, *own], np.int64)
         #: By label what it asks of the step.
         self._formulas = {
@@ -259,11 +259,6 @@ def _known(formula: Formula, evaluator: Evaluator, robot: int, label: int) -> Fo
         return Truth(own[1] == label) if own[0] == robot else leaf
 
     return substituted(formula, value)
-
-
-def cost_of(action: GroundAction, cost: Cost) -> int:
-    """The second component of a subaction's cost."""
-    return action.cost if cost == "makespan+cost" else int(cost == "makespan+actions")
 
 
 def _text(formula: Formula) -> str:
@@ -299,7 +294,7 @@ class JointActionStepper(Stepper):
         self._labels = np.array(
             [[numbers[i][p] if p else 0 for i, p in enumerate(a.parts)] for a in actions], np.int32
         ).reshape(len(actions), len(robots))
-        self._cost = np.array([_cost_of(action, cost) for action in actions], np.int64)
+        self._cost = np.array([action.second_cost(cost) for action in actions], np.int64)
 
     def steps(self, rows: Rows, options: Options | None = None) -> Steps:
         """See `Stepper`; ``options`` are not looked at: no robot chooses by itself."""
@@ -358,10 +353,3 @@ class JointActionStepper(Stepper):
         _, operators = self._operators.applicable(row[None, :])
         here = set(found.tolist()) & set(operators.tolist())
         return self._actions[min(here, key=lambda n: (int(self._cost[n]), n))].label
-
-
-def _cost_of(action: GroundAction, cost: Cost) -> int:
-    """The second component of a joint action's cost: under ``makespan+actions`` its parts."""
-    if cost == "makespan+actions":
-        return sum(part is not None for part in action.parts)
-    return cost_of(action, cost)

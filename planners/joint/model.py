@@ -236,10 +236,6 @@ class JointModel:
         """The goal that is this state; what it remembers, and slack, are left out."""
         return FullState(tuple(self.codec.true_facts(self.forgetting_slack(row))))
 
-    def robot_number(self, name: str) -> int | None:
-        """The number of a robot, None if there is no such robot."""
-        return self.robots.index(name) if name in self.robots else None
-
     def label_text(self, robot: int, label: int) -> str | None:
         """The text of a robot's label; None is idling."""
         return self.labels[robot][label] if label else None

@@ -169,11 +169,10 @@ def _leaf_text(leaf: Leaf) -> str:
 
 
 def _compound_text(compound: Compound, parts: Iterator[str]) -> str:
-    match compound:
-        case Forall(variables, _) | Exists(variables, _):
-            declared = f"({' '.join(map(declaration, variables))})"
-            return label(type(compound).__name__.lower(), (declared, *parts))
-    return label(type(compound).__name__.lower(), parts)
+    declared = []
+    if isinstance(compound, Forall | Exists):
+        declared = [f"({' '.join(map(declaration, compound.variables))})"]
+    return label(type(compound).__name__.lower(), (*declared, *parts))
 
 
 def declaration(variable: Variable) -> str:

@@ -7,6 +7,7 @@ The reader is iterative, so deep nesting costs an error message and not the stac
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
@@ -80,13 +81,17 @@ class Source:
     name: str
     text: str
     is_union: bool = False
+    #: Where lines begin, once it was asked.
+    _lines: list[int] = field(default_factory=list, repr=False)
 
     def position(self, offset: int) -> Position:
         """The line and column (from 1) of a character offset."""
         if self.is_union:
             return Position(self.name)
-        line = self.text.count("\n", 0, offset) + 1
-        return Position(self.name, line, offset - self.text.rfind("\n", 0, offset))
+        if not self._lines:
+            self._lines.extend((0, *(match.end() for match in re.finditer("\n", self.text))))
+        line = bisect_right(self._lines, offset)
+        return Position(self.name, line, offset - self._lines[line - 1] + 1)
 
     def section(self, name: str) -> Position:
         """Where a section such as ``:objects`` begins; the first parenthesis if there is none."""

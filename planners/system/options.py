@@ -14,6 +14,7 @@ import sys
 import types
 from collections.abc import Iterator, Mapping
 from dataclasses import Field, dataclass, field, fields, replace
+from itertools import product
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
 from planners.system.errors import UsageError
@@ -162,30 +163,36 @@ def _made(record: type[Any], values: Mapping[str, object]) -> Any:
 def _refuse_contradictions(known: Mapping[str, Option], values: Mapping[str, object]) -> None:
     """Raise `UsageError` for an option beside one that it excludes, or without what it needs."""
     given = [known[n] for n, value in values.items() if value is not False and value != ()]
+    for each, other in product(given, repeat=2):
+        exact = f"{other.name}={values[other.name]}"
+        if other.name in each.without or exact in each.without:
+            of = f" {values[other.name]}" if exact in each.without else ""
+            raise UsageError(
+                f"{each.spelling} and {other.spelling}{of} exclude each other",
+                remedy="Give one of them.",
+            )
     for each in given:
-        for other in given:
-            exact = f"{other.name}={values[other.name]}"
-            if other.name in each.without or exact in each.without:
-                of = f" {values[other.name]}" if exact in each.without else ""
-                raise UsageError(
-                    f"{each.spelling} and {other.spelling}{of} exclude each other",
-                    remedy="Give one of them.",
-                )
-        if not each.needs:
-            continue
-        needed, accepted = known[each.needs[0]], each.needs[1:]
-        value = values.get(needed.name, needed.default)
-        if value in accepted if accepted else needed in given:
-            continue
-        said = f"{each.spelling} {values[each.name]}" if each.values else each.spelling
-        remedy = f"Leave out {said}, or {needed.spelling} {value}."
-        if needed not in given:
-            added = (needed.spelling, *(accepted[:1] or [needed.metavar]))
-            remedy = f"Add {' '.join(filter(None, added))}."
-        belongs = f"{said} belongs to {needed.spelling}"
-        if accepted:
-            belongs += f" {named(accepted, 'or')}"
-        raise UsageError(belongs, remedy=remedy)
+        if each.needs:
+            needed = known[each.needs[0]]
+            value = values.get(needed.name, needed.default)
+            _require(needed, value, each, values[each.name], needed in given)
+
+
+def _require(needed: Option, value: object, by: Option, own: object, is_given: bool) -> None:
+    """Raise `UsageError` unless an option that another one needs is given, or has the right value.
+
+    ``own`` is the value of the one that needs it.
+    """
+    accepted = by.needs[1:]
+    if value in accepted if accepted else is_given:
+        return
+    said = f"{by.spelling} {own}" if by.values else by.spelling
+    remedy = f"Leave out {said}, or {needed.spelling} {value}."
+    if not is_given:
+        added = (needed.spelling, *(accepted[:1] or [needed.metavar]))
+        remedy = f"Add {' '.join(filter(None, added))}."
+    belongs = f"{said} belongs to {needed.spelling}"
+    raise UsageError(f"{belongs} {named(accepted, 'or')}" if accepted else belongs, remedy=remedy)
 
 
 def _check(given: Option, value: object) -> None:
@@ -200,19 +207,14 @@ def _check(given: Option, value: object) -> None:
             f"{given.spelling} is given or not: {value} is neither",
             remedy="In Python it is True or False.",
         )
-    if given.kind is not int:
-        return
     least = given.least
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, int)
-        or (least is not None and value < least)
-    ):
-        what = "a whole number" if least is None else f"{least} or more"
-        raise UsageError(
-            f"{given.spelling} {value}: expected {what}",
-            remedy=f"Say {given.spelling} {max(least or 0, 1)}.",
-        )
+    if given.kind is not int or (type(value) is int and (least is None or value >= least)):
+        return
+    what = "a whole number" if least is None else f"{least} or more"
+    raise UsageError(
+        f"{given.spelling} {value}: expected {what}",
+        remedy=f"Say {given.spelling} {max(least or 0, 1)}.",
+    )
 
 
 def _not_none(kind: Any) -> object:
