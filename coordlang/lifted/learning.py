@@ -11,9 +11,11 @@ from.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import islice
 from typing import Literal
 
 import numpy as np
@@ -30,10 +32,9 @@ from coordlang.sites.coordinates import Point
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.verification.by_definition import verify_candidates
 from coordlang.vocabulary.refuter import Refuter
-from coordlang.vocabulary.sat import PartitionProblem, Undecided, at_most, satisfiable
+from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from planners.joint.tables import Bools, Ints
 from planners.parallel.workers import Workers
-from planners.search.sat import sat_solver
 from planners.system.errors import Position, ProvedImpossible
 from planners.system.limits import run_until_stopped
 
@@ -41,33 +42,28 @@ from planners.system.limits import run_until_stopped
 _COMPARED = 4_000
 
 
-class SimplestHitting:
-    """The members of least weight that meet all sets of a list that only grows.
+def simplest_hitting(sets: Sequence[Bools], weights: Ints) -> list[int]:
+    """The members of least weight that meet all sets, in order.
 
-    Weights are asked for from below, so what is found is proved to be lightest.  ``weights`` are
-    those of the members, by number; positive.
+    Each of ``sets``, none of them empty, is a table of what is in it; ``weights`` (members) are
+    positive.
     """
+    from pysat.examples.rc2 import RC2
+    from pysat.formula import WCNF
 
-    def __init__(self, weights: Sequence[int]) -> None:
-        self._weights = np.array(weights, np.int64)
-        self._sets: dict[bytes, Bools] = {}
-        self._bound = 0
-
-    def add(self, members: Bools) -> None:
-        """Add a set, which is not empty, as a table of what is in it."""
-        self._sets.setdefault(members.tobytes(), members)
-
-    def find(self) -> list[int]:
-        """Members that meet all sets, in order."""
-        if not self._sets:
-            return []
-        inside = np.array(list(self._sets.values())).T
-        useful = undominated(inside, self._weights)
-        weights = self._weights[useful].tolist()
-        clauses = [[*(np.flatnonzero(one) + 1).tolist()] for one in inside[useful].T]
-        while (found := _lightest(weights, clauses, self._bound)) is None:
-            self._bound += 1
-        return sorted(useful[found].tolist())
+    if not sets:
+        return []
+    inside = np.array(sets).T
+    useful = undominated(inside, weights)
+    formula = WCNF()
+    for members in inside[useful].T:
+        formula.append((np.flatnonzero(members) + 1).tolist())
+    for member, weight in enumerate(weights[useful].tolist(), 1):
+        formula.append([-member], weight=weight)
+    with RC2(formula, solver="minisat22") as solver:
+        found = [member - 1 for member in solver.compute() if 0 < member <= len(useful)]
+    chosen: list[int] = useful[found].tolist()
+    return chosen
 
 
 def undominated(inside: Bools, weights: Ints) -> Ints:
@@ -90,92 +86,62 @@ def undominated(inside: Bools, weights: Ints) -> Ints:
     return found
 
 
-def _lightest(
-    weights: Sequence[int], clauses: Sequence[Sequence[int]], bound: int
-) -> list[int] | None:
-    """Members with at most a total weight, by position; None if there are none."""
-    weighted = [var for var, weight in enumerate(weights, 1) for _ in range(weight)]
-    light, _ = at_most(weighted, bound, len(weights))
-    with sat_solver("cadical153", [*light, *clauses]) as solver:
-        if not satisfiable(solver):
-            return None
-        return [var - 1 for var in solver.get_model() if 0 < var <= len(weights)]
-
-
 #: Conflicts that the solver may spend on one partition.
 _CONFLICTS = 100_000
 
 
-@dataclass(frozen=True, slots=True)
-class Merged:
-    """A word for each class, by number.
-
-    ``proved``: no partition of these classes into fewer words is a language for the problems.
-    """
-
-    words: tuple[int, ...]
-    proved: bool
-
-
 def merge_classes(
-    count: int,
-    classes: Sequence[Ints],
-    known: Sequence[Iterable[Clause]],
-    refuting: Callable[[int, Ints], Mapping[Clause, object]],
-    progress: Callable[[str], None],
-) -> Merged:
-    """As few words as are found for ``count`` classes.
+    count: int, classes: Mapping[_Taken, Ints], progress: Progress
+) -> tuple[list[int], bool]:
+    """As few words as are found for ``count`` classes, one word for each of which is a language.
 
-    ``classes`` are for each problem the class of each state; one word for each class is a language.
-    ``known`` are for each problem clauses that every language satisfies; ``refuting(problem, words
-    of states)`` gives clauses that these words violate, none if they are a language for it.
+    ``classes`` are for each problem the class of each state.  Returns the word of each class, and
+    whether no partition of these classes into fewer words is proved to be a language.
     """
+    words = list(range(count))
     clauses = dict.fromkeys(
-        _over_classes(clause, own)
-        for own, some in zip(classes, known, strict=True)
-        for clause in some
+        _over_classes(clause, own) for taken, own in classes.items() for clause in taken.clauses
     )
-    best, proved = tuple(range(count)), count < 2
-    while not proved:
-        size = len(set(best)) - 1
-        problem = PartitionProblem(range(count), max(1, size))
+    while (size := len(set(words)) - 1) > 0:
         try:
-            for clause in clauses:
-                problem.separate_one(clause)
-            found = _partition(problem, classes, clauses, refuting)
+            found = _partition(count, size, classes, clauses)
         except Undecided:
-            break
-        finally:
-            problem.close()
+            return words, False
         if found is None:
-            proved = True
-        else:
-            best = tuple(found[k] for k in range(count))
-            progress(f"merging words: {len(set(best))} suffice")
-            proved = len(set(best)) == 1
-    return Merged(best, proved)
+            break
+        words = [found[k] for k in range(count)]
+        progress(f"merging words: {len(set(words))} suffice")
+    return words, True
 
 
 def _partition(
-    problem: PartitionProblem,
-    classes: Sequence[Ints],
-    clauses: dict[Clause, None],
-    refuting: Callable[[int, Ints], Mapping[Clause, object]],
+    count: int, size: int, classes: Mapping[_Taken, Ints], clauses: dict[Clause, None]
 ) -> dict[int, int] | None:
-    """A partition of the classes that nothing refutes; None if there is none of this size."""
-    while (found := problem.solve(_CONFLICTS)) is not None:
-        for number, own in enumerate(classes):
-            violated = refuting(number, np.array([found[k] for k in own.tolist()], np.int64))
-            if violated:
-                for clause in violated:
-                    over = _over_classes(clause, own)
-                    if over not in clauses:
-                        clauses[over] = None
-                        problem.separate_one(over)
+    """A partition of the classes that nothing refutes; None if there is none of this size.
+
+    Clauses that are met on the way are added to the known ones.
+    """
+    with closing(PartitionProblem(range(count), size)) as problem:
+        for clause in clauses:
+            problem.separate_one(clause)
+        while (found := problem.solve(_CONFLICTS)) is not None:
+            violated = _violated(found, classes)
+            if not violated:
                 break
-        else:
-            return found
-    return None
+            for clause in violated:
+                if clause not in clauses:
+                    clauses[clause] = None
+                    problem.separate_one(clause)
+    return found
+
+
+def _violated(words: Mapping[int, int], classes: Mapping[_Taken, Ints]) -> list[Clause]:
+    """The clauses over classes that their words violate in the first problem that refutes them."""
+    for taken, own in classes.items():
+        violated = taken.violated(np.array([words[k] for k in own.tolist()], np.int64))
+        if violated:
+            return [_over_classes(clause, own) for clause in violated]
+    return []
 
 
 def _over_classes(clause: Clause, classes: Ints) -> Clause:
@@ -297,26 +263,43 @@ def learn(
     return replace(found[-1], stopped=stopped)
 
 
+class _Taken:
+    """A problem that is learned from, with the clauses that it gave.
+
+    ``table`` has the values of all features that there are: (features, states).
+    """
+
+    def __init__(self, own: Instance, seed: int, progress: Progress, refuted: Ints | None) -> None:
+        group = SymmetryGroup(())  # features need not be symmetric
+        spaces, rows = own.candidates.spaces, len(own.candidates.rows)
+        self.own = own
+        self.clauses: dict[Clause, None] = {}
+        self.table: Ints = np.zeros((0, 0), np.int64)
+        self._refuter = Refuter(spaces, group, rows, seed, progress, refuted)
+
+    def violated(self, words: Ints) -> Collection[Clause]:
+        """Clauses that words of the states violate; none if they are a language here."""
+        found = self._refuter.violated(words)
+        self.clauses.update(dict.fromkeys(found))
+        return found.keys()
+
+
 @dataclass(frozen=True, slots=True)
 class _Words:
     """Words over features.
 
-    ``table`` has the values of the classes, ``merged`` their words, ``of_states`` the words of each
-    problem's states.
+    ``word`` are for the values of each class, and ``of_states`` for each problem's states;
+    ``proved``: see `Learned`.
     """
 
     features: tuple[Feature, ...]
-    table: Ints
-    merged: Merged
+    word: Mapping[Vector, int]
+    proved: bool
     of_states: tuple[Ints, ...]
-
-    @property
-    def size(self) -> int:
-        return len(set(self.merged.words))
 
 
 class _Learner:
-    """What was learned from, and the clauses that it gave; ``every`` are all problems."""
+    """What was learned from; ``every`` are all problems."""
 
     def __init__(
         self,
@@ -326,35 +309,30 @@ class _Learner:
         workers: Workers,
         progress: Progress,
     ) -> None:
-        self.taken: list[Instance] = []
+        self.taken: list[_Taken] = []
         self.rounds = 0
         self.landmarks = False
         self._every, self._workers = every, workers
         self._complexity, self._seed, self._progress = complexity, seed, progress
-        self._refuters: list[Refuter] = []
-        self._clauses: list[dict[Clause, None]] = []
         self._pool = Pool((), np.zeros((0, 0), np.int64), 0)
-        self._tables: list[Ints] = []
 
     def take(self, own: Instance, refuted: Ints | None = None) -> None:
         """Learn from this problem, too; words of its states that it refutes give the first clauses.
 
         With many robots plans fail in too many ways for all of them to be looked at.
         """
-        group = SymmetryGroup(())  # features need not be symmetric
-        spaces, rows = own.candidates.spaces, len(own.candidates.rows)
-        self.taken.append(own)
-        self._refuters.append(Refuter(spaces, group, rows, self._seed, self._progress, refuted))
-        self._clauses.append({})
+        self.taken.append(_Taken(own, self._seed, self._progress, refuted))
 
     def begin(self, landmarks: bool = False) -> None:
         """Find the features that there are in the problems that were taken."""
         self.landmarks = landmarks
-        states = [States(own.states.world, own.states.rows) for own in self.taken]
+        states = [States(taken.own.states.world, taken.own.states.rows) for taken in self.taken]
         self._progress("finding features that tell states apart")
         self._pool = pool_of(states, self._complexity, landmarks)
         ends = np.cumsum([len(own) for own in states])
-        self._tables = np.split(self._pool.values, ends[:-1], axis=1)
+        tables = np.split(self._pool.values, ends[:-1], axis=1)
+        for taken, table in zip(self.taken, tables, strict=True):
+            taken.table = table
 
     def verified(self, prefer: Preference | None) -> Learned:
         """Words that are verified on every problem; those that refute some are learned from."""
@@ -368,7 +346,8 @@ class _Learner:
                 continue
             for own, of_states in zip(self._every, words.of_states, strict=True):
                 if not own.holds(of_states, self._workers, self._progress):
-                    assert own not in self.taken, "what was learned from is a language there"
+                    known = (taken.own for taken in self.taken)
+                    assert own not in known, "what was learned from is a language there"
                     self.take(own, of_states)
                     self.begin(self.landmarks)
                     break
@@ -387,23 +366,21 @@ class _Learner:
                     raise
                 break
             found.append(self._words(chosen, prefer))
-            if found[-1].size == 1 or not chosen:
+            if not chosen or not any(found[-1].word.values()):
                 break
             excluded.append(max(chosen, key=lambda k: self._pool.features[k].complexity))
-        return min(found, key=lambda words: words.size)
+        return min(found, key=lambda words: len(set(words.word.values())))
 
     def _learned(self, words: _Words) -> Learned:
-        """What was learned, with words numbered as they come."""
+        """What was learned."""
         sizes = tuple(
             (len(own.states), own.candidates.count, len(np.unique(of_states)))
             for own, of_states in zip(self._every, words.of_states, strict=True)
         )
-        number = {word: k for k, word in enumerate(dict.fromkeys(words.merged.words))}
-        classes = zip(map(tuple, words.table.tolist()), words.merged.words, strict=True)
         return Learned(
             words.features,
-            {vector: number[own] for vector, own in classes},
-            words.merged.proved,
+            words.word,
+            words.proved,
             sizes,
             tried=self._pool.tried,
             pool=len(self._pool.features),
@@ -412,43 +389,44 @@ class _Learner:
         )
 
     def _words(self, chosen: Sequence[int], prefer: Preference | None) -> _Words:
-        """Words over some features: one for each class of states, or as few as are found."""
+        """Words over some features: one for each class of states, or as few as are found.
+
+        They are numbered as they come.
+        """
         every = self._every
         features = tuple(self._pool.features[k] for k in chosen)
         vectors = np.concatenate([own.vectors(features) for own in every])
         table, number = np.unique(vectors, axis=0, return_inverse=True)
         ends = np.cumsum([len(own.states) for own in every])
         classes = np.split(number.reshape(-1), ends[:-1])
-        merged = Merged(tuple(range(len(table))), len(table) == 1)
+        words, proved = list(range(len(table))), len(table) == 1
         if prefer is not None:
-            known = [classes[every.index(own)] for own in self.taken]
-            merged = merge_classes(len(table), known, self._clauses, self._refuting, self._progress)
-        of_class = np.array(merged.words, np.int64)
-        return _Words(features, table, merged, tuple(of_class[own] for own in classes))
-
-    def _refuting(self, number: int, words: Ints) -> Mapping[Clause, object]:
-        found = self._refuters[number].violated(words)
-        self._clauses[number].update(dict.fromkeys(found))
-        return found
+            known = {taken: classes[every.index(taken.own)] for taken in self.taken}
+            words, proved = merge_classes(len(table), known, self._progress)
+        renumbered = {word: k for k, word in enumerate(dict.fromkeys(words))}
+        of_class = np.array([renumbered[word] for word in words], np.int64)
+        word = dict(zip(map(tuple, table.tolist()), of_class.tolist(), strict=True))
+        return _Words(features, word, proved, tuple(of_class[own] for own in classes))
 
     def _choose(self, excluded: Sequence[int]) -> list[int]:
         """The simplest features that nothing refutes in the problems that were taken."""
-        hitting = SimplestHitting([feature.complexity for feature in self._pool.features])
-        new = list(enumerate(map(list, self._clauses)))
-        while True:
-            for number, clauses in new:
+        weights = np.array([feature.complexity for feature in self._pool.features], np.int64)
+        apart: dict[bytes, Bools] = {}
+        new = [(taken, list(taken.clauses)) for taken in self.taken]
+        while new:
+            for taken, clauses in new:
                 for clause in clauses:
-                    hitting.add(self._separating(number, clause, excluded))
-            chosen = hitting.find()
-            refuted = ((n, self._violated(n, chosen)) for n in range(len(self._tables)))
-            new = [next(((n, found) for n, found in refuted if found), (0, []))]
-            if not new[0][1]:
-                return chosen
+                    features = self._separating(taken, clause, excluded)
+                    apart.setdefault(features.tobytes(), features)
+            chosen = simplest_hitting(list(apart.values()), weights)
+            refuted = ((taken, self._violated(taken, chosen)) for taken in self.taken)
+            new = list(islice(((taken, found) for taken, found in refuted if found), 1))
+        return chosen
 
-    def _violated(self, number: int, chosen: Sequence[int]) -> list[Clause]:
+    def _violated(self, taken: _Taken, chosen: Sequence[int]) -> list[Clause]:
         """Clauses that the classes of features violate in one problem."""
-        _, word = np.unique(self._tables[number][chosen].T, axis=0, return_inverse=True)
-        found = self._refuting(number, word.reshape(-1).astype(np.int64))
+        _, word = np.unique(taken.table[chosen].T, axis=0, return_inverse=True)
+        found = taken.violated(word.reshape(-1).astype(np.int64))
         if found:
             self.rounds += 1
             self._progress(
@@ -457,17 +435,15 @@ class _Learner:
             )
         return list(found)
 
-    def _separating(self, number: int, clause: Clause, excluded: Sequence[int]) -> Bools:
+    def _separating(self, taken: _Taken, clause: Clause, excluded: Sequence[int]) -> Bools:
         """The features that tell some pair of a clause apart."""
-        own = self.taken[number]
         if not clause:
-            raise _inseparable(own.candidates)
+            raise _inseparable(taken.own.candidates)
         pairs = np.array(sorted(clause))
-        table = self._tables[number]
-        apart: Bools = (table[:, pairs[:, 0]] != table[:, pairs[:, 1]]).any(axis=1)
+        apart: Bools = (taken.table[:, pairs[:, 0]] != taken.table[:, pairs[:, 1]]).any(axis=1)
         apart[list(excluded)] = False
         if not apart.any():
-            raise _too_weak(own, pairs, self._complexity)
+            raise _too_weak(taken.own, pairs, self._complexity)
         return apart
 
 

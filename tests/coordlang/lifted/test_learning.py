@@ -16,7 +16,7 @@ import pytest
 from coordlang.language.candidates import all_pairs
 from coordlang.language.partition import Partition
 from coordlang.lifted.features import Feature
-from coordlang.lifted.learning import Instance, Learned, SimplestHitting, learn
+from coordlang.lifted.learning import Instance, Learned, learn, simplest_hitting
 from coordlang.lifted.pool import pool_of
 from coordlang.verification.by_definition import verify
 from planners.joint.tables import Ints
@@ -34,9 +34,9 @@ def test_the_lightest_members_that_meet_all_sets() -> None:
             frozenset(choice.sample(members, choice.randint(1, len(weights))))
             for _ in range(choice.randint(0, 6))
         ]
-        hitting = SimplestHitting(weights)
+        tables = [np.array([k in one for k in members]) for one in sets]
         for known in range(len(sets) + 1):
-            found = hitting.find()
+            found = simplest_hitting(tables[:known], np.array(weights))
             least = min(
                 sum(weights[k] for k in some)
                 for size in range(len(weights) + 1)
@@ -45,8 +45,6 @@ def test_the_lightest_members_that_meet_all_sets() -> None:
             )
             assert all(one & set(found) for one in sets[:known])
             assert sum(weights[k] for k in found) == least
-            if known < len(sets):
-                hitting.add(np.array([k in sets[known] for k in members]))
 
 
 @pytest.mark.thorough
