@@ -107,9 +107,9 @@ def build(grid: Grid) -> Figures:
     """From PDDL text to a verified greedy language, in this process."""
     from coordlang.language.candidates import all_pairs, from_problems
     from coordlang.language.partition import Partition
-    from coordlang.required.divergences import differences
     from coordlang.verification.by_definition import verify_candidates
     from coordlang.vocabulary import Job, greedy
+    from coordlang.vocabulary.first_differences import differences
     from planners.parallel.workers import Workers
 
     clock, here = Clock(), Workers()

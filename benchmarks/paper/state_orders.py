@@ -9,7 +9,7 @@ from random import Random
 import numpy as np
 
 from coordlang.language.candidates import Candidates
-from coordlang.required.divergences import first_differences, states_on_plans
+from coordlang.vocabulary.first_differences import first_differences
 from coordlang.vocabulary.greedy import greedy_partition
 from coordlang.vocabulary.separations import separations
 from planners.joint.tables import Ints, find_rows
@@ -38,8 +38,8 @@ def greedy_partitions(
     tuple
         The name of the order, and the word number of every state of ``candidates.rows``.
     """
-    constraints = separations(first_differences(candidates.spaces).divergences)
-    states = states_on_plans(candidates.spaces).tolist()
+    differences = first_differences(candidates.spaces)
+    constraints, states = separations(differences.divergences), differences.states.tolist()
     found = dict(systematic_orders(candidates, states))
     for number in range(1, orders + 1):
         found[f"random {number}"] = random.sample(states, len(states))

@@ -20,12 +20,6 @@ from coordlang.language.candidates import Candidates, require_solvable
 from coordlang.language.partition import Partition, read_key
 from coordlang.language.provenance import Guarantee, Tolerance, provenance_of
 from coordlang.language.words import Language
-from coordlang.required.divergences import (
-    FirstDifferences,
-    differences,
-    states_on_plans,
-    without_divergences,
-)
 from coordlang.required.failure import NONE, Failures
 from coordlang.required.miscoordination import Inseparable, Miscoordination
 from coordlang.verification.by_definition import Verdict, verify_candidates
@@ -34,9 +28,13 @@ from coordlang.verification.check_certificate import check as check_certificate
 from coordlang.verification.make_certificate import certify
 from coordlang.vocabulary import METHODS, Job, Outcome
 from coordlang.vocabulary.few_words import FewWords, few_words
+from coordlang.vocabulary.first_differences import (
+    FirstDifferences,
+    differences,
+    first_differences,
+)
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.greedy import first_language
-from coordlang.vocabulary.hidden_slack import hidden_differences
 from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.minimal import refuting_clauses
 from coordlang.vocabulary.repair import repair
@@ -176,8 +174,7 @@ def job_for_few_words(making: Making, seed: int = 0) -> Job:
     try:
         job = making.job(options)
     except Inseparable:
-        job = making.job(options, without_divergences(spaces))
-        return replace(job, states=tuple(states_on_plans(spaces).tolist()))
+        return making.job(options, first_differences(spaces, defined=False))
     return replace(job, incumbent=first_language(job))
 
 
@@ -252,8 +249,7 @@ class Making:
         `Inseparable` if there is no language over states.
         """
         if found is None:
-            find = hidden_differences if self.candidates.model.hides_slack else differences
-            found = find(self.candidates, self.workers, self.progress)
+            found = differences(self.candidates, self.workers, self.progress)
         return Job(
             self.candidates,
             tuple(found.states.tolist()),

@@ -27,10 +27,10 @@ from coordlang.lifted.features import Feature
 from coordlang.lifted.language import Vector, vectors
 from coordlang.lifted.pool import Pool, pool_of
 from coordlang.lifted.world import States, World
-from coordlang.required.miscoordination import Inseparable, inseparable
+from coordlang.required.miscoordination import Inseparable
 from coordlang.sites.coordinates import Point
 from coordlang.symmetry.group import SymmetryGroup
-from coordlang.verification.by_definition import verify_candidates
+from coordlang.verification.by_definition import inseparable, verify_candidates
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from planners.joint.tables import Bools, Ints

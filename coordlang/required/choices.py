@@ -14,7 +14,7 @@ are worked out once for each different pair.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import product
 from math import prod
 
@@ -153,10 +153,6 @@ class LabelSets:
         return answers
 
 
-#: A robot's choices below some node: each first label with the set of what may follow it.
-Moves = dict[int, int]
-
-
 class Choices:
     """The sets ``C_i(p)`` of all nodes of a plan space, and which nodes require coordination.
 
@@ -234,14 +230,27 @@ class Choices:
         known = self._failing.get(key)
         if known is None:
             self.evaluations += 1
-            if not all(map(self.sets.within, chosen, self.of_node[:, node].tolist())):
-                known = True  # that sequence is in no optimal plan, the other sets are not empty
-            elif not self.requires[node]:
-                known = False
-            else:
-                known = self.moves_fail([self.sets.moves(number) for number in chosen], node)
-            self._failing[key] = known
+            known = self._failing[key] = self._some_fails(chosen, node)
         return known
+
+    def _some_fails(self, chosen: tuple[int, ...], node: int) -> bool:
+        if not all(map(self.sets.within, chosen, self.of_node[:, node].tolist())):
+            return True  # that sequence is in no optimal plan, the other sets are not empty
+        if not self.requires[node]:
+            return False
+        edges = self.edges_of(node)
+        if prod(len(self.sets.moves(number)) for number in chosen) > len(edges):
+            return True  # different edges have different labels, so some choice is none of them
+        return any(
+            labels not in edges or self.fails(after, edges[labels])
+            for labels, after in self.steps(chosen)
+        )
+
+    def steps(self, chosen: tuple[int, ...]) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
+        """All first labels of some sets of the robots, each with the sets of what follows them."""
+        moves = [self.sets.moves(number) for number in chosen]
+        for labels in product(*moves):
+            yield labels, tuple(own[label] for own, label in zip(moves, labels, strict=True))
 
     def fails_each(self, nodes: Ints) -> Bools:
         """Of nodes ``(x_1 .. x_n, y)`` whether some mixture of plans from the x_i fails from y.
@@ -271,19 +280,6 @@ class Choices:
         answers = [self.fails(tuple(row[:-1]), row[-1]) for row in table.tolist()]
         fails[left] = np.array(answers, np.bool_)[number]
         return fails
-
-    def moves_fail(self, moves: Sequence[Moves], node: int) -> bool:
-        """`fails` for sets given by their moves: each first label with the set of what follows."""
-        edges = self.edges_of(node)
-        if prod(map(len, moves)) > len(edges):
-            return True  # different edges have different labels, so some choice is none of them
-        for labels in product(*moves):
-            target = edges.get(labels)
-            if target is None or self.fails(
-                tuple(own[label] for own, label in zip(moves, labels, strict=True)), target
-            ):
-                return True
-        return False
 
     def edges_of(self, node: int) -> dict[tuple[int, ...], int]:
         """The targets of a node's edges, by labels."""

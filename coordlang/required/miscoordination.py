@@ -8,18 +8,14 @@ node have different labels, so no more mixed actions are looked at than it has e
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
-from typing import Any
 
 import numpy as np
 
 from coordlang.language.candidates import describe
 from coordlang.required.choices import Choices
 from planners.joint.model import PlanningTask
-from planners.joint.tables import Bools, unique_tuples
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import ProvedImpossible
@@ -27,11 +23,10 @@ from planners.system.limits import reaching
 
 #: The labels of all robots in one joint step.
 Labels = tuple[int, ...]
-#: A node of a walk: what the plans may still do, and where their mixture is.
-_Node = tuple[Any, int]
-#: How a walk came to a node: the way before, the mixed labels and what the plans may do after them;
-#: at the beginning the number of a node of the plan space.
-_Way = int | tuple["_Way", Labels, Any]
+#: A node of a walk: each robot's choices, and where their mixture is.
+_Node = tuple[tuple[int, ...], int]
+#: The mixed labels that lead to a node of the walk, the last ones first.
+_Way = tuple[Labels, "_Way"] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,81 +37,57 @@ class Trail:
     edges: tuple[tuple[int, ...], ...]
 
 
-def _first_break(
-    space: PlanSpace,
-    begin: Iterable[_Node],
-    steps: Callable[[Any], Iterable[tuple[Labels, Any]]],
-    can_fail: Callable[[Any, int], bool],
-) -> tuple[int, list[tuple[Labels, Any]]] | None:
-    """Where a walk begins that ends with a mixture that breaks, and its steps; None if none does.
-
-    Breadth first; it begins at some nodes.  ``steps`` are for what plans may do the mixed labels,
-    each with what they may do then; where no mixture ``can_fail`` it goes no further.
-    """
-    begins: dict[int, dict[_Node, _Way]] = defaultdict(dict)
-    for node in begin:
-        begins[int(space.layer[node[1]])][node] = node[1]
-    below: dict[_Node, _Way] = {}
-    layer = walked = 0
-
-    def so_far() -> str:
-        return f"{walked:,} nodes walked to the first break of a mixture, {layer} steps left"
-
-    with reaching(so_far, space.model.smaller("smaller tasks")):
-        for layer in range(len(space.layers) - 1, 0, -1):
-            here, below = {**below, **begins[layer]}, {}
-            walked += len(here)
-            for (ahead, y), way in here.items():
-                edges = space.out_edges(y)
-                targets = {space.labels_of(edge): space.target_of(edge) for edge in edges}
-                for mixed, after in steps(ahead):
-                    target = targets.get(mixed)
-                    if target is None:
-                        return _steps_of((way, mixed, after))
-                    if (after, target) not in below and can_fail(after, target):
-                        below[after, target] = way, mixed, after
-    return None
-
-
-def _steps_of(way: _Way) -> tuple[int, list[tuple[Labels, Any]]]:
-    found: list[tuple[Labels, Any]] = []
-    while not isinstance(way, int):
-        way, mixed, after = way
-        found.append((mixed, after))
-    return way, found[::-1]
-
-
 def earliest_witness(choices: Choices, start: int) -> Trail:
     """Plans from a node that requires coordination whose mixture breaks in the fewest steps.
 
     As many robots as is easily possible follow the same plan.
     """
-    space = choices.space
-
-    def steps(chosen: tuple[int, ...]) -> Iterator[tuple[Labels, tuple[int, ...]]]:
-        moves = [choices.sets.moves(number) for number in chosen]
-        for labels in product(*moves):
-            yield labels, tuple(own[label] for own, label in zip(moves, labels, strict=True))
-
-    begin = tuple(choices.of_node[:, start].tolist()), start
-    found = _first_break(space, [begin], steps, choices.fails)
-    assert found is not None, "the node requires coordination"
-    labels = [mixed for mixed, _ in found[1]]
-
-    def plan_of(robots: Sequence[int]) -> list[int] | None:
-        return space.path_of_robots(start, robots, [[step[r] for r in robots] for step in labels])
-
-    plans = _shared_plans(space.robots, plan_of)
-    return Trail(start, tuple(zip(*(plan[: len(labels)] for plan in plans), strict=True)))
+    steps: list[Labels] = []
+    way = _first_break(choices, start)
+    while way is not None:
+        mixed, way = way
+        steps.insert(0, mixed)
+    plans = _shared_plans(choices.space, start, steps)
+    return Trail(start, tuple(zip(*(plan[: len(steps)] for plan in plans), strict=True)))
 
 
-def _shared_plans(
-    robots: int, plan_of: Callable[[Sequence[int]], list[int] | None]
-) -> list[list[int]]:
-    """A plan for each robot, the same one for robots for which one is found together."""
+def _first_break(choices: Choices, start: int) -> _Way:
+    """The fewest steps of a mixture that breaks with the last one, breadth first."""
+    begin = tuple(choices.of_node[:, start].tolist())
+    here: dict[_Node, _Way] = {(begin, start): None}
+    walked = 0
+
+    def so_far() -> str:
+        return f"{walked:,} nodes walked to the first break of a mixture"
+
+    with reaching(so_far, choices.space.model.smaller("smaller tasks")):
+        while here:
+            below: dict[_Node, _Way] = {}
+            for (chosen, y), way in here.items():
+                walked += 1
+                targets = choices.edges_of(y)
+                for mixed, after in choices.steps(chosen):
+                    target = targets.get(mixed)
+                    if target is None:
+                        return mixed, way
+                    if (after, target) not in below and choices.fails(after, target):
+                        below[after, target] = mixed, way
+            here = below
+    raise AssertionError("the node requires coordination")
+
+
+def _shared_plans(space: PlanSpace, start: int, steps: Sequence[Labels]) -> list[list[int]]:
+    """A plan for each robot that begins with its part of some steps.
+
+    It is the same one for robots for which one is found together.
+    """
     groups: list[list[int]] = []
     plans: list[list[int]] = []
-    for robot in range(robots):
+
+    def plan_of(robots: Sequence[int]) -> list[int] | None:
+        return space.path_of_robots(start, robots, [[step[r] for r in robots] for step in steps])
+
+    for robot in range(space.robots):
         for number, group in enumerate(groups):
             if (together := plan_of([*group, robot])) is not None:
                 group.append(robot)
@@ -128,72 +99,7 @@ def _shared_plans(
             groups.append([robot])
             plans.append(alone)
     of_robot = {r: plan for group, plan in zip(groups, plans, strict=True) for r in group}
-    return [of_robot[robot] for robot in range(robots)]
-
-
-# ---- plans through the same states
-
-
-def witness_in_same_states(space: PlanSpace) -> Trail | None:
-    """Plans of some task that pass through the same states and yet introduce RC, or None.
-
-    Plans through the same states choose freely among the edges between two of them.  While all
-    mixtures of these are such edges, the mixture is where the plans are.  So the walk begins only
-    where some are not; O(nodes of a layer) for each node in the worst case.
-    """
-
-    def steps(x: int) -> Iterator[tuple[Labels, int]]:
-        joining: dict[int, list[Labels]] = {}
-        for edge in space.out_edges(x):
-            joining.setdefault(space.target_of(edge), []).append(space.labels_of(edge))
-        for target in sorted(joining):
-            own = (sorted(set(labels)) for labels in zip(*joining[target], strict=True))
-            yield from ((mixed, target) for mixed in product(*own))
-
-    leaking = np.flatnonzero(_leaks(space)).tolist()
-    begin = ((node, node) for node in leaking)
-    found = _first_break(space, begin, steps, lambda x, y: x != y)
-    if found is None:
-        return None
-    node, mixture = found
-
-    def plan_of(robots: Sequence[int]) -> list[int] | None:
-        path, at = [], node
-        for mixed, target in mixture:
-            own = (
-                edge
-                for edge in space.out_edges(at)
-                if space.target_of(edge) == target
-                and all(space.labels_of(edge)[r] == mixed[r] for r in robots)
-            )
-            if (edge := next(own, None)) is None:
-                return None
-            path.append(edge)
-            at = target
-        return path
-
-    plans = _shared_plans(space.robots, plan_of)
-    start, before = way_to(space, node)
-    shared = [(edge,) * space.robots for edge in before]
-    return Trail(start, (*shared, *zip(*plans, strict=True)))
-
-
-def _leaks(space: PlanSpace) -> Bools:
-    """(nodes) out of which some mixture of the edges of a bundle is none of them.
-
-    O(edges log edges).
-    """
-    ends = np.column_stack((space.sources, space.targets()))
-    pairs, bundle = unique_tuples(ends, [len(space)] * 2)
-    mixtures = np.ones(len(pairs))
-    for robot in range(space.robots):
-        own = space.robot_labels(robot)
-        bounds = [max(1, len(pairs)), int(own.max(initial=0)) + 1]
-        different, _ = unique_tuples(np.column_stack((bundle, own)), bounds)
-        mixtures *= np.bincount(different[:, 0], minlength=len(pairs))
-    found = np.zeros(len(space), np.bool_)
-    found[pairs[mixtures > np.bincount(bundle, minlength=len(pairs)), 0]] = True
-    return found
+    return [of_robot[robot] for robot in range(space.robots)]
 
 
 def way_to(space: PlanSpace, node: int) -> tuple[int, list[int]]:
@@ -280,17 +186,6 @@ def _short(task: str) -> str:
     return " -> ".join(
         part if len(part) <= _LONGEST else f"{part[: part.index(')') + 1]} .." for part in parts
     )
-
-
-def inseparable(space: PlanSpace) -> Miscoordination | None:
-    """Plans of some task that pass through the same states and yet introduce RC, or None."""
-    trail = witness_in_same_states(space)
-    return describe_failure(space, trail) if trail is not None else None
-
-
-def separable(space: PlanSpace) -> bool:
-    """Whether plans that introduce RC always pass through different states."""
-    return witness_in_same_states(space) is None
 
 
 def describe_failure(

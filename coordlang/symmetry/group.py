@@ -178,53 +178,41 @@ def _closure(generators: Sequence[Symmetry], largest: int) -> list[Symmetry] | N
 
 
 class _Check:
-    """The check for the model, the table of states and the tasks of ``candidates``."""
+    """The check for the model, the table of states and the tasks of ``candidates``.
+
+    A renaming that takes states to states is a symmetry iff all that the tasks are made of is the
+    same when it is renamed.
+    """
 
     def __init__(self, candidates: Candidates) -> None:
         self._model = candidates.model
         self._rows = candidates.rows
         # All pairs of states, the second to be reached from the first, go to such pairs.
         self._spaces = () if candidates.kind == "all" else candidates.spaces
-        same = _Image({}, self._model.codec.facts.atoms)
-        self._actions = {(a.schema, a.args): same.action(a) for a in self._model.actions}
-        self._tasks = self._tasks_under(same, np.arange(len(self._rows)))
+        self._itself = self._under({}, np.arange(len(self._rows)))
 
     def states_under(self, renaming: Renaming) -> Ints | None:
         """Where the renaming takes each state number; None if it is no symmetry."""
-        image = _Image(renaming, self._model.codec.facts.atoms)
-        if not self._keeps_robots(renaming) or not self._keeps_actions(image):
-            return None
         rows = _images(renaming, self._model.codec, self._rows)
         if rows is None or (states := find_rows(self._rows, rows)).min(initial=0) < 0:
             return None
-        return states if self._tasks_under(image, states) == self._tasks else None
+        return states if self._under(renaming, states) == self._itself else None
 
-    def _keeps_robots(self, renaming: Renaming) -> bool:
-        """Whether robots go to robots whose idling costs as much; joint actions name them."""
-        robots = self._model.robots
-        if self._model.is_joint_action:
-            return all(renaming.get(robot, robot) == robot for robot in robots)
-        idle = dict(zip(robots, self._model.idling_costs, strict=True))
-        return {renaming.get(robot, robot): idle[robot] for robot in robots} == idle
+    def _under(self, renaming: Renaming, states: Ints) -> tuple[Hashable, ...]:
+        """Robots, ground actions and tasks, as renamed.
 
-    def _keeps_actions(self, image: _Image) -> bool:
-        """Whether every ground action goes to one that does the same under the renaming."""
-        robots = self._model.robots
-        owner = [robots.index(image.name(robot)) for robot in robots]
-        return all(
-            self._actions.get((action.schema, image.names(action.args)))
-            == image.action(action, owner)
-            for action in self._model.actions
-        )
-
-    def _tasks_under(self, image: _Image, states: Ints) -> set[tuple[int, Hashable]]:
-        """Where the tasks go, as pairs of a state number and a goal."""
-        found: set[tuple[int, Hashable]] = set()
+        Robots come with what idling costs them; joint actions name their robots.
+        """
+        model, image = self._model, _Image(renaming, self._model.codec.facts.atoms)
+        robots = list(map(image.name, model.robots))
+        kinds = model.robots if model.is_joint_action else model.idling_costs
+        actions = (image.action(action, robots) for action in model.actions)
+        tasks: set[tuple[int, Hashable]] = set()
         for space in self._spaces:
-            goals = [image.form(goal) for goal in space.goals]
+            goals = list(map(image.form, space.goals))
             for node in space.starts.tolist():
-                found.add((int(states[space.state[node]]), goals[space.goal[node]]))
-        return found
+                tasks.add((int(states[space.state[node]]), goals[space.goal[node]]))
+        return frozenset(zip(robots, kinds, strict=True)), frozenset(actions), frozenset(tasks)
 
 
 class _Image:
@@ -258,12 +246,14 @@ class _Image:
 
         return fold(formula, leaf, compound)
 
-    def action(self, action: GroundAction, owner: Sequence[int] | None = None) -> Hashable:
-        """What an action does; ``owner``: where the robots go."""
+    def action(self, action: GroundAction, robots: Sequence[str]) -> Hashable:
+        """What an action is and does; ``robots`` are those of the model, renamed."""
         form = self.form
         return (
+            action.schema,
+            self.names(action.args),
             action.cost,
-            frozenset(action.owners if owner is None else (owner[own] for own in action.owners)),
+            frozenset(robots[own] for own in action.owners),
             form(action.precondition),
             frozenset((self.atom(e.atom), e.adds, form(e.condition)) for e in action.effects),
             frozenset(map(form, action.links)),

@@ -20,7 +20,7 @@ import numpy as np
 from coordlang.language.candidates import Candidates
 from coordlang.language.partition import Partition
 from coordlang.language.sentences import sentence
-from coordlang.required.miscoordination import Miscoordination, describe_failure
+from coordlang.required.miscoordination import Miscoordination, Trail, describe_failure
 from coordlang.verification.sets import SetWalk
 from planners.joint.tables import Ints, unique_tuples
 from planners.parallel.batch import Batch, Table, digest
@@ -57,24 +57,52 @@ def verify(partition: Partition, spaces: Sequence[PlanSpace]) -> Verdict:
 
     for space in spaces:
         tasks += len(space.starts)
-        nodes += int((space.layer > 0).sum())
         with reaching(so_far, space.model.smaller("smaller or fewer tasks")):
-            word = partition.word_of(space.rows)  # of each state, in every part of the space
-            parting = parting_nodes(space, word[space.state])
-            if not len(parting):
-                continue
-            part = space.with_tasks(parting, np.zeros(len(parting), np.int64))
-        goal, walked = SetWalk(part, word[part.state]).run()
+            word = partition.word_of(space.rows)
+            goal, walked = refuting_goal(space, word)
         nodes += walked
         if goal is not None:
-            mine = space.goal[space.starts] == goal
-            part = space.with_tasks(space.starts[mine], space.second[mine])
-            trail, walked = SetWalk(part, word[part.state]).violation()
+            part, trail, walked = _violation(space, word, goal)
             first_plan = part.nodes_on(trail.start, [step[0] for step in trail.edges])
-            said = sentence(int(word[part.state[node]]) for node in first_plan)
+            said = sentence(word[part.state[first_plan]].tolist())
             words = tuple(partition.words[number] for number in said)
             return Verdict(False, tasks, nodes + walked, describe_failure(part, trail, words))
     return Verdict(True, tasks, nodes, None)
+
+
+def refuting_goal(space: PlanSpace, word: Ints) -> tuple[int | None, int]:
+    """The number of a goal with plans that have one sentence and introduce RC; None if none has.
+
+    ``word`` (states) are the words.  Second the nodes that were checked, as in `Verdict`.
+    """
+    nodes = int((space.layer > 0).sum())
+    parting = parting_nodes(space, word[space.state])
+    if not len(parting):
+        return None, nodes
+    part = space.with_tasks(parting, np.zeros(len(parting), np.int64))
+    goal, walked = SetWalk(part, word[part.state]).run()
+    return goal, nodes + walked
+
+
+def _violation(space: PlanSpace, word: Ints, goal: int) -> tuple[PlanSpace, Trail, int]:
+    """The tasks with a goal that has a violation, one of them, and the nodes walked to find it."""
+    mine = space.goal[space.starts] == goal
+    part = space.with_tasks(space.starts[mine], space.second[mine])
+    return part, *SetWalk(part, word[part.state]).violation()
+
+
+def inseparable(space: PlanSpace) -> Miscoordination | None:
+    """Plans of some task that pass through the same states and yet introduce RC, or None.
+
+    States that robots wait in are taken once.  No language over states tells such plans apart:
+    they have one sentence under the words that are one for each state.
+    """
+    apart = np.arange(len(space.rows))
+    goal, _ = refuting_goal(space, apart)
+    if goal is None:
+        return None
+    part, trail, _ = _violation(space, apart, goal)
+    return describe_failure(part, trail)
 
 
 def parting_nodes(space: PlanSpace, word: Ints) -> Ints:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from coordlang.language.candidates import Candidates
 from coordlang.language.warping import Clause
-from coordlang.required.divergences import FirstDifferences
 from coordlang.symmetry.group import Symmetry
 from coordlang.vocabulary.counterexamples import Counterexample
+from coordlang.vocabulary.first_differences import FirstDifferences
 from planners.parallel.workers import Workers
 from planners.search.plan_space import PlanSpace
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from coordlang.language.warping import Pair, pair
 from coordlang.required.composition_walk import Difference
-from coordlang.required.divergences import Divergences
+from planners.joint.tables import Ints
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,14 +26,13 @@ class Separation:
 Constraint = tuple[Separation, ...]
 
 
-def separations(divergences: Divergences) -> list[Constraint]:
-    """For each divergence its alternatives (Theorem 3, alpha part).
+def separations(divergences: Ints) -> list[Constraint]:
+    """For each divergence, a row of `FirstDifferences`, its alternatives (Theorem 3, alpha part).
 
     With two robots there is one: all three pairs of ``alpha*``.  With n robots any two of the
     different next states will do, together with the last shared state.
     """
-    rows = zip(divergences.last.tolist(), divergences.following.tolist(), strict=True)
-    return [alternatives(last, [s for s in row if s >= 0]) for last, row in rows]
+    return [alternatives(last, [s for s in row if s >= 0]) for last, *row in divergences.tolist()]
 
 
 def alternatives(shared: int, others: Iterable[int]) -> Constraint:

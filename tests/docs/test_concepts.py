@@ -6,7 +6,7 @@ from __future__ import annotations
 import pkgutil
 import re
 
-from coordlang.required.miscoordination import inseparable
+from coordlang.verification.by_definition import inseparable
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans

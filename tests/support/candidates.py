@@ -11,7 +11,7 @@ from random import Random
 
 from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
 from coordlang.language.listed import ListedTask
-from coordlang.required.miscoordination import inseparable
+from coordlang.verification.by_definition import inseparable
 from planners.joint.states import split_atoms
 from planners.pddl.model_options import ModelOptions
 from planners.search.plan_space import PlanSpace

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
-from coordlang.required.miscoordination import inseparable
+from coordlang.verification.by_definition import inseparable
 from planners.joint.model import JointModel, PlanningTask
 from planners.loading import PlanningInstance, build
 from planners.pddl.lifted import Domain, Problem

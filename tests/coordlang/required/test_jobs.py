@@ -14,10 +14,10 @@ import pytest
 import coordlang
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.language.partition import Partition
-from coordlang.required.divergences import FirstDifferences, differences
 from coordlang.required.miscoordination import Inseparable
 from coordlang.required.task_answers import answers
 from coordlang.verification.by_definition import verify, verify_candidates
+from coordlang.vocabulary.first_differences import FirstDifferences, differences
 from planners.loading import load
 from planners.parallel.batch import Store
 from planners.parallel.workers import Workers
@@ -67,8 +67,7 @@ def test_jobs_give_what_the_whole_gives(robots: int, number: int) -> None:
             continue
         assert (whole.states == parts.states).all()
         a, b = whole, parts
-        assert a.divergences.last.tolist() == b.divergences.last.tolist()
-        assert a.divergences.following.tolist() == b.divergences.following.tolist()
+        assert a.divergences.tolist() == b.divergences.tolist()
         assert (a.requiring, a.nodes, a.edges) == (b.requiring, b.nodes, b.edges)
         partition = Partition.of_states(candidates.rows, words(whole, seed))
         verdict = verify(partition, candidates.spaces)

@@ -10,13 +10,14 @@ import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
-from coordlang.required import divergences
-from coordlang.required.divergences import (
+from coordlang.required.miscoordination import Inseparable
+from coordlang.verification.by_definition import inseparable
+from coordlang.vocabulary import first_differences
+from coordlang.vocabulary.first_differences import (
     FirstDifferences,
     differences,
     symmetric_goals,
 )
-from coordlang.required.miscoordination import Inseparable, separable
 from planners.parallel.workers import Workers
 from planners.pddl import parse_problem, read_domain, read_problem
 from planners.pddl.model_options import ModelOptions
@@ -38,8 +39,7 @@ def agree(candidates: Candidates, portion: float = PORTION) -> bool:
         return False
     assert found.states.tolist() == every.states.tolist()
     one, other = found, every
-    assert one.divergences.last.tolist() == other.divergences.last.tolist()
-    assert one.divergences.following.tolist() == other.divergences.following.tolist()
+    assert one.divergences.tolist() == other.divergences.tolist()
     assert (one.requiring, one.nodes, one.edges) == (other.requiring, other.nodes, other.edges)
     return bool(one.requiring)
 
@@ -48,7 +48,9 @@ def answer(candidates: Candidates, portion: float, by_symmetry: bool) -> FirstDi
     """First differences with or without symmetries; None if some plans are inseparable."""
     with pytest.MonkeyPatch.context() as patch:
         for_action = 0 if by_symmetry else 10**9
-        patch.setattr(divergences, "symmetric_goals", lambda c: symmetric_goals(c, 0, for_action))
+        patch.setattr(
+            first_differences, "symmetric_goals", lambda c: symmetric_goals(c, 0, for_action)
+        )
         try:
             return differences(candidates, Workers(), portion=portion)
         except Inseparable:
@@ -106,14 +108,14 @@ def test_a_language_is_the_same_and_inseparable_plans_are_shown(
     grid = all_tasks("grid", "gw4-3x3")
     without = build_language(grid, "greedy")
     monkeypatch.setattr(
-        "coordlang.required.divergences.symmetric_goals", lambda c: symmetric_goals(c, 0, 0)
+        "coordlang.vocabulary.first_differences.symmetric_goals", lambda c: symmetric_goals(c, 0, 0)
     )
     assert build_language(grid, "greedy").language.states == without.language.states
     shown = 0
     for seed in range(30):
         domain, problem, options = random_model(seed, 2)
         candidates = all_pairs(domain, [problem], options)
-        if not candidates.count or all(map(separable, candidates.spaces)):
+        if not candidates.count or not any(map(inseparable, candidates.spaces)):
             continue
         with pytest.raises(Inseparable):
             build_language(candidates, "greedy")

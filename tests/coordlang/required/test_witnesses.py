@@ -14,10 +14,9 @@ from coordlang.required.choices import Choices
 from coordlang.required.miscoordination import (
     Miscoordination,
     Step,
-    inseparable,
     miscoordination,
-    witness_in_same_states,
 )
+from coordlang.verification.by_definition import inseparable
 from planners.check.validate import Verdict, validate
 from planners.joint.model import JointModel
 from planners.search.plan_space import PlanSpace
@@ -77,7 +76,7 @@ def test_breaks_equal_the_walk(robots: int | None, seeds: range) -> None:
         steps, starts = steps_of(space), space.starts.tolist()
         together = first_break(steps, space.robots, starts, together=True)
         shown = inseparable(space)
-        assert (shown is None) == (together is None) == (witness_in_same_states(space) is None)
+        assert (shown is None) == (together is None)
         answers["inseparable", shown is not None] += 1
         if shown is not None:
             breaks(candidates, space, shown)

@@ -14,9 +14,10 @@ import pytest
 from coordlang.language.candidates import Candidates, from_problems
 from coordlang.language.partition import Partition
 from coordlang.required.choices import Choices
-from coordlang.required.divergences import DivergenceSearch, first_differences
-from coordlang.required.miscoordination import Miscoordination, inseparable, miscoordination
-from coordlang.verification.by_definition import parting_nodes, verify
+from coordlang.required.divergences import divergences, minimal
+from coordlang.required.miscoordination import Miscoordination, miscoordination
+from coordlang.verification.by_definition import inseparable, parting_nodes, verify
+from coordlang.vocabulary.first_differences import first_differences
 from planners.pddl.model_options import ModelOptions
 from tests.support import naive
 from tests.support.candidates import listed, small_candidates
@@ -66,16 +67,11 @@ def test_where_plans_that_require_coordination_part(robots: int, most: int, numb
         if not same_states:
             found = first_differences(candidates.spaces)
             assert found.requiring == sum(requires)
-            last, after = (found.divergences.last.tolist(), found.divergences.following.tolist())
-            table = {
-                (p, frozenset(s for s in q if s >= 0)) for p, q in zip(last, after, strict=True)
-            }
+            rows = found.divergences.tolist()
+            table = {(p, frozenset(s for s in q if s >= 0)) for p, *q in rows}
             assert table == naive.minimal(alphas)
-            search = DivergenceSearch(robots, chunk=7)
-            for space in candidates.spaces:
-                search.add(Choices(space))
-            rows = [(p, *q) for p, q in zip(last, after, strict=True)]
-            assert [*map(tuple, search.table().tolist())] == rows
+            parts = [divergences(Choices(space), chunk=7) for space in candidates.spaces]
+            assert minimal(np.concatenate(parts)).tolist() == rows
     assert min(seen["required"], seen["not required"]) >= number // 10, seen
     assert seen["inseparable"] >= number // 40
 

@@ -16,11 +16,11 @@ from coordlang.commands.building import Making, build_language, job_for_few_word
 from coordlang.language.candidates import Candidates
 from coordlang.language.flexibility import flexibility
 from coordlang.required.choices import Choices
-from coordlang.required.divergences import states_on_plans
 from coordlang.required.failure import failure_probability
 from coordlang.required.plan_table import plan_table
 from coordlang.vocabulary import few_words as module
 from coordlang.vocabulary.few_words import canonical, few_words, partitions
+from coordlang.vocabulary.first_differences import first_differences
 from planners.system.errors import OutOfTime
 from tests.support import naive
 from tests.support.candidates import on_graph
@@ -57,7 +57,7 @@ def by_hand(candidates: Candidates, words: int) -> tuple[dict[str, Fraction], in
     """By the definition, over all partitions: the least mean, and the least worst task; how many."""
     every = [(space, task) for space in candidates.spaces for task in range(len(space.starts))]
     tasks = [own for own in every if naive.failure(*own, None, 100)]
-    states = states_on_plans(candidates.spaces).tolist()
+    states = first_differences(candidates.spaces, defined=False).states.tolist()
     least, tried = {"mean": Fraction(1), "worst": Fraction(1)}, 0
     for chosen in product(range(words), repeat=len(states)):
         if canonical(chosen) == chosen:
@@ -78,7 +78,7 @@ def test_two_words_are_the_best_of_all_partitions(folder: str, stem: str, mean: 
     """Design figures: 3.79 % on the open 2x2 grid, 0.76 % on the T-shaped map."""
     candidates = all_tasks(folder, stem)
     least, tried = by_hand(candidates, 2)
-    states = states_on_plans(candidates.spaces).tolist()
+    states = first_differences(candidates.spaces, defined=False).states.tolist()
     assert least["mean"] == mean
     assert tried == partitions(len(states), 2, 10_000) == 2_048
     for worst in (False, True):

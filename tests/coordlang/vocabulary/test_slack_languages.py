@@ -8,15 +8,16 @@ from collections.abc import Iterator
 from dataclasses import replace
 from random import Random
 
+import numpy as np
 import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.language.partition import Partition
-from coordlang.required.divergences import first_differences, states_on_plans
 from coordlang.required.miscoordination import Inseparable
 from coordlang.verification.by_definition import verify
 from coordlang.verification.check_certificate import check
+from coordlang.vocabulary.first_differences import first_differences
 from planners.pddl.model_options import ModelOptions
 from planners.search.plans import counts
 from planners.system.errors import BadInput, ProvedImpossible, Refuted, UsageError
@@ -57,7 +58,7 @@ def test_verdicts_and_least_numbers_are_those_of_the_definition(robots: int, see
     seen: Counter[str] = Counter()
     for found in small_tasks(seeds, robots):
         (space,) = found.spaces
-        states = states_on_plans([space]).tolist()
+        states = np.unique(space.state).tolist()
         random = Random(len(space))
         apart = {state: number for number, state in enumerate(states)}
         drawn = [{state: random.randrange(words) for state in states} for words in (1, 2, 3)]
@@ -110,7 +111,7 @@ def test_methods_that_part_plans_where_states_first_differ_are_refused() -> None
             build_language(found, method)
         assert error.value.exit_code == 2
     alphas = first_differences(found.spaces).divergences
-    waiting = (alphas.following == alphas.last[:, None]).any(axis=1)
+    waiting = (alphas[:, 1:] == alphas[:, :1]).any(axis=1)
     assert waiting.any()  # no partition gives p, s1 and p three words, but there are languages
 
 

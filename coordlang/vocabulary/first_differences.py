@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""First differences: where plans that introduce RC part, over all candidate tasks.
+
+The sets ``alpha*`` of the paper's Theorem 3: Proposition 3 of docs/concepts.md.  Goals are cut into
+portions, each a job; of goals that are images of each other under a symmetry one is looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+
+import numpy as np
+
+from coordlang.language.candidates import Candidates
+from coordlang.required.choices import Choices
+from coordlang.required.divergences import divergences, minimal
+from coordlang.required.miscoordination import Inseparable
+from coordlang.symmetry.group import checked_generators
+from coordlang.verification.by_definition import inseparable, refuting_goal
+from planners.joint.tables import Ints, find_rows, unique_rows
+from planners.parallel.batch import Batch, Table, digest
+from planners.parallel.workers import Workers
+from planners.search.graphs import parts_of_graph
+from planners.search.plan_space import PlanSpace
+from planners.search.portions import PORTION, Explored, Source, cut
+from planners.system.limits import reaching
+
+
+@dataclass(frozen=True, slots=True)
+class FirstDifferences:
+    """The first differences of all candidate tasks (the paper's ``alpha*``, each once).
+
+    ``divergences`` (k, 1 + robots) are the last shared state and the different next states, sorted,
+    filled up with -1; states are numbers in the plan spaces' table.  With two robots a row is
+    ``alpha* = {last, s1, s2}``.  ``states`` are the numbers of the states on the tasks' plans,
+    sorted.  ``requiring`` counts the tasks that require coordination.  ``nodes`` and ``edges`` are
+    those of the plan spaces; ``sets`` counts the different sets of a robot's label sequences and
+    ``evaluations`` the mixtures of such sets that were looked at: the work.
+    """
+
+    divergences: Ints
+    states: Ints
+    requiring: int
+    nodes: int
+    edges: int
+    sets: int
+    evaluations: int
+
+
+def first_differences(spaces: Iterable[PlanSpace], *, defined: bool = True) -> FirstDifferences:
+    """Find them in plan spaces over one table of states.
+
+    Unless they are ``defined``, as they are where no plans are inseparable, there are no
+    divergences, and all the rest.
+    """
+    return _together([_found(space, defined=defined) for space in spaces])
+
+
+def differences(
+    candidates: Candidates,
+    workers: Workers,
+    progress: Callable[[str], None] = lambda _: None,
+    portion: float = PORTION,
+) -> FirstDifferences:
+    """Find them for candidate tasks, in jobs of about ``portion`` effort.
+
+    Of plans within a slack that states do not say there are none to speak of: a plan may part from
+    another one by waiting in the state that they share.
+
+    Raises `Inseparable` with the plans of the first portion that has some.
+    """
+    model, source, spoken_for = candidates.model, candidates.source, None
+    goals = symmetric_goals(candidates)
+    if goals is not None and isinstance(source, Explored):
+        progress(f"looking at {len(goals.chosen):,} of {len(source.goals):,} goals, by symmetry")
+        source, spoken_for = source.only(goals.chosen), goals.spoken_for[goals.chosen]
+    portions = cut(source.efforts, portion)
+    efforts = [float(source.efforts[own.start : own.stop].sum()) for own in portions]
+    identity = digest(source.identity, spoken_for, model.hides_slack)
+    shared = source, spoken_for, not model.hides_slack
+    batch = Batch("first differences", _of_goals, shared, portions, identity, efforts)
+    found: list[Table] = []
+
+    def so_far() -> str:
+        return f"{len(found):,} of {len(portions):,} portions of the goals"
+
+    with reaching(so_far, "fewer candidate tasks"), closing(workers.tables(batch)) as tables:
+        for table in tables:
+            if not table:
+                witness = inseparable(source.portion(portions[len(found)]))
+                assert witness is not None
+                raise Inseparable(witness, hides_slack=model.hides_slack)
+            found.append(table)
+            progress(f"looking where coordination is required: {so_far()}")
+    return _together(found, goals)
+
+
+def _of_goals(shared: tuple[Source, Ints | None, bool], goals: range) -> Table:
+    """One job: what the tasks of some goals say; nothing if some plans are inseparable."""
+    source, spoken_for, defined = shared
+    space = source.portion(goals)
+    if refuting_goal(space, np.arange(len(space.rows)))[0] is not None:
+        return {}
+    times = None if spoken_for is None else spoken_for[goals.start : goals.stop]
+    return _found(space, times, defined=defined)
+
+
+def _found(space: PlanSpace, times: Ints | None = None, *, defined: bool) -> Table:
+    """What one plan space says; ``times`` (goals): for how many goals each counts, None: itself."""
+    choices = Choices(space)
+    counts = np.ones(len(space), np.int64) if times is None else times[space.goal]
+    none = np.zeros((0, 1 + space.robots), np.int64)
+    return {
+        "divergences": divergences(choices) if defined else none,
+        "states": np.unique(space.state),
+        "figures": np.array(
+            [
+                counts[space.starts][choices.requires[space.starts]].sum(),
+                counts.sum(),
+                (counts * space.out_degrees).sum(),
+                len(choices.sets),
+                choices.evaluations,
+            ]
+        ),
+    }
+
+
+def _together(found: Sequence[Table], goals: SymmetricGoals | None = None) -> FirstDifferences:
+    """What jobs found as one: sets and mixtures are counted anew in each.
+
+    Where the ``goals`` are some that speak for all, the other figures are those of all already.
+    """
+    rows = minimal(np.concatenate([table["divergences"] for table in found]))
+    states = np.unique(np.concatenate([table["states"] for table in found]))
+    if goals is not None:
+        rows, states = minimal(goals.images_of_rows(rows)), goals.images_of_states(states)
+    figures = np.stack([table["figures"] for table in found]).sum(axis=0)
+    return FirstDifferences(rows, states, *figures.tolist())
+
+
+# ---- goals up to symmetry
+
+#: Pairs of a goal and a state, times robots, from which on symmetries are looked for: below, what
+#: they save takes no longer than to find them.
+LEAST_WORK = 50_000
+#: So many pairs for each ground action and fact, which symmetries are checked on.
+PAIRS_FOR_ACTION = 10
+
+
+@dataclass(frozen=True, slots=True)
+class SymmetricGoals:
+    """The goals "every state", of which some speak for all (Proposition 15 of docs/concepts.md).
+
+    ``generators`` (states) say where each state number goes, for a group of symmetries;
+    ``representative`` (states) is for each goal, by the number of its state, the least goal that a
+    symmetry takes to it.
+    """
+
+    generators: tuple[Ints, ...]
+    representative: Ints
+
+    @classmethod
+    def of(cls, generators: Sequence[Ints], states: int) -> SymmetricGoals:
+        """Find the orbits of the group that permutations of state numbers generate."""
+        here = np.tile(np.arange(states), len(generators))
+        count, orbit = parts_of_graph(states, here, np.concatenate(generators))
+        least = np.full(count, states)
+        np.minimum.at(least, orbit, np.arange(states))
+        return cls(tuple(generators), least[orbit])
+
+    @property
+    def chosen(self) -> Ints:
+        """The goals that speak for all, sorted."""
+        return np.unique(self.representative)
+
+    @property
+    def spoken_for(self) -> Ints:
+        """(goals) for how many goals each speaks: 0 for those that are not chosen."""
+        return np.bincount(self.representative, minlength=len(self.representative))
+
+    def images_of_states(self, states: Ints) -> Ints:
+        """The images of states under all symmetries of the group, sorted."""
+        return np.flatnonzero(np.isin(self.representative, self.representative[states]))
+
+    def images_of_rows(self, rows: Ints) -> Ints:
+        """The images of rows (state, other states sorted, -1 to fill up), sorted, each once."""
+        known, _ = unique_rows(rows.astype(np.uint64))
+        new = known
+        while len(new):
+            images = [_image(new.astype(np.int64), to) for to in self.generators]
+            images_once, _ = unique_rows(np.concatenate(images).astype(np.uint64))
+            new = images_once[find_rows(known, images_once) < 0]
+            known, _ = unique_rows(np.concatenate((known, new)))
+        return known.astype(np.int64)
+
+
+def _image(rows: Ints, to: Ints) -> Ints:
+    most = len(to)
+    image = np.append(to, most)[rows]  # -1 is the last entry: beyond all states
+    image[:, 1:].sort(axis=1)
+    return np.where(image == most, -1, image)
+
+
+def symmetric_goals(
+    candidates: Candidates, least: int = LEAST_WORK, for_action: int = PAIRS_FOR_ACTION
+) -> SymmetricGoals | None:
+    """The goals of all pairs of states up to symmetry; None where one speaks for itself only.
+
+    None, too, where it is not worth the while: for tasks of other kinds, under
+    ``--remember-actions`` and slack, for less work than ``least``, and for fewer than
+    ``for_action`` pairs of states for each ground action and fact.
+    """
+    model = candidates.model
+    states = len(candidates.rows)
+    if candidates.kind != "all" or model.remembers or model.slack:
+        return None
+    if states**2 * len(model.robots) < least:
+        return None
+    if states**2 < for_action * (len(model.actions) + len(model.codec.facts)):
+        return None
+    found, _ = checked_generators(candidates, with_tasks=False)
+    generators = [s.states for s in found if (s.states != np.arange(states)).any()]
+    return SymmetricGoals.of(generators, states) if generators else None
