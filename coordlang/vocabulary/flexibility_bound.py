@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coordlang.language.flexibility import MANY, Floats
-from coordlang.required.choices import Choices
+from coordlang.required.divergences import required_nodes
 from planners.joint.states import bits
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, counts
@@ -37,7 +37,7 @@ def largest_boxes(spaces: Sequence[PlanSpace]) -> Iterator[tuple[int, list[int] 
     size where there are too many boxes.
     """
     for space in spaces:
-        counted, required = counts(space), Choices(space).requires
+        counted, required = counts(space), required_nodes(space)
         for start in space.starts.tolist():
             plans = Plans(space, start, counted)
             is_unbounded = not required[start] or plans.count > _PLANS

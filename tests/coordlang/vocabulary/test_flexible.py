@@ -16,7 +16,7 @@ from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates, from_listed
 from coordlang.language.flexibility import flexibility
 from coordlang.language.listed import read_task_file
-from coordlang.required.choices import Choices
+from coordlang.required.divergences import required_nodes
 from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Assignment, Outcome
@@ -169,7 +169,7 @@ def test_bounds_are_the_largest_sets_that_mix(robots: int) -> None:
         candidates = on_graph(seed, robots)
         if candidates is None:
             continue
-        requires = [Choices(space).requires for space in candidates.spaces]
+        requires = [required_nodes(space) for space in candidates.spaces]
         bounds = flexibility_bounds(candidates.spaces)
         for bound, (space, task, plans, _) in zip(bounds, listed(candidates), strict=True):
             if len(plans) > 8:
