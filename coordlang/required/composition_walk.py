@@ -12,7 +12,7 @@ Propositions 2 and 14 of docs/concepts.md say why this decides what it decides.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise
 
@@ -33,8 +33,6 @@ _ALWAYS_THERE = 1 << 20
 _PIECE = 1_000_000
 #: Walk edges out of one layer; more are hours of work.
 _MOST = 1e10
-#: Mixtures that failed have no state: this in place of ``y``.
-FAILED = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,12 +40,17 @@ class Moves:
     """Edges of a walk out of a table of nodes.
 
     ``source`` (k) numbers in the table, ``edges`` (k, robots) the plan-space edge that each plan
-    takes, ``mixed`` (k) the plan-space node that the mixture reaches, `FAILED` where it breaks.
+    takes, ``mixed`` (k) the plan-space node that the mixture reaches; where it breaks the number of
+    nodes of the plan space, from which no edges lead.
     """
 
     source: Ints
     edges: Ints
     mixed: Ints
+
+    def targets(self, space: PlanSpace) -> Ints:
+        """The walk nodes that they lead to."""
+        return np.column_stack((space.targets(self.edges), self.mixed))
 
 
 def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints, most: float = _MOST) -> Iterator[Moves]:
@@ -68,7 +71,7 @@ def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints, most: float = _MOST) 
             source, prefix = source[which], prefix[which]
             edges = [*(old[which] for old in edges), edge]
             prefix = index.follow(robot, prefix, space.robot_labels(robot, edge))
-        mixed = np.full(len(prefix), FAILED)
+        mixed = np.full(len(source), len(space))
         mixed[prefix >= 0] = space.targets(prefix[prefix >= 0])
         yield Moves(source, np.stack(edges, axis=1), mixed)
 
@@ -79,16 +82,36 @@ def move_counts(space: PlanSpace, plans: Ints) -> NDArray[np.float64]:
     return counts
 
 
-def can_fail(choices: Choices, targets: Ints, mixed: Ints) -> Bools:
-    """Whether mixtures can fail that have come to ``targets`` (k, robots) and ``mixed`` (k).
+def can_fail(choices: Choices, nodes: Ints) -> Bools:
+    """Whether mixtures can fail from walk nodes; one that is broken has failed.
 
-    A failed mixture has; what cannot need not be walked further, whatever the words are.
+    What cannot need not be walked further, whatever the words are.
     """
-    open_rows = np.flatnonzero(mixed != FAILED)
-    possible = np.ones(len(mixed), np.bool_)
-    nodes = np.column_stack((targets[open_rows], mixed[open_rows]))
-    possible[open_rows] = choices.fails_each(nodes)
+    possible: Bools = nodes[:, -1] == len(choices.space)
+    open_rows = np.flatnonzero(~possible)
+    possible[open_rows] = choices.fails_each(nodes[open_rows])
     return possible
+
+
+def layered(
+    space: PlanSpace, begin: Ints, width: int, expand: Callable[[Ints], Ints]
+) -> Iterator[tuple[Ints, Ints]]:
+    """The nodes of a walk by steps to go, most first: tables with ``width`` columns.
+
+    With each table come the rows to which the links out of the table before lead.  The walk begins
+    where all plans and their mixture are at one of the nodes ``begin``; further columns are 0
+    there.  ``expand`` gives for a table of nodes where each link out of them leads.
+    """
+    arriving = np.zeros((0, width), np.int64)
+    for number in reversed(range(len(space.layers))):
+        here = begin[space.layer[begin] == number]
+        fresh = np.zeros((len(here), width), np.int64)
+        fresh[:, : space.robots + 1] = here[:, None]
+        both = np.concatenate((fresh, arriving))
+        table, place = unique_tuples(both, [int(c.max(initial=0)) + 1 for c in both.T])
+        yield table, place[len(here) :]
+        if number:
+            arriving = expand(table)
 
 
 def _check_size(sizes: NDArray[np.float64], space: PlanSpace, most: float) -> None:
@@ -119,15 +142,15 @@ Difference = tuple[int, ...]
 _LINKS = 1_000_000
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class _Layer:
     """Walk nodes ``(x_1 .. x_n, y)`` with as many joint steps to go.
 
     With what links them to the layer below.
 
-    ``x`` (k, robots) are plan-space nodes, ``meets``, ``parts`` (links) say whether a link leads
-    from different nodes to one, or from one node shared by all plans and their mixture to different
-    ones.  ``tail`` (k): can the plans stay together from here and still fail?
+    ``x`` (k, robots) are plan-space nodes, ``parts``, ``meets`` (links) say whether a link leads
+    from one node shared by all plans and their mixture to different ones, or from different nodes
+    to one from which the plans can stay together and still fail.
     """
 
     x: Ints
@@ -135,7 +158,6 @@ class _Layer:
     child: Ints
     parts: Bools
     meets: Bools
-    tail: Bools
 
 
 class DifferenceWalk:
@@ -193,7 +215,7 @@ class DifferenceWalk:
             yield from self._with_endings(
                 first[rows, 0], after[rows], endings, ending[layer.child[rows]]
             )
-            last = np.flatnonzero(layer.meets & below.tail[layer.child])
+            last = np.flatnonzero(layer.meets)
             last = last[~_separated(word, after[last, 0], first[last])]
             endings.append(np.column_stack((after[last, 0], first[last])))
             on = np.flatnonzero(ending[layer.child] >= 0)
@@ -230,9 +252,8 @@ class DifferenceWalk:
         ]
         for below, layer in pairwise(self._layers):
             here, after = state[layer.x[layer.source]], state[below.x[layer.child]]
-            meets = layer.meets & below.tail[layer.child]
             ends = [0] * len(layer.x)
-            columns = (layer.source, layer.child, layer.parts, meets)
+            columns = (layer.source, layer.child, layer.parts, layer.meets)
             links = zip(*(column.tolist() for column in columns), strict=True)
             for link, (source, child, parts, meet) in enumerate(links):
                 more = following[child]
@@ -275,58 +296,41 @@ def _separated(word: Ints, shared: Ints, others: Ints) -> Bools:
 
 def _walk(space: PlanSpace) -> list[_Layer]:
     """All layers, goals first, of nodes from which some mixture fails."""
-    width, bound = space.robots + 1, len(space) + 1  # the last number: the mixture has failed
-    choices, index = Choices(space), EdgeIndex.of(space)
-    requiring = np.flatnonzero(choices.requires)
-    tables: list[Ints] = []
-    links: list[tuple[Ints, Ints]] = []
-    source, arriving = np.zeros(0, np.int64), np.zeros((0, width), np.int64)
-    for number in range(len(space.layers) - 1, -1, -1):
-        here = requiring[space.layer[requiring] == number]
-        starting = np.repeat(here[:, None], width, axis=1)
-        table, place = unique_tuples(np.concatenate((starting, arriving)), [bound] * width)
-        tables.append(table)
-        links.append((source, place[len(starting) :]))
-        if number:
-            source, arriving = _links(choices, index, table)
-        if 4 * sum(a.nbytes + b.nbytes for a, b in links) > memory_left():
+    choices, index, width = Choices(space), EdgeIndex.of(space), space.robots + 1
+    sources: list[Ints] = []
+    nodes = 0
+
+    def expand(table: Ints) -> Ints:
+        nonlocal nodes
+        nodes += len(table)
+        bounds = [len(table), *[len(space) + 1] * width]
+        links = [np.zeros((0, 1 + width), np.int64)]
+        for move in moves(space, index, table):
+            targets = move.targets(space)
+            rows = np.column_stack((move.source, targets))[can_fail(choices, targets)]
+            links.append(unique_tuples(rows, bounds)[0])
+        together = np.concatenate(links)
+        sources.append(together[:, 0])
+        if 8 * sum(own.nbytes for own in sources) > memory_left():
             raise OutOfMemory(
-                f"the composition walk has more than {sum(len(t) for t in tables):,} nodes: too "
-                "large to keep",
+                f"the composition walk has more than {nodes:,} nodes: too large to keep",
                 remedy=f"Use --method greedy or minimal, fewer tasks, or {more_memory()}.",
             )
-    return _layers(tables[::-1], links[:0:-1])
+        return together[:, 1:]
 
-
-def _links(choices: Choices, index: EdgeIndex, table: Ints) -> tuple[Ints, Ints]:
-    """The different links out of a table of nodes: (source, where each leads)."""
-    space = choices.space
-    failed = len(space)
-    bounds = [len(table), *[failed + 1] * table.shape[1]]
-    links = [np.zeros((0, len(bounds)), np.int64)]
-    for move in moves(space, index, np.where(table == failed, FAILED, table)):
-        target = space.targets(move.edges)
-        fails = can_fail(choices, target, move.mixed)
-        mixed = np.where(move.mixed == FAILED, failed, move.mixed)
-        links.append(unique_tuples(np.column_stack((move.source, target, mixed))[fails], bounds)[0])
-    together = np.concatenate(links)
-    return together[:, 0], together[:, 1:]
-
-
-def _layers(tables: Sequence[Ints], links: Sequence[tuple[Ints, Ints]]) -> list[_Layer]:
-    """The layers with what their links are, goals first."""
-    none = np.zeros(0, np.int64)
-    nothing = np.zeros(0, np.bool_)
-    x = tables[0][:, :-1]
-    layers = [_Layer(x, none, none, nothing, nothing, (x == x[:, :1]).all(axis=1))]
-    for table, (source, child) in zip(tables[1:], links, strict=True):
-        x, below = table[:, :-1], layers[-1]
+    tables, children = zip(
+        *layered(space, np.flatnonzero(choices.requires), width, expand), strict=True
+    )
+    x = tables[-1][:, :-1]
+    joined = tail = (x == x[:, :1]).all(axis=1)  # tail: can plans stay together and still fail?
+    none, nothing = np.zeros(0, np.int64), np.zeros(0, np.bool_)
+    layers = [_Layer(x, none, none, nothing, nothing)]
+    for table, source, child in zip(tables[-2::-1], sources[::-1], children[:0:-1], strict=True):
+        x = table[:, :-1]
         together = (x == x[:, :1]).all(axis=1)
-        joined = (below.x == below.x[:, :1]).all(axis=1)
-        tail = np.zeros(len(x), np.bool_)
-        tail[source[together[source] & joined[child] & below.tail[child]]] = True
-        diagonal = together & (table[:, -1] == x[:, 0])
-        parts = diagonal[source] & ~joined[child]
-        meets = ~together[source] & joined[child]
-        layers.append(_Layer(x, source, child, parts, meets, tail))
+        parts = together[source] & (table[source, -1] == x[source, 0]) & ~joined[child]
+        layers.append(_Layer(x, source, child, parts, ~together[source] & tail[child]))
+        stays = source[together[source] & tail[child]]
+        joined, tail = together, np.zeros(len(x), np.bool_)
+        tail[stays] = True
     return layers

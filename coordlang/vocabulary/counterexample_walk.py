@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from coordlang.required.choices import Choices
-from coordlang.required.composition_walk import FAILED, Moves, can_fail, move_counts, moves
+from coordlang.required.composition_walk import Moves, can_fail, layered, move_counts, moves
 from coordlang.vocabulary.counterexamples import Counterexamples
 from coordlang.vocabulary.sat import Undecided
 from planners.joint.tables import Bools, Ints, unique_tuples
@@ -160,55 +160,43 @@ class _Walk:
         """The nodes: ``layers[k]`` has k joint steps to go."""
         space, robots = self._space, self._space.robots
         starts = np.unique(space.starts)
-        starts = starts[self._choices.requires[starts]]
         layers: list[_Layer] = []
-        arriving = np.zeros((0, 2 * robots), np.int64)
-        for number in reversed(range(len(space.layers))):
-            here = starts[space.layer[starts] == number]
-            fresh = np.zeros((len(here), 2 * robots), np.int64)
-            fresh[:, : robots + 1] = here[:, None]
-            both = np.concatenate((fresh, arriving))
-            bounds = (
-                [len(space)] * robots
-                + [len(space) + 1]
-                + [int(both[:, k].max(initial=0)) + 1 for k in range(robots + 1, 2 * robots)]
-            )
-            nodes, place = unique_tuples(both, bounds)
-            if layers:
-                layers[-1].child = place[len(fresh) :]
-            if number == 0:
-                layers.append(_layer(nodes, np.zeros(0, np.int64), np.zeros((0, robots), np.int64)))
-                break
+
+        def expand(nodes: Ints) -> Ints:
             layer, arriving = self._expand(nodes)
             layers.append(layer)
+            return arriving
+
+        begin = starts[self._choices.requires[starts]]
+        tables = list(layered(space, begin, 2 * robots, expand))
+        for layer, (_, child) in zip(layers, tables[1:], strict=True):
+            layer.child = child
+        none = np.zeros(0, np.int64)
+        layers.append(_layer(tables[-1][0], none, np.zeros((0, robots), np.int64)))
         layers.reverse()
         return layers
 
     def _expand(self, nodes: Ints) -> tuple[_Layer, Ints]:
         """A layer with the moves out of its nodes, and the nodes that they lead to."""
-        robots, failed = self._space.robots, len(self._space)
+        robots = self._space.robots
         limited = self._at_once < np.inf
         if limited and move_counts(self._space, nodes[:, :robots]).sum() > self._at_once:
             raise Undecided
         sources: list[Ints] = [np.zeros(0, np.int64)]
         edges: list[Ints] = [np.zeros((0, robots), np.int64)]
         children: list[Ints] = [np.zeros((0, 2 * robots), np.int64)]
-        # A failed mixture has no edges: -1 as prefix finds none.
-        y = nodes[:, robots]
-        walking = np.column_stack((nodes[:, :robots], np.where(y == failed, FAILED, y)))
-        for move in moves(self._space, self._index, walking):
-            kept, target, lead = self._in_agreement(nodes, move)
-            mixed = move.mixed[kept]
-            fails = can_fail(self._choices, target, mixed)
-            kept, mixed = kept[fails], np.where(mixed == FAILED, failed, mixed)[fails]
-            sources.append(move.source[kept])
-            edges.append(move.edges[kept])
-            children.append(np.column_stack((target[fails], mixed, lead[fails])))
+        for every in moves(self._space, self._index, nodes[:, : robots + 1]):
+            move, leads = self._in_agreement(nodes, every)
+            targets = move.targets(self._space)
+            fails = can_fail(self._choices, targets)
+            sources.append(move.source[fails])
+            edges.append(move.edges[fails])
+            children.append(np.column_stack((targets[fails], leads[fails])))
         layer = _layer(nodes, np.concatenate(sources), np.concatenate(edges))
         return layer, np.concatenate(children)
 
-    def _in_agreement(self, nodes: Ints, move: Moves) -> tuple[Ints, Ints, Ints]:
-        """The moves after which the sentences can agree, with the nodes reached and the leads."""
+    def _in_agreement(self, nodes: Ints, move: Moves) -> tuple[Moves, Ints]:
+        """The moves after which the sentences can agree, and the leads then."""
         robots = self._space.robots
         kept = np.arange(len(move.source))
         first = self._entered[move.edges[:, 0]]
@@ -219,7 +207,8 @@ class _Walk:
             agree = lead != _PARTED
             kept, first = kept[agree], first[agree]
             leads = [known[agree] for known in (*leads, lead)]
-        return kept, self._space.targets(move.edges[kept]), np.column_stack(leads)
+        agreeing = Moves(move.source[kept], move.edges[kept], move.mixed[kept])
+        return agreeing, np.column_stack(leads)
 
 
 def _layer(nodes: Ints, source: Ints, edges: Ints) -> _Layer:
