@@ -6,14 +6,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import compress
 from typing import Literal
 
 import numpy as np
 
 from coordlang.language.listed import ListedTask, goal_text, listed_task, model_of_listed
 from planners.joint.model import NO_FACT, FullState, Goal, JointModel, PlanningTask
-from planners.joint.tables import Rows, find_rows, unique_rows
+from planners.joint.tables import Bools, Rows, find_rows, unique_rows
 from planners.loading import PlanningInstance, build
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
@@ -163,9 +162,8 @@ def from_listed(
         unreachable = _surely_unreachable(model, starts, inits)
     else:
         reached, _ = unique_rows(model.codec.facts_part(space.rows))
-        found = find_rows(reached, model.codec.facts_part(inits))
-        unreachable = np.flatnonzero(found < 0).tolist()
-    for number in unreachable[:1]:
+        unreachable = find_rows(reached, model.codec.facts_part(inits)) < 0
+    for number in np.flatnonzero(unreachable)[:1].tolist():
         raise BadInput(
             f"task {number + 1}: the state {model.state_text(inits[number])} cannot be "
             f"reached from the initial state of {problems[0].source.name}",
@@ -174,25 +172,26 @@ def from_listed(
         )
     if space is None:
         return _listed_one_by_one(loaded, listed, tasks, position, skip_unsolvable)
+    if model.remembers:  # a task starts with no action to remember: those are states of their own
+        space = explore(model, inits)
+    source, lost = _by_goal(space, tasks)
+    if lost and not (skip_unsolvable and source.goals):
+        remedy = searched(model, tasks[lost[0]].goal, space.rows)
+        raise _unsolvable(lost[0], listed[lost[0]], position, remedy)
+    skipped = {number: _named(number, listed[number]) for number in lost}
+    served = tuple(task for number, task in enumerate(listed) if number not in skipped)
+    return Candidates("file", loaded, source, len(reached), served, tuple(skipped.values()))
+
+
+def _by_goal(space: Space, tasks: Sequence[PlanningTask]) -> tuple[Explored, list[int]]:
+    """Tasks in an explored space, by goal; and the numbers of those that have no plan."""
     by_goal: dict[Goal, list[Rows]] = {}
     for task in tasks:
         by_goal.setdefault(task.goal, []).append(task.init)
-    goals = [(goal, np.stack(rows)) for goal, rows in by_goal.items()]
-    if model.remembers:  # a task starts with no action to remember: those are states of their own
-        space = explore(model, inits)
-    kept = solvable(space, goals)
-    known = {(goal, init.tobytes()) for goal, inits in kept for init in inits}
-    served = [(task.goal, task.init.tobytes()) in known for task in tasks]
-    lost = [number for number, good in enumerate(served) if not good]
-    if lost and not (skip_unsolvable and kept):
-        first = lost[0]
-        remedy = searched(model, tasks[first].goal, space.rows)
-        raise _unsolvable(first, listed[first], position, remedy)
-    skipped = tuple(_named(number, listed[number]) for number in lost)
-    source = Explored(space, kept)
-    return Candidates(
-        "file", loaded, source, len(reached), tuple(compress(listed, served)), skipped
-    )
+    kept = solvable(space, [(goal, np.stack(inits)) for goal, inits in by_goal.items()])
+    served = {(goal, init.tobytes()) for goal, inits in kept for init in inits}
+    tasks_of = enumerate((task.goal, task.init.tobytes()) for task in tasks)
+    return Explored(space, kept), [number for number, task in tasks_of if task not in served]
 
 
 def explored_if_small(model: JointModel, inits: Rows) -> Space | None:
@@ -211,8 +210,8 @@ def explored_if_small(model: JointModel, inits: Rows) -> Space | None:
     return found.space()
 
 
-def _surely_unreachable(model: JointModel, starts: Rows, inits: Rows) -> list[int]:
-    """The numbers of states that no start can reach, as far as state variables prove it.
+def _surely_unreachable(model: JointModel, starts: Rows, inits: Rows) -> Bools:
+    """Which states no start can reach, as far as state variables prove it.
 
     Of the facts of a state variable exactly one is true in every state that a start reaches.
     """
@@ -223,7 +222,7 @@ def _surely_unreachable(model: JointModel, starts: Rows, inits: Rows) -> list[in
         for variable in state_variables(model, start):
             own &= true[:, list(variable.facts)].sum(axis=1) == 1
         possible |= own
-    return np.flatnonzero(~possible).tolist()
+    return ~possible
 
 
 def _listed_one_by_one(
