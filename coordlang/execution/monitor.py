@@ -4,10 +4,10 @@
 This file needs Python's standard library and nothing else, neither PDDL nor a planner: copy it
 beside a choices file (docs/formats.md), which ``coordlang choices --format json`` writes.
 
-A `Subplans` holds what is open under the sentence; `Monitor` is where the robot is in it.  All
-checks and larger pieces of work are done when the file is read, and in `Monitor.can` and
-`Monitor.commit`.  What a robot calls in every step takes the same time and memory however many
-steps were done before, opens no file and imports nothing.
+A `Monitor` is where the robot is in what is open under the sentence.  All checks and larger pieces
+of work are done when the file is read, and in `Monitor.can` and `Monitor.commit`.  What a robot
+calls in every step takes the same time and memory however many steps were done before, opens no
+file and imports nothing.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ import json
 import re
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field
 from decimal import Decimal
 from fnmatch import fnmatchcase
 from functools import cache, partial
 from io import BytesIO
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 FORMAT = "coordlang/choices"
 VERSION = 1
@@ -70,8 +70,7 @@ class NotPossible(MonitorError):
     """A promise that can no longer be kept."""
 
 
-@dataclass(frozen=True, slots=True)
-class Detour:
+class Detour(NamedTuple):
     """What a robot wants of its remaining steps; all of it at once.
 
     ``visit``: atoms, each known to be true in the present or in some later state.  ``avoid``: atoms
@@ -86,13 +85,8 @@ class Detour:
     do: tuple[str, ...] = ()
     never: tuple[str, ...] = ()
 
-    @classmethod
-    def of(cls, **wanted: Texts) -> Detour:
-        """Each field as one text or several; None stands for idling."""
-        return cls(**{name: _texts(value) for name, value in wanted.items()})
-
     def __and__(self, other: Detour) -> Detour:
-        pairs = ((getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
+        pairs = zip(self, other, strict=True)
         return Detour(*(tuple(dict.fromkeys((*one, *two))) for one, two in pairs))
 
 
@@ -110,139 +104,17 @@ class Answer:
         return self.subplan is not None
 
 
-class Knowledge:
-    """What is known in each state of a choices file: which facts are true, unknown or false."""
+@dataclass(eq=False, repr=False, slots=True)
+class _State:
+    """A state of the automaton of the own subplans that are open; it has no cycles.
 
-    def __init__(self, entry: Mapping[str, Any], states: Sequence[Any], where: str) -> None:
-        facts, others = _atoms(entry, "facts", where), _atoms(entry, "others", where)
-        #: Every atom, and whether something is ever known of it.
-        self.atoms = {**dict.fromkeys(facts, True), **dict.fromkeys(sorted(others), False)}
-        if len(self.atoms) < len(facts) + len(others):
-            raise _broken(f"{where}: an atom occurs twice in 'facts' and 'others'")
-        #: In each state the facts that are true (True) or unknown (None); others are false.
-        self._in_state: list[dict[str, bool | None]] = []
-        for state, record in enumerate(states):
-            found: dict[str, bool | None] = {}
-            for key, value in (("true", True), ("unknown", None)):
-                for fact in _get(record, key, list, f"state {state}"):
-                    if not _is_number(fact) or not 0 <= fact < len(facts):
-                        raise _broken(
-                            f"state {state}: '{key}' has {_shown(fact)}; "
-                            f"facts are numbers below {len(facts)}"
-                        )
-                    if found.setdefault(facts[fact], value) is not value:
-                        raise MonitorError(
-                            f"state {state} says that fact {fact} is true and unknown"
-                        )
-            self._in_state.append(found)
-
-    def value(self, state: int, atom: str) -> bool | None:
-        """Whether an atom is true in a state; None where it is unknown.
-
-        Raises `MonitorError` for what is no atom of the file.
-        """
-        if atom not in self.atoms:
-            raise self._no_atom(atom)
-        return self._in_state[state].get(atom, False) if self.atoms[atom] else None
-
-    def _no_atom(self, atom: str) -> MonitorError:
-        head = _head(atom)
-        alike = [text for text in self.atoms if _head(text) == head]
-        if alike:
-            more = " .." if len(alike) > _SHOWN else ""
-            similar = f"there are {', '.join(alike[:_SHOWN])}{more}"
-        else:
-            similar = f"none is ({_shown(head)} ..)"
-        return MonitorError(f"{_shown(atom)} is no atom that can change: {similar}")
-
-
-def _head(atom: str) -> str:
-    return atom.strip("()").split(" ")[0]
-
-
-@dataclass(frozen=True, slots=True)
-class Subplans:
-    """What is open to a robot: the own subplans that are left, as an automaton without cycles.
-
-    Node 0 is where they begin.  ``moves[n]`` leads from node n by what is done there (None: idle,
-    sorted, idling first) to a node with a larger number; ``left[n]`` is the number of subplans from
-    n on, at least 1; ``state[n]`` the state of the choices file in which n is.
+    ``known`` are the facts that are true (True) or may be true (None).  ``moves`` lead on by what
+    is done (None: idle; sorted, idling first); ``left`` is the number of subplans from here on.
     """
 
-    moves: Sequence[Mapping[str | None, int]]
-    state: Sequence[int]
-    left: Sequence[int]
-
-    def first(self) -> tuple[str | None, ...]:
-        """The first subplan in order."""
-        node, done = 0, []
-        while self.moves[node]:
-            text, node = next(iter(self.moves[node].items()))
-            done.append(text)
-        return tuple(done)
-
-    def making(self, node: int, detour: Detour, knowledge: Knowledge, most: int) -> Subplans | None:
-        """Those from a node on that make a detour; None if there are none.
-
-        Nodes are pairs: one of these, and the parts of the detour that are made by then (bits: the
-        visits, then the dos).  Raises `MonitorError` for more than ``most`` of them.
-        """
-        made_in = cache(partial(_made_in, detour, knowledge))
-        made_by = cache(partial(_made_by, detour))
-        made = made_in(self.state[node])
-        nodes = [(node, made)] if made is not None else []
-        numbers = {pair: number for number, pair in enumerate(nodes)}
-        moves: list[dict[str | None, int]] = []
-        for here, before in nodes:  # which grows meanwhile
-            moves.append({})
-            for text, to in self.moves[here].items():
-                now, then = made_by(text), made_in(self.state[to])
-                if now is None or then is None:
-                    continue
-                after = to, before | now | then
-                if after not in numbers:
-                    if len(nodes) >= most:
-                        raise MonitorError(
-                            f"{len(detour.visit) + len(detour.do)} visits and dos at once are too "
-                            f"many here: there are more than {most:,} ways to have made some of "
-                            "them; ask for fewer"
-                        )
-                    numbers[after] = len(nodes)
-                    nodes.append(after)
-                moves[-1][text] = numbers[after]
-        whole = (1 << len(detour.visit) + len(detour.do)) - 1
-        left = [0] * len(nodes)
-        for number in reversed(range(len(nodes))):
-            here, parts = nodes[number]
-            ends = not self.moves[here]
-            left[number] = (
-                int(parts == whole) if ends else sum(left[n] for n in moves[number].values())
-            )
-        if not any(left[:1]):
-            return None
-        kept = [number for number, count in enumerate(left) if count]
-        new = dict(zip(kept, range(len(kept)), strict=True))
-        return Subplans(
-            [{text: new[to] for text, to in moves[old].items() if left[to]} for old in kept],
-            [self.state[nodes[old][0]] for old in kept],
-            [left[old] for old in kept],
-        )
-
-
-def _made_in(detour: Detour, knowledge: Knowledge, state: int) -> int | None:
-    """The visits made in a state, as bits; None if the detour avoids it."""
-    if any(knowledge.value(state, atom) is not False for atom in detour.avoid):
-        return None
-    visited = (knowledge.value(state, atom) for atom in detour.visit)
-    return sum(1 << bit for bit, made in enumerate(visited) if made)
-
-
-def _made_by(detour: Detour, text: str | None) -> int | None:
-    """The dos that a subaction makes, as bits beside those of the visits; None if it is never."""
-    if any(_matches(pattern, text) for pattern in detour.never):
-        return None
-    bits = enumerate(detour.do, len(detour.visit))
-    return sum(1 << bit for bit, pattern in bits if _matches(pattern, text))
+    known: Mapping[str, bool | None]
+    moves: dict[str | None, _State] = field(default_factory=dict)
+    left: int = 1
 
 
 class Monitor:
@@ -273,11 +145,15 @@ class Monitor:
         self.atoms = _text(entry, "atoms", where)
         if self.atoms not in ("exact", "own"):
             raise _broken(f"{where}: 'atoms' is {_shown(self.atoms)}, not exact or own")
-        states = _get(entry, "states", list, where)
-        self._open = _read_subplans(entry, states)
-        self._knowledge = Knowledge(entry, states, where)
+        facts, others = (_atoms(entry, key, where) for key in ("facts", "others"))
+        #: Every atom, and what is known of it in a state that does not mention it.
+        self._atoms = {**dict.fromkeys(facts, False), **dict.fromkeys(sorted(others))}
+        if len(self._atoms) < len(facts) + len(others):
+            raise _broken(f"{where}: an atom occurs twice in 'facts' and 'others'")
+        states = _read_states(entry, facts, where)
         self._most = max(MAX_NODES, _NODES_OF_STATE * len(states))
-        self._here = self._step = 0
+        self._start = self._here = states[0]  # both, so that no step has states to give back
+        self._step = 0
         self._promised = Detour()
 
     @classmethod
@@ -309,12 +185,12 @@ class Monitor:
     @property
     def finished(self) -> bool:
         """Whether the robot has done all its steps."""
-        return not self._open.moves[self._here]
+        return not self._here.moves
 
     @property
     def remaining(self) -> int:
         """How many own subplans are left, of those that keep every promise."""
-        return self._open.left[self._here]
+        return self._here.left
 
     @property
     def promised(self) -> Detour:
@@ -326,14 +202,14 @@ class Monitor:
 
         Nothing when it has finished.
         """
-        return tuple(self._open.moves[self._here])
+        return tuple(self._here.moves)
 
     def did(self, subaction: str | None) -> None:
         """Tell what the robot did in this step, as ``(move r1 a b)``; None or ``idle`` for idling.
 
         Raises `NotAllowed`, and is then as it was before.
         """
-        moves = self._open.moves[self._here]
+        moves = self._here.moves
         is_known = isinstance(subaction, str) and subaction in moves
         plain = subaction if is_known else _plain(subaction)
         text = None if plain == IDLE else plain
@@ -344,38 +220,115 @@ class Monitor:
 
     def known(self, atom: str) -> bool | None:
         """Whether an atom is true now, whatever the others did; None if that depends on them."""
-        text = atom if isinstance(atom, str) and atom in self._knowledge.atoms else _plain(atom)
-        return self._knowledge.value(self._open.state[self._here], text)
+        text = atom if isinstance(atom, str) and atom in self._atoms else _plain(atom)
+        self._check_atom(text)
+        return self._value(self._here, text)
 
-    def can(self, detour: Detour | None = None, /, **wanted: Texts) -> Answer:
+    def can(
+        self, visit: Texts = (), avoid: Texts = (), do: Texts = (), never: Texts = ()
+    ) -> Answer:
         """Whether all this can still be had at once, promises kept: ``can(visit="(at r1 c)")``.
 
-        O(automaton * 2^(visits and dos)), of the steps still to be done.  (With any number of
-        visits the question is NP-complete.)  Raises `MonitorError` beyond `MAX_NODES` nodes.
+        Each is one text or several, of a `Detour`.  O(automaton * 2^(visits and dos)), of the steps
+        still to be done.  (With any number of visits the question is NP-complete.)  Raises
+        `MonitorError` beyond `MAX_NODES` nodes.
         """
-        found = self._making((detour or Detour()) & Detour.of(**wanted))
-        return Answer(None, 0) if found is None else Answer(found.first(), found.left[0])
+        found = self._making(Detour(*map(_texts, (visit, avoid, do, never))))
+        if found is None:
+            return Answer(None, 0)
+        at, subplan = found, []
+        while at.moves:
+            text, at = next(iter(at.moves.items()))
+            subplan.append(text)
+        return Answer(tuple(subplan), found.left)
 
-    def commit(self, detour: Detour | None = None, /, **wanted: Texts) -> None:
+    def commit(
+        self, visit: Texts = (), avoid: Texts = (), do: Texts = (), never: Texts = ()
+    ) -> None:
         """Promise it: from now on only what keeps the promise is allowed.
 
         As much work as `can`.  Raises `NotPossible`, and is then as it was before.
         """
-        promise = (detour or Detour()) & Detour.of(**wanted)
+        promise = Detour(*map(_texts, (visit, avoid, do, never)))
         found = self._making(promise)
         if found is None:
-            kept = " together with what was promised before" if self._promised != Detour() else ""
+            kept = " together with what was promised before" if any(self._promised) else ""
             raise NotPossible(
                 f"step {self.step + 1}: {self.robot} has no subplan left for this{kept}"
             )
         self._promised &= promise
-        self._open, self._here = found, 0
+        self._start = self._here = found
 
-    def _making(self, detour: Detour) -> Subplans | None:
-        """The subplans from here on that make a detour and keep the promises; None if none do."""
+    def _making(self, detour: Detour) -> _State | None:
+        """The subplans from here on that make a detour and keep the promises; None if none do.
+
+        Its states are pairs: one that was open, and the parts of the detour that are made by then
+        (bits: the visits, then the dos).
+        """
         for atom in (*detour.visit, *detour.avoid):
-            self._knowledge.value(0, atom)  # raises for what is no atom
-        return self._open.making(self._here, detour, self._knowledge, self._most)
+            self._check_atom(atom)
+        made_in, made_by = cache(partial(self._made_in, detour)), cache(partial(_made_by, detour))
+        made = made_in(self._here)
+        if made is None:
+            return None
+        found = {(self._here, made): _State(self._here.known)}
+        for state, before in (todo := list(found)):  # which grows meanwhile
+            for text, to in state.moves.items():
+                now, then = made_by(text), made_in(to)
+                if now is None or then is None:
+                    continue
+                after = to, before | now | then
+                if after not in found:
+                    found[after] = _State(to.known)
+                    todo.append(after)
+                found[state, before].moves[text] = found[after]
+            if len(found) > self._most:
+                raise MonitorError(
+                    f"{len(detour.visit) + len(detour.do)} visits and dos at once are too many "
+                    f"here: there are more than {self._most:,} ways to have made some of them; ask "
+                    "for fewer"
+                )
+        whole = (1 << len(detour.visit) + len(detour.do)) - 1
+        for (state, made), new in reversed(found.items()):
+            new.moves = {text: to for text, to in new.moves.items() if to.left}
+            ways = sum(to.left for to in new.moves.values())
+            new.left = ways if state.moves else int(made == whole)
+        return new if new.left else None  # that of the present comes last
+
+    def _made_in(self, detour: Detour, state: _State) -> int | None:
+        """The visits made in a state, as bits; None if the detour avoids it."""
+        if any(self._value(state, atom) is not False for atom in detour.avoid):
+            return None
+        visited = enumerate(detour.visit)
+        return sum(1 << bit for bit, atom in visited if self._value(state, atom))
+
+    def _value(self, state: _State, atom: str) -> bool | None:
+        return state.known.get(atom, self._atoms[atom])
+
+    def _check_atom(self, atom: str) -> None:
+        """Raise `MonitorError` for what is no atom of the file."""
+        if atom in self._atoms:
+            return
+        head = _head(atom)
+        alike = [text for text in self._atoms if _head(text) == head]
+        if alike:
+            more = " .." if len(alike) > _SHOWN else ""
+            similar = f"there are {', '.join(alike[:_SHOWN])}{more}"
+        else:
+            similar = f"none is ({_shown(head)} ..)"
+        raise MonitorError(f"{_shown(atom)} is no atom that can change: {similar}")
+
+
+def _made_by(detour: Detour, text: str | None) -> int | None:
+    """The dos that a subaction makes, as bits above those of the visits; None if it is never."""
+    if any(_matches(pattern, text) for pattern in detour.never):
+        return None
+    bits = enumerate(detour.do, len(detour.visit))
+    return sum(1 << bit for bit, pattern in bits if _matches(pattern, text))
+
+
+def _head(atom: str) -> str:
+    return atom.strip("()").split(" ")[0]
 
 
 def _parsed(path: str, max_bytes: int) -> Any:
@@ -471,66 +424,69 @@ def _entry(data: Any, robot: str | None) -> Mapping[str, Any]:
         if name in entries:
             raise _broken(f"it has the choices of {_shown(name)} twice")
         entries[name] = entry
-    names = ", ".join(_shown(name) for name in list(entries)[:_SHOWN])
+    chosen = list(entries) if robot is None else [robot]
+    if len(chosen) == 1 and chosen[0] in entries:
+        return entries[chosen[0]]
+    names = ", ".join(map(_shown, list(entries)[:_SHOWN])) or "no robot"
     names += " .." if len(entries) > _SHOWN else ""
-    if robot is not None:
-        if robot not in entries:
-            raise MonitorError(
-                f"the file has no choices of {_shown(robot)}; it has those of {names or 'no robot'}"
-            )
-        return entries[robot]
-    if len(entries) != 1:
-        raise MonitorError(f"whose choices? The file has those of {names or 'no robot'}")
-    return next(iter(entries.values()))
+    if robot is None:
+        raise MonitorError(f"whose choices? The file has those of {names}")
+    raise MonitorError(f"the file has no choices of {_shown(robot)}; it has those of {names}")
 
 
-def _moves(
-    states: Sequence[Any], number: int, steps: Sequence[int], texts: set[str]
-) -> dict[str | None, int]:
-    """What the robot may do in a state, idling first; ``texts`` are known to be well written."""
-    following = _get(states[number], "next", dict, f"state {number}")
-    for text, to in following.items():
-        if text not in texts:
-            _check_plain(text, f"state {number}: 'next'")
-            texts.add(text)
-        if not (_is_number(to) and number < to < len(states) and steps[to] == steps[number] + 1):
-            raise MonitorError(
-                f"state {number} does not lead to a state of step {steps[number] + 1}"
-            )
-    ways = ((None if text == IDLE else text, to) for text, to in following.items())
-    return dict(sorted(ways, key=lambda move: move[0] or ""))
-
-
-def _read_subplans(entry: Mapping[str, Any], states: Sequence[Any]) -> Subplans:
-    """The subplans of the states of a file.
+def _read_states(entry: Mapping[str, Any], facts: Sequence[str], where: str) -> dict[int, _State]:
+    """The states of a file by number, read backwards; 0 is the start.
 
     Raises `MonitorError` unless every state can be reached from state 0 in step 0 and leads to
     later states of the next step, so that there are no cycles, all subplans have one length, and
-    the counts of subplans agree.  States are looked at backwards: the counts never take much more
-    memory than those in the file.
+    the counts of subplans agree: these never take much more memory than those in the file.
     """
-    steps = [_get(state, "step", int, f"state {number}") for number, state in enumerate(states)]
-    if not states or steps[0] != 0:
+    records = _get(entry, "states", list, where)
+    steps = [_get(record, "step", int, f"state {n}") for n, record in enumerate(records)]
+    if not records or steps[0] != 0:
         raise MonitorError("the automaton has no state 0 in step 0")
-    texts, reached = {IDLE}, {0}
-    moves: list[dict[str | None, int]] = []
-    for number in range(len(states)):
-        if number not in reached:
-            raise MonitorError(f"state {number} cannot be reached from state 0")
-        moves.append(_moves(states, number, steps, texts))
-        reached.update(moves[-1].values())
-    left, last = [1] * len(states), max(steps)
-    for number in reversed(range(len(states))):
-        if moves[number]:
-            left[number] = sum(left[to] for to in moves[number].values())
-        elif steps[number] != last:
+    states: dict[int, _State] = {}
+    texts, reached, last = {IDLE}, {0}, max(steps)
+    for number, record in zip(reversed(range(len(records))), reversed(records), strict=True):
+        moves: list[tuple[str | None, _State]] = []
+        for text, to in _get(record, "next", dict, f"state {number}").items():
+            if text not in texts:
+                _check_plain(text, f"state {number}: 'next'")
+                texts.add(text)
+            if not _is_number(to) or to not in states or steps[to] != steps[number] + 1:
+                raise MonitorError(
+                    f"state {number} does not lead to a state of step {steps[number] + 1}"
+                )
+            moves.append((None if text == IDLE else text, states[to]))
+            reached.add(to)
+        if not moves and steps[number] != last:
             raise MonitorError(f"state {number} ends after {steps[number]} of {last} steps")
-        _check_count(states[number], "left", left[number], f"state {number}")
+        left = sum(to.left for _, to in moves) or 1
+        _check_count(record, "left", left, f"state {number}")
+        in_order = dict(sorted(moves, key=lambda move: move[0] or ""))
+        states[number] = _State(_known(record, facts, number), in_order, left)
+    if lost := states.keys() - reached:
+        raise MonitorError(f"state {min(lost)} cannot be reached from state 0")
     if "steps" in entry and _get(entry, "steps", int, "a robot's choices") != last:
         raise MonitorError(f"'steps' is {_shown(entry['steps'])}, but the states have {last}")
     if "subplans" in entry:
-        _check_count(entry, "subplans", left[0], "a robot's choices")
-    return Subplans(moves, range(len(states)), left)
+        _check_count(entry, "subplans", states[0].left, "a robot's choices")
+    return states
+
+
+def _known(record: Any, facts: Sequence[str], number: int) -> dict[str, bool | None]:
+    """The facts that are true, or may be true, in a state of a file."""
+    found: dict[str, bool | None] = {}
+    for key, value in (("true", True), ("unknown", None)):
+        for fact in _get(record, key, list, f"state {number}"):
+            if not _is_number(fact) or not 0 <= fact < len(facts):
+                raise _broken(
+                    f"state {number}: '{key}' has {_shown(fact)}; "
+                    f"facts are numbers below {len(facts)}"
+                )
+            if found.setdefault(facts[fact], value) is not value:
+                raise MonitorError(f"state {number} says that fact {fact} is true and unknown")
+    return found
 
 
 def _check_count(record: Mapping[str, Any], key: str, count: int, where: str) -> None:

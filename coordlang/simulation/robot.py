@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from itertools import accumulate
 from random import Random
 
-from coordlang.execution.monitor import IDLE, Detour, Monitor
+from coordlang.execution.monitor import IDLE, Monitor, Texts
 from coordlang.simulation.pace import Message, OwnWords, Pace
 
 #: Metres x, metres y, heading in radians (0: to the right, counterclockwise).
@@ -204,17 +204,17 @@ class Robot:
     def _look_around(self, sensed: Sensed) -> None:
         """Commit to what is wanted, and to keep out of places that somebody stands in."""
         for atom in sensed.wanted:
-            self._ask({"visit": atom}, Detour.of(visit=atom))
+            self._ask({"visit": atom}, visit=atom)
         met = {self._place_of(stranger, sensed.pose) for stranger in sensed.strangers}
         for place in sorted(met - self._met):
             if ways := [text for text, led in sorted(self._leads.items()) if led == place]:
                 self._met.add(place)
-                self._ask({"avoid": place}, Detour.of(never=ways))
+                self._ask({"avoid": place}, never=ways)
 
-    def _ask(self, told: Mapping[str, object], detour: Detour) -> None:
-        granted = bool(self._monitor.can(detour))
+    def _ask(self, told: Mapping[str, object], **detour: Texts) -> None:
+        granted = bool(self._monitor.can(**detour))
         if granted:
-            self._monitor.commit(detour)
+            self._monitor.commit(**detour)
         self._events.append(("detour", {**told, "granted": granted}))
 
     def _place_of(self, stranger: tuple[float, float], pose: Pose) -> str:

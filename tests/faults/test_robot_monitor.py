@@ -152,7 +152,7 @@ MALFORMED: list[tuple[str, Any, str]] = [
     ("states 0 step", 0.0, "'step' is 0.0, not a whole number"),
     ("states 3 next", {"idle": 1}, "state 3 does not lead"),
     ("states 0 next idle", 3, "state 0 does not lead"),
-    ("states 0 next", {"idle": 1}, "state 2 cannot be reached"),
+    ("states 0 next", {"idle": 1}, "says 4 subplans are left, but there are 1"),
     ("states 5 next", {"x": 6}, "state 5 does not lead|has x in"),
     ("states 0 next (Fly R1)", 1, r"state 0: 'next' has \(Fly R1\) in place"),
     ("states 3 next", {}, "3 ends after|state 5 cannot be reached"),

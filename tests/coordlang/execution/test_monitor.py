@@ -132,7 +132,7 @@ def check_detours(
             )
         detour = random_detour(random, task_language, robot, left, known)
         expected = twin.fulfilling(robot, chosen[:here], detour, known) & left
-        answer = at.can(detour)
+        answer = at.can(*detour)
         assert bool(answer) == bool(expected)
         assert answer.subplans == len(expected)
         seen["possible" if expected else "impossible"] += 1
@@ -140,13 +140,13 @@ def check_detours(
         if not expected:
             assert answer.subplan is None
             with pytest.raises(NotPossible):
-                at.commit(detour)
+                at.commit(*detour)
             assert (at.allowed(), at.remaining, at.step, at.promised) == before
             continue
         assert answer.subplan in {
             tuple(texts(task_language, robot, own[here:])) for own in expected
         }
-        at.commit(detour)
+        at.commit(*detour)
         assert at.remaining == len(expected)
         assert subplans(at) == {tuple(texts(task_language, robot, own[here:])) for own in expected}
         seen["less is left"] += len(expected) < len(left)
