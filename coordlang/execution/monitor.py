@@ -108,10 +108,12 @@ class Answer:
 class _State:
     """A state of the automaton of the own subplans that are open; it has no cycles.
 
-    ``known`` are the facts that are true (True) or may be true (None).  ``moves`` lead on by what
-    is done (None: idle; sorted, idling first); ``left`` is the number of subplans from here on.
+    ``step`` steps are done there; ``known`` are the facts that are true (True) or may be true
+    (None).  ``moves`` lead on by what is done (None: idle; sorted, idling first); ``left`` is the
+    number of subplans from here on.
     """
 
+    step: int
     known: Mapping[str, bool | None]
     moves: dict[str | None, _State] = field(default_factory=dict)
     left: int = 1
@@ -153,7 +155,6 @@ class Monitor:
         states = _read_states(entry, facts, where)
         self._most = max(MAX_NODES, _NODES_OF_STATE * len(states))
         self._start = self._here = states[0]  # both, so that no step has states to give back
-        self._step = 0
         self._promised = Detour()
 
     @classmethod
@@ -180,7 +181,7 @@ class Monitor:
     @property
     def step(self) -> int:
         """How many steps are done."""
-        return self._step
+        return self._here.step
 
     @property
     def finished(self) -> bool:
@@ -214,9 +215,8 @@ class Monitor:
         plain = subaction if is_known else _plain(subaction)
         text = None if plain == IDLE else plain
         if text not in moves:
-            raise NotAllowed(self.robot, text, self._step, self.allowed())
+            raise NotAllowed(self.robot, text, self.step, self.allowed())
         self._here = moves[text]
-        self._step += 1
 
     def known(self, atom: str) -> bool | None:
         """Whether an atom is true now, whatever the others did; None if that depends on them."""
@@ -271,7 +271,7 @@ class Monitor:
         made = made_in(self._here)
         if made is None:
             return None
-        found = {(self._here, made): _State(self._here.known)}
+        found = {(self._here, made): _State(self._here.step, self._here.known)}
         for state, before in (todo := list(found)):  # which grows meanwhile
             for text, to in state.moves.items():
                 now, then = made_by(text), made_in(to)
@@ -279,7 +279,7 @@ class Monitor:
                     continue
                 after = to, before | now | then
                 if after not in found:
-                    found[after] = _State(to.known)
+                    found[after] = _State(to.step, to.known)
                     todo.append(after)
                 found[state, before].moves[text] = found[after]
             if len(found) > self._most:
@@ -446,32 +446,37 @@ def _read_states(entry: Mapping[str, Any], facts: Sequence[str], where: str) -> 
     if not records or steps[0] != 0:
         raise MonitorError("the automaton has no state 0 in step 0")
     states: dict[int, _State] = {}
-    texts, reached, last = {IDLE}, {0}, max(steps)
+    texts, reached, last = {IDLE}, set[_State](), max(steps)
     for number, record in zip(reversed(range(len(records))), reversed(records), strict=True):
-        moves: list[tuple[str | None, _State]] = []
-        for text, to in _get(record, "next", dict, f"state {number}").items():
-            if text not in texts:
-                _check_plain(text, f"state {number}: 'next'")
-                texts.add(text)
-            if not _is_number(to) or to not in states or steps[to] != steps[number] + 1:
-                raise MonitorError(
-                    f"state {number} does not lead to a state of step {steps[number] + 1}"
-                )
-            moves.append((None if text == IDLE else text, states[to]))
-            reached.add(to)
+        moves = _moves(record, number, steps[number] + 1, states, texts)
+        reached.update(moves.values())
         if not moves and steps[number] != last:
             raise MonitorError(f"state {number} ends after {steps[number]} of {last} steps")
-        left = sum(to.left for _, to in moves) or 1
+        left = sum(to.left for to in moves.values()) or 1
         _check_count(record, "left", left, f"state {number}")
-        in_order = dict(sorted(moves, key=lambda move: move[0] or ""))
-        states[number] = _State(_known(record, facts, number), in_order, left)
-    if lost := states.keys() - reached:
+        states[number] = _State(steps[number], _known(record, facts, number), moves, left)
+    if lost := [number for number, state in states.items() if number and state not in reached]:
         raise MonitorError(f"state {min(lost)} cannot be reached from state 0")
     if "steps" in entry and _get(entry, "steps", int, "a robot's choices") != last:
         raise MonitorError(f"'steps' is {_shown(entry['steps'])}, but the states have {last}")
     if "subplans" in entry:
         _check_count(entry, "subplans", states[0].left, "a robot's choices")
     return states
+
+
+def _moves(
+    record: Any, number: int, step: int, states: Mapping[int, _State], texts: set[str]
+) -> dict[str | None, _State]:
+    """What the robot may do in a state, idling first; ``texts`` are known to be well written."""
+    moves: dict[str | None, _State] = {}
+    for text, to in _get(record, "next", dict, f"state {number}").items():
+        if text not in texts:
+            _check_plain(text, f"state {number}: 'next'")
+            texts.add(text)
+        if not _is_number(to) or to not in states or states[to].step != step:
+            raise MonitorError(f"state {number} does not lead to a state of step {step}")
+        moves[None if text == IDLE else text] = states[to]
+    return dict(sorted(moves.items(), key=lambda move: move[0] or ""))
 
 
 def _known(record: Any, facts: Sequence[str], number: int) -> dict[str, bool | None]:
