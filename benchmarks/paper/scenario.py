@@ -111,8 +111,8 @@ def freedom(tasks: Sequence[TaskLanguage]) -> dict[str, int]:
             agreed = _options(one.model, robot, {step[robot] for step in first})
             every = known.optimal_choices(one.task, robot)
             plan += len(agreed)
-            sentence += len(_options(one.model, robot, set(choices.label.tolist())) - agreed)
-            optimal += len(_options(one.model, robot, set(every.label.tolist())) - agreed)
+            sentence += len(_options(one.model, robot, choices.labels) - agreed)
+            optimal += len(_options(one.model, robot, every.labels) - agreed)
     return {"plan": plan, "sentence": sentence, "optimal": optimal}
 
 
@@ -166,7 +166,9 @@ def subplans(automaton: Automaton) -> list[Part]:
     found: list[tuple[Part, int]] = [((), 0)]
     for _ in range(automaton.steps):
         found = [
-            ((*part, label), to) for part, state in found for label, to in automaton.moves(state)
+            ((*part, label), to)
+            for part, state in found
+            for label, to in automaton.moves[state].items()
         ]
     return [part for part, _ in found]
 

@@ -109,6 +109,9 @@ def avoids(automaton: Automaton, forbidden: frozenset[int]) -> bool:
     alive = {0}
     for _ in range(automaton.steps):
         alive = {
-            to for state in alive for label, to in automaton.moves(state) if label not in forbidden
+            to
+            for state in alive
+            for label, to in automaton.moves[state].items()
+            if label not in forbidden
         }
     return bool(alive)

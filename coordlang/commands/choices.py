@@ -12,6 +12,7 @@ from os import fspath
 from typing import Any
 
 import click
+import msgspec
 
 from coordlang.commands.inputs import Arguments, InTask, public
 from coordlang.commands.layout import alike, columns, fitted
@@ -97,11 +98,12 @@ class RobotsChoices(InTask):
     def monitor(self, robot: str) -> Monitor:
         """A run-time monitor of one robot; `UsageError` if there is no such robot."""
         (number,) = _numbers(self.used.model.robots, robot)
-        return execution.monitor(self.found, self.used.model.robots[number])
+        return execution.monitor(self.used.model, self.found.robots[number], self.sentence)
 
     def data(self) -> dict[str, Any]:
         """The data of a choices file (docs/formats.md)."""
-        return execution.to_data(self.found, self.chosen)
+        data: dict[str, Any] = msgspec.to_builtins(execution.to_record(self.found, self.chosen))
+        return data
 
     def save(self, path: File) -> None:
         """Write a choices file, for `Monitor.read` on the robot; complete or not at all."""
@@ -265,7 +267,7 @@ def _table(found: RobotsChoices, own: RobotChoices, width: int) -> list[str]:
         for state, atoms in zip(layer, distinguishing(found.found, own, layer), strict=True):
             moves = [
                 f"{model.label_text(own.robot, label) or 'idle'} -> {to}"
-                for label, to in automaton.moves(state)
+                for label, to in automaton.moves[state].items()
             ]
             left = f"{automaton.left[state]:,}"
             rows.append((str(step), str(state), left, moves, " ".join(atoms)))

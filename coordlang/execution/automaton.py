@@ -11,14 +11,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from itertools import pairwise
 from math import log10
 from operator import and_, or_
 from typing import NamedTuple
 
-import numpy as np
-
-from planners.joint.tables import Ints, ranges
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import OutOfMemory
 from planners.system.limits import memory_left, more_memory
@@ -49,17 +45,14 @@ class Knowledge(NamedTuple):
 class Automaton:
     """A deterministic automaton over one robot's label numbers (0: idle); state 0 is its start.
 
-    ``layers[k]`` are the states after k joint steps, those of the last one are final.  The edges
-    out of state s are ``first[s]`` to ``first[s + 1]``, sorted by label, each with a ``label`` and
-    a ``target`` (only this module indexes these).  ``left`` has for each state the exact number of
-    subplans from it on, at least 1; ``known`` what the robot knows there, all empty where no
-    knowledge was computed.
+    ``layers[k]`` are the states after k joint steps, those of the last one are final.  For each
+    state ``moves`` has label -> next state, sorted, ``left`` the exact number of subplans from it
+    on, at least 1, and ``known`` what the robot knows there, all empty where no knowledge was
+    computed.
     """
 
     layers: tuple[range, ...]
-    first: Ints
-    label: Ints
-    target: Ints
+    moves: tuple[Mapping[int, int], ...]
     left: tuple[int, ...]
     known: tuple[Knowledge, ...]
 
@@ -78,20 +71,9 @@ class Automaton:
         return len(self.layers) - 1
 
     @property
-    def out_degrees(self) -> Ints:
-        """The number of edges out of each state."""
-        return np.diff(self.first)
-
-    def moves(self, state: int) -> list[tuple[int, int]]:
-        """The pairs (label, next state) of a state, sorted."""
-        edges = slice(int(self.first[state]), int(self.first[state + 1]))
-        return list(zip(self.label[edges].tolist(), self.target[edges].tolist(), strict=True))
-
-    def moves_of(self, states: Ints) -> tuple[Ints, Ints, Ints]:
-        """The moves of many states: their positions in ``states``, labels and next states."""
-        degrees = self.out_degrees[states]
-        edges = ranges(self.first[states], degrees)
-        return np.repeat(np.arange(len(states)), degrees), self.label[edges], self.target[edges]
+    def labels(self) -> set[int]:
+        """The labels that its subplans have."""
+        return set[int]().union(*self.moves)
 
 
 def determinise(
@@ -179,30 +161,23 @@ def _nodes(space: PlanSpace, robot: int, truth: Sequence[int] | None, number: in
 
 def _numbered(merged: Sequence[Sequence[_Class]]) -> Automaton:
     """Number the states in the order in which a walk by layers and labels meets them."""
-    order = [0]
-    bounds, first, label, target, known = [0], [0], [], [], []
+    layers: list[range] = []
+    found, end = {0: 0}, 1
+    numbered: list[Mapping[int, int]] = []
+    known: list[Knowledge] = []
     for layer in merged:
-        bounds.append(bounds[-1] + len(order))
-        found: dict[int, int] = {}
-        for state in order:
+        layers.append(range(len(numbered), end))
+        here, found = found, {}
+        for state in here:
             knowledge, moves = layer[state]
             known.append(knowledge)
-            for own, (to,) in moves.items():
-                label.append(own)
-                target.append(bounds[-1] + found.setdefault(to, len(found)))
-            first.append(len(label))
-        order = list(found)
+            to = (found.setdefault(after, end + len(found)) for (after,) in moves.values())
+            numbered.append(dict(zip(moves, to, strict=True)))
+        end += len(found)
     left = [1] * len(known)
-    for state in range(bounds[-2] - 1, -1, -1):
-        left[state] = sum(left[to] for to in target[first[state] : first[state + 1]])
-    return Automaton(
-        layers=tuple(range(a, b) for a, b in pairwise(bounds)),
-        first=np.array(first, np.int64),
-        label=np.array(label, np.int64),
-        target=np.array(target, np.int64),
-        left=tuple(left),
-        known=tuple(known),
-    )
+    for state in reversed(range(layers[-1].start)):
+        left[state] = sum(left[to] for to in numbered[state].values())
+    return Automaton(tuple(layers), tuple(numbered), tuple(left), tuple(known))
 
 
 def _after(layer: Sequence[_Class], subset: Classes) -> dict[int, Classes]:

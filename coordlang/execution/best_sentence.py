@@ -4,18 +4,20 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
+from typing import Any
 
-from coordlang.execution.preferences import PlanPreference, Preference
+from coordlang.execution.preferences import Memory, PlanPreference, Preference
 from coordlang.execution.task_language import TaskLanguage
+from planners.search.plan_space import PlanSpace
 from planners.system.errors import OutOfMemory
 from planners.system.limits import memory_left, more_memory
 
 #: Bytes of one entry of a prefix's counts.
 _ENTRY_BYTES = 200
-#: In `_Graph.open`: the plan ends, with no further word.
+#: In place of a word, and of a node: the plan ends, with no further word.
 _END = -1
 
 
@@ -55,27 +57,27 @@ def best_sentence(
     ``most`` entries, or more than the memory holds.
     """
     graph = _Graph(task_language, preferences)
-    start = _Prefix((graph.word[0],), {0: 1})
-    queue = [(graph.bound(start), start.words, 0, start)]
+    words: tuple[int, ...] = (graph.word[0],)
+    counts: Mapping[int, int] = {0: 1}
+    queue: list[Any] = [(graph.bound(words, counts), words, counts)]
     seen: set[object] = set()
-    entries, prefixes, pushed = 0, 0, 0
+    entries = 0
     while queue:
-        _, words, _, prefix = heappop(queue)
-        if prefix.plans is not None:
-            values = graph.values(len(words), prefix.plans, prefix.grades)
-            told = tuple(abs(value) if isinstance(value, int) else value for value in values)
-            return BestSentence(words, prefix.plans, told, prefixes)
-        same = graph.continuation(prefix)
+        bound, words, counts = heappop(queue)
+        if words[-1] == _END:
+            values = (abs(value) if isinstance(value, int) else value for value in bound[:-1])
+            return BestSentence(words[:-1], sum(counts.values()), tuple(values), len(seen))
+        same = words[-1], frozenset(counts.items() if graph.open else counts)
         if same in seen:
             continue  # the one that was here before is as good, and shorter or smaller
         seen.add(same)
-        prefixes += 1
-        for longer in graph.extensions(prefix):
-            entries, pushed = entries + len(longer.counts), pushed + 1
-            heappush(queue, (graph.bound(longer), longer.words, pushed, longer))
+        for word, further in graph.extensions(words[-1], counts).items():
+            entries += len(further)
+            longer = *words, word
+            heappush(queue, (graph.bound(longer, further), longer, further))
         if (most is not None and entries > most) or entries * _ENTRY_BYTES > memory_left():
             raise OutOfMemory(
-                f"{prefixes:,} beginnings of sentences were looked at, and the best sentence is "
+                f"{len(seen):,} beginnings of sentences were looked at, and the best sentence is "
                 "not decided yet",
                 remedy="Prefer the shortest sentence first, use a smaller task, or "
                 f"{more_memory()}.",
@@ -83,64 +85,47 @@ def best_sentence(
     raise AssertionError("a task has at least one sentence")
 
 
-@dataclass(frozen=True, slots=True)
-class _Prefix:
-    """The prefix of a sentence, or a whole sentence.
-
-    ``counts`` has how many beginnings of plans come to each point with the first state of the last
-    word.  Of a whole sentence ``plans`` is the number of its plans, and ``grades`` has the worst
-    and the best grade for each `PlanPreference`.
-    """
-
-    words: tuple[int, ...]
-    counts: dict[int, int]
-    plans: int | None = None
-    grades: tuple[tuple[int, int], ...] = ()
-
-
 class _Graph:
     """The task's plans as paths of *points*.
 
-    A point is a plan-space node with what the preferences remember there.  Points are numbered from
-    the start on, layer by layer.  ``following[p]`` holds pairs (point, number of joint actions);
-    ``node`` and ``word`` are those of each point.  The rest bounds the continuations of plans from
-    p on: ``more[p]`` is the least number of further words, ``grades[p]`` the least grade for each
-    `PlanPreference`, and ``open[p]``, if ``most-plans`` is a preference, has for each next word how
-    many plans from p can have one sentence with it, at most.
+    A point is a plan-space node with what the preferences remember there; behind the last node of
+    each plan is one more, of the word `_END`.  Points are numbered from the start on, layer by
+    layer.  ``following[p]`` holds pairs (point, number of joint actions); ``node`` and ``word`` are
+    those of each point.  The rest bounds the continuations of plans from p on: ``more[p]`` is the
+    least number of further words, ``grades[p]`` the least grade for each `PlanPreference`, and
+    ``open[p]``, if ``most-plans`` is a preference, has for each next word how many plans from p can
+    have one sentence with it, at most.
+
+    The prefix of a sentence is its words with the *counts*, how many beginnings of plans come to
+    each point with the first state of the last word.  A whole sentence ends with `_END`.
     """
 
     def __init__(self, task_language: TaskLanguage, preferences: Sequence[Preference]) -> None:
         self.preferences = tuple(preferences)
         automata = [one for one in preferences if isinstance(one, PlanPreference)]
-        space, first = task_language.space, task_language.start
-        points = [(first, tuple(one.start(int(space.state[first])) for one in automata))]
+        space, start = task_language.space, task_language.start
+        points = [(start, tuple(one.start(int(space.state[start])) for one in automata))]
         number = {points[0]: 0}
         self.following: list[list[tuple[int, int]]] = []
         for node, memories in points:  # grows while it is walked
-            after = Counter[int]()
-            for edge in space.out_edges(node):
-                target = space.target_of(edge)
-                labels, state = space.labels_of(edge) if automata else (), int(space.state[target])
-                steps = zip(automata, memories, strict=True)
-                there = target, tuple(one.step(memory, labels, state) for one, memory in steps)
-                if there not in number:
-                    number[there] = len(points)
+            after = Counter(_after(space, automata, node, memories))
+            for there in after:
+                if number.setdefault(there, len(points)) == len(points):
                     points.append(there)
-                after[number[there]] += 1
-            self.following.append(sorted(after.items()))
+            self.following.append(sorted((number[there], n) for there, n in after.items()))
         self.node = [node for node, _ in points]
-        self.word = [int(task_language.word[node]) for node in self.node]
+        self.word = [_END if node == _END else int(task_language.word[node]) for node in self.node]
         self.more = [0] * len(points)
         self.grades: list[tuple[int, ...]] = [()] * len(points)
         self.open = [Counter[int]() for _ in points] if "most-plans" in preferences else []
-        for point in reversed(range(len(points))):
-            if self.following[point]:
-                self._bound_by_followers(point)
+        for at in reversed(range(len(points))):
+            if self.following[at]:
+                self._bound_by_followers(at)
                 continue
-            graded = zip(automata, points[point][1], strict=True)
-            self.grades[point] = tuple(one.grade(memory) for one, memory in graded)
+            graded = zip(automata, points[at][1], strict=True)
+            self.grades[at] = tuple(one.grade(memory) for one, memory in graded)
             if self.open:
-                self.open[point][_END] = 1
+                self.open[at][_END] = 1
 
     def _bound_by_followers(self, point: int) -> None:
         """The bounds at a point, from those of the points after it."""
@@ -154,64 +139,57 @@ class _Graph:
             else:
                 self.open[point][self.word[q]] += number * max(self.open[q].values())
 
-    def continuation(self, prefix: _Prefix) -> object:
-        """What the continuations of a prefix and their values depend on."""
-        points = prefix.counts.items() if self.open else prefix.counts
-        return prefix.words[-1], frozenset(points)
-
-    def extensions(self, prefix: _Prefix) -> list[_Prefix]:
-        """The prefixes with one word more, and the whole sentence if some plan ends here."""
-        word = prefix.words[-1]
-        inside, todo = Counter(prefix.counts), list(prefix.counts)
+    def extensions(self, word: int, counts: Mapping[int, int]) -> dict[int, Counter[int]]:
+        """The words that may follow a prefix with this last word, with the counts then."""
+        inside, todo = Counter(counts), list(counts)
         further: dict[int, Counter[int]] = defaultdict(Counter)
-        ended: dict[int, int] = {}
         heapify(todo)
         while todo:
             point = heappop(todo)
-            if not self.following[point]:
-                ended[point] = inside[point]
             for q, number in self.following[point]:
                 if self.word[q] == word and q not in inside:
                     heappush(todo, q)
-                counts = inside if self.word[q] == word else further[self.word[q]]
-                counts[q] += inside[point] * number
-        found = [_Prefix((*prefix.words, w), counts) for w, counts in further.items()]
-        if ended:
-            columns = zip(*(self.grades[p] for p in ended), strict=True)
-            grades = tuple((max(column), min(column)) for column in columns)
-            found.append(_Prefix(prefix.words, {}, sum(ended.values()), grades))
-        return found
+                counts_then = inside if self.word[q] == word else further[self.word[q]]
+                counts_then[q] += inside[point] * number
+        return further
 
-    def values(
-        self, length: int, plans: int, grades: Sequence[tuple[int, int]]
-    ) -> tuple[int | tuple[int, int], ...]:
-        """The value of a sentence in each preference; the smaller the better."""
-        left = iter(grades)
-        worth = {"shortest": length, "most-plans": -plans}
-        return tuple(worth[one] if isinstance(one, str) else next(left) for one in self.preferences)
+    def bound(self, words: Sequence[int], counts: Mapping[int, int]) -> tuple[Any, ...]:
+        """The best values that any sentence with this prefix can have, and its least length.
 
-    def bound(self, prefix: _Prefix) -> tuple[object, ...]:
-        """The best values that any sentence with this prefix can have; the length last."""
-        length, plans, grades = len(prefix.words), prefix.plans, prefix.grades
-        if plans is None:
-            length += min(self.more[p] for p in prefix.counts)
-            most = Counter[int]()
-            for point, count in prefix.counts.items() if self.open else ():
-                for word, number in self.open[point].items():
-                    most[word] += count * number
-            plans = max(most.values(), default=0)
-            grades = self._best_grades(prefix)
-        return (*self.values(length, plans, grades), length)
+        Of a whole sentence they are its own.
+        """
+        length = len(words) - 1 + min(self.more[p] for p in counts)
+        most = Counter[int]()
+        for point, count in counts.items() if self.open else ():
+            for word, number in self.open[point].items():
+                most[word] += count * number
+        known = {"shortest": length, "most-plans": -max(most.values(), default=0)}
+        grades = self._grades(counts)
+        values = (known[one] if isinstance(one, str) else next(grades) for one in self.preferences)
+        return *values, length
 
-    def _best_grades(self, prefix: _Prefix) -> tuple[tuple[int, int], ...]:
+    def _grades(self, counts: Mapping[int, int]) -> Iterator[tuple[int, int]]:
         """The (worst, best) grades at least.
 
         Some node's plans go on, and all that came to this node can go on in the same way.
         """
-        by_node: dict[int, list[tuple[int, ...]]] = {}
-        for point in prefix.counts:
-            by_node.setdefault(self.node[point], []).append(self.grades[point])
-        best = map(min, zip(*(self.grades[p] for p in prefix.counts), strict=True))
+        by_node: dict[int, list[tuple[int, ...]]] = defaultdict(list)
+        for point in counts:
+            by_node[self.node[point]].append(self.grades[point])
+        best = map(min, zip(*(self.grades[p] for p in counts), strict=True))
         of_node = [tuple(map(max, zip(*grades, strict=True))) for grades in by_node.values()]
         worst = map(min, zip(*of_node, strict=True))
-        return tuple(zip(worst, best, strict=True))
+        return zip(worst, best, strict=True)
+
+
+def _after(
+    space: PlanSpace, automata: Sequence[PlanPreference], node: int, memories: tuple[Memory, ...]
+) -> Iterator[tuple[int, tuple[Memory, ...]]]:
+    """What comes after a point, once for each joint action."""
+    if node != _END and space.layer[node] == 0:
+        yield _END, memories
+    for edge in space.out_edges(node) if node != _END else ():
+        target = space.target_of(edge)
+        labels, state = space.labels_of(edge) if automata else (), int(space.state[target])
+        steps = zip(automata, memories, strict=True)
+        yield target, tuple(one.step(memory, labels, state) for one, memory in steps)

@@ -243,25 +243,12 @@ def to_record(choices: SentenceChoices, robots: Sequence[int] | None = None) -> 
     )
 
 
-def to_data(choices: SentenceChoices, robots: Sequence[int] | None = None) -> dict[str, Any]:
-    """The data of a choices file, of all robots or of those with these numbers."""
-    data: dict[str, Any] = msgspec.to_builtins(to_record(choices, robots))
-    return data
-
-
 def to_bytes(choices: SentenceChoices, robots: Sequence[int] | None = None) -> bytes:
     """The text of a choices file: the same choices give the same bytes."""
     return msgspec.json.encode(to_record(choices, robots)) + b"\n"
 
 
-def monitor(choices: SentenceChoices, robot: str) -> Monitor:
-    """A run-time monitor of one robot's choices."""
-    model = choices.task_language.model
-    own = choices.robots[model.robots.index(robot)]
-    return monitor_of(model, own, choices.task_language.text(choices.words))
-
-
-def monitor_of(model: JointModel, own: RobotChoices, sentence: str) -> Monitor:
+def monitor(model: JointModel, own: RobotChoices, sentence: str) -> Monitor:
     """A run-time monitor of a robot's subplans under a sentence."""
     entry = msgspec.to_builtins(_robot(model, own))
     return Monitor({"format": FORMAT, "version": VERSION, "sentence": sentence, "choices": [entry]})
@@ -271,6 +258,10 @@ def _robot(model: JointModel, own: RobotChoices) -> RobotRecord:
     automaton, texts = own.automaton, model.codec.facts.texts
     sometimes_known = reduce(or_, (known.true | ~known.possible for known in automaton.known))
     facts = [fact for fact in range(len(texts)) if sometimes_known >> fact & 1]
+
+    def numbers(bits: int) -> list[int]:
+        return [number for number, fact in enumerate(facts) if bits >> fact & 1]
+
     return RobotRecord(
         robot=model.robots[own.robot],
         steps=automaton.steps,
@@ -279,23 +270,17 @@ def _robot(model: JointModel, own: RobotChoices) -> RobotRecord:
         facts=[texts[fact] for fact in facts],
         others=[text for fact, text in enumerate(texts) if not sometimes_known >> fact & 1],
         states=[
-            _state(model, own, facts, step, state)
+            StateRecord(
+                step=step,
+                left=json_count(automaton.left[state]),
+                next={
+                    model.label_text(own.robot, label) or IDLE: to
+                    for label, to in automaton.moves[state].items()
+                },
+                true=numbers(automaton.known[state].true),
+                unknown=numbers(automaton.known[state].unknown),
+            )
             for step, states in enumerate(automaton.layers)
             for state in states
         ],
-    )
-
-
-def _state(
-    model: JointModel, own: RobotChoices, facts: Sequence[int], step: int, state: int
-) -> StateRecord:
-    automaton = own.automaton
-    known = automaton.known[state]
-    moves = automaton.moves(state)
-    return StateRecord(
-        step=step,
-        left=json_count(automaton.left[state]),
-        next={model.label_text(own.robot, label) or IDLE: to for label, to in moves},
-        true=[number for number, fact in enumerate(facts) if known.true >> fact & 1],
-        unknown=[number for number, fact in enumerate(facts) if known.unknown >> fact & 1],
     )

@@ -142,8 +142,8 @@ def _cluster(choices: SentenceChoices, own: RobotChoices) -> list[str]:
             text = "\n".join([f"{state}: {automaton.left[state]:,} left", *atoms])
             lines.append(f"    {name} [label={_quoted(text)}{final}];")
         lines.append("    {rank=same; " + " ".join(f"{name};" for name in names) + "}")
-    for state in range(len(automaton)):
-        for label, to in automaton.moves(state):
+    for state, moves in enumerate(automaton.moves):
+        for label, to in moves.items():
             text = model.label_text(own.robot, label) or IDLE
             lines.append(f"    r{own.robot}s{state} -> r{own.robot}s{to} [label={_quoted(text)}];")
     return [*lines, "  }"]

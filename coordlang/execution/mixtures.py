@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from coordlang.execution.task_language import TaskLanguage
 from coordlang.required.miscoordination import Miscoordination, Trail, describe_failure
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel
-from planners.joint.tables import Ints, unique_tuples
+from planners.joint.tables import Ints, ranges, unique_tuples
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace, UnfoldingStep
 from planners.system.errors import OutOfMemory
@@ -60,14 +61,14 @@ def walk_mixtures(
     """
     space = task_language.space
     index = EdgeIndex.of(space)
-    robots = len(automata)
+    robots, moves = len(automata), [_moves(own) for own in automata]
     table = np.array([[0] * robots + [task_language.start]])
     layers = [table[:, robots]]
     steps: list[UnfoldingStep] = []
     walked, held = 1, 0
     for step in range(automata[0].steps):
-        _check(space.model, automata, table, step, held, most)
-        source, labels, after = _moves(automata, table)
+        _check(space.model, moves, table, step, held, most)
+        source, labels, after = _together(moves, table)
         edge = table[source, robots]
         for robot in range(robots):
             edge = index.follow(robot, edge, labels[:, robot])
@@ -85,16 +86,33 @@ def walk_mixtures(
     return Mixtures(found, None, walked)
 
 
-def _moves(automata: Sequence[Automaton], table: Ints) -> tuple[Ints, Labels, Ints]:
+class _Moves(NamedTuple):
+    """An automaton's moves: for each state their number and the position of the first one."""
+
+    degree: Ints
+    first: Ints
+    label: Ints
+    target: Ints
+
+
+def _moves(automaton: Automaton) -> _Moves:
+    degree = np.array([len(own) for own in automaton.moves], np.int64)
+    pairs = [pair for own in automaton.moves for pair in own.items()]
+    return _Moves(degree, np.cumsum(degree) - degree, *np.array(pairs, np.int64).reshape(-1, 2).T)
+
+
+def _together(moves: Sequence[_Moves], table: Ints) -> tuple[Ints, Labels, Ints]:
     """All joint moves, sorted by source and labels: (source, labels, next automaton states)."""
     source = np.arange(len(table))
     labels: list[Ints] = []
     after: list[Ints] = []
-    for robot, own in enumerate(automata):
-        earlier, label, target = own.moves_of(table[source, robot])
+    for robot, own in enumerate(moves):
+        state = table[source, robot]
+        earlier = np.repeat(np.arange(len(source)), own.degree[state])
+        edges = ranges(own.first[state], own.degree[state])
         source = source[earlier]
-        labels = [*(column[earlier] for column in labels), label]
-        after = [*(column[earlier] for column in after), target]
+        labels = [*(column[earlier] for column in labels), own.label[edges]]
+        after = [*(column[earlier] for column in after), own.target[edges]]
     return source, np.stack(labels, axis=1).astype(np.int32), np.stack(after, axis=1)
 
 
@@ -125,7 +143,7 @@ def _witness(
 
 def _check(
     model: JointModel,
-    automata: Sequence[Automaton],
+    own_moves: Sequence[_Moves],
     table: Ints,
     step: int,
     held: int,
@@ -133,10 +151,10 @@ def _check(
 ) -> None:
     """Estimate a layer's joint moves before they are made."""
     size = np.ones(len(table))
-    for robot, own in enumerate(automata):
-        size *= own.out_degrees[table[:, robot]]
+    for robot, own in enumerate(own_moves):
+        size *= own.degree[table[:, robot]]
     moves = float(size.sum())
-    needed = held + moves * (48 + 24 * len(automata))
+    needed = held + moves * (48 + 24 * len(own_moves))
     if (most is not None and moves + held / 40 > most) or (
         needed > SMALL and needed > memory_left()
     ):

@@ -80,7 +80,9 @@ def _tree(model: JointModel, own: RobotChoices) -> ET.Element:
         if own.robot in action.owners and not action.parts
     }
     for step, states in enumerate(own.automaton.layers[:-1]):
-        moves = [_Move(state, *move) for state in states for move in own.automaton.moves(state)]
+        moves = [
+            _Move(state, *move) for state in states for move in own.automaton.moves[state].items()
+        ]
         here = ET.SubElement(steps, "Sequence", name=f"step {step}")
         ET.SubElement(here, "Action", ID="AwaitStep", step=str(step))
         here.append(_choosing(model, own, moves))
@@ -143,7 +145,7 @@ def _models(model: JointModel, choices: SentenceChoices) -> ET.Element:
         found.append(_leaf_model(kind, name, [port]))
     ports: dict[str, int] = {}
     for own in choices.robots:
-        for label in sorted(set(own.automaton.label.tolist())):
+        for label in sorted(own.automaton.labels):
             if (text := model.label_text(own.robot, label)) is not None:
                 name, *arguments = text.strip("()").split()
                 ports[name] = max(ports.get(name, 0), len(arguments))

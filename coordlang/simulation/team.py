@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import partial
 from random import Random
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
 from coordlang.execution.automaton import determinise
-from coordlang.execution.choices import choices, knowing, monitor, monitor_of
+from coordlang.execution.choices import choices, knowing, monitor
 from coordlang.execution.monitor import IDLE, Monitor
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import words_passed
@@ -29,11 +29,8 @@ from planners.system.messages import echoed
 Agreement = Literal["sentence", "plan", "nothing"]
 
 
-class Equipment(NamedTuple):
-    """What one robot is given for one run: a monitor of its own, and its words."""
-
-    monitor: Monitor
-    words: OwnWords | None
+#: What each robot is given for one run: a monitor of its own, and its words.
+Team = dict[str, tuple[Monitor, OwnWords | None]]
 
 
 class Mission:
@@ -69,31 +66,31 @@ class Mission:
         self.leads = {name: _leads(self.world, space, robot) for robot, name in numbered}
         self.steps = space.cost_of(task_language.task)[0]
         self._plans = Plans.of(space, task_language.task)
-        self._given: dict[str, Equipment] = {}
+        self._given: Team = {}
         if agreement == "sentence":
             found = choices(task_language, sentence)
-            for robot, name in enumerate(model.robots):
-                words = own_words(found.fits, task_language, robot)
-                self._given[name] = Equipment(monitor(found, name), words)
+            for name, own in zip(model.robots, found.robots, strict=True):
+                words = own_words(found.fits, task_language, own.robot)
+                self._given[name] = monitor(model, own, ""), words
 
     @property
     def robots(self) -> tuple[str, ...]:
         """The robots, in the order of joint actions."""
         return self.task_language.model.robots
 
-    def team(self, seed: int) -> dict[str, Equipment]:
+    def team(self, seed: int) -> Team:
         """Return what each robot is given in the run with this seed."""
         if self.agreement == "sentence":
-            return {name: Equipment(g.monitor.copy(), g.words) for name, g in self._given.items()}
+            return {name: (own.copy(), words) for name, (own, words) in self._given.items()}
         agreed = self.agreement == "plan"
-        model, team = self.task_language.model, {}
+        team: Team = {}
         for robot, name in enumerate(self.robots):
             fits = self._only(
                 self.agreed_plan(seed) if agreed else self._drawn(f"{seed} plan {name}")
             )
             own = knowing(fits, robot, self._places_of(name))
             words = own_words(fits, self.task_language, robot) if agreed else None
-            team[name] = Equipment(monitor_of(model, own, ""), words)
+            team[name] = monitor(self.task_language.model, own, ""), words
         return team
 
     def agreed_plan(self, seed: int) -> Plan:
@@ -146,9 +143,7 @@ def own_words(fits: PlanSpace, task_language: TaskLanguage, robot: int) -> OwnWo
     passed = [(1 << number - 1) - 1 for number in words_passed(fits, word).tolist()]
     found = determinise(fits, robot, passed)
     text = partial(fits.model.label_text, robot)
-    moves = [
-        {text(label) or IDLE: to for label, to in found.moves(state)} for state in range(len(found))
-    ]
+    moves = [{text(label) or IDLE: to for label, to in own.items()} for own in found.moves]
     return OwnWords(moves, [known.possible.bit_length() for known in found.known])
 
 

@@ -51,9 +51,7 @@ def test_least_automaton_of_any_graph() -> None:
             }
             subsets = subsets | layer
         automaton = determinise(layered_space(sizes, edges), 0)
-        assert accepted([dict(automaton.moves(n)) for n in range(len(automaton))]) == futures(
-            edges, start
-        )
+        assert accepted([dict(own) for own in automaton.moves]) == futures(edges, start)
         assert automaton.count == len(futures(edges, start))
         least = len({futures(edges, nodes) for nodes in subsets})
         assert len(automaton) == least

@@ -33,7 +33,7 @@ from tests.support.task_languages import (
 
 
 def moves(automaton: Automaton) -> list[dict[int, int]]:
-    return [dict(automaton.moves(state)) for state in range(len(automaton))]
+    return [dict(own) for own in automaton.moves]
 
 
 def check_automata(found: SentenceChoices, twin: Listed) -> None:
@@ -46,7 +46,7 @@ def check_automata(found: SentenceChoices, twin: Listed) -> None:
         assert accepted(moves(automaton)) == parts
         assert automaton.count == len(parts)
         for state in range(len(automaton)):
-            labels = [label for label, _ in automaton.moves(state)]
+            labels = list(automaton.moves[state])
             assert labels == sorted(set(labels))
         plain = determinise(found.fits, own.robot)
         assert accepted(moves(plain)) == parts
@@ -66,7 +66,7 @@ def check_automata(found: SentenceChoices, twin: Listed) -> None:
                 if own.atoms == "exact":
                     assert said == known[part[:step]]
                 if step < len(part):
-                    state = dict(automaton.moves(state))[part[step]]
+                    state = automaton.moves[state][part[step]]
 
 
 def check_combinations(found: SentenceChoices, twin: Listed) -> None:
@@ -74,9 +74,8 @@ def check_combinations(found: SentenceChoices, twin: Listed) -> None:
     allow no others.
     """
     labels = found.task_language.model.labels
-    robots = found.task_language.model.robots
     for chosen in product(*(accepted(moves(own.automaton)) for own in found.robots)):
-        monitors = [monitor(found, robot) for robot in robots]
+        monitors = [monitor(found.task_language.model, own, "") for own in found.robots]
         for step in zip(*chosen, strict=True):
             for number, (at, label) in enumerate(zip(monitors, step, strict=True)):
                 text = labels[number][label] if label else None
@@ -196,7 +195,7 @@ def check_own_atoms(
                 assert (says == "unknown") == (not mask >> number & 1)
                 assert says == "unknown" or fact in known[part[:step]][says == "false"]
             if label is not None:
-                state = dict(own.automaton.moves(state))[label]
+                state = own.automaton.moves[state][label]
 
 
 #: With three robots where there are some; conditional effects, joint actions, shared subactions.
@@ -259,9 +258,9 @@ def test_a_task_that_starts_at_its_goal() -> None:
     candidates = from_problems(domain, [replace(problem, goal=TRUE)])
     (task_language,) = languages_in_tasks(build_language(candidates, "greedy").language, candidates)
     found = choices(task_language, (int(task_language.word[task_language.start]),))
-    for own, robot in zip(found.robots, task_language.model.robots, strict=True):
+    for own in found.robots:
         assert len(own.automaton) == own.automaton.count == 1
-        at = monitor(found, robot)
+        at = monitor(task_language.model, own, "")
         assert at.finished
         assert (at.step, at.remaining, at.allowed()) == (0, 1, ())
         assert at.can(never="(move *)")

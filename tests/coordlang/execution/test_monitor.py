@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 
 from coordlang.execution import monitor as monitor_module
-from coordlang.execution.choices import SentenceChoices, choices, monitor, to_bytes, to_data
+from coordlang.execution.choices import SentenceChoices, choices, to_bytes
 from coordlang.execution.monitor import Detour, Monitor, MonitorError, NotAllowed, NotPossible
 from coordlang.execution.task_language import TaskLanguage
 from tests.support.naive_choices import Known, Listed, Own
@@ -29,6 +29,10 @@ from tests.support.task_languages import RUNS, in_built_languages, shipped, with
 def three_cells() -> SentenceChoices:
     task_language = shipped("three-cells/problem")[1]
     return choices(task_language, task_language.words_of("w1 w0"))
+
+
+def monitor_of(found: SentenceChoices, robot: str) -> Monitor:
+    return Monitor(json.loads(to_bytes(found)), robot)
 
 
 def texts(task_language: TaskLanguage, robot: int, own: Own) -> list[str | None]:
@@ -154,7 +158,7 @@ def check_detours(
 
 
 def test_monitor_by_hand(three_cells: SentenceChoices) -> None:
-    at = monitor(three_cells, "r2")
+    at = monitor_of(three_cells, "r2")
     assert (at.robot, at.sentence, at.atoms) == ("r2", "w1 w0", "exact")
     assert (at.step, at.remaining, at.finished) == (0, 2, False)
     assert at.allowed() == (None, "(move r2 b a)")
@@ -189,17 +193,20 @@ def test_monitor_by_hand(three_cells: SentenceChoices) -> None:
 
 
 def test_messages(three_cells: SentenceChoices) -> None:
-    at = monitor(three_cells, "r1")
+    at = monitor_of(three_cells, "r1")
     for ask, said in (
         (lambda: at.can(visit="(at r9 a)"), r"\(at r9 a\) is no atom .*: there are \(at r1 a\), "),
         (lambda: at.commit(never="(move r1 a c)"), "step 1: r1 has no subplan left for this$"),
-        (lambda: Monitor(to_data(three_cells), "r7"), "no choices of r7; it has those of r1, r2"),
-        (lambda: Monitor(to_data(three_cells)), "whose choices"),
+        (
+            lambda: Monitor(json.loads(to_bytes(three_cells)), "r7"),
+            "no choices of r7; it has those of r1, r2",
+        ),
+        (lambda: Monitor(json.loads(to_bytes(three_cells))), "whose choices"),
     ):
         with pytest.raises(MonitorError, match=said):
             ask()
     with pytest.raises(TypeError, match="seen"):
-        at.can(seen="(at r1 a)")
+        at.can(seen="(at r1 a)")  # type: ignore[call-arg]
     at.commit(do="(move r1 a c)")
     with pytest.raises(NotPossible, match="together with what was promised before"):
         at.commit(never="(move *)")

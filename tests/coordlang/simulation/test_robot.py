@@ -66,12 +66,12 @@ def test_numbers_and_texts_are_all_that_a_robot_is_told() -> None:
 
 
 def test_each_own_subplan_is_drawn_equally_often() -> None:
-    given = mission_of("corridor").team(0)["r1"]
-    subplans = given.monitor.remaining
+    given, _ = mission_of("corridor").team(0)["r1"]
+    subplans = given.remaining
     assert subplans > 3
     random, found = Random(5), Counter[tuple[str | None, ...]]()
     for _ in range(100 * subplans):
-        monitor, subplan = given.monitor.copy(), list[str | None]()
+        monitor, subplan = given.copy(), list[str | None]()
         while not monitor.finished:
             subplan.append(drawn(monitor, random))
             monitor.did(subplan[-1])
