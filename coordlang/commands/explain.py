@@ -69,7 +69,6 @@ class WordsExplained:
 
     def data(self) -> dict[str, Any]:
         """Words, variables and formulas, as ``--json`` has them."""
-        variables = self.mapped.valuation.variables
         rules = [
             {"word": word, "text": formula_text(cover) if cover else None}
             for word, cover in self.descriptions.rules
@@ -77,7 +76,9 @@ class WordsExplained:
         return {
             "words": self.states,
             "default": self.used.language.default,
-            "variables": [{"name": v.name, "values": list(v.value_texts)} for v in variables],
+            "variables": [
+                {"name": v.name, "values": list(v.value_texts)} for v in self.mapped.variables
+            ],
             "formulas": {word: cover_data(cover) for word, cover in self.covers.items()},
             "told": {"in_order": self.descriptions.in_order, "rules": rules},
             **({"lifted": self.lifted.data()} if self.lifted else {}),

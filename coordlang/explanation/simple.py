@@ -16,7 +16,7 @@ from sys import maxsize
 
 import numpy as np
 
-from coordlang.explanation.variables import Valuation, valuation
+from coordlang.explanation.variables import valuation
 from coordlang.explanation.words import MappedStates, all_covers
 from coordlang.vocabulary.clauses import most_constrained_first, without_implied
 from coordlang.vocabulary.job import Assignment, Job, Outcome
@@ -71,10 +71,14 @@ class _Search:
     def __init__(self, job: Job, found: Outcome, conflicts: int) -> None:
         self._job, self._found, self._conflicts = job, found, conflicts
         self.best: Assignment = found.partition
-        values = valuation(job.candidates.model, job.candidates.rows[list(job.states)])
-        self._value = dict(zip(job.states, values.value, strict=True))
-        self._sizes = [len(variable.values) for variable in values.variables]
-        self._before = self.lengths = formula_lengths(_mapped(job, values, found.partition))
+        variables, value = valuation(job.candidates.model, job.candidates.rows[list(job.states)])
+        self._value = dict(zip(job.states, value, strict=True))
+        self._sizes = [len(variable.values) for variable in variables]
+        word = np.array([found.partition[state] for state in job.states], np.int64)
+        names, word = np.unique(word, return_inverse=True)
+        words = tuple(f"w{name}" for name in names)
+        mapped = MappedStates(words, variables, value, word)
+        self._before = self.lengths = formula_lengths(mapped)
         self.bound: Lengths = (found.size - 1, found.size - 1)  # each term limits a variable
         self._languages: Languages | None = found.languages
 
@@ -151,13 +155,6 @@ class _Search:
         self._job.check(partition)
         self.best, self.lengths = partition, lengths
         return True
-
-
-def _mapped(job: Job, values: Valuation, partition: Assignment) -> MappedStates:
-    """The states with their words as `explain` has them."""
-    words = sorted(set(partition.values()))
-    word = np.array([words.index(partition[state]) for state in job.states], np.int64)
-    return MappedStates(tuple(f"w{n}" for n in range(len(words))), values, word)
 
 
 class FormulaProblem(PartitionProblem):

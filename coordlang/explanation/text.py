@@ -59,8 +59,11 @@ def shown(cover: Cover) -> str:
 
 def pddl_condition(cover: Cover) -> str:
     """A formula as PDDL, with ``and``, ``or`` and ``not``."""
-    parts = [_joined("and", list(conjunction)) for conjunction in cover.conditions()]
-    return _joined("or", parts)
+    literals = (
+        [show(atom) if value else f"(not {show(atom)})" for atom, value in conjunction.items()]
+        for conjunction in cover.conjunctions()
+    )
+    return _joined("or", [_joined("and", own) for own in literals])
 
 
 def _joined(operator: str, parts: list[str]) -> str:

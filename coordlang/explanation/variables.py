@@ -55,28 +55,18 @@ class Variable:
         return tuple(None if value is None else show(value) for value in self.values)
 
 
-@dataclass(frozen=True, slots=True)
-class Valuation:
-    """A table of states as values of variables.
-
-    ``value[s, v]`` is the index of variable v's value in its ``values``, (states, variables).
-    """
-
-    variables: tuple[Variable, ...]
-    value: Ints
-
-
-def valuation(model: JointModel, rows: Rows) -> Valuation:
+def valuation(model: JointModel, rows: Rows) -> tuple[tuple[Variable, ...], Ints]:
     """States as values of as few multi-valued variables as the invariants give.
 
-    Robots' own ones first.  A variable takes at least two values in ``rows``; facts that never
-    change there are left out.  Any two different states differ in some variable.
+    Returns the variables, robots' own ones first, and for each state the index of the value of each
+    in its ``values``, (states, variables).  A variable takes at least two values in ``rows``; facts
+    that never change there are left out.  Any two different states differ in some variable.
     """
     atoms, holds = truth(model, rows)
     _, everywhere = truth(model, _surroundings(model, rows))
     sometimes, always = np.asarray(holds.any(axis=0)), np.asarray(holds.all(axis=0))
     variables: list[Variable] = []
-    columns: list[Ints] = []
+    value = np.zeros((len(rows), 0), np.int64)
     for group in _mutex_groups(atoms, everywhere, model.robots):
         used = [number for number in group.atoms if sometimes[number]]
         if not used or always[used[0]]:
@@ -84,11 +74,10 @@ def valuation(model: JointModel, rows: Rows) -> Valuation:
         none = not everywhere[:, group.atoms].any(axis=1).all()
         variables.append(_variable(group, used, atoms, none))
         column: Ints = np.full(len(rows), len(used), np.int64)
-        for value, number in enumerate(used):
-            column[holds[:, number]] = value
-        columns.append(column)
-    table = np.array(columns, np.int64).reshape(len(columns), len(rows))
-    return Valuation(tuple(variables), table.T)
+        for own, number in enumerate(used):
+            column[holds[:, number]] = own
+        value = np.column_stack((value, column))
+    return tuple(variables), value
 
 
 def truth(model: JointModel, rows: Rows) -> tuple[tuple[Atom, ...], Bools]:

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from coordlang.explanation.minimise import Points, minimise
-from coordlang.explanation.variables import Valuation, Variable, valuation
+from coordlang.explanation.variables import Variable, valuation
 from coordlang.language.words import Language
 from coordlang.lifted.features import Feature
 from coordlang.lifted.language import LiftedLanguage, Vector, read_values, vectors
 from coordlang.lifted.notation import condition, english, feature_of, formula
 from coordlang.lifted.world import States, World
 from coordlang.sites.coordinates import Point
-from planners.joint.model import JointModel, show
+from planners.joint.model import JointModel
 from planners.joint.tables import Bools, Ints, Rows, find_rows, unique_rows
 from planners.pddl.lifted import Atom, Domain, Problem
 from planners.system.errors import Position, note
@@ -108,13 +108,6 @@ class Cover:
                 found[tuple(pair for part in parts for pair in part.items())] = None
         return [dict(pairs) for pairs in found]
 
-    def conditions(self) -> list[tuple[str, ...]]:
-        """`conjunctions` as PDDL text: ground atoms and negated atoms."""
-        return [
-            tuple(show(atom) if value else f"(not {show(atom)})" for atom, value in pairs.items())
-            for pairs in self.conjunctions()
-        ]
-
 
 @dataclass(frozen=True, slots=True)
 class MappedStates:
@@ -122,11 +115,13 @@ class MappedStates:
 
     In all other states the formulas are arbitrary: several may be true there, or none.
 
-    ``word`` has the number in ``words`` of each state's word.
+    ``value`` are the states as values of ``variables`` (`valuation`), and ``word`` has the number
+    in ``words`` of each state's word.
     """
 
     words: tuple[str, ...]
-    valuation: Valuation
+    variables: tuple[Variable, ...]
+    value: Ints
     word: Ints
 
     @property
@@ -149,7 +144,7 @@ def mapped_states(language: Language, model: JointModel, also: Rows | None = Non
         more = more[find_rows(rows, more) < 0] if len(rows) else more
         rows = np.concatenate((rows, more))
         word = np.concatenate((word, np.full(len(more), table.default)))
-    return MappedStates(table.words, valuation(model, rows), word)
+    return MappedStates(table.words, *valuation(model, rows), word)
 
 
 def all_covers(mapped: MappedStates) -> dict[str, Cover]:
@@ -168,7 +163,7 @@ def cover(
 
     ``quick``: look for few terms in one pass only, without proof.
     """
-    value, variables = mapped.valuation.value, mapped.valuation.variables
+    value, variables = mapped.value, mapped.variables
     mine = mapped.word == word
     other = ~mine if against is None else np.isin(mapped.word, list(against)) & ~mine
     points = Points(tuple(len(v.values) for v in variables), value[mine], value[other])
@@ -338,9 +333,9 @@ def _terms(
     word = np.array([values[vector] for vector in vectors], object)
     table = np.array(vectors, np.int64).reshape(len(vectors), len(features))
     domains = [np.unique(column) for column in table.T]
-    columns = zip(domains, table.T, strict=True)
-    number = np.array([np.searchsorted(own, column) for own, column in columns], np.int64)
-    number = number.reshape(table.T.shape).T
+    number = table.copy()
+    for own, column in zip(domains, number.T, strict=True):
+        column[:] = np.searchsorted(own, column)
     found = {}
     for name in words:
         mine = word == name

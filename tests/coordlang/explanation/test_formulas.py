@@ -23,6 +23,7 @@ from coordlang.explanation.words import (
 )
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.language.words import Language
+from planners.joint.model import show
 from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Atom
 from planners.pddl.model_options import ModelOptions
@@ -33,16 +34,11 @@ from tests.support.random_models import random_model
 from tests.support.task_languages import language_of, random_language
 
 
-def listed(conjunction: tuple[str, ...], atoms: set[str]) -> bool:
-    """A conjunction of ground literals as PDDL reads it."""
-    return all(
-        text[5:-1] not in atoms if text.startswith("(not ") else text in atoms
-        for text in conjunction
-    )
-
-
 def holds(formula: Cover, atoms: set[str]) -> bool:
-    return any(listed(conjunction, atoms) for conjunction in formula.conditions())
+    return any(
+        all((show(atom) in atoms) == value for atom, value in conjunction.items())
+        for conjunction in formula.conjunctions()
+    )
 
 
 def check_exact(language: Language, candidates: Candidates, formulas: dict[str, Cover]) -> None:
@@ -93,7 +89,7 @@ def test_exactly_one_formula_is_true_in_every_mapped_state(robots: int) -> None:
         seen["each"] += all(formula is not None for _, formula in told.rules)
         seen["several terms"] += any(len(f.terms) > 1 for f in formulas.values())
         seen["a word without states"] += any(not f.states for f in formulas.values())
-        seen["several values"] += any(len(v.values) > 2 for v in mapped.valuation.variables)
+        seen["several values"] += any(len(v.values) > 2 for v in mapped.variables)
     assert all(
         seen[case]
         for case in ("every other state", "each", "several terms", "a word without states")
@@ -128,7 +124,7 @@ def test_where_a_robot_is() -> None:
             break
     else:
         raise AssertionError({w: shown(f) for w, f in formulas.items()})
-    assert all(f.fewest and f.length == 1 and len(f.conditions()) == 1 for f in formulas.values())
+    assert all(f.fewest and f.length == 1 and len(f.conjunctions()) == 1 for f in formulas.values())
 
 
 def test_text_and_pddl() -> None:
@@ -298,14 +294,14 @@ def test_variables_are_invariants(folder: str, stem: str, names: set[str]) -> No
     domain = read_domain(DOMAINS / folder / "domain.pddl")
     candidates = from_problems(domain, [read_problem(DOMAINS / folder / f"{stem}.pddl", domain)])
     space = explore(candidates.model, np.stack([task.init for task in candidates.loaded.tasks]))
-    found = valuation(candidates.model, space.rows)
-    assert names <= {variable.name for variable in found.variables}
+    variables, value = valuation(candidates.model, space.rows)
+    assert names <= {variable.name for variable in variables}
     atoms, holds = truth(candidates.model, space.rows)
-    for variable in found.variables:
+    for variable in variables:
         true = holds[:, [atoms.index(atom) for atom in variable.atoms]].sum(axis=1)
         assert true.max() == 1
         assert (true.min() == 0) == (None in variable.values)
-    assert len(np.unique(found.value, axis=0)) == len(space.rows)
+    assert len(np.unique(value, axis=0)) == len(space.rows)
 
 
 def test_remembered_actions_are_one_variable_a_robot() -> None:
@@ -316,5 +312,5 @@ def test_remembered_actions_are_one_variable_a_robot() -> None:
     formulas = all_covers(mapped_states(language, candidates.model))
     check_exact(language, candidates, formulas)
     table = language.partition(candidates.model)
-    names = {variable.name for variable in valuation(candidates.model, table.rows).variables}
+    names = {variable.name for variable in valuation(candidates.model, table.rows)[0]}
     assert {"last(r1)", "last(r2)"} <= names

@@ -80,9 +80,9 @@ def by_trying_all(number: int) -> tuple[Lengths, list[int], dict[int, Lengths]]:
     candidates = small_worlds(6)[number]
     built = build_language(candidates, "minimal")
     size, states = built.language.guarantee.size, list(built.job.states)
-    found = valuation(candidates.model, candidates.rows[states])
-    sizes = [len(variable.values) for variable in found.variables]
-    shortest = shortest_formulas([tuple(row) for row in found.value.tolist()], sizes)
+    variables, value = valuation(candidates.model, candidates.rows[states])
+    sizes = [len(variable.values) for variable in variables]
+    shortest = shortest_formulas([tuple(row) for row in value.tolist()], sizes)
     bad = failing(candidates)
     languages = [w for w in partitions(states, size) if is_language(w, bad)]
     return min(length(word, states, shortest) for word in languages), states, shortest
