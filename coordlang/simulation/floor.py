@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from itertools import count
 from random import Random
 
 from coordlang.sites.coordinates import Point, from_names
@@ -141,8 +140,8 @@ def _walls(
                 sides[side].add(begin)
     found = []
     for (is_upright, line), begins in sides.items():
-        for begin in begins - {start + 2 for start in begins}:
-            end = next(end for end in count(begin, 2) if end not in begins)
+        ends = {begin + 2 for begin in begins}
+        for begin, end in zip(sorted(begins - ends), sorted(ends - begins), strict=True):
             # Whole micrometres, so that equal lengths are equal numbers.
             at, low, high = (round(half * cell / 2, 6) for half in (line, begin, end))
             found.append((at, low, at, high) if is_upright else (low, at, high, at))

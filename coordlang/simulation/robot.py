@@ -24,9 +24,10 @@ Pose = tuple[float, float, float]
 #: Metres a second ahead, radians a second to the left.
 Velocity = tuple[float, float]
 
-#: ``stopped``: something is in its way, told once in a step; ``missed``: it was late for a
-#: beginning by the clock; ``word``: it may have come to a word; ``detour``: it asked its choices,
-#: to ``visit`` an atom or ``avoid`` a place, and has committed to it if that is ``granted``.
+#: What is worth recording, its kind and further fields.  ``stopped``: something is in its way,
+#: told once in a step; ``missed``: it was late for a beginning by the clock; ``word``: it may have
+#: come to a word; ``detour``: it asked its choices, to ``visit`` an atom or ``avoid`` a place, and
+#: has committed to it if that is ``granted``.
 Event = tuple[str, Mapping[str, object]]
 
 STANDING: Velocity = (0.0, 0.0)
@@ -89,18 +90,6 @@ class Sensed:
 
 
 @dataclass(frozen=True, slots=True)
-class Act:
-    """What a robot does in a tick: what its wheels are told, and what it tells all robots.
-
-    ``events`` are what else is worth recording: its kind, and its further fields.
-    """
-
-    velocity: Velocity = STANDING
-    messages: tuple[Message, ...] = ()
-    events: tuple[Event, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
 class OwnStep:
     """A step of a robot: its number from 0, the subaction (None: idle), its times in seconds.
 
@@ -146,6 +135,7 @@ class Robot:
         #: Own steps done, and words of the sentence passed at most, by its own account.
         self.done = self.words = 0
         self._is_turning = False
+        self._messages: list[Message] = []
         self._events: list[Event] = []
         #: Places that it asked to avoid, beginnings missed, the step in which it was stopped.
         self._met: set[str] = set()
@@ -176,30 +166,33 @@ class Robot:
             ahead.did(chosen[-1])
         return chosen
 
-    def act(self, sensed: Sensed) -> Act:
+    def act(self, sensed: Sensed) -> Velocity:
         """Take a tick: hear, go on with the step under way or begin the next one, and drive."""
         self._pace.hears(sensed.heard)
-        velocity, messages = self._gone_on(sensed)
-        events, self._events = tuple(self._events), []
-        return Act(velocity, messages, events)
-
-    def _gone_on(self, sensed: Sensed) -> tuple[Velocity, tuple[Message, ...]]:
         if not self._is_underway:
             self._look_around(sensed)
             begun = self.steps[-1].begin if self.steps else -1.0
             if self._monitor.finished or not self._pace.may_begin(
                 self.done, self.words, begun, sensed.time
             ):
-                return STANDING, ()
+                return STANDING
             self._begin(sensed.time)
         step = self.steps[-1]
         if step.place is None:
-            ends = self._pace.is_common or sensed.time >= step.begin + self._pace.period
-            return STANDING, self._finish(step, sensed.time) if ends else ()
-        target = self._points[step.place]
-        if distance(sensed.pose, target) < _ARRIVED * self._cell:
-            return STANDING, self._finish(step, sensed.time)
-        return self._driven(target, step, sensed), ()
+            has_ended = self._pace.is_common or sensed.time >= step.begin + self._pace.period
+        else:
+            has_ended = distance(sensed.pose, self._points[step.place]) < _ARRIVED * self._cell
+        if has_ended:
+            self._finish(step, sensed.time)
+        if has_ended or step.place is None:
+            return STANDING
+        return self._driven(self._points[step.place], step, sensed)
+
+    def told(self) -> tuple[list[Message], list[Event]]:
+        """What it has told all robots since this was asked last, and what is worth recording."""
+        told = self._messages, self._events
+        self._messages, self._events = [], []
+        return told
 
     def _look_around(self, sensed: Sensed) -> None:
         """Commit to what is wanted, and to keep out of places that somebody stands in."""
@@ -240,16 +233,17 @@ class Robot:
             self._events.append(("missed", {}))
         self._missed = missed
 
-    def _finish(self, step: OwnStep, time: float) -> tuple[Message, ...]:
+    def _finish(self, step: OwnStep, time: float) -> None:
         before, words = self.words, None
         if self._own_words is not None:
             self._word_state = self._own_words.moves[self._word_state][step.subaction or IDLE]
             words = self.words = max(before, self._own_words.words[self._word_state])
         self.steps[-1] = replace(step, end=time, words=words)
         self.done += 1
-        told = self._pace.told(self.done, self.words, self.words > before)
-        self._events += [("word", {}) for kind, _ in told if kind == "word"]
-        return tuple(Message(self.name, kind, number) for kind, number in told)
+        for kind, number in self._pace.told(self.done, self.words, self.words > before):
+            self._messages.append(Message(self.name, kind, number))
+            if kind == "word":
+                self._events.append(("word", {}))
 
     def _driven(self, target: tuple[float, float], step: OwnStep, sensed: Sensed) -> Velocity:
         """Turn on the spot, then drive, steering; slower where it is near or not straight ahead.

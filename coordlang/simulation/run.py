@@ -164,11 +164,11 @@ class _Going:
         heard, self.heard = self.heard, ()
         velocities = {}
         for name, robot in self.robots.items():
-            act = robot.act(self._sensed(name, robot, heard))
-            velocities[name] = act.velocity
-            self.heard += act.messages
-            self.messages += len(act.messages)
-            for kind, further in act.events:
+            velocities[name] = robot.act(self._sensed(name, robot, heard))
+            messages, events = robot.told()
+            self.heard += (*messages,)
+            self.messages += len(messages)
+            for kind, further in events:
                 self._event(kind, [name], **further)
         changes = sum(len(robot.steps) + robot.done for robot in self.robots.values())
         if changes > self.changes:
