@@ -8,9 +8,11 @@ step.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
+from itertools import chain
 from math import log10
 from operator import and_, or_
 from typing import NamedTuple
@@ -87,79 +89,48 @@ def determinise(
     in.  It is then the least automaton with this output (a Moore machine: states are merged that
     agree on the knowledge, now and after every continuation).
 
-    Three passes over the layers: nodes that behave alike are one (upwards), subset construction
-    (downwards), equal futures are one (upwards).  Linear but for the subsets, of which there may be
-    exponentially many: raises `OutOfMemory`, with an estimate, before they fill the memory or have
-    more than ``most`` members.
+    Two passes over the layers: subset construction (downwards), equal futures are one (upwards).
+    Linear but for the subsets, of which there may be exponentially many: raises `OutOfMemory`, with
+    an estimate, before they fill the memory or have more than ``most`` members.
     """
-    nodes = (_nodes(space, robot, truth, number) for number in range(len(space.layers)))
-    layers, top = _merged(nodes)  # merging nodes changes no set of own continuations
-    states: list[list[_State]] = []
-    subsets: list[Classes] = [(top[int(space.starts[0]) - space.layers[-1].start],)]
-    members = 0
-    for depth, layer in enumerate(reversed(layers)):
-        following: dict[Classes, int] = {}
-        here: list[_State] = []
-        for subset in subsets:
-            known = [layer[member][0] for member in subset]
-            knowledge = Knowledge(
-                reduce(and_, (one.true for one in known)),
-                reduce(or_, (one.possible for one in known)),
-            )
-            after = _after(layer, subset).items()
-            moves = {own: (following.setdefault(to, len(following)),) for own, to in after}
-            here.append((knowledge, moves))
+    true = [0] * len(space) if truth is None else truth
+    labels, targets = space.robot_labels(robot).tolist(), space.targets().tolist()
+    subsets: dict[_Nodes, None] = {(int(space.starts[0]),): None}
+    steps, members = len(space.layers) - 1, 0
+    layers: list[dict[_Nodes, tuple[Knowledge, dict[int, _Nodes]]]] = []
+    for depth in range(steps + 1):
+        layers.append({})
+        for number, subset in enumerate(subsets):
+            after: dict[int, set[int]] = defaultdict(set)
+            for node in subset:
+                for edge in space.out_edges(node):
+                    after[labels[edge]].add(targets[edge])
+            facts = [true[node] for node in subset]
+            moves = {own: tuple(sorted(nodes)) for own, nodes in sorted(after.items())}
+            layers[-1][subset] = Knowledge(reduce(and_, facts), reduce(or_, facts)), moves
             members += len(subset)
-            if len(here) % 1024 == 0:
-                _check(space, robot, members, most, depth, len(layers) - 1)
-        states.append(here)
-        subsets = list(following)
-        _check(space, robot, members, most, depth, len(layers) - 1)
-    return _numbered(_merged(reversed(states))[0][::-1])
+            if number % 1024 == 0 or number == len(subsets) - 1:
+                _check(space, robot, members, most, depth, steps)
+        every = (moves.values() for _, moves in layers[-1].values())
+        subsets = dict.fromkeys(chain.from_iterable(every))
+    number_of: dict[_Nodes, int] = {}
+    merged: list[list[_State]] = []
+    for layer in reversed(layers):
+        numbers: dict[_State, int] = {}
+        for subset, (known, moves) in layer.items():
+            state = known, tuple((own, number_of[nodes]) for own, nodes in moves.items())
+            number_of[subset] = numbers.setdefault(state, len(numbers))
+        merged.append(list(numbers))
+    return _numbered(merged[::-1])
 
 
-#: Numbers of states of a layer, sorted.
-Classes = tuple[int, ...]
-#: What is known in a state, and the states of the next layer to which each label leads.
-_State = tuple[Knowledge, Mapping[int, Sequence[int]]]
-#: The same of states that are merged; labels are sorted.
-_Class = tuple[Knowledge, dict[int, Classes]]
+#: Numbers of nodes of a layer of the plan space, sorted.
+_Nodes = tuple[int, ...]
+#: What is known in a state, and the number in the next layer of the state to which a label leads.
+_State = tuple[Knowledge, tuple[tuple[int, int], ...]]
 
 
-def _merged(layers: Iterable[Sequence[_State]]) -> tuple[list[list[_Class]], list[int]]:
-    """Make one of the states that know the same and lead by the same labels to the same states.
-
-    Layers come with the last one first.  Returns them in this order, and the number of the class of
-    each state of the one that came last.
-    """
-    merged: list[list[_Class]] = []
-    class_of: list[int] = []
-    for layer in layers:
-        number: dict[tuple[Knowledge, tuple[tuple[int, Classes], ...]], int] = {}
-        here = []
-        for known, moves in layer:
-            after = [(own, {class_of[to] for to in targets}) for own, targets in moves.items()]
-            key = known, tuple((own, tuple(sorted(to))) for own, to in sorted(after))
-            here.append(number.setdefault(key, len(number)))
-        class_of = here
-        merged.append([(known, dict(moves)) for known, moves in number])
-    return merged, class_of
-
-
-def _nodes(space: PlanSpace, robot: int, truth: Sequence[int] | None, number: int) -> list[_State]:
-    """The nodes of a layer of a plan space, with the robot's own labels."""
-    span, edges = space.layers[number], space.layer_edges(number)
-    below = space.layers[number - 1].start if number else 0
-    moves: list[dict[int, list[int]]] = [{} for _ in range(span.stop - span.start)]
-    source, target = (edges.source - span.start).tolist(), (edges.target - below).tolist()
-    labels = space.robot_labels(robot, edges.edges).tolist()
-    for node, label, to in zip(source, labels, target, strict=True):
-        moves[node].setdefault(label, []).append(to)
-    true = [0] * len(moves) if truth is None else truth[span.start : span.stop]
-    return [(Knowledge(own, own), move) for own, move in zip(true, moves, strict=True)]
-
-
-def _numbered(merged: Sequence[Sequence[_Class]]) -> Automaton:
+def _numbered(merged: Sequence[Sequence[_State]]) -> Automaton:
     """Number the states in the order in which a walk by layers and labels meets them."""
     layers: list[range] = []
     found, end = {0: 0}, 1
@@ -171,24 +142,12 @@ def _numbered(merged: Sequence[Sequence[_Class]]) -> Automaton:
         for state in here:
             knowledge, moves = layer[state]
             known.append(knowledge)
-            to = (found.setdefault(after, end + len(found)) for (after,) in moves.values())
-            numbered.append(dict(zip(moves, to, strict=True)))
+            numbered.append({own: found.setdefault(to, end + len(found)) for own, to in moves})
         end += len(found)
     left = [1] * len(known)
     for state in reversed(range(layers[-1].start)):
         left[state] = sum(left[to] for to in numbered[state].values())
     return Automaton(tuple(layers), tuple(numbered), tuple(left), tuple(known))
-
-
-def _after(layer: Sequence[_Class], subset: Classes) -> dict[int, Classes]:
-    """Where a subset of classes leads by each label."""
-    if len(subset) == 1:
-        return layer[subset[0]][1]
-    found: dict[int, set[int]] = {}
-    for member in subset:
-        for own, classes in layer[member][1].items():
-            found.setdefault(own, set()).update(classes)
-    return {own: tuple(sorted(classes)) for own, classes in sorted(found.items())}
 
 
 def _check(
