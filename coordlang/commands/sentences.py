@@ -14,12 +14,16 @@ from coordlang.commands.inputs import Arguments, InTask, public
 from coordlang.commands.plans import OptimalPlans, PlanSteps, show_listed
 from coordlang.commands.records import NODES_DRAWN, PlanOptions, SayOptions, UnderstandOptions
 from coordlang.commands.terminal import covered_code, echo, write
-from coordlang.execution.best_sentence import BestSentence, best_sentence
+from coordlang.execution.best_sentence import (
+    BestSentence,
+    Preference,
+    best_sentence,
+    read_preference,
+)
 from coordlang.execution.drawing import cut_note, plans_dot
 from coordlang.execution.guided_search import ExpandedStates, GuidedPlan, plan_under_sentence
 from coordlang.execution.open_plans import PlanDag, open_plans_data, plan_dag
 from coordlang.execution.plan_sentence import read_plan_file, sentence_of_plan
-from coordlang.execution.preferences import Preference, read_preference
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.provenance import tolerance_data
 from planners.search import HeuristicName

@@ -13,8 +13,9 @@ from planners.joint.model import IDLE, NO_FACT, own_text
 from planners.joint.states import split_atoms
 
 #: Colours that people of every colour vision tell apart (Okabe and Ito 2008).  Words carry their
-#: names as well.
-COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442", "#999999")
+#: names as well: in white on the dark colours.
+_COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442", "#999999")
+_DARK = ("#0072b2", "#009e73", "#d55e00")
 
 _ATOMS_SHOWN = 6
 _ACTIONS_SHOWN = 3
@@ -53,10 +54,9 @@ def _looks(dag: PlanDag) -> dict[str, str]:
     """
     result = {}
     for number, word in enumerate(dag.words):
-        fill = COLOURS[number % len(COLOURS)]
-        red, green, blue = (int(fill[k : k + 2], 16) / 255 for k in (1, 3, 5))
-        text = "#ffffff" if 0.299 * red + 0.587 * green + 0.114 * blue < 0.5 else "#000000"
-        again = ", peripheries=2" if number >= len(COLOURS) else ""
+        fill = _COLOURS[number % len(_COLOURS)]
+        text = "#ffffff" if fill in _DARK else "#000000"
+        again = ", peripheries=2" if number >= len(_COLOURS) else ""
         result[word] = f'fillcolor="{fill}", fontcolor="{text}"{again}'
     return result
 

@@ -17,6 +17,7 @@ from planners.joint.model import Goal, JointModel
 from planners.joint.tables import Rows
 from planners.search.goals import FAR, Values
 from planners.search.heuristics import heuristic
+from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan
 from planners.search.slack import rests
 
@@ -92,27 +93,22 @@ def plan_under_sentence(
     with the same language and model have expanded; for ``count_words`` see `_a_star`.  Of plans
     within slack the earliest is read off the plan space, without a search.  Raises `NoPlanFits`.
     """
-    space = task_language.space
+    space, start = task_language.space, task_language.start
+    if words is not None:
+        space = task_language.plans_with(words)
+        start = int(space.starts[0])
     if space.model.slack:
-        return _earliest(task_language, words)
+        return _earliest(task_language, space, start)
     states = states or ExpandedStates(task_language.model, task_language.partition)
-    goal = space.goals[space.goal[task_language.start]]
-    init = space.rows[space.state[task_language.start]]
+    goal, init = space.goals[space.goal[start]], space.rows[space.state[start]]
     bound = heuristic(name, task_language.model, goal, init)
     found = _a_star(states, init, goal, bound, words, count_words)
-    if found is None or found.cost != space.cost_of(task_language.task):
-        task_language.plans_with(words or ())  # raises: says where the sentence first breaks
-        raise AssertionError("A* missed an optimal plan")
+    assert found.cost == task_language.space.cost_of(task_language.task), "A* is optimal"
     return found
 
 
-def _earliest(task_language: TaskLanguage, words: Sequence[int] | None) -> GuidedPlan:
+def _earliest(task_language: TaskLanguage, space: PlanSpace, start: int) -> GuidedPlan:
     """The plan within slack that rests soonest, the first one of these in their order."""
-    if words is None:
-        space, start = task_language.space, task_language.start
-    else:
-        space = task_language.plans_with(words)
-        start = int(space.starts[0])
     resting = rests(space.labels)
     # Per node the steps until a rest that lasts to the end; per edge those with it.
     left = np.zeros(len(space), np.int64)
@@ -140,8 +136,8 @@ def _a_star(
     bound: Values,
     words: Sequence[int] | None,
     count_words: bool,
-) -> GuidedPlan | None:
-    """Search for an optimal plan with a sentence; for other sentences a longer plan or none.
+) -> GuidedPlan:
+    """Search for an optimal plan with a sentence that some optimal plan has.
 
     A node is a state and the *index* of its word in the sentence (0 without a sentence).  What does
     not fit is pruned: a step stays in its word or goes on to the next one, and a goal state counts
@@ -160,7 +156,6 @@ def _a_star(
     ways: dict[Node, tuple[Cost, Node, tuple[int, ...]]] = {}  # cost, predecessor, labels
     queue: list[tuple[Cost, int, int, int, int, Node, Cost]] = []
     expanded: set[Node] = set()
-    generated = 0
 
     def put(node: Node, cost: Cost, order: int) -> None:
         least, left = height[node[0]], last - node[1]
@@ -169,10 +164,9 @@ def _a_star(
         key = (cost[0] + least, cost[1]), least, left, -len(expanded), order
         heappush(queue, (*key, node, cost))
 
-    if words is None or states.word[start] in words[:1]:
-        _bound(states, bound, height, [start])
-        put((start, 0), (0, 0), 0)
-        generated = 1
+    _bound(states, bound, height, [start])
+    put((start, 0), (0, 0), 0)
+    generated = 1
     while queue:
         *_, node, cost = heappop(queue)
         if node in expanded or cost != best[node[0]]:
@@ -191,7 +185,7 @@ def _a_star(
                 best[to[0]], ways[to] = after, (after, node, labels)
                 put(to, after, order)
                 generated += 1
-    return None
+    raise AssertionError("some plan has the sentence")
 
 
 def _fitting(
@@ -200,10 +194,9 @@ def _fitting(
     """The joint steps out of a node that fit the sentence: (number, next node, labels, cost)."""
     state, index = node
     for number, (target, labels, cost) in enumerate(states.steps(state)):
-        if words is None or states.word[target] == words[index]:
-            yield number, (target, index), labels, cost
-        elif states.word[target] in words[index + 1 : index + 2]:
-            yield number, (target, index + 1), labels, cost
+        goes_on = words is not None and states.word[target] != words[index]
+        if words is None or not goes_on or states.word[target] in words[index + 1 : index + 2]:
+            yield number, (target, index + goes_on), labels, cost
 
 
 def _bound(

@@ -11,8 +11,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.execution.best_sentence import best_sentence
-from coordlang.execution.preferences import PlanPreference, read_preference
+from coordlang.execution.best_sentence import PlanPreference, best_sentence, read_preference
 from coordlang.execution.task_language import TaskLanguage
 from planners.search.plans import Plan, Plans
 from planners.system.errors import OutOfMemory, UsageError
