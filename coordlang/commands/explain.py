@@ -16,7 +16,6 @@ from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import SentenceDemands, sentence_demands
 from coordlang.explanation.text import (
     cover_data,
-    demands_data,
     demands_text,
     descriptions_text,
     pddl_condition,
@@ -160,7 +159,7 @@ class Explanation(InTask):
             for sentence in self.sentences
         ]
         for entry, asks in zip(listed, self.demands() if self.with_demands else (), strict=False):
-            entry |= demands_data(asks)
+            entry |= asks.data()
         return {
             **self.words.data(),
             "task": describe(used.space, used.task),

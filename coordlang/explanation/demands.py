@@ -7,7 +7,9 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise
+from typing import Any
 
+import msgspec
 import numpy as np
 
 from coordlang.explanation.words import Cover
@@ -25,11 +27,10 @@ _STATES = 500
 FEW = 12
 
 #: A robot's subplan: the text of its subaction in each step, None for idling.
-Subplan = tuple[str | None, ...]
+Subplan = list[str | None]
 
 
-@dataclass(frozen=True, slots=True)
-class RobotPart:
+class RobotPart(msgspec.Struct, frozen=True):
     """What a sentence leaves to one robot.
 
     ``subplans`` is the number of its different subplans in the plans with the sentence; ``listed``
@@ -39,27 +40,36 @@ class RobotPart:
 
     robot: str
     subplans: int
-    listed: tuple[Subplan, ...]
-    by_step: tuple[Subplan, ...]
+    listed: list[Subplan]
+    by_step: list[Subplan]
 
 
-@dataclass(frozen=True, slots=True)
-class WordChange:
+class Way(msgspec.Struct, frozen=True):
+    """What robots do to change the word, one entry each; the steps in which plans do it so."""
+
+    subactions: Subplan
+    steps: list[int]
+
+
+class WordChange(
+    msgspec.Struct,
+    frozen=True,
+    rename={"before": "from", "after": "to", "robots": "decided_by"},
+):
     """A change from one word of the sentence to the next one.
 
     ``earliest`` and ``latest`` are the first and the last step (from 1) at whose end plans make it.
     ``robots`` are the fewest robots whose subactions decide it: wherever plans make the change,
     these robots' subactions settle whether a joint step to a mapped state makes it, whatever the
-    others do; no robots: every such step makes it.  ``ways`` are what they do, one entry each, and
-    the steps in which plans make the change in this way.
+    others do; no robots: every such step makes it.  ``ways`` are how they do it.
     """
 
     before: str
     after: str
     earliest: int
     latest: int
-    robots: tuple[str, ...]
-    ways: tuple[tuple[Subplan, tuple[int, ...]], ...]
+    robots: list[str]
+    ways: list[Way]
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +79,16 @@ class SentenceDemands:
     sentence: tuple[str, ...]
     plans: int
     steps: int
-    parts: tuple[RobotPart, ...]
-    changes: tuple[WordChange, ...]
+    parts: list[RobotPart]
+    changes: list[WordChange]
+
+    def data(self) -> dict[str, Any]:
+        """What it demands, for JSON; steps count from 1, null is idling."""
+        robots = msgspec.to_builtins(self.parts)
+        for part in robots:
+            del part["by_step"]
+        changes = msgspec.to_builtins(self.changes)
+        return {"steps": self.steps, "robots": robots, "changes": changes}
 
 
 def sentence_demands(
@@ -96,8 +114,8 @@ def sentence_demands(
         sentence=tuple(partition.words[w] for w in sentence),
         plans=counts(space)[start],
         steps=space.cost_of(0)[0],
-        parts=tuple(_part(choices, robot, few) for robot in range(space.robots)),
-        changes=tuple(changes),
+        parts=[_part(choices, robot, few) for robot in range(space.robots)],
+        changes=changes,
     )
 
 
@@ -124,11 +142,10 @@ def _part(choices: Choices, robot: int, few: int) -> RobotPart:
     listed = choices.sets.sequences(own) if subplans <= few else ()
 
     def texts(used: Sequence[int]) -> Subplan:
-        return tuple(_own_text(space.model, robot, label) for label in used)
+        return [_own_text(space.model, robot, label) for label in used]
 
-    return RobotPart(
-        space.model.robots[robot], subplans, tuple(map(texts, listed)), tuple(map(texts, labels))
-    )
+    name = space.model.robots[robot]
+    return RobotPart(name, subplans, list(map(texts, listed)), list(map(texts, labels)))
 
 
 def _own_text(model: JointModel, robot: int, label: int) -> str | None:
@@ -155,7 +172,7 @@ def _change(
     node = space.sources[edges]
     step = space.cost_of(0)[0] - space.layer[node] + 1
     robots = _deciding(space, partition, np.unique(space.state[node]), pair[1], order)
-    ways: dict[Subplan, set[int]] = defaultdict(set)
+    ways: dict[tuple[str | None, ...], set[int]] = defaultdict(set)
     for when, edge in zip(step.tolist(), edges.tolist(), strict=True):
         labels = space.labels_of(edge)
         ways[tuple(_own_text(space.model, robot, labels[robot]) for robot in robots)].add(when)
@@ -164,11 +181,11 @@ def _change(
         after=partition.words[pair[1]],
         earliest=int(step.min()),
         latest=int(step.max()),
-        robots=tuple(space.model.robots[r] for r in robots),
-        ways=tuple(
-            (subactions, tuple(sorted(when)))
-            for subactions, when in sorted(ways.items(), key=lambda w: (min(w[1]), str(w)))
-        ),
+        robots=[space.model.robots[r] for r in robots],
+        ways=[
+            Way(list(does), sorted(when))
+            for does, when in sorted(ways.items(), key=lambda w: (min(w[1]), str(w)))
+        ],
     )
 
 

@@ -195,40 +195,13 @@ def _cause(change: WordChange) -> str:
     if not change.robots:
         return "whatever the robots do"
     if len(change.robots) == 1:
-        ways = [own or "waiting" for (own,), _ in change.ways]
+        ways = [way.subactions[0] or "waiting" for way in change.ways]
         return f"{change.robots[0]} decides it by {_alternatives(ways)}"
     ways = [
         " and ".join(
-            f"{name} {own or 'wait'}" for name, own in zip(change.robots, does, strict=True)
+            f"{name} {own or 'wait'}"
+            for name, own in zip(change.robots, way.subactions, strict=True)
         )
-        for does, _ in change.ways
+        for way in change.ways
     ]
     return f"{named(change.robots)} decide it together: {_alternatives(ways, '; or ')}"
-
-
-def demands_data(demands: SentenceDemands) -> dict[str, Any]:
-    """What a sentence demands, for JSON; steps count from 1, null is idling."""
-    return {
-        "steps": demands.steps,
-        "robots": [
-            {
-                "robot": part.robot,
-                "subplans": part.subplans,
-                "listed": [list(subplan) for subplan in part.listed],
-            }
-            for part in demands.parts
-        ],
-        "changes": [
-            {
-                "from": change.before,
-                "to": change.after,
-                "earliest": change.earliest,
-                "latest": change.latest,
-                "decided_by": list(change.robots),
-                "ways": [
-                    {"subactions": list(does), "steps": list(when)} for does, when in change.ways
-                ],
-            }
-            for change in demands.changes
-        ],
-    }
