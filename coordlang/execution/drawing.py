@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from functools import reduce
+from itertools import groupby
 from operator import and_
 
 from coordlang.execution.choices import RobotChoices, SentenceChoices
@@ -36,9 +37,9 @@ def plans_dot(dag: PlanDag) -> str:
     ]
     states = [set(split_atoms(node.key)) for node in dag.nodes if not node.merged]
     always = set.intersection(*states) if len(states) > 1 else set()
-    for layer in dag.layers:
-        out.append(f"  subgraph step{dag.nodes[layer.start].step} {{ rank=same;")
-        out += [f"    n{n} [{_node(dag.nodes[n], always, looks)}];" for n in layer]
+    for step, layer in groupby(enumerate(dag.nodes), lambda numbered: numbered[1].step):
+        out.append(f"  subgraph step{step} {{ rank=same;")
+        out += [f"    n{n} [{_node(node, always, looks)}];" for n, node in layer]
         out.append("  }")
     for edge in dag.edges:
         merged = dag.nodes[edge.source].merged or dag.nodes[edge.target].merged
@@ -53,7 +54,7 @@ def _looks(dag: PlanDag) -> dict[str, str]:
     In the order in which plans come to the words.
     """
     result = {}
-    for number, word in enumerate(dag.words):
+    for number, word in enumerate(dict.fromkeys(dag.sentence)):
         fill = _COLOURS[number % len(_COLOURS)]
         text = "#ffffff" if fill in _DARK else "#000000"
         again = ", peripheries=2" if number >= len(_COLOURS) else ""

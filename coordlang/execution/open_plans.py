@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import count
 from typing import Any
 
 from coordlang.execution.task_language import TaskLanguage
@@ -63,18 +63,6 @@ class PlanDag:
     edges: tuple[DagEdge, ...]
     cut: int
 
-    @property
-    def words(self) -> tuple[str, ...]:
-        """The different words of its nodes, in the order in which plans come to them."""
-        return tuple(dict.fromkeys(self.sentence))
-
-    @property
-    def layers(self) -> list[range]:
-        """The numbers of the nodes of each step."""
-        steps = groupby(range(len(self.nodes)), lambda number: self.nodes[number].step)
-        layers = [list(numbers) for _, numbers in steps]
-        return [range(layer[0], layer[-1] + 1) for layer in layers]
-
 
 def plan_dag(
     task_language: TaskLanguage, words: Sequence[int], space: PlanSpace, most: int | None = None
@@ -131,10 +119,7 @@ def _width(space: PlanSpace, most: int | None) -> int:
     sizes: list[int] = [span.stop - span.start for span in space.layers]
     if most is None or sum(sizes) <= most:
         return max(sizes)
-    width = 2
-    while sum(min(size, width + 1) for size in sizes) <= most:
-        width += 1
-    return width
+    return next(w for w in count(2) if sum(min(size, w + 1) for size in sizes) > most)
 
 
 def _edges(
