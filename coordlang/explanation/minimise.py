@@ -95,9 +95,6 @@ def minimise(points: Points, quick: bool = False) -> Boxes:
     if not len(points.on):
         none = np.zeros((0, sum(points.sizes)), np.bool_)
         return Boxes(none, none, True)
-    if not len(points.off):
-        everything = points.supercube(np.arange(len(points.on)))[None, :]
-        return Boxes(np.ones_like(everything), everything, True)
     boxes = _irredundant(points, _pass(points))
     fewest = False
     if not quick:

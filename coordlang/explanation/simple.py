@@ -103,8 +103,10 @@ class _Search:
             return
         with suppress(Undecided):  # a question is too hard
             close_bounds(lambda: (self.bound[0], self.lengths[0]), self._decide)
+            budget = Budget(maxsize, self._conflicts)
             while self.bound[1] < self.lengths[1]:
-                self._limit_fewer()
+                if not self._finds(self.lengths[0], self.lengths[1] - 1, budget):
+                    self.bound = self.lengths
 
     def _decide(self, terms: int, budget: Budget) -> bool:
         """Find a language with so many terms or prove that there is none.
@@ -119,12 +121,6 @@ class _Search:
         except Undecided:
             return False
         return True
-
-    def _limit_fewer(self) -> None:
-        """Find a language with as many terms that limit fewer variables, or prove there is none."""
-        terms, limits = self.lengths
-        if not self._finds(terms, limits - 1, Budget(maxsize, self._conflicts)):
-            self.bound = self.lengths
 
     def _finds(self, terms: int, limits: int | None, budget: Budget) -> bool:
         """Whether there is a language with such formulas, which then is the best."""

@@ -73,9 +73,8 @@ def valuation(model: JointModel, rows: Rows) -> tuple[tuple[Variable, ...], Ints
             continue
         none = not everywhere[:, group.atoms].any(axis=1).all()
         variables.append(_variable(group, used, atoms, none))
-        column: Ints = np.full(len(rows), len(used), np.int64)
-        for own, number in enumerate(used):
-            column[holds[:, number]] = own
+        true = holds[:, used]
+        column = np.where(true.any(axis=1), true.argmax(axis=1), len(used))
         value = np.column_stack((value, column))
     return tuple(variables), value
 
