@@ -28,10 +28,10 @@ def literal_text(literal: Literal) -> str:
     """
     variable, negative = literal.variable, literal.is_negative
     if variable.is_fact:
-        return variable.name if literal.values == {variable.values[0]} else f"not {variable.name}"
+        return variable.name if literal.values == variable.values[:1] else f"not {variable.name}"
     texts_of = dict(zip(variable.values, variable.texts, strict=True))
     values: dict[str, list[str]] = {}
-    for value in literal.others if negative else literal.listed:
+    for value in literal.others if negative else literal.values:
         subject, text = texts_of[value]
         values.setdefault(subject, []).append(text)
     parts = [_compared(subject, texts, negative) for subject, texts in values.items()]
@@ -84,7 +84,7 @@ def cover_data(cover: Cover) -> dict[str, Any]:
                 "literals": [
                     {
                         "variable": one.variable.name,
-                        "values": [None if value is None else show(value) for value in one.listed],
+                        "values": [None if value is None else show(value) for value in one.values],
                     }
                     for one in term
                 ],

@@ -29,20 +29,18 @@ Conjunction = dict[Atom, bool]
 
 @dataclass(frozen=True, slots=True)
 class Literal:
-    """The variable has one of these values (atoms; None: none of the variable's atoms is true)."""
+    """The variable has one of these values of its own, in their order.
+
+    Values are atoms; None: none of the variable's atoms is true.
+    """
 
     variable: Variable
-    values: frozenset[Atom | None]
+    values: tuple[Atom | None, ...]
 
     @property
     def others(self) -> tuple[Atom | None, ...]:
         """The variable's other values, in their order."""
         return tuple(value for value in self.variable.values if value not in self.values)
-
-    @property
-    def listed(self) -> tuple[Atom | None, ...]:
-        """The variable's allowed values, in their order."""
-        return tuple(value for value in self.variable.values if value in self.values)
 
     @property
     def is_negative(self) -> bool:
@@ -60,7 +58,7 @@ class Literal:
         One conjunction where one value is allowed, or where excluding the others is the same; else
         one for each atom.
         """
-        allowed = [value for value in self.listed if value is not None]
+        allowed = [value for value in self.values if value is not None]
         if len(self.values) == 1 and allowed:
             return [{allowed[0]: True}]
         if None in self.values or None not in self.variable.values:
@@ -181,7 +179,7 @@ def _shortest(variables: Sequence[Variable], points: Points, least: Bools, box: 
         if box[span].all():
             continue
         limits = [
-            (Literal(variable, frozenset(compress(variable.values, values))), values)
+            (Literal(variable, tuple(compress(variable.values, values))), values)
             for values in (least[span], box[span].copy())
         ]
         literal, box[span] = min(limits, key=lambda one: (one[0].length, one[0].is_negative))
