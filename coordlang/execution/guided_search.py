@@ -17,7 +17,6 @@ from planners.joint.model import Goal, JointModel
 from planners.joint.tables import Rows
 from planners.search.goals import FAR, Values
 from planners.search.heuristics import heuristic
-from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan
 from planners.search.slack import rests
 
@@ -94,21 +93,24 @@ def plan_under_sentence(
     within slack the earliest is read off the plan space, without a search.  Raises `NoPlanFits`.
     """
     space, start = task_language.space, task_language.start
-    if words is not None:
-        space = task_language.plans_with(words)
-        start = int(space.starts[0])
     if space.model.slack:
-        return _earliest(task_language, space, start)
+        return _earliest(task_language, words)
     states = states or ExpandedStates(task_language.model, task_language.partition)
     goal, init = space.goals[space.goal[start]], space.rows[space.state[start]]
     bound = heuristic(name, task_language.model, goal, init)
+    if words is not None:
+        task_language.plans_with(words)  # raises if there is none
     found = _a_star(states, init, goal, bound, words, count_words)
-    assert found.cost == task_language.space.cost_of(task_language.task), "A* is optimal"
+    assert found.cost == space.cost_of(task_language.task), "A* is optimal"
     return found
 
 
-def _earliest(task_language: TaskLanguage, space: PlanSpace, start: int) -> GuidedPlan:
+def _earliest(task_language: TaskLanguage, words: Sequence[int] | None) -> GuidedPlan:
     """The plan within slack that rests soonest, the first one of these in their order."""
+    space, start = task_language.space, task_language.start
+    if words is not None:
+        space = task_language.plans_with(words)
+        start = int(space.starts[0])
     resting = rests(space.labels)
     # Per node the steps until a rest that lasts to the end; per edge those with it.
     left = np.zeros(len(space), np.int64)

@@ -55,11 +55,6 @@ def period(longest: float) -> float:
     return round(math.ceil((_TURNING + (longest / SPEED + _SLACK)) / TICK) * TICK, 6)
 
 
-def distance(pose: Pose, target: tuple[float, float]) -> float:
-    """Metres to a point."""
-    return math.hypot(target[0] - pose[0], target[1] - pose[1])
-
-
 def _bearing(pose: Pose, target: tuple[float, float]) -> float:
     """Radians to turn, from -pi to pi, until a point is straight ahead."""
     angle = math.atan2(target[1] - pose[1], target[0] - pose[0]) - pose[2]
@@ -181,7 +176,7 @@ class Robot:
         if step.place is None:
             has_ended = self._pace.is_common or sensed.time >= step.begin + self._pace.period
         else:
-            has_ended = distance(sensed.pose, self._points[step.place]) < _ARRIVED * self._cell
+            has_ended = math.dist(sensed.pose[:2], self._points[step.place]) < _ARRIVED * self._cell
         if has_ended:
             self._finish(step, sensed.time)
         if has_ended or step.place is None:
@@ -263,7 +258,7 @@ class Robot:
         if room <= 0 and self._stopped_in != self.done:
             self._stopped_in = self.done
             self._events.append(("stopped", {}))
-        ahead = _GAIN * distance(sensed.pose, target) * max(0.0, math.cos(angle))
+        ahead = _GAIN * math.dist(sensed.pose[:2], target) * max(0.0, math.cos(angle))
         return max(0.0, min(_bounded(ahead, SPEED), room)), turn
 
 
