@@ -93,29 +93,9 @@ def determinise(
     Linear but for the subsets, of which there may be exponentially many: raises `OutOfMemory`, with
     an estimate, before they fill the memory or have more than ``most`` members.
     """
-    true = [0] * len(space) if truth is None else truth
-    labels, targets = space.robot_labels(robot).tolist(), space.targets().tolist()
-    subsets: dict[_Nodes, None] = {(int(space.starts[0]),): None}
-    steps, members = len(space.layers) - 1, 0
-    layers: list[dict[_Nodes, tuple[Knowledge, dict[int, _Nodes]]]] = []
-    for depth in range(steps + 1):
-        layers.append({})
-        for number, subset in enumerate(subsets):
-            after: dict[int, set[int]] = defaultdict(set)
-            for node in subset:
-                for edge in space.out_edges(node):
-                    after[labels[edge]].add(targets[edge])
-            facts = [true[node] for node in subset]
-            moves = {own: tuple(sorted(nodes)) for own, nodes in sorted(after.items())}
-            layers[-1][subset] = Knowledge(reduce(and_, facts), reduce(or_, facts)), moves
-            members += len(subset)
-            if number % 1024 == 0 or number == len(subsets) - 1:
-                _check(space, robot, members, most, depth, steps)
-        every = (moves.values() for _, moves in layers[-1].values())
-        subsets = dict.fromkeys(chain.from_iterable(every))
     number_of: dict[_Nodes, int] = {}
     merged: list[list[_State]] = []
-    for layer in reversed(layers):
+    for layer in reversed(_subsets(space, robot, truth, most)):
         numbers: dict[_State, int] = {}
         for subset, (known, moves) in layer.items():
             state = known, tuple((own, number_of[nodes]) for own, nodes in moves.items())
@@ -128,6 +108,32 @@ def determinise(
 _Nodes = tuple[int, ...]
 #: What is known in a state, and the number in the next layer of the state to which a label leads.
 _State = tuple[Knowledge, tuple[tuple[int, int], ...]]
+
+
+def _subsets(
+    space: PlanSpace, robot: int, truth: Sequence[int] | None, most: int | None
+) -> list[dict[_Nodes, tuple[Knowledge, dict[int, _Nodes]]]]:
+    """Where own beginnings lead, layer by layer, what is known there, and where labels lead."""
+    true = [0] * len(space) if truth is None else truth
+    labels, targets = space.robot_labels(robot).tolist(), space.targets().tolist()
+    subsets: dict[_Nodes, None] = {(int(space.starts[0]),): None}
+    steps, members = len(space.layers) - 1, 0
+    layers: list[dict[_Nodes, tuple[Knowledge, dict[int, _Nodes]]]] = []
+    for depth in range(steps + 1):
+        layers.append({})
+        for number, subset in enumerate(subsets):
+            after: dict[int, set[int]] = defaultdict(set)
+            for edge in chain.from_iterable(map(space.out_edges, subset)):
+                after[labels[edge]].add(targets[edge])
+            facts = [true[node] for node in subset]
+            moves = {own: tuple(sorted(nodes)) for own, nodes in sorted(after.items())}
+            layers[-1][subset] = Knowledge(reduce(and_, facts), reduce(or_, facts)), moves
+            members += len(subset)
+            if number % 1024 == 0 or number == len(subsets) - 1:
+                _check(space, robot, members, most, depth, steps)
+        every = (moves.values() for _, moves in layers[-1].values())
+        subsets = dict.fromkeys(chain.from_iterable(every))
+    return layers
 
 
 def _numbered(merged: Sequence[Sequence[_State]]) -> Automaton:

@@ -238,16 +238,7 @@ class _Graph:
     def __init__(self, task_language: TaskLanguage, preferences: Sequence[Preference]) -> None:
         self.preferences = tuple(preferences)
         automata = [one for one in preferences if isinstance(one, PlanPreference)]
-        space, start = task_language.space, task_language.start
-        points = [(start, tuple(one.start(int(space.state[start])) for one in automata))]
-        number = {points[0]: 0}
-        self.following: list[list[tuple[int, int]]] = []
-        for node, memories in points:  # grows while it is walked
-            after = Counter(_after(space, automata, node, memories))
-            for there in after:
-                if number.setdefault(there, len(points)) == len(points):
-                    points.append(there)
-            self.following.append(sorted((number[there], n) for there, n in after.items()))
+        points, self.following = _points(task_language, automata)
         self.node = [node for node, _ in points]
         self.word = [_END if node == _END else int(task_language.word[node]) for node in self.node]
         self.more = [0] * len(points)
@@ -317,9 +308,29 @@ class _Graph:
         return zip(worst, best, strict=True)
 
 
+#: A plan-space node, or `_END`, and what each preference over plans remembers there.
+_Point = tuple[int, tuple[Memory, ...]]
+
+
+def _points(
+    task_language: TaskLanguage, automata: Sequence[PlanPreference]
+) -> tuple[list[_Point], list[list[tuple[int, int]]]]:
+    """The points from the start on, and what follows each: points with numbers of joint actions."""
+    space, start = task_language.space, task_language.start
+    points = [(start, tuple(one.start(int(space.state[start])) for one in automata))]
+    number, following = {points[0]: 0}, []
+    for point in points:  # grows while it is walked
+        after = Counter(_after(space, automata, *point))
+        for there in after:
+            if number.setdefault(there, len(points)) == len(points):
+                points.append(there)
+        following.append(sorted((number[there], n) for there, n in after.items()))
+    return points, following
+
+
 def _after(
     space: PlanSpace, automata: Sequence[PlanPreference], node: int, memories: tuple[Memory, ...]
-) -> Iterator[tuple[int, tuple[Memory, ...]]]:
+) -> Iterator[_Point]:
     """What comes after a point, once for each joint action."""
     if node != _END and space.layer[node] == 0:
         yield _END, memories

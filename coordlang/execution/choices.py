@@ -258,6 +258,7 @@ def _robot(model: JointModel, own: RobotChoices) -> RobotRecord:
     automaton, texts = own.automaton, model.codec.facts.texts
     sometimes_known = reduce(or_, (known.true | ~known.possible for known in automaton.known))
     facts = [fact for fact in range(len(texts)) if sometimes_known >> fact & 1]
+    others = sorted({*range(len(texts))} - {*facts})
 
     def numbers(bits: int) -> list[int]:
         return [number for number, fact in enumerate(facts) if bits >> fact & 1]
@@ -268,7 +269,7 @@ def _robot(model: JointModel, own: RobotChoices) -> RobotRecord:
         subplans=json_count(automaton.count),
         atoms=own.atoms,
         facts=[texts[fact] for fact in facts],
-        others=[text for fact, text in enumerate(texts) if not sometimes_known >> fact & 1],
+        others=[texts[fact] for fact in others],
         states=[
             StateRecord(
                 step=step,

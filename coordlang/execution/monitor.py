@@ -118,6 +118,11 @@ class _State:
     moves: dict[str | None, _State] = field(default_factory=dict)
     left: int = 1
 
+    def keep(self, moves: Mapping[str | None, _State]) -> None:
+        """Lead on by those of some moves that lead anywhere; without any ``left`` stays."""
+        self.moves = {text: to for text, to in moves.items() if to.left}
+        self.left = sum(to.left for to in self.moves.values()) or self.left
+
 
 class Monitor:
     """Follows one robot through its choices.
@@ -138,6 +143,13 @@ class Monitor:
     """
 
     def __init__(self, data: Mapping[str, Any], robot: str | None = None) -> None:
+        if not isinstance(data, Mapping) or data.get("format") != FORMAT:
+            raise MonitorError(f'expected a choices file: {{"format": "{FORMAT}", ..}}')
+        version = data.get("version")
+        if not _is_number(version) or version != VERSION:
+            raise MonitorError(
+                f"choices file version {_shown(version)}; this program reads version {VERSION}"
+            )
         entry = _entry(data, robot)
         self.robot = _text(entry, "robot", "a robot's choices")
         self.sentence = _text(data, "sentence", "the file")
@@ -290,9 +302,8 @@ class Monitor:
                 )
         whole = (1 << len(detour.visit) + len(detour.do)) - 1
         for (state, made), new in reversed(found.items()):
-            new.moves = {text: to for text, to in new.moves.items() if to.left}
-            ways = sum(to.left for to in new.moves.values())
-            new.left = ways if state.moves else int(made == whole)
+            new.left = int(not state.moves and made == whole)
+            new.keep(new.moves)
         return new if new.left else None  # that of the present comes last
 
     def _made_in(self, detour: Detour, state: _State) -> int | None:
@@ -411,13 +422,6 @@ def _check_plain(text: Any, where: str) -> None:
 
 def _entry(data: Any, robot: str | None) -> Mapping[str, Any]:
     """The choices of one robot in the data of a choices file."""
-    if not isinstance(data, Mapping) or data.get("format") != FORMAT:
-        raise MonitorError(f'expected a choices file: {{"format": "{FORMAT}", ..}}')
-    version = data.get("version")
-    if not _is_number(version) or version != VERSION:
-        raise MonitorError(
-            f"choices file version {_shown(version)}; this program reads version {VERSION}"
-        )
     entries: dict[str, Mapping[str, Any]] = {}
     for entry in _get(data, "choices", list, "the file"):
         name = _text(entry, "robot", "a robot's choices")
