@@ -18,7 +18,7 @@ from benchmarks.paper.plots import Lines, Series, lines
 from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
 from benchmarks.paper.suite import OTHERS, TITLES, WORLDS, language_for
 from benchmarks.paper.tables import by_world, rate
-from coordlang.execution.task_language import languages_in_tasks
+from benchmarks.paper.task_choices import languages_in_tasks
 
 #: What is said: the whole plan, or a sentence of one of these languages.
 SAID = ("plan", "minimal", "flexible", "slack", "few", "silence")

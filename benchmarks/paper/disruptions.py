@@ -17,9 +17,8 @@ from statistics import fmean
 import numpy as np
 
 from benchmarks.paper.grid import task_cells
-from benchmarks.paper.task_choices import Disruption, TaskChoices
+from benchmarks.paper.task_choices import Disruption, TaskChoices, languages_in_tasks
 from benchmarks.paper.warehouse import Delivery, human_in
-from coordlang.execution.task_language import languages_in_tasks
 from coordlang.language.candidates import Candidates
 from coordlang.language.sentences import Sentence, sentence_counts
 from coordlang.language.words import Language

@@ -11,8 +11,9 @@ from random import Random
 from benchmarks.frame import DOMAINS, SHARED
 from benchmarks.paper.grid import cell_position, is_cell, placement
 from benchmarks.paper.suite import CORRIDOR, WORLDS, World, language_for
+from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.commands.building import build_language
-from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
+from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import Candidates, from_listed
 from coordlang.language.listed import ListedTask
 from coordlang.language.words import Language

@@ -11,8 +11,9 @@ from benchmarks.paper.recipe import Recipe, Record, Result, Section, Settings, U
 from benchmarks.paper.reported import PLANNING_RATIO
 from benchmarks.paper.suite import METHODS, OTHERS, QUICK_ROW, ROW, WORLDS, language_for, method_of
 from benchmarks.paper.tables import elsewhere, table
+from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.execution.guided_search import ExpandedStates, plan_under_sentence
-from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
+from coordlang.execution.task_language import TaskLanguage
 
 
 def units(settings: Settings) -> list[Unit]:

@@ -20,9 +20,9 @@ from benchmarks.paper.plots import drawing
 from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
 from benchmarks.paper.suite import CORRIDOR, METHODS, OTHERS, WORLDS, language_for, method_of
 from benchmarks.paper.tables import elsewhere, in_percent, table
-from benchmarks.paper.task_choices import TaskChoices
+from benchmarks.paper.task_choices import TaskChoices, languages_in_tasks
 from coordlang.execution.automaton import Automaton
-from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
+from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.listed import ListedTask
 from planners.joint.model import JointModel
 from planners.search.plans import Plan, Plans

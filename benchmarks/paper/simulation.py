@@ -19,9 +19,8 @@ from benchmarks.paper.grid import task_cells
 from benchmarks.paper.recipe import Recipe, Record, Result, Section, Settings, Unit
 from benchmarks.paper.scenario import PLACE, detour, drawn_task, trading_rooms
 from benchmarks.paper.suite import CORRIDOR, language_for, method_of
-from benchmarks.paper.task_choices import TaskChoices
+from benchmarks.paper.task_choices import TaskChoices, languages_in_tasks
 from benchmarks.paper.warehouse import WAREHOUSES, deliveries, human_in, listed_tasks
-from coordlang.execution.task_language import languages_in_tasks
 from coordlang.simulation.pace import PACES
 from coordlang.simulation.record import RunRecord, WishRecord
 from coordlang.simulation.simulator import Settings as How

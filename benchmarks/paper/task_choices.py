@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from random import Random
@@ -11,10 +12,21 @@ import numpy as np
 
 from coordlang.execution.automaton import Automaton, determinise
 from coordlang.execution.task_language import TaskLanguage
+from coordlang.language.candidates import Candidates
 from coordlang.language.sentences import Sentence, sentence
+from coordlang.language.words import Language
 from planners.joint.tables import Bools
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, counts
+
+
+def languages_in_tasks(language: Language, candidates: Candidates) -> Iterator[TaskLanguage]:
+    """Yield a language in each of its candidate tasks."""
+    partition = language.partition(candidates.model)
+    for space in candidates.spaces:
+        word = partition.word_of(space.rows)[space.state]
+        for task in range(len(space.starts)):
+            yield TaskLanguage(language, partition, space, task, word, True)
 
 
 @dataclass(frozen=True, slots=True)

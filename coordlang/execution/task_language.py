@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from coordlang.language.candidates import Candidates, describe
+from coordlang.language.candidates import describe
 from coordlang.language.listed import ListedTask, model_of_listed
 from coordlang.language.partition import Partition
 from coordlang.language.provenance import Tolerance
@@ -225,15 +225,6 @@ def _verdict(partition: Partition, space: PlanSpace) -> Verdict | None:
     except OutOfMemory as error:
         note(f"what the language promises is not verified here: {error.what}")
         return None
-
-
-def languages_in_tasks(language: Language, candidates: Candidates) -> Iterator[TaskLanguage]:
-    """A language in each of its candidate tasks."""
-    partition = language.partition(candidates.model)
-    for space in candidates.spaces:
-        word = partition.word_of(space.rows)[space.state]
-        for task in range(len(space.starts)):
-            yield TaskLanguage(language, partition, space, task, word, True)
 
 
 def _covers(language: Language, space: PlanSpace, recorded: Sequence[PlanningTask]) -> bool:

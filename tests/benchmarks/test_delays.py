@@ -12,8 +12,8 @@ import pytest
 
 from benchmarks.paper.late_robots import DelayTrials, Execution
 from benchmarks.paper.suite import WORLDS, language_for
-from benchmarks.paper.task_choices import sentence_of
-from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
+from benchmarks.paper.task_choices import languages_in_tasks, sentence_of
+from coordlang.execution.task_language import TaskLanguage
 from coordlang.required.failure import failure_probability
 from planners.joint.model import PlanningTask
 from planners.search.plans import Plans

@@ -13,8 +13,8 @@ from benchmarks.paper.reported import (
     TABLE_1,
 )
 from benchmarks.paper.suite import CORRIDOR, OTHERS, ROWS, WORLDS, language_for
+from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.execution.guided_search import ExpandedStates
-from coordlang.execution.task_language import languages_in_tasks
 from planners.search.plans import Plans
 from tests.support.task_languages import three_cells
 

@@ -15,8 +15,9 @@ from random import Random
 import numpy as np
 import pytest
 
+from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.commands.building import build_language
-from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
+from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
 from coordlang.language.listed import ListedTask
 from coordlang.language.partition import Partition

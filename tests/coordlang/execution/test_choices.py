@@ -11,10 +11,11 @@ from itertools import product
 
 import pytest
 
+from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.commands.building import build_language
 from coordlang.execution.automaton import Automaton, determinise
 from coordlang.execution.choices import RobotChoices, SentenceChoices, choices, monitor, own_facts
-from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
+from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import from_problems
 from planners.pddl.lifted import TRUE
 from planners.search.plans import Plans

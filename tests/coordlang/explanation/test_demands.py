@@ -10,8 +10,9 @@ from random import Random
 import numpy as np
 import pytest
 
+from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.commands.building import build_language
-from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
+from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import RobotPart, SentenceDemands, sentence_demands
 from coordlang.explanation.text import demands_text
 from coordlang.explanation.words import all_covers, mapped_states

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.commands.build import build
 from coordlang.commands.explain import explain
-from coordlang.execution.task_language import TaskLanguage, languages_in_tasks
+from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.words import Conjunction
 from coordlang.exports.ltlf import export_ltlf, symbols_of
 from coordlang.exports.membership import exclusive_terms, short_terms

@@ -14,11 +14,11 @@ import jsonschema
 import pytest
 
 import coordlang as api
+from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.commands.building import build_language
 from coordlang.commands.schema import SCHEMAS
 from coordlang.execution.choices import choices, to_bytes
 from coordlang.execution.monitor import Monitor, MonitorError
-from coordlang.execution.task_language import languages_in_tasks
 from coordlang.language.file import read_language
 from coordlang.language.file import to_bytes as language_bytes
 from coordlang.language.listed import ListedTask, read_task_file, tasks_text

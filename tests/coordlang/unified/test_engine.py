@@ -38,8 +38,8 @@ from unified_planning.plans import (
     TimeTriggeredPlan,
 )
 
+from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.commands.building import build_language
-from coordlang.execution.task_language import languages_in_tasks
 from coordlang.language.candidates import from_problems
 from coordlang.language.sentences import task_sentences
 from coordlang.unified import engine as engine_module
