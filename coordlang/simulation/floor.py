@@ -37,6 +37,7 @@ _REACHED = 0.05
 class Floor:
     """Where the places and walls of a world are, and the pairs of places that moves link.
 
+    ``longest`` and ``shortest`` are the lengths of such links, in metres; 0 and infinite without.
     ``known`` are coordinates of places, x to the right and y down, as a file of coordinates has
     them; where they are not all known, the names of the places have to say them (``c2-3``).
     ``cell`` is the length of one unit of them in metres.  Raises `BadInput` if the coordinates are
@@ -53,21 +54,8 @@ class Floor:
         }
         self.walls = _walls(points, links, cell)
         self.links = tuple(link.ends for link in world.links if link.moves)
-
-    @property
-    def lengths(self) -> list[float]:
-        """The lengths of the links, in metres."""
-        return [math.dist(self.points[a], self.points[b]) for a, b in self.links]
-
-    @property
-    def longest(self) -> float:
-        """The length of the longest link, in metres."""
-        return max(self.lengths, default=0.0)
-
-    @property
-    def shortest(self) -> float:
-        """The length of the shortest link, in metres; infinite without links."""
-        return min(self.lengths, default=math.inf)
+        lengths = [math.dist(self.points[a], self.points[b]) for a, b in self.links]
+        self.longest, self.shortest = max(lengths, default=0.0), min(lengths, default=math.inf)
 
 
 def require_room(floor: Floor, radius: float) -> None:

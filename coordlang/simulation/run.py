@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import astuple
+from dataclasses import asdict, astuple
 from itertools import combinations
 from random import Random
 from typing import Any
@@ -23,7 +23,7 @@ from coordlang.simulation.record import (
     WishRecord,
 )
 from coordlang.simulation.robot import TICK, Pose, Robot, Sensed, period
-from coordlang.simulation.simulator import POSITION_NOISE, Settings, Simulator, require_simulator
+from coordlang.simulation.simulator import POSITION_NOISE, Settings, Simulator
 from coordlang.simulation.team import Mission
 from coordlang.sites.coordinates import Point
 
@@ -31,8 +31,6 @@ from coordlang.sites.coordinates import Point
 _PATIENCE = 4
 #: And with somebody walking about for so many.
 _WITH_WALKER = 12
-#: The settings that the record has.
-_RECORDED = ("step", "cell", "radius", "noise", "lidar", "human")
 #: Ticks from one pose of the record to the next.
 _INTERVAL = 2
 
@@ -52,7 +50,6 @@ def runs_of(
     installed, or the robots are too large for the floor.
     """
     require_room(floor, settings.radius)
-    require_simulator()
     for further in range(number):
         going = _Going(mission, floor, settings, seed + further, wishes)
         while not going.has_ended:
@@ -81,7 +78,7 @@ def record_of(
         makespan=mission.steps,
         period=period(floor.longest),
         interval=_INTERVAL * TICK,
-        **{name: getattr(settings, name) for name in _RECORDED},
+        **asdict(settings),
         wishes=list(wishes),
         places={name: (round(x, 6), round(y, 6)) for name, (x, y) in sorted(floor.points.items())},
         walls=list(floor.walls),

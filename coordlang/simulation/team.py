@@ -51,6 +51,7 @@ class Mission:
         self.task_language, self.agreement = task_language, agreement
         self.sentence = tuple(sentence)
         model, space = task_language.model, task_language.space
+        self.robots = model.robots
         path = space.nodes_on(task_language.start, space.first_path(task_language.start))
         states = [model.codec.decode(space.rows[space.state[node]]) for node in path]
         self.world = find_world(model, states)
@@ -72,11 +73,6 @@ class Mission:
             for name, own in zip(model.robots, found.robots, strict=True):
                 words = own_words(found.fits, task_language, own.robot)
                 self._given[name] = monitor(model, own, ""), words
-
-    @property
-    def robots(self) -> tuple[str, ...]:
-        """The robots, in the order of joint actions."""
-        return self.task_language.model.robots
 
     def team(self, seed: int) -> Team:
         """Return what each robot is given in the run with this seed."""
