@@ -22,7 +22,7 @@ from decimal import Decimal
 from fnmatch import fnmatchcase
 from functools import cache, partial
 from io import BytesIO
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 FORMAT = "coordlang/choices"
 VERSION = 1
@@ -68,26 +68,6 @@ class NotAllowed(MonitorError):
 
 class NotPossible(MonitorError):
     """A promise that can no longer be kept."""
-
-
-class Detour(NamedTuple):
-    """What a robot wants of its remaining steps; all of it at once.
-
-    ``visit``: atoms, each known to be true in the present or in some later state.  ``avoid``: atoms
-    known to be false in the present and in every later state.  ``do``: patterns of own subactions,
-    each done at least once from now on; ``never``: patterns that are not done any more.  In a
-    pattern ``*`` stands for any text, ``(move r1 * c3)``; ``idle`` is idling.  *Known* means:
-    whatever the others choose.
-    """
-
-    visit: tuple[str, ...] = ()
-    avoid: tuple[str, ...] = ()
-    do: tuple[str, ...] = ()
-    never: tuple[str, ...] = ()
-
-    def __and__(self, other: Detour) -> Detour:
-        pairs = zip(self, other, strict=True)
-        return Detour(*(tuple(dict.fromkeys((*one, *two))) for one, two in pairs))
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +147,7 @@ class Monitor:
         states = _read_states(entry, facts, where)
         self._most = max(MAX_NODES, _NODES_OF_STATE * len(states))
         self._start = self._here = states[0]  # both, so that no step has states to give back
-        self._promised = Detour()
+        self._has_promised = False
 
     @classmethod
     def read(cls, path: str, robot: str | None = None, *, max_bytes: int = MAX_BYTES) -> Monitor:
@@ -205,11 +185,6 @@ class Monitor:
         """How many own subplans are left, of those that keep every promise."""
         return self._here.left
 
-    @property
-    def promised(self) -> Detour:
-        """Everything that `commit` was called with, each text once."""
-        return self._promised
-
     def allowed(self) -> tuple[str | None, ...]:
         """What the robot may do next (None: idle), sorted, idling first.
 
@@ -239,13 +214,18 @@ class Monitor:
     def can(
         self, visit: Texts = (), avoid: Texts = (), do: Texts = (), never: Texts = ()
     ) -> Answer:
-        """Whether all this can still be had at once, promises kept: ``can(visit="(at r1 c)")``.
+        """Whether a detour can still be had, all of it, promises kept: ``can(visit="(at r1 c)")``.
 
-        Each is one text or several, of a `Detour`.  O(automaton * 2^(visits and dos)), of the steps
-        still to be done.  (With any number of visits the question is NP-complete.)  Raises
-        `MonitorError` beyond `MAX_NODES` nodes.
+        ``visit``: atoms, each known to be true in the present or in some later state.  ``avoid``:
+        atoms known to be false in the present and in every later state.  ``do``: patterns of own
+        subactions, each done at least once from now on; ``never``: patterns that are not done any
+        more.  In a pattern ``*`` stands for any text, ``(move r1 * c3)``; ``idle`` is idling.
+        *Known* means: whatever the others choose.
+
+        O(automaton * 2^(visits and dos)), of the steps still to be done.  (With any number of
+        visits the question is NP-complete.)  Raises `MonitorError` beyond `MAX_NODES` nodes.
         """
-        found = self._making(Detour(*map(_texts, (visit, avoid, do, never))))
+        found = self._making(*map(_texts, (visit, avoid, do, never)))
         if found is None:
             return Answer(None, 0)
         at, subplan = found, []
@@ -257,29 +237,35 @@ class Monitor:
     def commit(
         self, visit: Texts = (), avoid: Texts = (), do: Texts = (), never: Texts = ()
     ) -> None:
-        """Promise it: from now on only what keeps the promise is allowed.
+        """Promise a detour: from now on only what keeps the promise is allowed.
 
         As much work as `can`.  Raises `NotPossible`, and is then as it was before.
         """
-        promise = Detour(*map(_texts, (visit, avoid, do, never)))
-        found = self._making(promise)
+        found = self._making(*map(_texts, (visit, avoid, do, never)))
         if found is None:
-            kept = " together with what was promised before" if any(self._promised) else ""
+            kept = " together with what was promised before" if self._has_promised else ""
             raise NotPossible(
                 f"step {self.step + 1}: {self.robot} has no subplan left for this{kept}"
             )
-        self._promised &= promise
+        self._has_promised = True
         self._start = self._here = found
 
-    def _making(self, detour: Detour) -> _State | None:
+    def _making(
+        self,
+        visit: Sequence[str],
+        avoid: Sequence[str],
+        do: Sequence[str],
+        never: Sequence[str],
+    ) -> _State | None:
         """The subplans from here on that make a detour and keep the promises; None if none do.
 
         Its states are pairs: one that was open, and the parts of the detour that are made by then
         (bits: the visits, then the dos).
         """
-        for atom in (*detour.visit, *detour.avoid):
+        for atom in (*visit, *avoid):
             self._check_atom(atom)
-        made_in, made_by = cache(partial(self._made_in, detour)), cache(partial(_made_by, detour))
+        made_in = cache(partial(self._made_in, visit, avoid))
+        made_by = cache(partial(_made_by, do, never, len(visit)))
         made = made_in(self._here)
         if made is None:
             return None
@@ -296,22 +282,20 @@ class Monitor:
                 found[state, before].moves[text] = found[after]
             if len(found) > self._most:
                 raise MonitorError(
-                    f"{len(detour.visit) + len(detour.do)} visits and dos at once are too many "
-                    f"here: there are more than {self._most:,} ways to have made some of them; ask "
-                    "for fewer"
+                    f"{len(visit) + len(do)} visits and dos at once are too many here: there are "
+                    f"more than {self._most:,} ways to have made some of them; ask for fewer"
                 )
-        whole = (1 << len(detour.visit) + len(detour.do)) - 1
+        whole = (1 << len(visit) + len(do)) - 1
         for (state, made), new in reversed(found.items()):
             new.left = int(not state.moves and made == whole)
             new.keep(new.moves)
         return new if new.left else None  # that of the present comes last
 
-    def _made_in(self, detour: Detour, state: _State) -> int | None:
-        """The visits made in a state, as bits; None if the detour avoids it."""
-        if any(self._value(state, atom) is not False for atom in detour.avoid):
+    def _made_in(self, visit: Sequence[str], avoid: Sequence[str], state: _State) -> int | None:
+        """The visits made in a state, as bits; None if it is to be avoided."""
+        if any(self._value(state, atom) is not False for atom in avoid):
             return None
-        visited = enumerate(detour.visit)
-        return sum(1 << bit for bit, atom in visited if self._value(state, atom))
+        return sum(1 << bit for bit, atom in enumerate(visit) if self._value(state, atom))
 
     def _value(self, state: _State, atom: str) -> bool | None:
         return state.known.get(atom, self._atoms[atom])
@@ -330,12 +314,11 @@ class Monitor:
         raise MonitorError(f"{_shown(atom)} is no atom that can change: {similar}")
 
 
-def _made_by(detour: Detour, text: str | None) -> int | None:
-    """The dos that a subaction makes, as bits above those of the visits; None if it is never."""
-    if any(_matches(pattern, text) for pattern in detour.never):
+def _made_by(do: Sequence[str], never: Sequence[str], shift: int, text: str | None) -> int | None:
+    """The dos that a subaction makes, as bits from ``shift`` on; None if it is never done."""
+    if any(_matches(pattern, text) for pattern in never):
         return None
-    bits = enumerate(detour.do, len(detour.visit))
-    return sum(1 << bit for bit, pattern in bits if _matches(pattern, text))
+    return sum(1 << bit for bit, pattern in enumerate(do, shift) if _matches(pattern, text))
 
 
 def _head(atom: str) -> str:

@@ -106,14 +106,6 @@ def test_steps_take_constant_memory_and_wake_no_garbage_collector() -> None:
     assert max(grown) < 20_000
 
 
-def test_a_promise_that_is_renewed_does_not_grow() -> None:
-    at = Monitor(choices_file(60))
-    while at.step < 50:
-        at.commit(never="(move r2 *)", visit="(at r1 c3)")
-        assert (len(at.promised.visit), len(at.promised.never)) == (1, 1)
-        one_step(at)
-
-
 def test_the_loop_opens_and_imports_nothing(tmp_path: Path) -> None:
     """The interpreter reports every file, import and compilation to an audit hook."""
     program = """

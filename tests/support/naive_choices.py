@@ -11,11 +11,21 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from math import prod
+from typing import NamedTuple
 
-from coordlang.execution.monitor import Detour
 from coordlang.execution.task_language import TaskLanguage
 from planners.search.plans import Plan, Plans
 from tests.support import naive
+
+
+class Detour(NamedTuple):
+    """What `Monitor.can` is asked for."""
+
+    visit: tuple[str, ...] = ()
+    avoid: tuple[str, ...] = ()
+    do: tuple[str, ...] = ()
+    never: tuple[str, ...] = ()
+
 
 #: One robot's labels, step by step.
 Own = tuple[int, ...]

@@ -19,9 +19,9 @@ import pytest
 
 from coordlang.execution import monitor as monitor_module
 from coordlang.execution.choices import SentenceChoices, choices, to_bytes
-from coordlang.execution.monitor import Detour, Monitor, MonitorError, NotAllowed, NotPossible
+from coordlang.execution.monitor import Monitor, MonitorError, NotAllowed, NotPossible
 from coordlang.execution.task_language import TaskLanguage
-from tests.support.naive_choices import Known, Listed, Own
+from tests.support.naive_choices import Detour, Known, Listed, Own
 from tests.support.task_languages import RUNS, in_built_languages, shipped, with_twins
 
 
@@ -140,12 +140,12 @@ def check_detours(
         assert bool(answer) == bool(expected)
         assert answer.subplans == len(expected)
         seen["possible" if expected else "impossible"] += 1
-        before = (at.allowed(), at.remaining, at.step, at.promised)
+        before = (at.allowed(), at.remaining, at.step)
         if not expected:
             assert answer.subplan is None
             with pytest.raises(NotPossible):
                 at.commit(*detour)
-            assert (at.allowed(), at.remaining, at.step, at.promised) == before
+            assert (at.allowed(), at.remaining, at.step) == before
             continue
         assert answer.subplan in {
             tuple(texts(task_language, robot, own[here:])) for own in expected
