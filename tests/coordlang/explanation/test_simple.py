@@ -15,6 +15,7 @@ from coordlang.explanation.simple import _Search, simple
 from coordlang.explanation.variables import valuation
 from coordlang.explanation.words import mapped_states
 from coordlang.vocabulary.job import Assignment, Outcome
+from coordlang.vocabulary.loop import Budget
 from planners.system.errors import OutOfTime
 from tests.support.candidates import failing, is_language, partitions, small_worlds
 from tests.support.domains import all_tasks
@@ -110,22 +111,26 @@ def two_rows() -> Built:
     return build_language(all_tasks("grid", "gw2-2x3"), "minimal")
 
 
-@pytest.mark.parametrize("phase", ["_decide", "_limit_fewer"])
+@pytest.mark.parametrize("phase", ["terms", "limits"])
 def test_stopped_searches_return_languages(phase: str, monkeypatch: pytest.MonkeyPatch) -> None:
     candidates, built = all_tasks("grid", "gw2-2x3"), two_rows()
     word = built.language.partition(candidates.model).word_of(candidates.rows).tolist()
     found = Outcome({s: word[s] for s in built.job.states}, 5)
     checked: list[Assignment] = []
 
-    def late(*_: object) -> None:
-        raise OutOfTime("late")
+    finds = _Search._finds
 
-    monkeypatch.setattr(_Search, phase, late)
+    def late(self: _Search, terms: int, limits: int | None, budget: Budget) -> bool:
+        if (phase == "terms") == (limits is None):
+            raise OutOfTime("late")
+        return finds(self, terms, limits, budget)
+
+    monkeypatch.setattr(_Search, "_finds", late)
     outcome = simple(replace(built.job, check=checked.append), found)
     assert isinstance(outcome.stopped, OutOfTime)
     assert outcome.partition is (checked[-1] if checked else found.partition)
     assert outcome.figures["terms_lower_bound"] <= 4 <= outcome.figures["terms"]
-    assert (phase == "_limit_fewer") == bool(checked)
+    assert (phase == "limits") == bool(checked)
 
 
 def test_a_search_gives_up() -> None:
