@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The select-then-apply form, of linear size: robots select one after another, then it is applied.
 
-What no other robot can see is applied as it is selected (`planners.classical.staged.Immediate`).
-A step in which all selections are of this kind is over with the last of them; else there is *work
-left*, in stages: all check; all undo (rarely); all apply.
+What no other robot can see is applied as it is selected (`planners.classical.staged`).
+A step in which all selections are of this kind is over with the last of them; else something is
+left to do, in stages: all check; all undo (rarely); all apply.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence, Set
+from collections.abc import Callable, Sequence, Set
 from itertools import pairwise
 
 from planners.classical.selectors import Selectors
-from planners.classical.staged import STAGES, Immediate, StagedAction, selected, staged_actions
+from planners.classical.staged import STAGES, StagedAction, selected, staged_actions
 from planners.classical.task import Known
 from planners.classical.writer import (
     Writer,
@@ -28,8 +28,8 @@ from planners.pddl.lifted import FALSE, TRUE, Atom, Formula, StepAtom
 _IDLE = "idle"
 #: Where all selected is applied, and the facts about the step are to be restored.
 _TIDY = own_fact("time to end the step")
-#: What a stage leads from and to: facts that say which stage it is.
-_Phases = tuple[Atom, Atom]
+#: A robot has selected what is left for later stages; forgotten when all have selected.
+_LEFT = own_fact("something left to do")
 #: The adds of all last selections of a step beyond which one more action makes them for all.
 _MANY = 20_000
 
@@ -40,8 +40,7 @@ def select_then_apply(team: Selectors, model: JointModel, goal: Goal, step_cost:
     Robots without work skip a stage, and a step without work left ends when all have selected.
     """
     value = _of_selections(team, model)
-    actions = staged_actions(team, value)
-    form = _SelectThenApply(Writer(model.codec.facts), team, actions, step_cost)
+    form = _SelectThenApply(Writer(model.codec.facts), team, staged_actions(team, value), step_cost)
     for robot in range(len(team.names)):
         form.write_robot(robot)
     form.write_goal(goal_formula(model, goal))
@@ -61,42 +60,12 @@ def _of_selections(team: Selectors, model: JointModel) -> Callable[[GroundLeaf],
     return lambda leaf: who.get(leaf, FALSE) if isinstance(leaf, StepAtom) else on_state(leaf)
 
 
-class _Stages:
-    """The stages of a step in their order, and the facts that say which one it is.
-
-    ``first`` is the fact that a step begins, and the one before is over.
-    """
-
-    def __init__(self, names: Sequence[str], late: Iterable[StagedAction]) -> None:
-        self._names = names
-        work = list(late)
-        order = []
-        for stage in STAGES:
-            busy = {action.robot for action in work if action.has(stage)}
-            order += [(stage, robot) for robot in sorted(busy)]
-        facts = [own_fact(f"time to {stage}", names[robot]) for stage, robot in order]
-        self.first = own_fact("time to choose", names[0])
-        self._first_work = facts[0] if facts else self.first
-        self._phases = dict(zip(order, pairwise((*facts, self.first)), strict=True))
-
-    def choosing(self, robot: int, *, work_left: bool) -> Atom:
-        """The fact that it is a robot's turn to choose; beyond the last one, what follows."""
-        if robot < len(self._names):
-            kind = "time to choose, work left" if work_left else "time to choose"
-            return own_fact(kind, self._names[robot])
-        return self._first_work if work_left else self.first
-
-    def of(self, stage: str, robot: int) -> _Phases:
-        """The fact that this stage comes now, and that the next one does."""
-        return self._phases[stage, robot]
-
-    def after_choosing(self, robot: int) -> list[str]:
-        """The stages after selecting that the robot takes part in."""
-        return [stage for stage in STAGES if (stage, robot) in self._phases]
-
-
 class _SelectThenApply:
-    """Writes the actions of the form, robot by robot."""
+    """Writes the actions of the form, robot by robot.
+
+    ``stages`` are, for each stage after selecting and each robot that takes part in it, the fact
+    that it comes now, and the one that the next stage does: a new step after the last one.
+    """
 
     def __init__(
         self,
@@ -107,105 +76,93 @@ class _SelectThenApply:
     ) -> None:
         self.out = out
         self._team = team
-        self._actions = actions
+        self._all = actions
+        self._actions = [action for action in actions if action.literals is not None]
         self._step_cost = step_cost
-        self._immediate = Immediate(team, actions)
-        late = [a for a in actions if a.literals is not None and a.number not in self._immediate]
-        self._stages = _Stages(team.names, late)
-        #: The first robot that may select with work left: one before it has work to leave.
-        self._first_late = min((a.robot for a in late), default=len(team.names)) + 1
+        #: The facts that it is a robot's turn to select.
+        self._choosing = [own_fact("time to choose", name) for name in team.names]
+        late = [action for action in self._actions if not action.at_once]
+        busy = {(STAGES.index(s), a.robot) for a in late for s in STAGES if a.has(s)}
+        order = [(STAGES[number], robot) for number, robot in sorted(busy)]
+        facts = [own_fact(f"time to {stage}", team.names[robot]) for stage, robot in order]
+        self._stages = dict(zip(order, pairwise((*facts, self._first)), strict=True))
+        #: What comes when all have selected, and something is left to do.
+        self._first_work = (*facts, self._first)[0]
+        #: Whether a robot before the last one may leave something to do.
+        self._leaves = any(action.robot + 1 < len(team.names) for action in late)
         #: What is true between two steps, false once something is selected, and restored.
-        self._restored = set(self._immediate.marks)
-        self._restored |= {
-            self._none_left(stage, robot)
-            for robot in range(len(team.names))
-            for stage in self._stages.after_choosing(robot)
-        }
+        marks = {action.mark for action in actions if action.mark is not None}
+        self._restored = marks | {self._none_left(*one) for one in order}
         last = sum(action.robot == len(team.names) - 1 for action in actions)
-        self._tidies = last * len(self._immediate.marks) > _MANY
+        self._tidies = last * len(marks) > _MANY
         if self._tidies:
-            self._tidy()
+            self.out.action("end the step", {_TIDY: True}, {self._first} | self._restored, {_TIDY})
+
+    @property
+    def _first(self) -> Atom:
+        """The fact that a step begins, and the one before is over."""
+        return self._choosing[0]
 
     def write_robot(self, robot: int) -> None:
         """Everything that one robot does in a step."""
-        for work_left in (False, True) if robot >= self._first_late else (False,):
-            if (idling := self._team.idling[robot]) is not None:
-                self._choose(robot, _IDLE, robot, {}, cost=idling, work_left=work_left)
-            for action in self._actions:
-                if action.literals is None:
-                    continue
-                if robot == action.robot:
-                    self._select(action, work_left=work_left)
-                elif work_left and robot in self._team.owners[action.number]:
-                    self._join(robot, action)
-        for stage in self._stages.after_choosing(robot):
-            here, after = self._stages.of(stage, robot)
-            name = f"nothing to {stage} {self._team.names[robot]}"
-            self._lead(name, {self._none_left(stage, robot): True}, here, after)
+        if (idling := self._team.idling[robot]) is not None:
+            self._choose(robot, _IDLE, robot, {}, cost=idling)
         for action in self._actions:
-            late = action.literals is not None and action.number not in self._immediate
-            if robot == action.robot and late:
+            if robot == action.robot:
+                self._select(action)
+            elif robot in self._team.owners[action.number]:
+                self._join(robot, action)
+        for (stage, own), (here, after) in self._stages.items():
+            if own == robot:
+                name = f"nothing to {stage} {self._team.names[robot]}"
+                self._lead(name, {self._none_left(stage, robot): True}, here, after)
+        for action in self._actions:
+            if robot == action.robot and not action.at_once:
                 self._carry_out(action)
 
     def write_goal(self, formula: Formula) -> None:
         """The goal counts between two steps."""
-        here = self._stages.first
-        self.out.between = self.out.fact(here)
+        self.out.between = self.out.fact(self._first)
         self.out.init = {self.out.between, *map(self.out.fact, sorted(self._restored, key=str))}
         found = known_literals(formula)
         if found and not found[1]:
-            self.out.goal = self.out.conditions({here: True, **found[0]})
+            self.out.goal = self.out.conditions({self._first: True, **found[0]})
             return
         done = own_fact("goal reached")
         self.out.goal = self.out.conditions({done: True})
-        self.out.route("reach the goal", formula, here, done, {})
+        self.out.route("reach the goal", formula, self._first, done, {})
 
     # -- select
 
-    def _select(self, action: StagedAction, *, work_left: bool) -> None:
+    def _select(self, action: StagedAction) -> None:
         """The first owner selects an action; what earlier robots have selected may forbid it."""
         assert action.literals is not None, "an action that can never be selected"
         team, robot = self._team, action.robot
-        known = {**action.literals, **self._not_ruled_out(action, work_left=work_left)}
-        late = action.number not in self._immediate
-        if late:
-            adds = {self._waits(robot, k) for k in team.owners[action.number] if k != robot}
-            adds.add(action.selected)
-            deletes = set[Atom]()
-            over = {self._none_left(stage, robot) for stage in STAGES if action.has(stage)}
-        else:
+        known = {**action.literals, **self._not_ruled_out(action)}
+        if action.at_once:
             adds, deletes = action.adds, action.deletes
-            mark = self._immediate.mark(action.number)
-            over = {mark} if mark else set()
+            over = set() if action.mark is None else {action.mark}
+        else:
+            adds = {self._waits(robot, k) for k in team.owners[action.number] if k != robot}
+            adds, deletes = adds | {action.selected}, set()
+            over = {self._none_left(stage, robot) for stage in STAGES if action.has(stage)}
         # What is over was true: to say so spares readers a conditional effect.
         known |= dict.fromkeys(over, True)
-        cost = team.seconds[action.number]
-        self._choose(
-            *(robot, action.label, robot, known, adds, deletes | over, cost),
-            work_left=work_left,
-            leaves_work=late,
-        )
+        cost, late = team.seconds[action.number], not action.at_once
+        self._choose(robot, action.label, robot, known, adds, deletes | over, cost, late=late)
 
-    def _not_ruled_out(self, action: StagedAction, *, work_left: bool) -> dict[Atom, bool]:
+    def _not_ruled_out(self, action: StagedAction) -> dict[Atom, bool]:
         """That no earlier robot has selected what cannot share a step with the action."""
-        found = {}
-        for other in self._team.clashes[action.number]:
-            earlier = self._team.owners[other][0]
-            if earlier < action.robot:
-                mark = self._immediate.mark(other)
-                if mark is not None:
-                    found[mark] = True
-                elif work_left:
-                    found[selected(self._team, earlier, self._team.actions[other].label)] = False
-        return found
+        clashing = [self._all[number] for number in self._team.clashes[action.number]]
+        earlier = [other for other in clashing if other.robot < action.robot]
+        selected = {other.selected: False for other in earlier if not other.at_once}
+        return selected | {other.mark: True for other in earlier if other.mark is not None}
 
     def _join(self, robot: int, action: StagedAction) -> None:
         """Another owner selects an action that its first owner has selected, and carries out."""
-        self._choose(
-            *(robot, action.label, action.robot, {action.selected: True}),
-            deletes={self._waits(action.robot, robot)},
-            work_left=True,
-        )
+        waits = {self._waits(action.robot, robot)}
+        known = {action.selected: True, _LEFT: True}
+        self._choose(robot, action.label, action.robot, known, deletes=waits)
 
     def _choose(
         self,
@@ -217,23 +174,31 @@ class _SelectThenApply:
         deletes: Set[Atom] = frozenset(),
         cost: int = 0,
         *,
-        work_left: bool,
-        leaves_work: bool = False,
+        late: bool = False,
     ) -> None:
         """One robot's turn to select; only the one of robot 0 pays for the step.
 
         ``first`` is the first owner of what is selected: robots that wait for another selection of
-        this one forbid it.  ``leaves_work``: something of it is left for later stages.
+        this one forbid it.  ``late``: something of it is left for later stages.
         """
-        known = dict(known)
-        if work_left:  # else no robot waits for a partner, for a shared action leaves work
-            for caller in self._callers(robot):
-                known[self._waits(caller, robot)] = caller == first
-        here = self._stages.choosing(robot, work_left=work_left)
-        after = self._stages.choosing(robot + 1, work_left=work_left or leaves_work)
+        waiting = {self._waits(caller, robot): caller == first for caller in self._callers(robot)}
+        name, known = f"choose {self._team.names[robot]} {label}", {**known, **waiting}
         cost += self._step_cost if robot == 0 else 0
-        name = f"choose {self._team.names[robot]} {label}"
-        self._lead(name, known, here, after, adds, deletes, cost)
+        here, following = self._choosing[robot], self._choosing[robot + 1 :]
+        if following:
+            adds |= {_LEFT} if late else set()
+            self._lead(name, known, here, following[0], adds, deletes, cost)
+            return
+        if not self._leaves:
+            self._lead(
+                name, known, here, self._first_work if late else self._first, adds, deletes, cost
+            )
+            return
+        for left in (False, True):
+            if known.get(_LEFT, left) == left:
+                own, over = {**known, _LEFT: left}, {_LEFT} if left else set()
+                after = self._first_work if left or late else self._first
+                self._lead(name, own, here, after, adds, deletes | over, cost)
 
     def _waits(self, caller: int, robot: int) -> Atom:
         """The caller has selected an action that this robot has to select too."""
@@ -259,7 +224,7 @@ class _SelectThenApply:
         cost: int = 0,
     ) -> None:
         """An action from one stage to the next; at the end of a step all of it is forgotten."""
-        if after == self._stages.first:
+        if after == self._first:
             if self._tidies:
                 after = _TIDY
             else:
@@ -267,20 +232,15 @@ class _SelectThenApply:
                 adds = adds | (self._restored - known.keys())
         self.out.action(name, {**known, here: True}, adds | {after}, deletes | {here}, cost)
 
-    def _tidy(self) -> None:
-        """One action for what all that end a step restore."""
-        first = self._stages.first
-        self.out.action("end the step", {_TIDY: True}, {first} | self._restored, {_TIDY})
-
     # -- check, undo, apply
 
     def _carry_out(self, action: StagedAction) -> None:
         """Check, undo and apply a selected action; of a shared one the first owner does all."""
         if action.has_checks:
-            self._check(action, *self._stages.of("check", action.robot))
+            self._check(action, *self._stages["check", action.robot])
         if action.early:
-            self._perform(action, *self._stages.of("undo", action.robot), early=True)
-        self._perform(action, *self._stages.of("apply", action.robot), early=False)
+            self._perform(action, *self._stages["undo", action.robot], early=True)
+        self._perform(action, *self._stages["apply", action.robot], early=False)
 
     def _check(self, action: StagedAction, here: Atom, after: Atom) -> None:
         """Meet the formulas of an action and note which of its conditional effects fire."""

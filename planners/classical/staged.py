@@ -38,8 +38,13 @@ class StagedAction:
     """
 
     #: The atoms that it may delete in a step in which it, or another action, may add them: their
-    #: deletes come before all adds of the step.  `staged_actions` decides this.
+    #: deletes come before all adds of the step.  `staged_actions` decides this, and what follows.
     early: frozenset[Atom] = frozenset()
+    #: Whether it is applied as it is selected.
+    at_once = False
+    #: The fact that ends when it is selected and applied; None if it rules out nothing later.
+    #: Actions of a robot that rule out the same ones share it.  It is true between two steps.
+    mark: Atom | None = None
 
     def __init__(
         self, team: Selectors, number: int, value: Callable[[GroundLeaf], Formula]
@@ -121,6 +126,17 @@ def staged_actions(
                 for other in adders[atom] - team.clashes[action.number]
             )
         )
+    reads_late, needs = _readers(actions)
+    marks: dict[tuple[int, frozenset[int]], Atom] = {}
+    for action in actions:
+        action.at_once = _may_be_at_once(team, action, reads_late, needs)
+        clashes = team.clashes[action.number]
+        later = frozenset(n for n in clashes if team.owners[n][0] > action.robot)
+        if action.at_once and later:
+            name = team.names[action.robot], str(len(marks))
+            action.mark = marks.setdefault(
+                (action.robot, later), own_fact("rules nothing out", *name)
+            )
     return actions
 
 
@@ -129,68 +145,27 @@ def selected(team: Selectors, robot: int, label: str) -> Atom:
     return own_fact("has chosen", team.names[robot], label)
 
 
-class Immediate:
-    """The actions that are applied as they are selected; ``number in immediate``.
+_Readers = Mapping[Atom, Set[StagedAction]]
 
-    An action is none of them if several robots own it, if something of it is checked or undone, if
-    a formula that is checked names it, or if an action beside it reads what it has written.
-    ``marks`` are the facts without which actions are ruled out until the step is over.
+
+def _may_be_at_once(
+    team: Selectors, action: StagedAction, reads_late: _Readers, needs: _Readers
+) -> bool:
+    """Whether an action can be applied as it is selected.
+
+    Not if several robots own it, if something of it is checked or undone, if a formula that is
+    checked names it, or if an action beside it reads what it has written.
     """
-
-    def __init__(self, team: Selectors, actions: Sequence[StagedAction]) -> None:
-        self._team = team
-        late, needed = _readers(actions)
-        self._numbers = {
-            action.number
-            for action in actions
-            if len(team.owners[action.number]) == 1
-            and not action.has("check")
-            and not action.has("undo")
-            and action.selected not in late
-            and not any(
-                self._is_seen(action, atom, late, needed) for atom in action.adds | action.deletes
-            )
-        }
-        self._mark: dict[int, Atom] = {}
-        classes: dict[tuple[int, frozenset[int]], Atom] = {}
-        for action in actions:
-            later = frozenset(
-                n for n in team.clashes[action.number] if team.owners[n][0] > action.robot
-            )
-            if action.number in self._numbers and later:
-                name = team.names[action.robot], str(len(classes))
-                mark = classes.setdefault(
-                    (action.robot, later), own_fact("rules nothing out", *name)
-                )
-                self._mark[action.number] = mark
-        self.marks = tuple(classes.values())
-
-    def __contains__(self, number: object) -> bool:
-        return number in self._numbers
-
-    def mark(self, number: int) -> Atom | None:
-        """The fact that ends when an immediate action is selected; None if it rules out none later.
-
-        Actions of a robot that rule out the same ones share it.  It is true between two steps.
-        """
-        return self._mark.get(number)
-
-    def _is_seen(
-        self,
-        action: StagedAction,
-        atom: Atom,
-        late: Mapping[Atom, Set[StagedAction]],
-        needed: Mapping[Atom, Set[StagedAction]],
-    ) -> bool:
-        """Whether an action beside this one reads the atom after this one has written it."""
-        readers = [other for other in late.get(atom, ()) if other.robot != action.robot]
-        readers += [other for other in needed.get(atom, ()) if other.robot > action.robot]
-        return any(other.number not in self._team.clashes[action.number] for other in readers)
+    if len(team.owners[action.number]) > 1 or action.has("check") or action.has("undo"):
+        return False
+    written = action.adds | action.deletes
+    readers = {r for atom in written for r in reads_late.get(atom, ()) if r.robot != action.robot}
+    readers |= {r for atom in written for r in needs.get(atom, ()) if r.robot > action.robot}
+    clashes = team.clashes[action.number]
+    return action.selected not in reads_late and all(r.number in clashes for r in readers)
 
 
-def _readers(
-    actions: Sequence[StagedAction],
-) -> tuple[Mapping[Atom, Set[StagedAction]], Mapping[Atom, Set[StagedAction]]]:
+def _readers(actions: Sequence[StagedAction]) -> tuple[_Readers, _Readers]:
     """For each atom the actions that read it after all have selected, or when they are selected."""
     late: dict[Atom, set[StagedAction]] = defaultdict(set)
     needed: dict[Atom, set[StagedAction]] = defaultdict(set)
