@@ -3,11 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import product
 
 from planners.joint.conditions import Evaluator
-from planners.pddl.formula_tree import Compound, Leaf, fold
 from planners.pddl.lifted import And, Atom, Formula, Not, Or, StepAtom, Truth
 
 #: Literals in the clauses of one formula at most.
@@ -16,8 +15,6 @@ _MOST = 4_000
 #: (fact, is it true) or (robot, label, is it chosen).
 _Literal = tuple[int, bool] | tuple[int, int, bool]
 Clause = frozenset[_Literal]
-#: Clauses of a formula and of its negation, None where they are too many.
-_Both = tuple["list[Clause] | None", "list[Clause] | None"]
 
 
 def clauses(formula: Formula, evaluator: Evaluator, robot: int, label: int) -> list[Clause] | None:
@@ -26,30 +23,24 @@ def clauses(formula: Formula, evaluator: Evaluator, robot: int, label: int) -> l
     No clause: it holds.  An empty one: it does not.  None: they would be too many.
     """
 
-    def leaf(found: Leaf) -> _Both:
-        match found:
-            case Truth(value):
-                return ([], [frozenset()]) if value else ([frozenset()], [])
-            case Atom() if (number := evaluator.facts.index.get(found)) is not None:
-                return [frozenset({(number, True)})], [frozenset({(number, False)})]
-            case StepAtom() if (known := evaluator.subactions.get(found)) is not None:
-                if known[0] == robot:
-                    return leaf(Truth(known[1] == label))
-                return [frozenset({(*known, True)})], [frozenset({(*known, False)})]
-        return [frozenset()], []
+    def saying(part: Formula, wanted: bool) -> list[Clause] | None:
+        """The clauses that say that a part of the formula has this value."""
+        value = isinstance(part, Truth) and part.value
+        match part:
+            case Not():
+                return saying(part.part, not wanted)
+            case And() | Or():
+                parts = [saying(inner, wanted) for inner in part.parts]
+                return _all(parts) if isinstance(part, And) == wanted else _any(parts)
+            case Atom() if (number := evaluator.facts.index.get(part)) is not None:
+                return [frozenset({(number, wanted)})]
+            case StepAtom() if (known := evaluator.subactions.get(part)) is not None:
+                if known[0] != robot:
+                    return [frozenset({(*known, wanted)})]
+                value = known[1] == label
+        return [] if value == wanted else [frozenset()]
 
-    def compound(kind: Compound, parts: Iterator[_Both]) -> _Both:
-        if isinstance(kind, Not):
-            positive, negative = next(parts)
-            return negative, positive
-        assert isinstance(kind, And | Or), "a quantifier in a ground formula"
-        every = list(parts)
-        positives, negatives = [p for p, _ in every], [n for _, n in every]
-        if isinstance(kind, And):
-            return _all(positives), _any(negatives)
-        return _any(positives), _all(negatives)
-
-    return fold(formula, leaf, compound)[0]
+    return saying(formula, True)
 
 
 def _all(parts: Sequence[list[Clause] | None]) -> list[Clause] | None:
