@@ -200,8 +200,8 @@ def explored_if_small(model: JointModel, inits: Rows) -> Space | None:
     Work is bounded before it is done: by products of the robots' own choices.
     """
     found, left = Exploration(model, inits), MOST_STEPS
-    while len(found.layer):
-        if len(found.seen) > MOST_STATES:
+    while len(found.layers[-1]):
+        if found.states > MOST_STATES:
             return None
         left -= model.stepper.most_steps(model.codec.facts_part(found.layer))
         if left < 0:

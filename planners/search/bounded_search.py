@@ -8,17 +8,16 @@ all optimal plans are in the layers (Proposition 16 of docs/concepts.md).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from planners.joint.model import Goal, JointModel, Options, PlanningTask, Steps
-from planners.joint.tables import Ints, Rows, unique_rows
+from planners.joint.model import Goal, JointModel, Options, PlanningTask
+from planners.joint.tables import Ints, Rows
 from planners.search.exact_bound import ExactBound, OptimalStates, exact_bound
 from planners.search.goals import FAR, searched
 from planners.search.heuristics import Heuristic
-from planners.search.layers import Edges, StateTable, grown, joined_edges
-from planners.search.reachable import PieceSizes, Space
+from planners.search.reachable import Edges, Exploration, PieceSizes, Space, grown, joined_edges
 from planners.search.state_variables import StateVariable
 from planners.system.errors import ProvedImpossible
 
@@ -26,8 +25,8 @@ from planners.system.errors import ProvedImpossible
 _NEVER = np.iinfo(np.int32).max
 #: In place of the layer of a state: no optimal plan passes through it.
 _LEFT_OUT = -1
-#: States expanded first; from the joint steps that they have the next numbers of states follow.
-_FIRST, _FIRST_PROBED = 500, 8
+#: States expanded first where the joint steps are limited.
+_FIRST_PROBED = 8
 #: Labels in all steps for which the solver's formula takes as long as the steps that are tried
 #: before it is asked; steps that are counted where nothing bounds them.
 _FORMULA, _STEPS = 50_000, 20
@@ -39,8 +38,6 @@ _TRIED = 4
 #: How a round ended: the goal was met, or more joint steps were composed than are tried without
 #: exact bounds.
 _MET, _GROWN = -1, -2
-#: Bytes of the states that joint steps lead to, composed at a time.
-_BYTES = 1 << 28
 #: States from which ways are tried, the ways that are followed from each, and the share of them
 #: that has to lead to the goal.
 _SAMPLED, _WAYS, _MOST = 50, 4, 0.5
@@ -59,12 +56,12 @@ class _GrownError(Exception):
     """More joint steps than are composed without exact bounds."""
 
 
-class BoundedSearch:
+class BoundedSearch(Exploration):
     """Layers of states within a bound that grows until the goal is met.
 
     ``table`` has the states that were met in all ``rounds``, in which so many joint steps were
-    ``composed``; ``states`` are those of each layer of the last round, the start first (goal states
-    are in the last layer), and ``edges[k]`` lead from layer k to the next one.
+    ``composed``; ``layers`` are those of the last round, the start first (goal states are in the
+    last layer), and ``edges[k]`` lead from layer k to the next one.
     """
 
     def __init__(
@@ -75,12 +72,9 @@ class BoundedSearch:
         variables: Sequence[StateVariable],
         pieces: PieceSizes,
     ) -> None:
-        self._model, self._task, self._heuristic, self._pieces = model, task, heuristic, pieces
-        self._variables = variables
-        self.table = StateTable(model.codec.width)
-        self.states: list[Ints] = []
-        self.edges: list[Edges] = []
-        self.composed = self.rounds = self.bound = 0
+        super().__init__(model, task.init[None, :], pieces)
+        self._task, self._heuristic, self._variables = task, heuristic, variables
+        self.rounds = self.bound = 0
         #: Per state the lower bound, and the layer that it was met in, in this round.
         self._h: Ints = np.zeros(0, np.int64)
         self._depth: Ints = np.zeros(0, np.int64)
@@ -95,14 +89,16 @@ class BoundedSearch:
 
         Raises `ProvedImpossible` if the goal cannot be reached.
         """
-        start = self._numbers(self._task.init[None, :])
-        following = int(self._h[start[0]]) if self._heuristic.value else FAR - 1
+        following = FAR - 1
+        self._note_bounds(0)
+        if self._heuristic.value:
+            following = int(self._h[0])
         work = 0
         slow = 1
         while following < FAR:
             self.bound, before = following, work
             done = self.composed
-            following = self._round(start)
+            following = self._round()
             work = self.composed - done
             if following == _MET:
                 return
@@ -127,7 +123,7 @@ class BoundedSearch:
         self._limited = False
         at_least = self.bound if self.bound < FAR - 1 else 0
         if self._model.cost == "makespan" and at_least:
-            last, left = self.table.rows(self.states[-1]), at_least - (len(self.states) - 1)
+            last, left = self.layer, at_least - self.depth
             if mostly_lead(self._model, self._task.goal, self._heuristic, last, left, most):
                 return at_least
         self.exact = exact_bound(self._model, self._task, self._variables, at_least, self._pieces)
@@ -146,17 +142,17 @@ class BoundedSearch:
         if self.exact is not None:
             self.exact.plans.close()
 
-    def _round(self, start: Ints) -> int:
+    def _round(self) -> int:
         """Search within the bound; the least bound that was too large, `_MET` or `_GROWN`."""
         self.rounds += 1
         self._depth[:] = _NEVER
-        self._depth[start] = 0
-        self.states, self.edges = [start], []
+        self._depth[0] = 0
+        self.layers, self.edges = self.layers[:1], []
         beyond = FAR
-        while not self._model.holds(self._task.goal, self.table.rows(self.states[-1])).any():
-            depth = len(self.states)
+        while not self._model.holds(self._task.goal, self.layer).any():
+            depth = len(self.layers)
             try:
-                edges, low = self._expand(self.states[-1], depth)
+                edges, low = self._within_bound(depth)
             except _GrownError:
                 return _GROWN
             beyond = min(beyond, low)
@@ -167,33 +163,19 @@ class BoundedSearch:
             if not len(new):
                 return beyond
             self.edges.append(edges)
-            self.states.append(new)
+            self.enter(new)
         return _MET
 
     def space(self) -> Space:
         """The states of the last round that lead to the goal, with the joint steps between them."""
         leads = np.zeros(len(self.table), np.bool_)
-        leads[self.states[-1]] = self._model.holds(
-            self._task.goal, self.table.rows(self.states[-1])
-        )
+        leads[self.layers[-1]] = self._model.holds(self._task.goal, self.layer)
         kept: list[Edges] = []
         while self.edges:
             below = self.edges.pop()  # they are many, and not needed again
             kept.append(below.only(leads[below.target]))
             leads[kept[-1].source] = True
-        edges = joined_edges(kept, len(self._model.robots))
-        states = np.flatnonzero(leads)
-        rows, number = unique_rows(self.table.rows(states))
-        of_state = np.zeros(len(self.table), np.int64)
-        of_state[states] = number
-        return Space.of(
-            self._model,
-            rows,
-            of_state[edges.source],
-            of_state[edges.target],
-            edges.labels.astype(np.int32),
-            edges.cost.astype(np.int64),
-        )
+        return self.space_of(np.flatnonzero(leads), kept)
 
     @property
     def _probe(self) -> int:
@@ -202,75 +184,51 @@ class BoundedSearch:
 
     def so_far(self) -> str:
         """How far it got, for messages."""
-        states = self.states
-        if not states:
-            return "no state"
         within = f" with a bound of {self.bound}" if self.bound < FAR - 1 else ""
         return (
-            f"{sum(map(len, states)):,} states within {len(states) - 1} steps of the initial state "
-            f"of {self._task.name}{within}, {len(states[-1]):,} of them new in the last step"
+            f"{self.states:,} states within {self.depth} steps of the initial state "
+            f"of {self._task.name}{within}, {len(self.layers[-1]):,} of them new in the last step"
         )
 
-    def _expand(self, states: Ints, depth: int) -> tuple[Edges, int]:
-        """The joint steps from a layer into the next, and the least bound that was too large."""
+    def _within_bound(self, depth: int) -> tuple[Edges, int]:
+        """The joint steps into a layer, and the least bound that was too large."""
         parts: list[Edges] = []
         beyond = FAR
-        for numbers, steps, low in self._steps(states, depth):
-            target = self._numbers(steps.result)
-            h = self._h[target]
-            late = h > self.bound - depth
-            beyond = min(beyond, low + depth, int(h[late].min(initial=FAR)) + depth)
-            source = numbers[steps.source]
-            into = target[~late]
-            self._depth[into] = np.minimum(self._depth[into], depth)
-            edges = Edges(source, target, steps.labels, steps.cost)
-            edges = edges.only(~late & (self._depth[target] == depth))
-            parts.append(edges.compact())
-        return joined_edges(parts, len(self._model.robots)), beyond
-
-    def _steps(self, states: Ints, depth: int) -> Iterator[tuple[Ints, Steps, int]]:
-        """Joint steps into a layer, in pieces, without choices that leave too few steps.
-
-        With the states of each piece, and the least number of steps that such a choice needs.
-        """
-        low = FAR
 
         def only(rows: Rows, options: Options) -> Options:
-            nonlocal low
-            if self._limited and _combinations(options) > _TOO_MANY * self._probe:
+            """Leave out choices after which too few steps are left."""
+            nonlocal beyond
+            many = self.composed > self._probe or _combinations(options) > _TOO_MANY * self._probe
+            if self._limited and many:
                 raise _GrownError
             if self.exact is not None:
                 options = self.exact.only(depth - 1, rows, options)
             if self._heuristic.in_time is not None:
                 options, low = self._heuristic.in_time(rows, options, self.bound - depth)
+                beyond = min(beyond, low + depth)
             return options
 
-        start, size = 0, _FIRST_PROBED if self._limited else _FIRST
-        most = max(1, min(self._pieces.steps, _BYTES // (8 * self._model.codec.width)))
-        if self._limited:
-            most = min(most, self._probe)
-        while start < len(states):
-            if self._limited and self.composed > self._probe:
-                raise _GrownError
-            numbers = states[start : start + size]
-            steps = self._model.successors(self.table.rows(numbers), only)
-            self.composed += len(steps)
+        for numbers, steps in self.steps(only, *((_FIRST_PROBED, self._probe) * self._limited)):
             if self._limited and len(steps) > self._probe:
                 raise _GrownError  # bounds of so many states take long
-            yield numbers, steps, low
-            start += size
-            size = max(1, min(self._pieces.states, int(most * size / max(1, len(steps)))))
+            before = len(self.table)
+            target = self.table.add(steps.result)
+            self._note_bounds(before)
+            h = self._h[target]
+            late = h > self.bound - depth
+            beyond = min(beyond, int(h[late].min(initial=FAR)) + depth)
+            into = target[~late]
+            self._depth[into] = np.minimum(self._depth[into], depth)
+            edges = Edges(numbers[steps.source], target, steps.labels, steps.cost)
+            parts.append(edges.only(~late & (self._depth[target] == depth)).compact())
+        return joined_edges(parts, len(self._model.robots)), beyond
 
-    def _numbers(self, rows: Rows) -> Ints:
-        """The numbers of states, with bounds for those that are new."""
-        before = len(self.table)
-        numbers = self.table.add(rows)
+    def _note_bounds(self, before: int) -> None:
+        """Bound the steps from the states that are new since there were so many."""
         size = len(self.table)
-        new = self.table.rows(np.arange(before, size))
         self._h, self._depth = grown(self._h, size, 0), grown(self._depth, size, _NEVER)
         if self._heuristic.value:
-            self._h[before:size] = self._heuristic.value(new)
-        return numbers
+            self._h[before:size] = self._heuristic.value(self.table.rows(np.arange(before, size)))
 
 
 def _combinations(options: Options) -> float:

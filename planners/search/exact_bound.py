@@ -23,10 +23,9 @@ from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, PlanningTask
 from planners.joint.tables import Bools, Ints, Rows
 from planners.search.goals import goal_facts
-from planners.search.layers import Edges, grown
 from planners.search.plan_formula import PlanFormula, TooManyClauses
 from planners.search.questions import FixedPlans, Literals, OutOfEffort, Plan
-from planners.search.reachable import PieceSizes
+from planners.search.reachable import Edges, PieceSizes, grown
 from planners.search.state_variables import StateVariable
 from planners.system.limits import reaching
 

@@ -1,18 +1,33 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reachable joint states as numpy arrays."""
+"""Searching forward: the joint states that are reached, numbered as they are met, as arrays."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, Steps
-from planners.joint.tables import Ints, Rows, find_rows, ranges, unique_rows
+from planners.joint.tables import (
+    Bools,
+    Ints,
+    Numbers,
+    Rows,
+    find_rows,
+    ranges,
+    unique_rows,
+)
 from planners.system.limits import reaching
 
+#: States expanded first; from the joint steps that they have the next numbers of states follow.
+_FIRST = 500
+#: Bytes of the states that joint steps lead to, composed at a time.
+_BYTES = 1 << 28
+#: States that are looked up at a time.
+_BLOCK = 1 << 16
+_MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)
 #: What to try besides a larger limit.
 FEWER = "fewer objects or robots"
 
@@ -80,73 +95,210 @@ class Space:
         return find_rows(self.rows, rows)
 
 
+class StateTable:
+    """States by number, and numbers by state: a hash table with open addressing.
+
+    A state's number is in the first slot from its hash on that has none of another state.
+    """
+
+    def __init__(self, width: int) -> None:
+        self._rows: Rows = np.zeros((1024, width), np.uint64)
+        self._slots: Ints = np.full(4096, -1)
+        self._size = 0
+
+    def __len__(self) -> int:
+        return self._size
+
+    def rows(self, numbers: Ints) -> Rows:
+        """The rows of states."""
+        return self._rows[numbers]
+
+    def add(self, rows: Rows) -> Ints:
+        """The numbers of states; those that are new get the next ones."""
+        parts = [self._add(rows[k : k + _BLOCK]) for k in range(0, len(rows), _BLOCK)]
+        return np.concatenate(parts) if parts else np.zeros(0, np.int64)
+
+    def _add(self, rows: Rows) -> Ints:
+        size = self._size
+        self._make_room(size + len(rows))
+        self._rows[size : size + len(rows)] = rows
+        number = np.zeros(len(rows), np.int64)
+        left, at = np.arange(len(rows)), self._first_slots(rows)
+        while len(left):
+            free = left[self._slots[at[left]] < 0]
+            self._slots[at[free]] = size + free
+            number[left] = self._slots[at[left]]
+            left = left[(self._rows[number[left]] != rows[left]).any(axis=1)]
+            at[left] = (at[left] + 1) % len(self._slots)
+        # Of equal new states one was numbered, and these numbers have gaps.
+        new = np.unique(number[number >= size])
+        self._size += len(new)
+        self._slots[at[new - size]] = np.arange(size, self._size)
+        self._rows[size : self._size] = self._rows[new]
+        return np.where(number < size, number, size + np.searchsorted(new, number))
+
+    def _make_room(self, size: int) -> None:
+        """Let so many states fit, with as many slots without a state at least."""
+        if size > len(self._rows):
+            self._rows = np.resize(self._rows, (2 * size, self._rows.shape[1]))
+        if 2 * size > len(self._slots):
+            self._slots = np.full(4 * size, -1)
+            left, at = np.arange(self._size), self._first_slots(self._rows[: self._size])
+            while len(left):
+                free = left[self._slots[at[left]] < 0]
+                self._slots[at[free]] = free
+                left = left[self._slots[at[left]] != left]
+                at[left] = (at[left] + 1) % len(self._slots)
+
+    def _first_slots(self, rows: Rows) -> Ints:
+        code = np.zeros(len(rows), np.uint64)
+        for column in rows.T:
+            code = (code ^ column) * _MULTIPLIER
+            code ^= code >> np.uint64(29)
+        return (code % np.uint64(len(self._slots))).astype(np.int64)
+
+
+def grown(values: Ints, size: int, empty: int) -> Ints:
+    """An array with room for so many values; there is as much again for more."""
+    more = max(size - len(values), len(values))
+    return np.concatenate((values, np.full(more, empty))) if size > len(values) else values
+
+
+@dataclass(frozen=True, slots=True)
+class Edges:
+    """Joint steps between two layers, by source, states by their numbers in the table."""
+
+    source: Numbers
+    target: Numbers
+    labels: Numbers
+    cost: Numbers
+
+    def only(self, kept: Bools) -> Edges:
+        """Some of them."""
+        if kept.all():
+            return self
+        some = np.flatnonzero(kept)
+        return Edges(self.source[some], self.target[some], self.labels[some], self.cost[some])
+
+    def compact(self) -> Edges:
+        """The same in as few bytes as the largest numbers need: there are many more than states."""
+        return Edges(*map(_narrow, (self.source, self.target, self.labels, self.cost)))
+
+
+def joined_edges(parts: Sequence[Edges], robots: int) -> Edges:
+    """Parts of the steps between two layers together."""
+    none = np.zeros(0, np.int8)
+    every = [Edges(none, none, np.zeros((0, robots), np.int8), none), *parts]
+    if len(parts) == 1:
+        return parts[0]
+    return Edges(*(np.concatenate([getattr(p, f.name) for p in every]) for f in fields(Edges)))
+
+
+def _narrow(numbers: Numbers) -> Numbers:
+    """The same numbers, none of which is negative, in the smallest signed type.
+
+    Unsigned 64-bit numbers and signed ones would add up to floats.
+    """
+    return numbers.astype(np.min_scalar_type(-1 - int(numbers.max(initial=0))))
+
+
 class Exploration:
     """A breadth-first search from some initial states (a table of rows), layer by layer.
 
-    ``layer`` are the states that were new in the last step, ``depth`` joint steps from the initial
-    ones; ``seen`` are all so far, sorted; ``composed`` joint steps were composed.
+    ``table`` numbers the states that were met; ``layers`` are the numbers of those that were
+    entered, by their distance from the initial states; ``edges`` are the joint steps that were
+    kept, of ``composed`` in all.
     """
 
     def __init__(self, model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> None:
         self._model, self._pieces = model, pieces
-        self.layer, _ = unique_rows(inits)
-        self.seen = self.layer
-        self.depth = self.composed = 0
-        self._sources: list[Rows] = []
-        self._steps: list[Steps] = []
+        self.table = StateTable(model.codec.width)
+        self.layers: list[Ints] = [np.unique(self.table.add(inits))]
+        self.edges: list[Edges] = []
+        self.composed = 0
+
+    @property
+    def layer(self) -> Rows:
+        """The states that were entered last."""
+        return self.table.rows(self.layers[-1])
+
+    @property
+    def depth(self) -> int:
+        """The joint steps from the initial states to these."""
+        return len(self.layers) - 1
+
+    @property
+    def states(self) -> int:
+        """How many states were entered."""
+        return sum(map(len, self.layers))
+
+    def steps(
+        self,
+        only: Callable[[Rows, Options], Options] | None = None,
+        first: int = _FIRST,
+        most: int | None = None,
+    ) -> Iterator[tuple[Ints, Steps]]:
+        """The joint steps out of the last layer, in pieces, with the states that each begins from.
+
+        The first piece are ``first`` states; how many steps these have says how long the next
+        pieces may be, to have ``most`` each.
+        """
+        room = max(1, min(self._pieces.steps, _BYTES // (8 * self._model.codec.width)))
+        most = min(room, most or room)
+        states, start, size = self.layers[-1], 0, min(self._pieces.states, first)
+        while start < len(states):
+            numbers = states[start : start + size]
+            steps = self._model.successors(self.table.rows(numbers), only)
+            self.composed += len(steps)
+            yield numbers, steps
+            start += size
+            size = max(1, min(self._pieces.states, most * size // max(1, len(steps))))
 
     def expand(
         self, only: Callable[[Rows, Options], Options] | None = None, *, keep: bool = True
-    ) -> Rows:
-        """The states after the layer's joint steps that were not seen before, sorted.
+    ) -> Ints:
+        """The states that the layer's joint steps lead to and that were not met before.
 
-        With ``keep`` the steps are kept for `space`.  The first piece of the layer is short; how
-        many steps its states have says how long the next ones may be.
+        With ``keep`` the steps are kept for `space`.
         """
-        fresh = self.seen[:0]
-        start, size = 0, min(self._pieces.states, 500)
-        while start < len(self.layer):
-            rows = self.layer[start : start + size]
-            steps = self._model.successors(rows, only)
-            self.composed += len(steps)
+        before = len(self.table)
+        for numbers, steps in self.steps(only):
+            target = self.table.add(steps.result)
             if keep:
-                self._sources.append(rows)
-                self._steps.append(steps)
-            new, _ = unique_rows(steps.result)
-            fresh, _ = unique_rows(np.concatenate((fresh, new[find_rows(self.seen, new) < 0])))
-            start += size
-            size = max(1, min(self._pieces.states, self._pieces.steps * size // (len(steps) or 1)))
-        return fresh
+                edges = Edges(numbers[steps.source], target, steps.labels, steps.cost)
+                self.edges.append(edges.compact())
+        return np.arange(before, len(self.table))
 
-    def enter(self, new: Rows) -> None:
+    def enter(self, new: Ints) -> None:
         """Let these states be the next layer."""
-        self.layer = new
-        self.seen, _ = unique_rows(np.concatenate((self.seen, new)))
-        self.depth += 1
+        self.layers.append(new)
 
     def so_far(self) -> str:
         """How far it got, for messages."""
         return (
-            f"{len(self.seen):,} states within {self.depth} steps of the initial states, "
+            f"{self.states:,} states within {self.depth} steps of the initial states, "
             f"{self.composed:,} joint steps; {len(self.layer):,} states are new in the last step"
         )
 
     def space(self) -> Space:
-        """The states seen with the steps that were kept; those to other states are left out."""
-        seen = self.seen
-        source = np.concatenate(
-            [
-                find_rows(seen, rows)[steps.source]
-                for rows, steps in zip(self._sources, self._steps, strict=True)
-            ]
+        """The states that were entered, with the steps between them that were kept."""
+        return self.space_of(np.concatenate(self.layers), self.edges)
+
+    def space_of(self, states: Ints, parts: Sequence[Edges]) -> Space:
+        """Some of the states, with those of some steps that lead to them."""
+        rows, number = unique_rows(self.table.rows(states))
+        of_state = np.full(len(self.table), -1)
+        of_state[states] = number
+        edges = joined_edges(parts, len(self._model.robots))
+        edges = edges.only(of_state[edges.target] >= 0)
+        return Space.of(
+            self._model,
+            rows,
+            of_state[edges.source],
+            of_state[edges.target],
+            edges.labels.astype(np.int32),
+            edges.cost.astype(np.int64),
         )
-        target = np.concatenate([find_rows(seen, s.result) for s in self._steps])
-        kept = target >= 0
-        labels, cost = (
-            np.concatenate([getattr(s, field) for s in self._steps])[kept]
-            for field in ("labels", "cost")
-        )
-        return Space.of(self._model, seen, source[kept], target[kept], labels, cost)
 
 
 def explore(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> Space:
@@ -156,7 +308,7 @@ def explore(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> Spac
     """
     found = Exploration(model, inits, pieces)
     with reaching(found.so_far, FEWER):
-        while len(found.layer):
+        while len(found.layers[-1]):
             found.enter(found.expand())
         return found.space()
 
@@ -168,6 +320,6 @@ def count(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> tuple[
     """
     found = Exploration(model, inits, pieces)
     with reaching(found.so_far, FEWER):
-        while len(found.layer):
+        while len(found.layers[-1]):
             found.enter(found.expand(keep=False))
-    return len(found.seen), found.composed
+    return found.states, found.composed

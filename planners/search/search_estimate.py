@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from planners.joint.model import JointModel, PlanningTask
-from planners.joint.tables import Rows
+from planners.joint.tables import Rows, unique_rows
 from planners.search.bounded_search import probe_size
 from planners.search.goals import FAR, Values
 from planners.search.heuristics import relaxed, search_heuristic
@@ -124,13 +124,13 @@ def _layers(model: JointModel, start: Rows, steps: int, states: int) -> list[Row
     """The states of each layer; the last one is empty if no others can be reached."""
     found = Exploration(model, start)
     layers = [found.layer]
-    while len(found.layer):
-        most = _most_steps(model, found.layer)
-        if most > steps or len(found.seen) > states:
+    while len(layers[-1]):
+        most = _most_steps(model, layers[-1])
+        if most > steps or found.states > states:
             break
         steps -= most
         found.enter(found.expand(keep=False))
-        layers.append(found.layer)
+        layers.append(unique_rows(found.layer)[0])
     return layers
 
 

@@ -41,7 +41,7 @@ def explore_within(
     found = Exploration(model, task.init[None, :], pieces)
 
     def so_far() -> str:
-        return f"{len(found.seen):,} states within {found.depth} of {steps} steps of {task.name}"
+        return f"{found.states:,} states within {found.depth} of {steps} steps of {task.name}"
 
     def only(rows: Rows, options: Options) -> Options:
         if heuristic.in_time is None:
@@ -49,10 +49,10 @@ def explore_within(
         return heuristic.in_time(rows, options, steps - found.depth - 1)[0]
 
     with reaching(so_far, "less slack"):
-        while len(found.layer) and found.depth < steps:
+        while len(found.layers[-1]) and found.depth < steps:
             new = found.expand(only)
             if heuristic.value is not None:
-                bound = heuristic.value(new)
+                bound = heuristic.value(found.table.rows(new))
                 new = new[(bound < FAR) & (found.depth + 1 + bound <= steps)]
             found.enter(new)
         found.expand()  # goal states that are met in the last layer rest there, as do others
