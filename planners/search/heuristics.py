@@ -15,6 +15,7 @@ import numpy as np
 
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import Goal, JointModel, Options, PlanningTask
+from planners.joint.states import TrueFacts
 from planners.joint.tables import Bools, Ints, Rows
 from planners.pddl.lifted import Atom
 from planners.search import SearchHeuristic
@@ -31,24 +32,18 @@ _STEPS = 200_000
 _BITS = 1 << 24
 
 
-#: What is somewhere: predicate, the other arguments, and which argument the place is.
-_Thing = tuple[str, tuple[str, ...], int]
-_Place = tuple[int, int]
-
-
-#: Model, goal and what its projections say -> lower bounds on the joint steps left.
-HEURISTICS: dict[str, Callable[[JointModel, Goal, Projections], Values]] = {
+#: Model, goal and state variables -> lower bounds on the joint steps left.
+HEURISTICS: dict[str, Callable[[JointModel, Goal, Sequence[StateVariable]], Values]] = {
     "relaxed": lambda model, goal, _: relaxed(model, goal),
-    "manhattan": lambda model, goal, _: manhattan(model, goal),
-    "projections": lambda _model, _goal, projections: projections.value,
+    "manhattan": lambda *all_of: manhattan(*all_of),
+    "projections": lambda *all_of: Projections(*all_of).value,
     "blind": lambda *_: lambda rows: np.zeros(len(rows), np.int64),
 }
 
 
 def heuristic(name: str, model: JointModel, goal: Goal, init: Rows) -> Values:
     """``HEURISTICS[name]`` for the states reachable from one; 0 exactly in goal states."""
-    projections = Projections(model, goal, state_variables(model, init))
-    bound = HEURISTICS[name](model, goal, projections)
+    bound = HEURISTICS[name](model, goal, state_variables(model, init))
 
     def value(rows: Rows) -> Ints:
         return np.maximum(bound(rows), ~model.holds(goal, rows))
@@ -82,7 +77,7 @@ def search_heuristic(
         return Heuristic(name)
     projections = Projections(model, task.goal, variables)
     chosen = "relaxed" if name == "auto" else name
-    own = HEURISTICS[chosen](model, task.goal, projections)
+    own = HEURISTICS[chosen](model, task.goal, variables)
     exact = name == "auto" and isinstance(model.stepper, ComposingStepper)
     start = task.init[None, :]
     if name == "auto" and not max(own(start)[0], projections.value(start)[0]):
@@ -210,82 +205,51 @@ def _transposed(true: Bools) -> Rows:
     return bits.view("<u8").astype(np.uint64, copy=False)
 
 
-def manhattan(model: JointModel, goal: Goal) -> Values:
-    """The largest Manhattan distance of something from where the goal wants it.
+def manhattan(model: JointModel, goal: Goal, variables: Sequence[StateVariable]) -> Values:
+    """The largest Manhattan distance of a state variable's value from where the goal wants it.
 
-    Places are objects whose names end in two numbers, such as ``c2-3``.  ``(at r1 c2-3)`` and all
-    atoms that differ from it in the place only are where one thing is.  The distance is divided by
-    the farthest that any action moves the thing; a thing that some action puts somewhere wherever
-    it was before is left out.  So the bound is admissible in every domain.
+    Places are objects whose names end in two numbers, such as ``c2-3``.  A variable is where one
+    thing is, as ``(at r1 c2-3)``.  The distance is divided by the farthest that any action moves
+    the thing; a thing that some action puts somewhere from no place is left out.  So the bound is
+    admissible in every domain.
 
-    Raises `UsageError` if no atom of the goal has a place.
+    Raises `UsageError` if the goal wants nothing at a place.
     """
-    facts = {fact: _thing(atom) for fact, atom in enumerate(model.codec.facts)}
-    things: dict[_Thing, dict[int, _Place]] = {}
-    for fact, found in facts.items():
-        if found is not None:
-            things.setdefault(found[0], {})[fact] = found[1]
-    speeds = _speeds(model, facts)
-    bounds = []
-    for fact in sorted(goal_facts(model, goal)):
-        found = facts[fact]
-        if found is not None and found[0] in speeds:
-            thing, place = found
-            speed = max(1, speeds[thing])
-            members = np.array(sorted(things[thing]), np.int64)
-            steps = np.array(
-                [-(-_distance(things[thing][f], place) // speed) for f in members.tolist()]
-            )
-            bounds.append((members, steps))
-    if not bounds:
+    wanted, facts = goal_facts(model, goal), list(map(_place, model.codec.facts))
+    bounds = np.zeros(len(facts), np.int64)
+    some = False
+    for variable in variables:
+        goals = [place for fact in variable.facts if fact in wanted and (place := facts[fact])]
+        moves = [
+            (facts[needs[0]], place)
+            for needs, value in variable.changes.values()
+            if (place := facts[value]) is not None
+        ]
+        if len(goals) == 1 and all(before for before, _ in moves):
+            some = True
+            speed = max([1, *(_distance(before, after) for before, after in moves if before)])
+            for fact in variable.facts:
+                place = facts[fact]
+                bounds[fact] = -(-_distance(place, goals[0]) // speed) if place else FAR
+    if not some:
         raise UsageError(
             "the Manhattan heuristic needs a goal with places such as c2-3",
             remedy="Use --heuristic relaxed: it needs no names.",
         )
 
     def value(rows: Rows) -> Ints:
-        true = model.codec.truth(rows)
-        result = np.zeros(len(rows), np.int64)
-        for members, steps in bounds:
-            result = np.maximum(result, np.where(true[:, members], steps, FAR).min(axis=1))
-        return result
+        true = TrueFacts.of(model.codec.facts_part(rows))
+        found: Ints = true.reduced(np.maximum, bounds, 0)
+        return found
 
     return value
 
 
-def _thing(atom: Atom) -> tuple[_Thing, _Place] | None:
-    """The thing and the place that an atom speaks of, if it has exactly one place."""
-    places = [
-        (n, m)
-        for n, arg in enumerate(atom.args)
-        if (m := re.search(r"(?<!\d)(\d{1,9})\D+(\d{1,9})$", arg))
-    ]
-    if len(places) != 1:
-        return None
-    [(number, match)] = places
-    rest = tuple(arg for n, arg in enumerate(atom.args) if n != number)
-    stem = re.split(r"\d", atom.args[number])[0]
-    return (atom.predicate, (*rest, stem), number), (int(match[1]), int(match[2]))
+def _place(atom: Atom) -> tuple[int, int] | None:
+    """The place that an atom speaks of, if there is exactly one."""
+    found = [m for arg in atom.args if (m := re.search(r"(?<!\d)(\d{1,9})\D+(\d{1,9})$", arg))]
+    return (int(found[0][1]), int(found[0][2])) if len(found) == 1 else None
 
 
-def _speeds(model: JointModel, facts: dict[int, tuple[_Thing, _Place] | None]) -> dict[_Thing, int]:
-    """How far one joint step moves each thing at most; without those that may turn up anywhere."""
-    speeds = {found[0]: 0 for found in facts.values() if found is not None}
-    for needs, fact in ways_to_facts(model):
-        found = facts[fact]
-        if found is None or fact in needs:
-            continue
-        before = [
-            other[1] for n in needs if (other := facts[n]) is not None and other[0] == found[0]
-        ]
-        if not before:
-            speeds.pop(found[0], None)
-        elif found[0] in speeds:
-            speeds[found[0]] = max(
-                speeds[found[0]], min(_distance(place, found[1]) for place in before)
-            )
-    return speeds
-
-
-def _distance(one: _Place, other: _Place) -> int:
+def _distance(one: tuple[int, int], other: tuple[int, int]) -> int:
     return abs(one[0] - other[0]) + abs(one[1] - other[1])
