@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -26,8 +25,6 @@ from planners.search.slack import explore_within, require_rest, seeing, seen_row
 from planners.search.state_variables import state_variables
 from planners.system.errors import ProvedImpossible
 from planners.system.limits import reaching
-
-_FAR = np.iinfo(np.int64).max // 4
 
 
 def search(
@@ -154,18 +151,16 @@ def _batch(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> PlanSpace
                 remedy=searched(space.model, tasks[number][0], space.rows),
             )
         states.append(found)
-    second, graph = _second_costs(space, distance)
+    graph = _shortest_ways(space, distance)
     node = np.full(distance.shape, -1)
     begins = np.flatnonzero(graph.layer == distance[graph.goal, graph.state] + space.model.slack)
     node[graph.goal[begins], graph.state[begins]] = begins
-    goal = np.repeat(np.arange(len(tasks)), [len(s) for s in states])
-    state = np.concatenate(states)
-    plans = replace(
-        graph,
-        goals=tuple(goal for goal, _ in tasks),
-        starts=node[goal, state],
-        second=second[goal, state],
-    ).reduced()
+    starts = node[
+        np.repeat(np.arange(len(tasks)), [len(s) for s in states]), np.concatenate(states)
+    ]
+    plans = replace(graph, goals=tuple(goal for goal, _ in tasks), starts=starts).reduced()
+    second = plans.least_sums(plans.cost)[plans.starts]
+    plans = replace(plans.cheapest(plans.cost), second=second)
     if space.model.slack:
         require_rest(plans)
     if space.model.slack_facts:
@@ -207,8 +202,8 @@ def _as_bits(table: Bools) -> Rows:
     return packed.view(np.uint64)
 
 
-def _second_costs(space: Space, distance: Ints) -> tuple[Ints, PlanSpace]:
-    """The least second cost component within the bound on steps, and the graph of optimal edges.
+def _shortest_ways(space: Space, distance: Ints) -> PlanSpace:
+    """The graph of the ways to the goals within the bound on steps, for no task as yet.
 
     A node is a goal, a state and the steps that are left: the distance, and up to the model's slack
     more.
@@ -226,36 +221,17 @@ def _second_costs(space: Space, distance: Ints) -> tuple[Ints, PlanSpace]:
     left = layer[source] - 1 - after  # the slack after the step: never more than before
     keep = (after >= 0) & (left >= 0) & (layer[source] > 0)
     source, step, left = source[keep], step[keep], left[keep]
-    target = node[left, goal[source], space.target[step]]
-    cost = space.cost[step]
-    value = np.where(layer == 0, 0, _FAR)
-    if cost.any():
-        bounds = np.searchsorted(layer[source], np.arange(int(layer.max(initial=0)) + 2))
-        for low, high in pairwise(bounds[1:]):
-            span = slice(low, high)
-            np.minimum.at(value, source[span], cost[span] + value[target[span]])
-        keep = cost + value[target] == value[source]
-        source, step, target, cost = source[keep], step[keep], target[keep], cost[keep]
-    else:
-        value = np.zeros(len(goal), np.int64)
-    second = np.zeros(distance.shape, np.int64)
-    begins = slack == space.model.slack
-    second[goal[begins], state[begins]] = value[begins]
-    return second, PlanSpace(
+    return PlanSpace(
         model=space.model,
         rows=space.rows,
         state=state,
         goal=goal,
         layer=layer,
         first=np.searchsorted(source, np.arange(len(goal) + 1)),
-        target=target,
+        target=node[left, goal[source], space.target[step]],
         labels=space.labels[step],
-        cost=cost,
+        cost=space.cost[step],
         goals=(),
-        starts=_none(),
-        second=_none(),
+        starts=np.zeros(0, np.int64),
+        second=np.zeros(0, np.int64),
     )
-
-
-def _none() -> Ints:
-    return np.zeros(0, np.int64)

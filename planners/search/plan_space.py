@@ -20,6 +20,9 @@ from planners.joint.conditions import Labels
 from planners.joint.model import Goal, JointModel
 from planners.joint.tables import Bools, Ints, Rows, ranges
 
+#: More than any sum of costs, of nodes from which no way leads to a goal.
+_NO_WAY = np.iinfo(np.int64).max // 4
+
 
 @dataclass(frozen=True, slots=True)
 class LayerEdges:
@@ -260,15 +263,21 @@ class PlanSpace:
         fewer = replace(self, starts=self.starts[tasks], second=self.second[tasks])
         return fewer._cut(kept).reduced()
 
-    def cheapest(self, cost: Ints) -> PlanSpace:
-        """The plans for which the sum of other costs of their edges (edges) is least; O(edges)."""
-        value = np.zeros(len(self), np.int64)
-        kept = np.zeros(len(self.target), np.bool_)
+    def least_sums(self, cost: Ints) -> Ints:
+        """The least sum of the costs of edges (edges) on a way to a goal, per node; O(edges)."""
+        value = np.where(self.layer == 0, 0, _NO_WAY)
+        if not cost.any():
+            return np.zeros_like(value)
         for below in self.edges_by_layer():
-            through = cost[below.edges] + value[below.target]
-            value[below.source] = np.iinfo(np.int64).max
-            np.minimum.at(value, below.source, through)
-            kept[below.edges] = through == value[below.source]
+            np.minimum.at(value, below.source, cost[below.edges] + value[below.target])
+        return value
+
+    def cheapest(self, cost: Ints) -> PlanSpace:
+        """The plans for which the sum of the costs of their edges (edges) is least; O(edges)."""
+        value = self.least_sums(cost)
+        kept = cost + value[self.target] == value[self.sources]
+        if kept.all():
+            return self
         return self.along(kept)
 
     def along(self, edges: Bools) -> PlanSpace:
