@@ -14,7 +14,7 @@ import numpy as np
 
 from planners.joint.model import Goal, JointModel, Options, PlanningTask
 from planners.joint.tables import Ints, Rows
-from planners.search.exact_bound import ExactBound, OptimalStates, exact_bound
+from planners.search.exact_bound import ExactBound, exact_bound
 from planners.search.goals import FAR, searched
 from planners.search.heuristics import Heuristic
 from planners.search.reachable import Edges, Exploration, PieceSizes, Space, grown, joined_edges
@@ -80,7 +80,6 @@ class BoundedSearch(Exploration):
         self._depth: Ints = np.zeros(0, np.int64)
         #: What a solver says of optimal plans, once it was asked.
         self.exact: ExactBound | None = None
-        self._optimal: OptimalStates | None = None
         #: Whether no more joint steps may be composed than the probe says.
         self._limited = heuristic.exact
 
@@ -129,7 +128,6 @@ class BoundedSearch(Exploration):
         self.exact = exact_bound(self._model, self._task, self._variables, at_least, self._pieces)
         if self.exact is None:
             return self.bound
-        self._optimal = OptimalStates(self.exact.plans, self._pieces.question)
         return self.exact.makespan
 
     @property
@@ -156,8 +154,8 @@ class BoundedSearch(Exploration):
             except _GrownError:
                 return _GROWN
             beyond = min(beyond, low)
-            if self._optimal is not None:
-                self._depth[self._optimal.left_out(edges, depth, len(self.table))] = _LEFT_OUT
+            if self.exact is not None:
+                self._depth[self.exact.left_out(edges, depth, len(self.table))] = _LEFT_OUT
                 edges = edges.only(self._depth[edges.target] == depth)
             new = np.flatnonzero(self._depth[: len(self.table)] == depth)
             if not len(new):

@@ -11,9 +11,8 @@ decided with some effort is answered with yes: more is searched then.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
 from itertools import count, product
 
 import numpy as np
@@ -43,25 +42,99 @@ _RECENT, _NEARLY_ALL = 200, 0.95
 SMALLER = "a task with a shorter plan, fewer objects or fewer robots"
 
 
-@dataclass(frozen=True, slots=True)
 class ExactBound:
     """The least makespan of one task, and what its optimal plans consist of.
 
-    ``used[k][robot]`` (labels) says which labels occur in step k of some optimal plan; ``plans``
-    are what they satisfy, to be closed by whoever asked for the bound.
+    ``plans`` are what they satisfy, to be closed by whoever asked for the bound; ``used[k][robot]``
+    (labels) says which labels occur in step k of some optimal plan; a state is kept where
+    ``effort`` conflicts do not answer its question.
+
+    Of each state that a search has met a cheapest way is kept as its last step: what the way costs,
+    the state before, and what the robots do there.
     """
 
-    plans: FixedPlans
-    makespan: int
-    used: list[list[Bools]]
+    def __init__(self, plans: FixedPlans, used: list[list[Bools]], effort: int) -> None:
+        self.plans, self.makespan, self._used, self._effort = plans, plans.steps, used, effort
+        self._paid: Ints = np.zeros(0, np.int64)
+        self._source: Ints = np.zeros(0, np.int64)
+        self._labels: Labels = np.zeros((0, plans.first.shape[1]), np.int32)
 
     def only(self, depth: int, rows: Rows, options: Options) -> Options:
         """The robots' options in states after ``depth`` steps, without labels that are not used."""
         found = []
-        for (first, label), used in zip(options, self.used[depth], strict=True):
+        for (first, label), used in zip(options, self._used[depth], strict=True):
             good = used[label]
             state = np.repeat(np.arange(len(rows)), np.diff(first))[good]
             found.append((np.searchsorted(state, np.arange(len(rows) + 1)), label[good]))
+        return found
+
+    def left_out(self, edges: Edges, depth: int, states: int) -> Ints:
+        """States of the layer that ``edges`` lead to through which no optimal plan passes.
+
+        Of large layers a sample is asked for first, and all if enough of it is left out;
+        ``states`` is how many there are in the table.
+        """
+        new = self._enter(edges, states)
+        some = new[:: -(-len(new) // _SAMPLE) or 1]
+        passes = self.may_pass(self._ways(some, depth))
+        if len(some) == len(new):
+            return new[~passes]
+        if passes.mean() > _MOSTLY:
+            return new[:0]
+        return new[~self.may_pass(self._ways(new, depth), _NEARLY_ALL)]
+
+    def may_pass(self, ways: Labels, enough: float = 1) -> Bools:
+        """Which beginnings of plans, as labels (ways, steps, robots), some optimal plan may have.
+
+        Those that no earlier answer refuted are asked for in a random order; where more than the
+        share ``enough`` of the last ones pass, the others are taken to pass, too.
+        """
+        asked = (ways + self.plans.first[: ways.shape[1]]).reshape(len(ways), -1)
+        columns = np.ascontiguousarray(asked.T)
+        passes = np.ones(len(ways), np.bool_)
+        recent: deque[bool] = deque(maxlen=_RECENT)
+        for way in np.random.default_rng(0).permutation(len(ways)).tolist():
+            if not passes[way]:
+                continue
+            literals = asked[way].tolist()
+            recent.append(self._unless_refuted(literals))
+            if not recent[-1]:
+                # What is refuted is part of other ways, too.
+                alike = np.arange(len(ways))
+                core = self.plans.core((-asked[way]).tolist())
+                for place in np.flatnonzero(np.isin(-asked[way], core))[::-1]:
+                    alike = alike[columns[place, alike] == asked[way, place]]
+                passes[alike] = False
+            elif len(recent) == _RECENT and sum(recent) > enough * _RECENT:
+                break
+        return passes
+
+    def _unless_refuted(self, literals: Literals) -> bool:
+        try:
+            with self.plans.at_most(self._effort):
+                return self.plans.holds(literals)
+        except OutOfEffort:
+            return True
+
+    def _enter(self, edges: Edges, states: int) -> Ints:
+        """Note cheapest ways to the different states that edges lead to, and return these."""
+        self._paid, self._source = grown(self._paid, states, 0), grown(self._source, states, 0)
+        missing = len(self._paid) - len(self._labels)
+        self._labels = np.pad(self._labels, ((0, missing), (0, 0)))
+        paid = self._paid[edges.source] + edges.cost
+        order = np.lexsort((paid, edges.target))
+        new, first = np.unique(edges.target[order], return_index=True)
+        best = order[first]
+        self._paid[new], self._source[new] = paid[best], edges.source[best]
+        self._labels[new] = edges.labels[best]
+        return new.astype(np.int64)
+
+    def _ways(self, states: Ints, depth: int) -> Labels:
+        """The ways to some states of a layer, as labels: (states, depth, robots)."""
+        found = np.zeros((len(states), depth, self._labels.shape[1]), np.int32)
+        for step in range(depth - 1, -1, -1):
+            found[:, step] = self._labels[states]
+            states = self._source[states]
         return found
 
 
@@ -78,7 +151,7 @@ def exact_bound(
     are spent.  Of a task without plan none is found.
     """
     try:
-        formula = PlanFormula.of(model, task, variables)
+        formula = PlanFormula(model, task, variables)
         plans = _shortest(formula, task, at_least, pieces.effort)
     except (TooManyClauses, OutOfEffort):
         return None
@@ -94,7 +167,7 @@ def exact_bound(
             plans.without_limit()
             used = _used(plans, model, plan, pieces.question)
             plans.simplify()
-            return ExactBound(plans, len(plan), used)
+            return ExactBound(plans, used, pieces.question)
     except BaseException:
         plans.close()
         raise
@@ -109,7 +182,7 @@ def _shortest(formula: PlanFormula, task: PlanningTask, at_least: int, effort: i
             if plans.holds():
                 ended.pop_all()
                 break
-            plans.spend(makespan * (_EASY + int((formula.step == 0).sum())))
+            plans.spend(makespan * (_EASY + len(formula.step)))
         effort = plans.left
     return plans
 
@@ -147,53 +220,6 @@ def _used(plans: FixedPlans, model: JointModel, plan: Plan, effort: int) -> list
 # ---- the least second component, by cores
 
 
-class _Sums:
-    """The sums that are assumed to be small, by the literal that says that one is larger.
-
-    A sum is a counter: its k-th literal is implied where more than k of some others hold.
-    """
-
-    def __init__(self, plans: FixedPlans) -> None:
-        self._plans = plans
-        #: Assumed to be false: the sum that each belongs to, and its place there.
-        self.open: dict[int, tuple[Literals | None, int]] = {}
-        self._times: dict[int, Literals] = {}
-
-    def add_actions(self, model: JointModel, task: PlanningTask) -> None:
-        """Assume of every action that costs something that it is not chosen at all.
-
-        By none of the robots that are alike: which one of them does it does not matter.
-        """
-        kinds = _kinds(model, task)
-        alike: dict[tuple[str, ...], Literals] = {}
-        for robot, costs in enumerate(_label_costs(model)):
-            own = model.robots[robot]
-            for label in np.flatnonzero(costs).tolist():
-                words = model.labels[robot][label].strip("()").split()
-                action = tuple(kinds[robot] if word == own else word for word in words)
-                times = [self._plans.label(step, robot, label) for step in range(self._plans.steps)]
-                alike.setdefault(action, []).extend(times)
-        for times in alike.values():
-            done = self._plans.any_of(times)
-            self._times[done] = times
-            self.open[done] = (None, 0)
-
-    def relax(self, core: Literals) -> None:
-        """Let as many of a core's literals hold as must; more, or one more often, is paid anew."""
-        for literal in core:
-            own, place = self.open.pop(literal)
-            if own is None:
-                own = self._plans.counter(self._times.pop(literal))
-            self._assume(own, place + 1)
-        if len(core) > 1:
-            self._assume(self._plans.counter(core), 1)
-
-    def _assume(self, sums: Literals, place: int) -> None:
-        """Assume that no more than this many of some literals hold."""
-        if place < len(sums):
-            self.open[sums[place]] = (sums, place)
-
-
 def _label_costs(model: JointModel) -> list[Ints]:
     """Per robot the second cost component of each of its labels."""
     assert isinstance(model.stepper, ComposingStepper)
@@ -215,12 +241,43 @@ def _least_cost(plans: FixedPlans, model: JointModel, task: PlanningTask) -> Lit
 
     Raises `planners.search.questions.OutOfEffort`.
     """
-    sums = _Sums(plans)
-    sums.add_actions(model, task)
-    while cores := list(_disjoint(plans, set(sums.open))):
+    #: What is assumed to be false: that an action is done at all, and that more of some literals
+    #: hold than the place of this one in their counter.
+    done = {plans.any_of(times): times for times in _costly(plans, model, task)}
+    more: dict[int, tuple[Literals, int]] = {}
+
+    def assume_at_most(place: int, counter: Literals) -> None:
+        if place < len(counter):
+            more[counter[place]] = counter, place
+
+    while cores := list(_disjoint(plans, {*done, *more})):
         for core in cores:
-            sums.relax(core)
-    return [-literal for literal in sorted(sums.open)]
+            for literal in core:
+                if literal in done:
+                    assume_at_most(1, plans.counter(done.pop(literal)))
+                else:
+                    counter, place = more.pop(literal)
+                    assume_at_most(place + 1, counter)
+            if len(core) > 1:
+                assume_at_most(1, plans.counter(core))
+    return [-literal for literal in sorted({*done, *more})]
+
+
+def _costly(plans: FixedPlans, model: JointModel, task: PlanningTask) -> Iterable[Literals]:
+    """For each action that costs something the literals that it is done, in any step.
+
+    By any of the robots that are alike: which one of them does it does not matter.
+    """
+    kinds = _kinds(model, task)
+    alike: dict[tuple[str, ...], Literals] = {}
+    for robot, costs in enumerate(_label_costs(model)):
+        own = model.robots[robot]
+        for label in np.flatnonzero(costs).tolist():
+            words = model.labels[robot][label].strip("()").split()
+            action = tuple(kinds[robot] if word == own else word for word in words)
+            times = [plans.label(step, robot, label) for step in range(plans.steps)]
+            alike.setdefault(action, []).extend(times)
+    return alike.values()
 
 
 def _disjoint(plans: FixedPlans, assumed: set[int]) -> Iterator[Literals]:
@@ -245,90 +302,3 @@ def _kinds(model: JointModel, task: PlanningTask) -> list[str]:
 
     known = [about(robot) for robot in model.robots]
     return [model.robots[known.index(own)] for own in known]
-
-
-# ---- states on optimal plans
-
-
-class OptimalStates:
-    """Which states of a search optimal plans pass through.
-
-    Of each state a cheapest way is kept as its last step: what the way costs, the state before, and
-    what the robots do there.  ``plans`` say what optimal plans satisfy; a state is kept where
-    ``effort`` conflicts do not answer its question.
-    """
-
-    def __init__(self, plans: FixedPlans, effort: int) -> None:
-        self._plans, self._effort = plans, effort
-        self._paid: Ints = np.zeros(0, np.int64)
-        self._source: Ints = np.zeros(0, np.int64)
-        self._labels: Labels = np.zeros((0, plans.first.shape[1]), np.int32)
-
-    def left_out(self, edges: Edges, depth: int, states: int) -> Ints:
-        """States of the layer that ``edges`` lead to through which no optimal plan passes.
-
-        Of large layers a sample is asked for first, and all if enough of it is left out;
-        ``states`` is how many there are in the table.
-        """
-        new = self._enter(edges, states)
-        some = new[:: -(-len(new) // _SAMPLE) or 1]
-        passes = self.may_pass(self._ways(some, depth))
-        if len(some) == len(new):
-            return new[~passes]
-        if passes.mean() > _MOSTLY:
-            return new[:0]
-        return new[~self.may_pass(self._ways(new, depth), _NEARLY_ALL)]
-
-    def may_pass(self, ways: Labels, enough: float = 1) -> Bools:
-        """Which beginnings of plans, as labels (ways, steps, robots), some optimal plan may have.
-
-        Those that no earlier answer refuted are asked for in a random order; where more than the
-        share ``enough`` of the last ones pass, the others are taken to pass, too.
-        """
-        asked = (ways + self._plans.first[: ways.shape[1]]).reshape(len(ways), -1)
-        columns = np.ascontiguousarray(asked.T)
-        passes = np.ones(len(ways), np.bool_)
-        recent: deque[bool] = deque(maxlen=_RECENT)
-        for way in np.random.default_rng(0).permutation(len(ways)).tolist():
-            if not passes[way]:
-                continue
-            literals = asked[way].tolist()
-            recent.append(self._unless_refuted(literals))
-            if not recent[-1]:
-                # What is refuted is part of other ways, too.
-                alike = np.arange(len(ways))
-                core = self._plans.core((-asked[way]).tolist())
-                for place in np.flatnonzero(np.isin(-asked[way], core))[::-1]:
-                    alike = alike[columns[place, alike] == asked[way, place]]
-                passes[alike] = False
-            elif len(recent) == _RECENT and sum(recent) > enough * _RECENT:
-                break
-        return passes
-
-    def _unless_refuted(self, literals: Literals) -> bool:
-        try:
-            with self._plans.at_most(self._effort):
-                return self._plans.holds(literals)
-        except OutOfEffort:
-            return True
-
-    def _enter(self, edges: Edges, states: int) -> Ints:
-        """Note cheapest ways to the different states that edges lead to, and return these."""
-        self._paid, self._source = grown(self._paid, states, 0), grown(self._source, states, 0)
-        missing = len(self._paid) - len(self._labels)
-        self._labels = np.pad(self._labels, ((0, missing), (0, 0)))
-        paid = self._paid[edges.source] + edges.cost
-        order = np.lexsort((paid, edges.target))
-        new, first = np.unique(edges.target[order], return_index=True)
-        best = order[first]
-        self._paid[new], self._source[new] = paid[best], edges.source[best]
-        self._labels[new] = edges.labels[best]
-        return new.astype(np.int64)
-
-    def _ways(self, states: Ints, depth: int) -> Labels:
-        """The ways to some states of a layer, as labels: (states, depth, robots)."""
-        found = np.zeros((len(states), depth, self._labels.shape[1]), np.int32)
-        for step in range(depth - 1, -1, -1):
-            found[:, step] = self._labels[states]
-            states = self._source[states]
-        return found

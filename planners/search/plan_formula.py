@@ -8,16 +8,15 @@ only where an effect changes it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from itertools import combinations
 
 import numpy as np
 
 from planners.grounding.actions import GroundAction
 from planners.joint.composition import ComposingStepper
-from planners.joint.model import FullState, Goal, JointModel, PlanningTask
-from planners.joint.step_clauses import Clause, clauses
+from planners.joint.model import FullState, JointModel, PlanningTask
+from planners.joint.step_clauses import clauses
 from planners.joint.tables import Ints, Rows
 from planners.pddl.formula_tree import negated
 from planners.pddl.lifted import TRUE, Formula
@@ -30,32 +29,54 @@ class TooManyClauses(Exception):
     """A condition of the model has too many clauses to be part of a formula."""
 
 
-@dataclass(frozen=True, slots=True)
 class PlanFormula:
-    """The clauses of one step of a plan, and of the goal, each followed by 0.
+    """The clauses of one ``step`` of a plan of a task, and of its goal.
 
     Variable k (from 1) of a step is fact k - 1, true in the state before it, then come labels,
     robot by robot, then helping variables; ``size`` is how many there are.  ``size + k`` is
-    variable k of the next step.
+    variable k of the next step.  States have one value of each of the state variables.
+
+    Raises `TooManyClauses`.
     """
 
-    model: JointModel
-    size: int
-    first_label: tuple[int, ...]
-    step: Ints
-    goal: Ints
-
-    @classmethod
-    def of(
-        cls, model: JointModel, task: PlanningTask, variables: Sequence[StateVariable]
-    ) -> PlanFormula:
-        """The formula of a task, whose states have one value of each of the variables.
-
-        Raises `TooManyClauses`.
-        """
-        goal = list(_goal_clauses(model, task.goal))
-        size, first_label, step = _Builder(model).build(variables, task.init)
-        return cls(model, size, first_label, _flat(step), _flat(goal))
+    def __init__(
+        self, model: JointModel, task: PlanningTask, variables: Sequence[StateVariable]
+    ) -> None:
+        stepper = model.stepper
+        assert isinstance(stepper, ComposingStepper)
+        self._model, self._stepper, facts = model, stepper, len(model.codec.facts)
+        counts = [len(own) for own in model.labels]
+        self._first_label = [facts + 1 + sum(counts[:robot]) for robot in range(len(counts))]
+        self.size = facts + sum(counts)
+        self.step: list[tuple[int, ...]] = []
+        #: Per fact the literals that make it true in the next state, and false.
+        self._adders: list[Literals] = [[] for _ in range(facts)]
+        self._deleters: list[Literals] = [[] for _ in range(facts)]
+        #: Per robot and some of its labels, as bytes, the variable that they imply.
+        self._implied: dict[tuple[int, bytes], int] = {}
+        for variable in variables:
+            self._exactly_one([fact + 1 for fact in variable.facts])
+        for robot, actions in enumerate(stepper.labelled):
+            self._exactly_one([self._label(robot, label) for label in range(len(actions))])
+            for label, action in enumerate(actions):
+                if action is not None:
+                    self._action(robot, label, action)
+        for i, j in combinations(range(len(model.robots)), 2):
+            self._apart(i, j)
+        known = {fact: number for number, own in enumerate(variables) for fact in own.facts}
+        for one, other in mutexes(model, task.init):
+            if one == other:
+                self.step.append((-(one + 1),))
+            elif one not in known or known[one] != known.get(other):
+                self.step.append((-(one + 1), -(other + 1)))
+        self._facts_follow()
+        goal = task.goal
+        self._flat_step = _flat(self.step)
+        self._goal = _flat(
+            [(fact + 1 if fact in goal.facts else -(fact + 1),) for fact in range(facts)]
+            if isinstance(goal, FullState)
+            else self._saying(goal)
+        )
 
     def plans(self, row: Rows, steps: int, effort: int) -> FixedPlans:
         """The plans of so many steps from a state to the goal, as a formula to be closed.
@@ -63,97 +84,50 @@ class PlanFormula:
         Variables are numbered from the goal back: solvers take far longer the other way round.
         """
         before = self.size * np.arange(steps, 0, -1)[:, None]
-        number = np.abs(self.step)
+        number = np.abs(self._flat_step)
         number[number > self.size] -= 2 * self.size
-        facts = np.full(len(self.model.codec.facts), -1)
-        facts[self.model.codec.true_facts(row)] = 1
+        facts = np.full(len(self._model.codec.facts), -1)
+        facts[self._model.codec.true_facts(row)] = 1
         begin = (1 + self.size * steps + np.arange(len(facts))) * facts
         clauses = (
-            self.goal,
-            (np.sign(self.step) * (number + before)).reshape(-1),
+            self._goal,
+            (np.sign(self._flat_step) * (number + before)).reshape(-1),
             np.column_stack((begin, np.zeros_like(begin))).reshape(-1),
         )
-        sizes = [len(own) for own in self.model.labels]
-        return FixedPlans(np.concatenate(clauses), before + self.first_label, sizes, effort)
-
-
-def _flat(clauses: Iterable[Sequence[int]]) -> Ints:
-    return np.array([literal for clause in clauses for literal in (*clause, 0)], np.int64)
-
-
-def clauses_of(model: JointModel, formula: Formula, robot: int, label: int) -> list[Clause]:
-    """The clauses of a condition; raises `TooManyClauses`."""
-    found = clauses(formula, model.evaluator, robot, label)
-    if found is None:
-        raise TooManyClauses
-    return found
-
-
-class _Builder:
-    def __init__(self, model: JointModel) -> None:
-        stepper = model.stepper
-        assert isinstance(stepper, ComposingStepper)
-        self._model, self._stepper = model, stepper
-        self._facts = len(model.codec.facts)
-        counts = [len(own) for own in model.labels]
-        self.first_label = tuple(
-            self._facts + 1 + sum(counts[:robot]) for robot in range(len(counts))
-        )
-        self._size = self._facts + sum(counts)
-        self.clauses: list[tuple[int, ...]] = []
-        #: Per fact the literals that make it true in the next state, and false.
-        self._adders: list[Literals] = [[] for _ in range(self._facts)]
-        self._deleters: list[Literals] = [[] for _ in range(self._facts)]
-        #: Per robot and some of its labels, as bytes, the variable that they imply.
-        self._implied: dict[tuple[int, bytes], int] = {}
-
-    def build(
-        self, variables: Sequence[StateVariable], init: Rows
-    ) -> tuple[int, tuple[int, ...], list[tuple[int, ...]]]:
-        """How many variables a step has, the first label of each robot, and the clauses."""
-        for variable in variables:
-            self._exactly_one([fact + 1 for fact in variable.facts])
-        for robot, own in enumerate(self._stepper.labelled):
-            self._exactly_one([self._label(robot, label) for label in range(len(own))])
-            for label, action in enumerate(own):
-                if action is not None:
-                    self._action(robot, label, action)
-        for i, j in combinations(range(len(self._model.robots)), 2):
-            self._apart(i, j)
-        known = {fact: number for number, own in enumerate(variables) for fact in own.facts}
-        for one, other in mutexes(self._model, init):
-            if one == other:
-                self.clauses.append((-(one + 1),))
-            elif one not in known or known[one] != known.get(other):
-                self.clauses.append((-(one + 1), -(other + 1)))
-        self._facts_follow()
-        return self._size, self.first_label, self.clauses
+        sizes = [len(own) for own in self._model.labels]
+        return FixedPlans(np.concatenate(clauses), before + self._first_label, sizes, effort)
 
     def _fresh(self) -> int:
-        self._size += 1
-        return self._size
+        self.size += 1
+        return self.size
 
     def _label(self, robot: int, label: int) -> int:
-        return self.first_label[robot] + label
+        return self._first_label[robot] + label
 
     def _exactly_one(self, variables: Literals) -> None:
         """Of some variables; at most one, by a chain: "one of those up to here"."""
-        self.clauses.append(tuple(variables))
+        self.step.append(tuple(variables))
         before = variables[0]
         for variable in variables[1:]:
-            self.clauses.append((-before, -variable))
+            self.step.append((-before, -variable))
             so_far = self._fresh()
-            self.clauses += [(-before, so_far), (-variable, so_far)]
+            self.step += [(-before, so_far), (-variable, so_far)]
             before = so_far
 
     def _literal(self, literal: tuple[int, ...]) -> int:
         number = literal[0] + 1 if len(literal) == 2 else self._label(literal[0], literal[1])
         return number if literal[-1] else -number
 
+    def _saying(self, formula: Formula, robot: int = 0, label: int = 0) -> list[tuple[int, ...]]:
+        """The clauses of a condition, where a robot has this label."""
+        found = clauses(formula, self._model.evaluator, robot, label)
+        if found is None:
+            raise TooManyClauses
+        return [tuple(map(self._literal, sorted(clause))) for clause in found]
+
     def _action(self, robot: int, label: int, action: GroundAction) -> None:
         chosen = self._label(robot, label)
-        for clause in clauses_of(self._model, action.precondition, robot, label):
-            self.clauses.append((-chosen, *map(self._literal, sorted(clause))))
+        self.step += [(-chosen, *said) for said in self._saying(action.precondition, robot, label)]
         index = self._model.codec.facts.index
         for effect in action.effects:
             if effect.atom not in index:
@@ -166,11 +140,10 @@ class _Builder:
     def _fires(self, robot: int, label: int, condition: Formula) -> int:
         """A variable for: the label is chosen, and the condition of an effect holds."""
         chosen, fires = self._label(robot, label), self._fresh()
-        self.clauses.append((-fires, chosen))
-        for clause in clauses_of(self._model, condition, robot, label):
-            self.clauses.append((-fires, *map(self._literal, sorted(clause))))
-        for clause in clauses_of(self._model, negated(condition), robot, label):
-            self.clauses.append((fires, -chosen, *map(self._literal, sorted(clause))))
+        self.step.append((-fires, chosen))
+        self.step += [(-fires, *said) for said in self._saying(condition, robot, label)]
+        otherwise = self._saying(negated(condition), robot, label)
+        self.step += [(fires, -chosen, *said) for said in otherwise]
         return fires
 
     def _apart(self, i: int, j: int) -> None:
@@ -180,7 +153,7 @@ class _Builder:
         for one, other in np.argwhere(columns).tolist():
             mine = np.flatnonzero(row_class.reshape(-1) == one)
             theirs = np.flatnonzero(column_class.reshape(-1) == other)
-            self.clauses.append((-self._one_of(i, mine), -self._one_of(j, theirs)))
+            self.step.append((-self._one_of(i, mine), -self._one_of(j, theirs)))
 
     def _one_of(self, robot: int, labels: Ints) -> int:
         """A variable that is implied by each of a robot's labels."""
@@ -189,25 +162,21 @@ class _Builder:
         key = (robot, labels.tobytes())
         if key not in self._implied:
             self._implied[key] = self._fresh()
-            self.clauses += [
+            self.step += [
                 (-self._label(robot, label), self._implied[key]) for label in labels.tolist()
             ]
         return self._implied[key]
 
     def _facts_follow(self) -> None:
         """What is true in the next state; added facts are, whatever deletes them, too."""
-        for fact in range(self._facts):
+        for fact in range(len(self._adders)):
             now, adders, deleters = fact + 1, self._adders[fact], self._deleters[fact]
-            then = now + self._size
-            self.clauses += [(-adder, then) for adder in adders]
-            self.clauses += [(-deleter, *adders, -then) for deleter in deleters]
-            self.clauses += [(-then, now, *adders), (then, -now, *deleters)]
+            then = now + self.size
+            self.step += [(-adder, then) for adder in adders]
+            self.step += [(-deleter, *adders, -then) for deleter in deleters]
+            self.step += [(-then, now, *adders), (then, -now, *deleters)]
 
 
-def _goal_clauses(model: JointModel, goal: Goal) -> Iterator[Literals]:
-    if isinstance(goal, FullState):
-        for fact in range(len(model.codec.facts)):
-            yield [fact + 1 if fact in goal.facts else -(fact + 1)]
-        return
-    for clause in clauses_of(model, goal, 0, 0):
-        yield [lit[0] + 1 if lit[-1] else -(lit[0] + 1) for lit in sorted(clause)]
+def _flat(clauses: Iterable[Sequence[int]]) -> Ints:
+    """Clauses one after another, each followed by 0."""
+    return np.array([literal for clause in clauses for literal in (*clause, 0)], np.int64)
