@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from fractions import Fraction
 from statistics import mean
 from typing import Any
@@ -60,7 +60,7 @@ class TaskCoordination(Presented, TaskAnswer):
             "requires_coordination": self.required,
             "miscoordination": witness_data(self.witness),
             "failure": None if self.failure is None else float(self.failure),
-            **({"failure_estimate": estimate.data()} if estimate else {}),
+            **({"failure_estimate": asdict(estimate)} if estimate else {}),
             **({"slack": self.slack} if self.slack else {}),
             **({"fewest_actions": self.fewest.data()} if self.fewest else {}),
         }

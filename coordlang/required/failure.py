@@ -22,7 +22,7 @@ from __future__ import annotations
 from bisect import bisect
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from fractions import Fraction
 from itertools import accumulate
 from math import gcd, prod
@@ -301,35 +301,21 @@ _RUNS = 1_000
 
 @dataclass(frozen=True, slots=True)
 class FailureEstimate:
-    """How often robots failed in ``runs`` independent draws.
+    """The share of ``runs`` independent draws in which robots failed.
 
     ``low`` and ``high`` are the 95 % confidence interval, by Wilson's score.
     """
 
-    failures: int
+    value: float
+    low: float
+    high: float
     runs: int
-
-    @property
-    def value(self) -> float:
-        """The share of runs that failed."""
-        return self.failures / self.runs
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """The 95 % confidence interval."""
-        return wilson(self.failures, self.runs)
-
-    def data(self) -> dict[str, Any]:
-        """Return it as JSON data."""
-        low, high = self.interval
-        return {"value": self.value, "low": low, "high": high, "runs": self.runs}
 
     def text(self) -> str:
         """Return it as text, named as an estimate."""
-        low, high = self.interval
         return (
             f"about {percent(self.value)} (estimated from {self.runs:,} draws: "
-            f"{100 * low:.1f} to {100 * high:.1f} %)"
+            f"{100 * self.low:.1f} to {100 * self.high:.1f} %)"
         )
 
 
@@ -360,7 +346,7 @@ class Failures:
             "failure_worst": None if self.worst is None else float(self.worst),
         }
         if self.estimate is not None:
-            data["failure_estimate"] = self.estimate.data()
+            data["failure_estimate"] = asdict(self.estimate)
         return data
 
     def text(self) -> str:
@@ -440,7 +426,7 @@ def estimated_failure(
     for _ in range(runs):
         game, start = random.choice(tasks)
         failures += game.fails(start, random)
-    return FailureEstimate(failures, runs)
+    return FailureEstimate(failures / runs, *wilson(failures, runs), runs)
 
 
 class _Game:

@@ -207,7 +207,6 @@ class SetWalk:
         self._sentences = SentenceSets()
         #: Of each set of steps its sentences, and its label sequences.
         self._said, self._done = [self._sentences.silence], [_EMPTY]
-        self._saying: dict[tuple[int, int], int] = {}
         self._edges = EdgeTrees(space)
 
         def so_far() -> str:
@@ -267,40 +266,16 @@ class SetWalk:
         return (entered - 1,) if entered else ()
 
     def _look_at_sets(self) -> None:
-        """Find the sentences and label sequences of new sets; what follows a step is no newer."""
+        """Find the sentences and label sequences of each set; what follows a step is older."""
         sentences, labels = self._sentences, self._sequences
-        for number in range(len(self._said), len(self._steps)):
+        for steps in self._steps.moves[1:]:
             said: set[int] = set()
             done: dict[int, set[int]] = {}
-            for step, after in self._steps.moves[number].items():
+            for step, after in steps.items():
                 said.add(sentences.before(self._entered(step), self._said[after]))
                 done.setdefault(step // self._base, set()).add(self._done[after])
             self._said.append(sentences.union(tuple(sorted(said))))
             self._done.append(_united(labels, done))
-
-    def _part_saying(self, steps: int, sentences: int) -> int:
-        """The part of a set of steps along which some of these sentences is said; there is one."""
-        todo = [] if self._known_part(steps, sentences) is not None else [(steps, sentences)]
-        while todo:
-            number, wanted = todo[-1]
-            below = {}
-            for step, after in self._steps.moves[number].items():
-                rest = self._sentences.after(self._entered(step), wanted)
-                shared = self._sentences.common(rest, self._said[after])
-                if shared is not None:
-                    below[step] = after, shared
-            parts = {step: self._known_part(*pair) for step, pair in below.items()}
-            known = [(step, part) for step, part in sorted(parts.items()) if part is not None]
-            if len(known) == len(parts):
-                self._saying[todo.pop()] = self._steps.number(known)
-            todo += [below[step] for step, part in parts.items() if part is None]
-        found = self._known_part(steps, sentences)
-        assert found is not None
-        return found
-
-    def _known_part(self, steps: int, sentences: int) -> int | None:
-        """`_part_saying` where it is known, or all of a set."""
-        return steps if self._said[steps] == sentences else self._saying.get((steps, sentences))
 
     # ---- is there a violation?
 
@@ -330,8 +305,9 @@ class SetWalk:
             for here, below in pairwise(reversed(layers)):
                 for node in here:
                     walked += 1
-                    able = self._able(*node)
-                    for steps, ahead, target in self._moves(node[0], able) if able else ():
+                    if not self._can_fail(*node):
+                        continue
+                    for steps, ahead, target in self._moves(*node):
                         if target is None:
                             return _Failure(node, steps, ahead), walked
                         child = target, _short(ahead)
@@ -340,19 +316,6 @@ class SetWalk:
                             before.setdefault(child, (node, steps))
                 here.clear()
         return None, walked
-
-    def _able(self, node: int, ahead: _Ahead) -> _Ahead | None:
-        """What robots can do that say what all can say; None if no choice of that can fail."""
-        said, common = self._common(ahead)
-        assert common is not None, "robots without a common sentence are left out"
-        if not self._can_fail(node, ahead):
-            return None
-        able = tuple(
-            (words, self._part_saying(own, self._sentences.before(said[len(words) :], common)))
-            for words, own in ahead
-        )
-        self._look_at_sets()
-        return able if self._can_fail(node, able) else None
 
     def _can_fail(self, node: int, ahead: _Ahead) -> bool:
         """Whether some choice of label sequences may fail from a node."""

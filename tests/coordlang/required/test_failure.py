@@ -88,9 +88,9 @@ def test_estimates_agree_with_the_count() -> None:
     ):
         word = [np.array(words)[space.state % len(words)] for space in candidates.spaces]
         counted = failure_probability(candidates.spaces, word).mean
-        low, high = estimated_failure(candidates.spaces, word, runs=700, seed=2).interval
-        assert low <= counted <= high
-        assert high - low < 0.08
+        drawn = estimated_failure(candidates.spaces, word, runs=700, seed=2)
+        assert drawn.low <= counted <= drawn.high
+        assert drawn.high - drawn.low < 0.08
         seen.append(counted)
     assert all(seen)
     assert len(set(seen)) == 4
