@@ -9,7 +9,7 @@ node have different labels, so no more mixed actions are looked at than it has e
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -100,6 +100,26 @@ def _shared_plans(space: PlanSpace, start: int, steps: Sequence[Labels]) -> list
             plans.append(alone)
     of_robot = {r: plan for group, plan in zip(groups, plans, strict=True) for r in group}
     return [of_robot[robot] for robot in range(space.robots)]
+
+
+def through_same_states(space: PlanSpace, trail: Trail, step: int) -> Trail:
+    """The plans of a trail through the same states, whose mixture breaks at a step, made few.
+
+    As many robots as is easily possible follow the same plan.
+    """
+    on = np.zeros(len(space), np.bool_)
+    on[space.nodes_on(trail.start, [edges[0] for edges in trail.edges])] = True
+    task = np.flatnonzero(space.starts == trail.start)[:1]
+    fits = replace(space, starts=space.starts[task], second=space.second[task]).within(on)
+    mixture = [_mixed(space, edges) for edges in trail.edges[: step + 1]]
+    plans = _shared_plans(fits, int(fits.starts[0]), mixture)
+    paths = (space.path_with(trail.start, list(map(fits.labels_of, plan))) for plan in plans)
+    return Trail(trail.start, tuple(zip(*(path for path in paths if path), strict=True)))
+
+
+def _mixed(space: PlanSpace, edges: Sequence[int]) -> Labels:
+    """The labels of one step of a mixture, of the edges that the plans take."""
+    return tuple(space.labels_of(edge)[robot] for robot, edge in enumerate(edges))
 
 
 def way_to(space: PlanSpace, node: int) -> tuple[int, list[int]]:
@@ -202,7 +222,7 @@ def describe_failure(
     ]
     nodes, mixture = [trail.start], list[tuple[int, ...]]()
     for edges in trail.edges:
-        mixture.append(tuple(space.labels_of(edge)[robot] for robot, edge in enumerate(edges)))
+        mixture.append(_mixed(space, edges))
         mixed = space.edge_with(nodes[-1], mixture[-1])
         if mixed is None:
             break

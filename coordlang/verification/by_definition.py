@@ -20,7 +20,12 @@ import numpy as np
 from coordlang.language.candidates import Candidates
 from coordlang.language.partition import Partition
 from coordlang.language.sentences import sentence
-from coordlang.required.miscoordination import Miscoordination, Trail, describe_failure
+from coordlang.required.miscoordination import (
+    Miscoordination,
+    Trail,
+    describe_failure,
+    through_same_states,
+)
 from coordlang.verification.sets import SetWalk
 from planners.joint.tables import Ints, unique_tuples
 from planners.parallel.batch import Batch, Table, digest
@@ -102,7 +107,10 @@ def inseparable(space: PlanSpace) -> Miscoordination | None:
     if goal is None:
         return None
     part, trail, _ = _violation(space, apart, goal)
-    return describe_failure(part, trail)
+    shown = describe_failure(part, trail)
+    if space.model.hides_slack:
+        return shown
+    return describe_failure(part, through_same_states(part, trail, shown.step))
 
 
 def parting_nodes(space: PlanSpace, word: Ints) -> Ints:
