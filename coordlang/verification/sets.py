@@ -174,25 +174,23 @@ class SentenceSets(SequenceSets):
         """The sentences of both; None if there are none."""
         if one is None or other is None or one == other:
             return one if one == other else None
-        todo = [(one, other)]
+        todo = [] if (one, other) in self._common else [(one, other)]
         while todo:
-            pair = todo[-1]
-            if pair in self._common:
-                todo.pop()
-                continue
-            mine, theirs = self.moves[pair[0]], self.moves[pair[1]]
-            below = {word: (after, theirs[word]) for word, after in mine.items() if word in theirs}
-            open_pairs = [p for p in below.values() if p[0] != p[1] and p not in self._common]
-            if open_pairs:
-                todo += open_pairs
-                continue
-            shared = [
-                (word, a if a == b else self._common[a, b])
-                for word, (a, b) in sorted(below.items())
-            ]
-            kept = [(word, after) for word, after in shared if after is not None]
-            self._common[todo.pop()] = self.number(kept) if kept else None
+            below = self._below(*todo[-1])
+            missing = [pair for pair in below.values() if pair not in self._common]
+            todo += missing
+            if not missing:
+                shared = [(word, self._common[pair]) for word, pair in below.items()]
+                kept = [(word, after) for word, after in shared if after is not None]
+                self._common[todo.pop()] = self.number(kept) if kept else None
         return self._common[one, other]
+
+    def _below(self, one: int, other: int) -> dict[int, tuple[int, int]]:
+        """The words that begin sentences of both, with what follows them in each."""
+        mine, theirs = self.moves[one], self.moves[other]
+        below = {word: (mine[word], theirs[word]) for word in sorted(mine.keys() & theirs.keys())}
+        self._common.update({(a, b): a for a, b in below.values() if a == b})
+        return below
 
 
 class SetWalk:
