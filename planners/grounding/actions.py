@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
-from itertools import combinations, islice, product
+from itertools import chain, combinations, islice, product
 
 from planners.pddl.formula_tree import conjuncts, label, negated, required_atoms
 from planners.pddl.lifted import (
@@ -142,8 +142,8 @@ def _matches(wanted: Atom, atom: Atom) -> bool:
     )
 
 
-#: (constraint, binding of its parameters) -> the ground actions that match.
-_Groups = dict[tuple[str, tuple[str, ...]], list[GroundAction]]
+#: A constraint, and objects for its parameters.
+_Key = tuple[Constraint, tuple[str, ...]]
 
 
 def apply_network(
@@ -158,70 +158,59 @@ def apply_network(
     if not domain.constraints:
         return tuple(actions)
     by_name = {c.name: c for c in domain.constraints}
-    members = {
-        variable.types: frozenset(objects_of(domain, problem, variable.types))
-        for constraint in domain.constraints
-        for variable in constraint.parameters
-    }
-    groups: _Groups = {}
-    keys: dict[GroundAction, list[tuple[str, tuple[str, ...]]]] = {}
-    for action in actions:
-        for constraint in domain.constraints:
-            for binding in _bindings(members, constraint, action):
-                groups.setdefault((constraint.name, binding), []).append(action)
-                keys.setdefault(action, []).append((constraint.name, binding))
+    dependences = [(by_name[needed], by_name[by]) for needed, by in domain.dependences]
+    types = {variable.types for c in domain.constraints for variable in c.parameters}
+    members = {own: frozenset(objects_of(domain, problem, own)) for own in types}
+    keys = [[*dict.fromkeys(_keys(domain, members, action))] for action in actions]
+    groups: dict[_Key, list[GroundAction]] = {}
+    for action, own in zip(actions, keys, strict=True):
+        for key in own:
+            groups.setdefault(key, []).append(action)
     return tuple(
-        _bound(domain, by_name, groups, action, keys[action]) if action in keys else action
-        for action in actions
+        _bound(dependences, groups, action, own) if own else action
+        for action, own in zip(actions, keys, strict=True)
     )
 
 
-def _bindings(
-    members: Mapping[tuple[str, ...], Set[str]], constraint: Constraint, action: GroundAction
-) -> list[tuple[str, ...]]:
-    found = []
-    for name, positions in constraint.actions:
-        if name == action.schema:
+def _keys(
+    domain: Domain, members: Mapping[tuple[str, ...], Set[str]], action: GroundAction
+) -> Iterator[_Key]:
+    """What an action matches."""
+    for constraint in domain.constraints:
+        for name, positions in constraint.actions:
+            if name != action.schema:
+                continue
             binding = tuple(action.args[p] for p in positions)
-            typed = all(
-                value in members[variable.types]
-                for value, variable in zip(binding, constraint.parameters, strict=True)
-            )
-            if typed and binding not in found:
-                found.append(binding)
-    return found
+            pairs = zip(binding, constraint.parameters, strict=True)
+            if all(value in members[variable.types] for value, variable in pairs):
+                yield constraint, binding
 
 
 def _bound(
-    domain: Domain,
-    by_name: dict[str, Constraint],
-    groups: _Groups,
+    dependences: Sequence[tuple[Constraint, Constraint]],
+    groups: Mapping[_Key, list[GroundAction]],
     action: GroundAction,
-    keys: Sequence[tuple[str, tuple[str, ...]]],
+    keys: Sequence[_Key],
 ) -> GroundAction:
     parts: list[Formula] = []
-    links: set[StepAtom] = set()
-    for name, binding in keys:
-        constraint = by_name[name]
-        others = _by_robot(groups[name, binding], action)
+    linked: list[list[StepAtom]] = []
+    for constraint, binding in keys:
+        others = _by_robot(groups[constraint, binding], action)
         if constraint.low > 1:
             parts.append(_some(others, constraint.low - 1))
-            links |= {atom for own in others for atom in own}
+            linked += others
         if constraint.high is not None:
             parts += conjuncts(negated(_some(others, constraint.high)))
-        for needed, by in domain.dependences:
-            if by != name:
-                continue
+        for needed in [needed for needed, by in dependences if by == constraint]:
             helpers = _by_robot(groups.get((needed, binding), []), action)
-            links |= {atom for own in helpers for atom in own}
+            linked += helpers
             if (needed, binding) not in keys:
                 parts.append(_some(helpers, 1))
-    if not parts and not links:
+    if not parts and not linked:
         return action
     after = (*conjuncts(action.precondition), *parts)
-    return replace(
-        action, precondition=And(after) if len(after) != 1 else after[0], links=frozenset(links)
-    )
+    precondition = And(after) if len(after) != 1 else after[0]
+    return replace(action, precondition=precondition, links=frozenset(chain(*linked)))
 
 
 def _by_robot(group: Sequence[GroundAction], action: GroundAction) -> list[list[StepAtom]]:

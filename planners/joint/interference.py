@@ -3,14 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planners.grounding.actions import GroundAction, GroundEffect
+from planners.joint.tables import Bools
 from planners.pddl.formula_tree import Leaf, forbidden_steps, label, literals, substituted
 from planners.pddl.lifted import FALSE, Atom, Formula, StepAtom, Truth
 
@@ -26,9 +27,10 @@ class Footprint:
     actions itself makes false are none; an atom both deleted and added counts as added.
     ``partners`` are the actions that a positive literal of a precondition or effect condition or a
     network names, ``excluded`` those that its precondition as a whole forbids, ``conditional_on``
-    those that the condition of an effect names.
+    those that the condition of an effect names; ``names`` has what formulas call the action itself.
     """
 
+    names: frozenset[StepAtom]
     requires_true: frozenset[Atom]
     requires_false: frozenset[Atom]
     adds: frozenset[Atom]
@@ -54,6 +56,7 @@ def footprint(action: GroundAction, step: frozenset[StepAtom] | None = None) -> 
             required += found
     adds = frozenset([e.atom for e in effects if e.adds])
     return Footprint(
+        names=frozenset((_name(action),)),
         requires_true=_leaves(Atom, required, (True,)),
         requires_false=_leaves(Atom, required, (False,)),
         adds=adds,
@@ -94,11 +97,11 @@ def conflict(a: GroundAction, b: GroundAction) -> str | None:
     first, second = footprint(a, pair), footprint(b, pair)
     sides = ((a, first, b, second), (b, second, a, first))
     for one, own, other, its in sides:
-        if _name(other) in own.excluded:
+        if own.excluded & its.names:
             return f"{one.label} forbids {other.label} in the same step"
         if both := own.deletes & its.adds:
             return f"{one.label} deletes {_show(both)}, which {other.label} adds"
-    if _name(b) in first.partners or _name(a) in second.partners:
+    if first.partners & second.names or second.partners & first.names:
         return None  # meant to be done together
     for one, own, other, its in sides:
         if both := own.deletes & its.requires_true:
@@ -122,8 +125,6 @@ class Choices:
 
     def __init__(self, actions: Sequence[GroundAction | None]) -> None:
         self.actions = actions
-        #: Action -> its label.
-        self.numbers = {_name(a): number for number, a in enumerate(actions) if a}
         #: The labels of subactions with more than one owner.
         self.shared = [n for n, a in enumerate(actions) if a and len(a.owners) > 1]
         self._labels: dict[str, dict[Leaf, list[int]]] = {f: {} for f in Footprint.__slots__}
@@ -139,55 +140,36 @@ class Choices:
         return self._labels[field]
 
 
-def compatible(left: Choices, right: Choices, i: int, j: int) -> NDArray[np.bool_]:
+def compatible(left: Choices, right: Choices, i: int, j: int) -> Bools:
     """Which labels of robots ``i`` (rows) and ``j`` (columns) may share a step, as a table.
 
     A shared subaction of both goes only with itself; one that only names other robots goes with
     idling too. O(pairs that touch one atom) beside the table itself.
     """
-    table = np.ones((len(left.actions), len(right.actions)), np.bool_)
-    for kinds in (("requires_true", "deletes"), ("requires_false", "adds")):
-        _forbid_meeting(table, left, right, *kinds)
-    for row, column in _naming("partners", left, right):  # meant to be done together
-        table[row, column] = True
-    _forbid_meeting(table, left, right, "adds", "deletes")
-    for row, column in _naming("excluded", left, right):
-        table[row, column] = False
+    meets = partial(_meeting, left, right)
+    apart = meets("requires_true", "deletes") | meets("requires_false", "adds")
+    table: Bools = ~apart | meets("partners", "names")  # meant to be done together
+    table &= ~(meets("adds", "deletes") | meets("excluded", "names"))
     # The condition of an effect of one names the other: what can fire depends on both.
-    for row, column in _naming("conditional_on", left, right):
+    for row, column in np.argwhere(meets("conditional_on", "names")).tolist():
         a, b = left.actions[row], right.actions[column]
         table[row, column] = not (a and b and conflict(a, b))
     _share(table, left, right, i, j)
     return table
 
 
-def _naming(field: str, left: Choices, right: Choices) -> Iterator[tuple[int, int]]:
-    """Pairs (of the left, of the right) in which one's footprint names the other in this field."""
-    yield from _named(field, left, right)
-    yield from ((row, column) for column, row in _named(field, right, left))
-
-
-def _named(field: str, naming: Choices, named: Choices) -> Iterator[tuple[int, int]]:
-    for action, labels in naming.labels(field).items():
-        number = named.numbers.get(action) if isinstance(action, StepAtom) else None
-        if number is not None:
-            for label_number in labels:
-                yield label_number, number
-
-
-def _forbid_meeting(
-    table: NDArray[np.bool_], left: Choices, right: Choices, one: str, other: str
-) -> None:
-    """Forbid the pairs in which an atom stands in the one field here and in the other there."""
+def _meeting(left: Choices, right: Choices, one: str, other: str) -> Bools:
+    """The pairs in which something stands in the one field here and in the other there."""
+    found = np.zeros((len(left.actions), len(right.actions)), np.bool_)
     for first, second in ((one, other), (other, one)):
         rows, columns = left.labels(first), right.labels(second)
-        few, many = sorted((rows, columns), key=len)
-        for atom in few:
-            if atom in many:
-                table[np.ix_(rows[atom], columns[atom])] = False
+        for leaf in min(rows, columns, key=len):
+            for row in rows[leaf] if leaf in rows and leaf in columns else ():
+                found[row, columns[leaf]] = True
+    return found
 
 
-def _share(table: NDArray[np.bool_], left: Choices, right: Choices, i: int, j: int) -> None:
+def _share(table: Bools, left: Choices, right: Choices, i: int, j: int) -> None:
     """A subaction owned by both robots is chosen by both or by neither."""
     for one, robot in ((left, j), (right, i)):
         for number in one.shared:
@@ -197,4 +179,4 @@ def _share(table: NDArray[np.bool_], left: Choices, right: Choices, i: int, j: i
     for number in left.shared:
         action = left.actions[number]
         if action and j in action.owners:
-            table[number, right.numbers[_name(action)]] = True
+            table[number, right.labels("names")[_name(action)]] = True
