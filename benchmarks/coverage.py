@@ -163,9 +163,10 @@ def far_apart(name: str) -> PlanningInstance:
     stem, robots = name.removesuffix(" far apart").rsplit(", ", 1)
     path = SCENARIOS / f"{stem}.map"
     found = read_map(path)
-    cells = [min(found.passable)]
+    passable = frozenset(cell for row in range(found.height) for cell in found.in_row(row))
+    cells = [min(passable)]
     while len(cells) < int(robots):
-        far = [walked(found.passable, cell) for cell in cells]
+        far = [walked(passable, cell) for cell in cells]
         cells.append(max(sorted(far[0]), key=lambda cell: min(own[cell] for own in far)))
     lines = ["version 1"]
     for (y, x), (goal_y, goal_x) in zip(cells, [*cells[1:], cells[0]], strict=True):

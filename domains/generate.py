@@ -17,13 +17,14 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import groupby
 from pathlib import Path
 from typing import Literal
 
 from gridmap import GridMap, open_grid, read_map, ring, three_cells
 from picture import draw
 
-from coordlang.sites.movingai import grid_problem_text, in_rows
+from coordlang.sites.movingai import grid_problem_text
 from planners.system.errors import BadInput, CoordlangError, UsageError
 
 HERE = Path(__file__).resolve().parent
@@ -95,7 +96,7 @@ def problem_text(task: Scenario, domain: str, style: Style = "agents") -> str:
     return grid_problem_text(
         task.name,
         domain,
-        in_rows(grid.cells),
+        [list(row) for _, row in groupby(grid.cells, key=lambda name: grid.cells[name][0])],
         grid.neighbours,
         task.starts,
         task.goals,

@@ -104,7 +104,8 @@ def three_cells() -> GridMap:
 
 def read_map(path: Path) -> GridMap:
     """A map in the format of movingai.com, see `coordlang.sites.movingai.read_map`."""
-    return _of(set(movingai.read_map(path).passable))
+    found = movingai.read_map(path)
+    return _of({cell for row in range(found.height) for cell in found.in_row(row)})
 
 
 def _clockwise(rows: int, columns: int) -> list[Cell]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from random import Random
 
@@ -19,7 +20,7 @@ from coordlang.language.listed import ListedTask
 from coordlang.language.words import Language
 from coordlang.required.choices import Choices
 from coordlang.sites.coordinates import Point
-from coordlang.sites.movingai import Cell, cell_name, grid_problem_text, in_rows, read_map
+from coordlang.sites.movingai import Cell, cell_name, grid_problem_text, read_map
 from planners.pddl import parse_problem, read_domain, read_problem
 from planners.pddl.lifted import Domain
 from planners.pddl.sexpr import Source
@@ -151,13 +152,15 @@ def _candidates(
     first = listed[0].init, listed[0].goal
     ends = [[text.strip("()").split()[-1] for text in atoms] for atoms in first]
     near = _adjacent(cells).__getitem__
-    text = grid_problem_text("floor", domain.name, in_rows(cells), near, *ends, written_by="")
+    rows = [list(names) for _, names in groupby(cells, key=lambda name: cells[name][0])]
+    text = grid_problem_text("floor", domain.name, rows, near, *ends, written_by="")
     return from_listed(domain, [parse_problem(Source("floor", text), domain)], listed)
 
 
 def _cells(floor: Floor) -> list[Cell]:
     if floor.foreign:
-        return sorted(read_map(foreign_map(floor)).passable)
+        found = read_map(foreign_map(floor))
+        return [cell for row in range(found.height) for cell in found.in_row(row)]
     folder = DOMAINS / floor.world.folder
     domain = read_domain(folder / "domain.pddl")
     names = read_problem(folder / f"{floor.world.problem}.pddl", domain).objects

@@ -4,9 +4,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from pathlib import Path
 
 from coordlang.sites.shipped import shipped_domains
@@ -42,11 +41,6 @@ class MovingMap:
     def width(self) -> int:
         """The number of columns."""
         return len(self.rows[0])
-
-    @property
-    def passable(self) -> frozenset[Cell]:
-        """All cells that robots can be in, which takes far more memory than the map."""
-        return frozenset(cell for row in range(self.height) for cell in self.in_row(row))
 
     def in_row(self, row: int) -> Iterator[Cell]:
         """The cells of a row that robots can be in, from the left."""
@@ -220,11 +214,6 @@ def _adjacent(names: Iterable[str], neighbours: Callable[[str], Sequence[str]]) 
             yield "    " + " ".join(f"(adjacent {cell} {other})" for other in near)
 
 
-def in_rows(cells: Mapping[str, Cell]) -> list[list[str]]:
-    """The names of cells, which come row by row, in a list for each row."""
-    return [list(names) for _, names in groupby(cells, key=lambda name: cells[name][0])]
-
-
 def _wrong(
     what: str, remedy: str, path: Path, line: int | None = None, column: int = 1
 ) -> BadInput:
@@ -246,22 +235,17 @@ def _header(path: Path, lines: Sequence[str]) -> tuple[dict[str, int], int]:
     """The ``height`` and ``width`` of a map, and the number of its header's last line."""
     sizes: dict[str, int] = {}
     for number, line in enumerate(lines, start=1):
-        match line.split():
-            case [] | ["type", _]:
-                continue
-            case ["height" | "width" as key, value] if (
-                key not in sizes and (size := _natural(value)) is not None and size > 0
-            ):
-                sizes[key] = size
-            case ["map"] if len(sizes) == 2:
-                return sizes, number
-            case _:
-                raise _wrong(
-                    f"unexpected {echoed(line)} in the header of a map",
-                    "Expected 'height N' and 'width N' (once each, N from 1), then 'map'.",
-                    path,
-                    number,
-                )
+        key, *values = line.split() or ["type", ""]
+        size = _natural(values[0]) if len(values) == 1 else None
+        if [key, *values] == ["map"] and len(sizes) == 2:
+            return sizes, number
+        if key in ("height", "width") and key not in sizes and size:
+            sizes[key] = size
+        elif key != "type" or len(values) != 1:
+            expected = "Expected 'height N' and 'width N' (once each, N from 1), then 'map'."
+            raise _wrong(
+                f"unexpected {echoed(line)} in the header of a map", expected, path, number
+            )
     expected = "Expected 'type octile', 'height N', 'width N', 'map', and then the rows."
     raise _wrong("this file has no line 'map'", expected, path, max(1, len(lines)))
 

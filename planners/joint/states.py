@@ -207,22 +207,15 @@ def split_atoms(text: str) -> list[str]:
     Raises `BadInput` when the parentheses do not match.
     """
     parts: list[str] = []
-    depth = start = end = 0
+    depth = start = 0
     for match in re.finditer(r"[()]", text):
-        if match.group() == "(":
-            if depth == 0:
-                if text[end : match.start()].strip():
-                    break
-                start = match.start()
-            depth += 1
-        else:
-            depth -= 1
-            if depth == 0:
-                end = match.end()
-                parts.append(" ".join(text[start:end].split()))
-        if depth < 0:
+        depth += 1 if match[0] == "(" else -1
+        if depth < 0 or (match[0] == "(" and depth == 1 and text[start : match.start()].strip()):
             break
-    if depth != 0 or text[end:].strip():
+        if depth == 0:
+            parts.append(" ".join(text[start : match.end()].split()))
+            start = match.end()
+    if depth != 0 or text[start:].strip():
         raise BadInput(
             f"cannot read the atoms {echoed(text[:60])}", remedy="Expected '(p a b) (q c) ..'."
         )

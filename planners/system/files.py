@@ -8,6 +8,7 @@ import gzip
 import sys
 import zlib
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from inspect import cleandoc
 from io import BytesIO
@@ -158,14 +159,10 @@ def read_stored_bytes(path: str | Path, *, most: int = MAX_TEXT) -> bytes:
 
 def names_format(data: bytes, name: str) -> bool:
     """Whether a JSON text says that it is of a format; what is no JSON says nothing."""
-    if name.encode() not in data:
-        return False
-    try:
-        check_utf8(data, Position("a file"))
-        found = msgspec.json.decode(data.removeprefix(_BYTE_ORDER_MARK), type=_Head)
-    except (BadInput, msgspec.DecodeError, RecursionError):
-        return False
-    return bool(found.format == name)
+    with suppress(msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        text = data.removeprefix(_BYTE_ORDER_MARK)
+        return name.encode() in data and bool(msgspec.json.decode(text, type=_Head).format == name)
+    return False
 
 
 def read_text(path: str | Path) -> str:

@@ -147,7 +147,7 @@ def test_maps_of_others_are_read(tmp_path: Path) -> None:
     assert len(maps) >= 12
     for path in maps:
         grid = read_map(path)
-        (row, column), *_ = sorted(grid.passable)
+        row, column = next(cell for row in range(grid.height) for cell in grid.in_row(row))
         scenario = tmp_path / "own.scen"
         line = f"0 m {grid.width} {grid.height} {column} {row} {column} {row} 0\n"
         scenario.write_text(line)
