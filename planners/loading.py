@@ -108,7 +108,9 @@ def _joint_model(
     """
     robots, slack = team.robots, options.slack
     subactions = [[a for a in actions if robot in a.owners] for robot in range(len(robots))]
-    labels = _labels_of_parts(actions, robots) if domain.is_joint_action else _labels(subactions)
+    labels = tuple((IDLE, *(action.label for action in own)) for own in subactions)
+    if domain.is_joint_action:
+        labels = _labels_of_parts(actions, robots)
     seen = options.words_see_slack
     left = [Atom(SLACK_LEFT, (str(k),)) for k in range(slack + 1)] if seen else []
     facts = FactTable.of({*_facts(domain, actions, starts), *left})
@@ -151,18 +153,14 @@ def _facts(
     return possible | {e.atom for a in actions for e in a.effects if e.adds}
 
 
-def _labels(subactions: Sequence[Sequence[GroundAction]]) -> tuple[Labels, ...]:
-    return tuple((IDLE, *(action.label for action in own)) for own in subactions)
-
-
 def _labels_of_parts(actions: Sequence[GroundAction], robots: Sequence[str]) -> tuple[Labels, ...]:
     """The labels of joint-action PDDL: what the robots' parts are called, in natural order."""
     parts = [{action.parts[robot] for action in actions} for robot in range(len(robots))]
-    return tuple((IDLE, *sorted((p for p in own if p), key=_natural_label)) for own in parts)
 
+    def by_names(text: str) -> list[object]:
+        return [natural(name) for name in text.strip("()").split()]
 
-def _natural_label(text: str) -> tuple[object, ...]:
-    return tuple(natural(name) for name in text.strip("()").split())
+    return tuple((IDLE, *sorted(filter(None, own), key=by_names)) for own in parts)
 
 
 def _step_atoms(subactions: Sequence[Sequence[GroundAction]]) -> dict[StepAtom, tuple[int, int]]:

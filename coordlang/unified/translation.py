@@ -12,7 +12,7 @@ import re
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement, count
-from typing import Any
+from typing import Any, NamedTuple
 
 from unified_planning.model import InstantaneousAction, OperatorKind, Problem, Variable
 from unified_planning.model.multi_agent import MultiAgentProblem
@@ -145,18 +145,12 @@ def _check_parameters(problem: Any, subactions: Subactions, concurrency: Concurr
         raise UsageError(f"{parameter}: {what}", remedy=remedy)
 
 
-@dataclass(frozen=True, slots=True)
-class _Bound:
-    """A variable that stands for the value of an object fluent, its type, and the atom."""
+class _Bound(NamedTuple):
+    """A variable that stands for the value of an object fluent, its declaration, and the atom."""
 
     variable: str
-    kind: str
+    declared: str
     atom: str
-
-    @property
-    def declared(self) -> str:
-        """The declaration of the variable."""
-        return f"{self.variable} - {self.kind}"
 
 
 class PddlNames:
@@ -409,7 +403,7 @@ class _Writer:
         """A new variable for the value of an object fluent, of which ``parts`` are the atom's."""
         self.values += 1
         name = f"?{self.names.of('variable', self.values, f'value-{self.values}')}"
-        return _Bound(name, self.type_name(fluent.type), _listed(*parts, name))
+        return _Bound(name, f"{name} - {self.type_name(fluent.type)}", _listed(*parts, name))
 
     def term(self, node: Any, agent: Any, bound: list[_Bound], inside: bool) -> str:
         """An object or a variable; for an object fluent a new variable, added to ``bound``."""

@@ -31,7 +31,7 @@ from planners.pddl.names import (
     typed_list,
     unknown,
 )
-from planners.pddl.sexpr import Expression, Group, Source, Token, parse, read_source
+from planners.pddl.sexpr import Expression, Group, Source, Token, first_text, parse, read_source
 from planners.system.files import require_seen
 from planners.system.limits import reaching
 from planners.system.messages import echoed
@@ -234,13 +234,13 @@ def _parameter_items(
     inside = next((n for n, item in enumerate(listed) if is_token(item, ":agent")), None)
     if inside is not None:
         before, behind = listed[:inside], listed[inside + 1 :]
-        return before + behind, _first_name(behind)
+        return before + behind, first_text(behind)
     if ":agent" not in fields:
         return listed, None
     clause = fields[":agent"]
     if len(clause) == 1 and isinstance(clause[0], Group):  # ":agent (?a - robot)"
         clause = clause[0].items
-    name = _first_name(clause)
+    name = first_text(clause)
     if any(is_token(item, name) for item in listed):
         return listed, name
     if len(clause) == 1:  # an untyped agent must not take the type of the parameters behind it
@@ -250,10 +250,6 @@ def _parameter_items(
         what = "expected '- TYPE' or nothing after the agent's variable"
         raise clause[1].fail(what, _AGENT_FORM)
     return clause + listed, name
-
-
-def _first_name(items: Sequence[Expression]) -> str:
-    return items[0].text if items and isinstance(items[0], Token) else ""
 
 
 def _read_schema(names: Names, head: _Head) -> Schema:

@@ -169,7 +169,7 @@ class Group(_Placed):
     @property
     def head(self) -> str:
         """The first token, or the empty string."""
-        return _first(self.items)
+        return first_text(self.items)
 
     def __iter__(self) -> Iterator[Token | Group]:
         return iter(self.items)
@@ -296,7 +296,7 @@ def _misplaced(
         start, items, _ = lists[1]
         return replace(here, offset=lists[-1][0]).fail(
             f"{text!r} begins inside of another list: a ')' is missing before it",
-            f"'({_first(items)}' opens at {source.position(start)} and is not closed: "
+            f"'({first_text(items)}' opens at {source.position(start)} and is not closed: "
             f"add {len(lists) - 2} ')' before this position.",
         )
     return None
@@ -306,11 +306,11 @@ def _unclosed(source: Source, lists: Sequence[_Open]) -> BadInput:
     start, items, _ = lists[-1]
     last = f", after {items[-1].position}" if items and isinstance(items[-1], Group) else ""
     return Token("(", start, source).fail(
-        f"the '({_first(items)}' that opens here is never closed",
+        f"the '({first_text(items)}' that opens here is never closed",
         f"Expected {len(lists)} more ')' before the end of the file{last}.",
     )
 
 
-def _first(items: Sequence[Expression]) -> str:
+def first_text(items: Sequence[Expression]) -> str:
     """The first token of a list, or the empty string."""
     return items[0].text if items and isinstance(items[0], Token) else ""
