@@ -12,14 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planners.grounding.actions import GroundAction
 from planners.grounding.instantiate import idling_schemas
-from planners.joint.interference import Footprint, footprint
+from planners.joint.interference import footprint
 from planners.joint.model import JointModel, show
 from planners.loading import PlanningInstance
 from planners.pddl.formula_tree import formula_text
 from planners.pddl.lifted import Domain, StepAtom
 from planners.search.search_estimate import SearchEstimate, estimate
+from planners.system.notebook import some
 
 #: States in which an example of interference is looked for.
 _LOOK_AT = 2000
@@ -77,7 +77,7 @@ def inspect(loaded: PlanningInstance) -> Inspection:
     start = model.codec.true_facts(loaded.tasks[0].init)
     idling = idling_schemas(domain)
     acting = {action.schema for action in model.actions}
-    touched = [(action, footprint(action)) for action in model.actions]
+    asking, formulas = _formulas(model)
     possible = {atom.predicate for atom in (*model.codec.facts, *model.statics)}
     idle = "where a joint action says so" if model.is_joint_action else "may idle in every step"
     rows = np.concatenate(layers)[:_LOOK_AT]
@@ -94,8 +94,8 @@ def inspect(loaded: PlanningInstance) -> Inspection:
         left_out=tuple(sorted(idling)),
         shared=_counted(a.schema for a in model.actions if len(a.owners) > 1 and not a.parts),
         unowned=loaded.options.unowned,
-        step_formulas=_counted(a.schema for a, own in touched if own.partners or own.excluded),
-        formulas=_formulas(model, touched),
+        step_formulas=asking,
+        formulas=formulas,
         without_effects=tuple(sorted({a.schema for a in model.actions if not a.effects})),
         costs=_costs(domain, model.cost),
         interfering=model.stepper.interfering_pairs(),
@@ -141,24 +141,23 @@ def _objects(loaded: PlanningInstance) -> dict[str, int]:
     return _counted(t for own in types for t in own)
 
 
-def _formulas(
-    model: JointModel, touched: Iterable[tuple[GroundAction, Footprint]]
-) -> tuple[str, ...]:
-    """What the first subaction of each schema with a formula about the step asks of the others."""
+def _formulas(model: JointModel) -> tuple[dict[str, int], tuple[str, ...]]:
+    """How many subactions of each schema ask something of the others, and what the first asks."""
+    touched = [(action, footprint(action)) for action in model.actions]
+    asking = [(action, own) for action, own in touched if own.partners or own.excluded]
     there = {StepAtom(action.schema, action.args) for action in model.actions}
     found: dict[tuple[str, str], str] = {}
-    for action, own in touched:
+    for action, own in asking:
         for kind, others in (("speaks of", own.partners), ("forbids", own.excluded)):
             if others and (action.schema, kind) not in found:
                 # What no robot has is often a mistake in the domain.
                 named = _some(others & there) or f"{_some(others)}, which no robot can ever do,"
                 found[action.schema, kind] = f"{action.label} {kind} {named} in the same step"
-    return tuple(found.values())
+    return _counted(action.schema for action, _ in asking), tuple(found.values())
 
 
 def _some(atoms: frozenset[StepAtom]) -> str:
-    names = sorted(map(show, atoms))
-    return ", ".join(names[:2]) + (f" and {len(names) - 2:,} more" if len(names) > 2 else "")
+    return some(sorted(map(show, atoms)), 2)
 
 
 def _costs(domain: Domain, cost: str) -> str:

@@ -24,6 +24,7 @@ from planners.search.plan_space import PlanSpace, UnfoldingStep
 from planners.search.plans import Plan, Plans
 from planners.system.errors import BadInput, UsageError, note
 from planners.system.messages import echoed
+from planners.system.notebook import some
 
 #: What the robots have agreed on: a sentence, a whole plan, or nothing.
 Agreement = Literal["sentence", "plan", "nothing"]
@@ -148,10 +149,9 @@ def _note_what_is_left_out(world: World, robots: Sequence[str], space: PlanSpace
     located = {role[1] for role in world.roles.values() if role[0] == "at"}
     others = [name for name in world.things if name in located and name not in robots]
     if others:
-        more = f" and {len(others) - 3} more" if len(others) > 3 else ""
         note(
             "only robots are on the floor; what is left out, so that nothing collides with it: "
-            f"{', '.join(others[:3])}{more}",
+            f"{some(others, 3)}",
             remedy="Subactions that move no robot are waiting.",
         )
     for number in sorted(set(space.state.tolist())):

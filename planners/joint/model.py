@@ -22,6 +22,7 @@ from planners.pddl.formula_tree import label
 from planners.pddl.lifted import Atom, Formula, StepAtom
 from planners.pddl.model_options import Cost
 from planners.system.errors import Position
+from planners.system.notebook import named
 
 #: The text of label 0.
 IDLE = "idle"
@@ -187,7 +188,7 @@ class JointModel:
         As the end of a sentence that begins with "Use".
         """
         ways = [*others, *(["--cost makespan+actions"] if self.cost == "makespan" else [])]
-        return " or ".join(filter(None, (", ".join(ways[:-1]), ways[-1])))
+        return named(ways, "or")
 
     def successors(
         self, rows: Rows, only: Callable[[Rows, Options], Options] | None = None

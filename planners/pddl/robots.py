@@ -13,6 +13,7 @@ from planners.pddl.lifted import Atom, Domain, Formula, Problem, Schema, Variabl
 from planners.pddl.model_options import ModelOptions, Unowned
 from planners.system.errors import BadInput, UsageError, note
 from planners.system.messages import echoed
+from planners.system.notebook import some
 
 #: The name of the extra robot that owns actions without a robot, under ``--unowned environment``.
 ENVIRONMENT = "environment"
@@ -229,7 +230,7 @@ class _Kinds:
 
     def unclear(self, why: str, candidates: Sequence[str]) -> BadInput:
         """The error for robots that cannot be told, with the candidates and their objects."""
-        listed = "; ".join(f"{kind} ({_some(self.of(kind))})" for kind in candidates)
+        listed = "; ".join(f"{kind} ({some(self.of(kind), _SHOWN)})" for kind in candidates)
         return BadInput(
             f"which objects are the robots? {why}",
             position=self.domain.source.section(":types"),
@@ -270,7 +271,7 @@ def _guessed(kinds: _Kinds, kind: str) -> tuple[tuple[str, ...], str]:
         what = f"Every action takes objects of type {echoed(kind)}, but they {doubt}"
         raise kinds.unclear(what, kinds.inhabited())
     note(
-        f"the robots are taken to be {_some(robots)}: every action takes an object of type "
+        f"the robots are taken to be {some(robots, _SHOWN)}: every action takes an object of type "
         f"{echoed(kind)}",
         position=domain.source.section(":types"),
         remedy=f"Say --robot-type {kind} if that is so; --robots NAME,NAME names others.",
@@ -312,11 +313,6 @@ def _moves(after: Atom, before: Atom, robot: str) -> bool:
 def _others(atom: Atom, robot: str) -> list[str]:
     """The variables of an atom besides the robot; constants are phases, not places or things."""
     return [arg for arg in atom.args if arg.startswith("?") and arg != robot]
-
-
-def _some(names: Sequence[str]) -> str:
-    shown = ", ".join(names[:_SHOWN])
-    return f"{shown} and {len(names) - _SHOWN:,} more" if len(names) > _SHOWN else shown
 
 
 def static_atoms(domain: Domain, problem: Problem) -> frozenset[Atom]:

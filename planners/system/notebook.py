@@ -54,6 +54,12 @@ def named(names: Sequence[str], between: str = "and") -> str:
     return f"{', '.join(others)} {between} {last}" if others else last
 
 
+def some(names: Sequence[str], most: int) -> str:
+    """At most so many names as text: ``r1, r2 and 3 more``."""
+    more = f" and {len(names) - most:,} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
 def _row(cell: str, texts: Sequence[str]) -> str:
     return f"<tr>{''.join(f'<{cell}>{escape(text)}</{cell}>' for text in texts)}</tr>"
 
