@@ -73,15 +73,7 @@ def parse_domain(source: Source) -> Domain:
     names = replace(
         names, functions=_arities(_read_signatures(functions, types)), objects=constants
     )
-    heads = [_read_head(names, item) for item in sections.get(":action", ())]
-    if not heads:
-        remedy = "Write at least one '(:action NAME :parameters (..) :precondition .. :effect ..)'."
-        raise root.fail("this domain has no action", remedy)
-    by_name: dict[str, _Head] = {}
-    for head in heads:
-        if by_name.setdefault(head.name.text, head) is not head:
-            what = f"action {echoed(head.name.text)} is declared twice"
-            raise head.name.fail(what, "Rename or remove one of them.")
+    heads = _read_heads(names, root, sections)
     if not any(head.item.comments for head in heads):  # a joint action is part of no other one
         names = replace(names, actions={head.name.text: len(head.parameters) for head in heads})
     schemas = tuple(_read_schema(names, head) for head in heads)
@@ -208,6 +200,19 @@ class _Head:
     fields: dict[str, tuple[Expression, ...]]
     parameters: tuple[Variable, ...]
     agent: int | None
+
+
+def _read_heads(names: Names, root: Group, sections: Sections) -> list[_Head]:
+    heads = [_read_head(names, item) for item in sections.get(":action", ())]
+    if not heads:
+        remedy = "Write at least one '(:action NAME :parameters (..) :precondition .. :effect ..)'."
+        raise root.fail("this domain has no action", remedy)
+    by_name: dict[str, _Head] = {}
+    for head in heads:
+        if by_name.setdefault(head.name.text, head) is not head:
+            what = f"action {echoed(head.name.text)} is declared twice"
+            raise head.name.fail(what, "Rename or remove one of them.")
+    return heads
 
 
 def _read_head(names: Names, item: Group) -> _Head:
