@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import chain, combinations
 
 import numpy as np
 
@@ -151,11 +151,16 @@ _Shape = tuple[str, tuple[int, ...]]
 
 @dataclass(frozen=True, slots=True)
 class _Group:
-    """The numbers of atoms of some shapes, of different predicates, that agree in the ``key``."""
+    """The numbers of atoms of some shapes, of different predicates, that agree in the ``key``.
+
+    ``exclusive``, ``exhaustive``: at most, at least one of them is true in every state.
+    """
 
     family: tuple[_Shape, ...]
     key: tuple[str, ...]
     atoms: list[int]
+    exclusive: bool = True
+    exhaustive: bool = False
 
 
 def _mutex_groups(atoms: Sequence[Atom], holds: Bools, robots: Sequence[str]) -> list[_Group]:
@@ -171,16 +176,15 @@ def _mutex_groups(atoms: Sequence[Atom], holds: Bools, robots: Sequence[str]) ->
 
     def preference(group: _Group) -> tuple[object, ...]:
         size, own = -len(group.atoms), owner(group)
-        rank = (not table.exhaustive(group), own == len(robots), size)
+        rank = (not group.exhaustive, own == len(robots), size)
         return (*rank, len(group.family), group.family, own, group.key)
 
     def place(group: _Group) -> tuple[object, ...]:
         own = owner(group)
         return own == len(robots), len(group.atoms) < 2, group.family[0][0], own, group.key
 
-    table = _AtomTable(atoms, holds)
-    several = (g for f in table.families() for g in table.groups(f) if len(g.atoms) > 1)
-    candidates = sorted(filter(table.exclusive, several), key=preference)
+    several = (g for g in _groups(atoms, holds) if g.exclusive and len(g.atoms) > 1)
+    candidates = sorted(several, key=preference)
     for number, atom in enumerate(atoms):  # what is left is a fact of its own
         whole = atom.predicate, tuple(range(len(atom.args)))
         candidates.append(_Group((whole,), atom.args, [number]))
@@ -193,56 +197,42 @@ def _mutex_groups(atoms: Sequence[Atom], holds: Bools, robots: Sequence[str]) ->
     return sorted(chosen, key=place)
 
 
-class _AtomTable:
-    """The atoms by shape and key, and what is known of them in all states."""
+def _by_shape(atoms: Sequence[Atom]) -> dict[_Shape, dict[tuple[str, ...], list[int]]]:
+    """The numbers of the atoms of each shape by their keys."""
+    shapes: dict[_Shape, dict[tuple[str, ...], list[int]]] = defaultdict(lambda: defaultdict(list))
+    for number, atom in enumerate(atoms):
+        for size in range(len(atom.args) + 1):
+            for positions in combinations(range(len(atom.args)), size):
+                key = tuple(atom.args[p] for p in positions)
+                shapes[atom.predicate, positions][key].append(number)
+    return shapes
 
-    def __init__(self, atoms: Sequence[Atom], holds: Bools) -> None:
-        self._holds = holds
-        weights = holds.astype(np.float32)
-        self._together: Bools = np.asarray(weights.T @ weights > 0)
-        np.fill_diagonal(self._together, False)
-        self._shapes: dict[_Shape, dict[tuple[str, ...], list[int]]] = defaultdict(
-            lambda: defaultdict(list)
-        )
-        for number, atom in enumerate(atoms):
-            for size in range(len(atom.args) + 1):
-                for positions in combinations(range(len(atom.args)), size):
-                    key = tuple(atom.args[p] for p in positions)
-                    self._shapes[atom.predicate, positions][key].append(number)
 
-    def groups(self, family: tuple[_Shape, ...]) -> list[_Group]:
-        """The atoms of some shapes, by key."""
-        keys = sorted({key for shape in family for key in self._shapes[shape]})
-        return [
-            _Group(family, key, [n for shape in family for n in self._shapes[shape].get(key, ())])
-            for key in keys
-        ]
+def _groups(atoms: Sequence[Atom], holds: Bools) -> Iterator[_Group]:
+    """The groups of single shapes, and those of several that are one variable only together.
 
-    def exclusive(self, group: _Group) -> bool:
-        """Whether no two of the atoms are true together."""
-        return not self._together[np.ix_(group.atoms, group.atoms)].any()
+    The latter are two or three of different predicates, as ``(holds r b)`` and ``(free r)`` are: of
+    these exactly one is true for each key.
+    """
+    shapes = _by_shape(atoms)
 
-    def exhaustive(self, group: _Group) -> bool:
-        """Whether one of the atoms is true in every state."""
-        return bool(self._holds[:, group.atoms].any(axis=1).all())
+    def groups(*family: _Shape) -> list[_Group]:
+        found = []
+        for key in sorted({key for shape in family for key in shapes[shape]}):
+            own = [number for shape in family for number in shapes[shape].get(key, ())]
+            true = holds[:, own].sum(axis=1)
+            found.append(_Group(family, key, own, bool(true.max() < 2), bool(true.min() > 0)))
+        return found
 
-    def families(self) -> Iterator[tuple[_Shape, ...]]:
-        """Single shapes, and two or three shapes that are one variable only together.
-
-        The latter are of different predicates, as ``(holds r b)`` and ``(free r)`` are: of these
-        exactly one is true for each key.
-        """
-        shapes = sorted(self._shapes)
-        incomplete = []
-        for shape in shapes:
-            yield (shape,)
-            groups = self.groups((shape,))
-            if shape[1] and all(map(self.exclusive, groups)):
-                incomplete += [] if all(map(self.exhaustive, groups)) else [shape]
-        for size in (2, 3):
-            for family in combinations(incomplete, size):
-                predicates, positions = zip(*family, strict=True)
-                if len(set(predicates)) == size and len(set(map(len, positions))) == 1:
-                    groups = self.groups(family)
-                    if all(self.exclusive(own) and self.exhaustive(own) for own in groups):
-                        yield family
+    incomplete = []
+    for shape in sorted(shapes):
+        found = groups(shape)
+        yield from found
+        if shape[1] and all(g.exclusive for g in found) and not all(g.exhaustive for g in found):
+            incomplete.append(shape)
+    for family in chain(combinations(incomplete, 2), combinations(incomplete, 3)):
+        lengths = {len(positions) for _, positions in family}
+        if len({predicate for predicate, _ in family}) == len(family) and len(lengths) == 1:
+            found = groups(*family)
+            if all(g.exclusive and g.exhaustive for g in found):
+                yield from found
