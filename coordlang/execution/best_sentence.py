@@ -170,9 +170,7 @@ class BestSentence:
     prefixes: int
 
 
-def best_sentence(
-    task_language: TaskLanguage, preferences: Sequence[Preference], most: int | None = None
-) -> BestSentence:
+def best_sentence(task_language: TaskLanguage, preferences: Sequence[Preference]) -> BestSentence:
     """Find the best sentence of the task by preferences in order of weight.
 
     The second one decides where the first is equal, and so on.
@@ -188,8 +186,8 @@ def best_sentence(
     prefixes that lead to the same nodes with the same counts are one.  ``shortest`` alone takes as
     many prefixes as the sentence has words.  The other preferences ask for the best string of a
     nondeterministic automaton, which has no polynomial algorithm in general (cf. Lyngsø and
-    Pedersen 2002 on hidden Markov models).  Raises `OutOfMemory` when the prefixes have more than
-    ``most`` entries, or more than the memory holds.
+    Pedersen 2002 on hidden Markov models).  Raises `OutOfMemory` when there are more prefixes than
+    the memory holds.
     """
     graph = _Graph(task_language, preferences)
     words: tuple[int, ...] = (graph.word[0],)
@@ -210,7 +208,7 @@ def best_sentence(
             entries += len(further)
             longer = *words, word
             heappush(queue, (graph.bound(longer, further), longer, further))
-        if (most is not None and entries > most) or entries * _ENTRY_BYTES > memory_left():
+        if entries * _ENTRY_BYTES > memory_left():
             raise OutOfMemory(
                 f"{len(seen):,} beginnings of sentences were looked at, and the best sentence is "
                 "not decided yet",

@@ -9,7 +9,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from coordlang.language.candidates import describe
 from coordlang.language.listed import ListedTask, model_of_listed
 from coordlang.language.partition import Partition
 from coordlang.language.provenance import Tolerance
@@ -54,7 +53,7 @@ class NoPlanFits(Refuted):
         self.next_words = tuple(next_words)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class TaskLanguage:
     """A language with the optimal plans of one task.
 
@@ -170,11 +169,6 @@ class TaskLanguage:
     def text(self, words: Sequence[int]) -> str:
         """A sentence as it is written."""
         return " ".join(self.partition.words[word] for word in words)
-
-    def __repr__(self) -> str:
-        """The language and the task, not the plan space."""
-        task = describe(self.space, self.task)
-        return f"TaskLanguage({self.language!r}, task={task!r}, covered={self.covered})"
 
 
 def language_in_task(

@@ -92,13 +92,12 @@ class SentenceDemands:
 
 
 def sentence_demands(
-    space: PlanSpace, partition: Partition, formulas: Mapping[str, Cover], few: int = FEW
+    space: PlanSpace, partition: Partition, formulas: Mapping[str, Cover]
 ) -> SentenceDemands:
     """What a sentence demands of the robots.
 
     ``space`` holds the plans with the sentence, of one task.  Where several groups of robots of
     one size decide a change of word, robots that the formula of the next word names come first.
-    Up to ``few`` subplans of a robot are listed.
     """
     word = partition.word_of(space.rows)[space.state]
     passed = words_passed(space, word)
@@ -114,7 +113,7 @@ def sentence_demands(
         sentence=tuple(partition.words[w] for w in sentence),
         plans=counts(space)[start],
         steps=space.cost_of(0)[0],
-        parts=[_part(choices, robot, few) for robot in range(space.robots)],
+        parts=[_part(choices, robot) for robot in range(space.robots)],
         changes=changes,
     )
 
@@ -133,13 +132,13 @@ def words_passed(space: PlanSpace, word: Ints) -> Ints:
     return passed
 
 
-def _part(choices: Choices, robot: int, few: int) -> RobotPart:
+def _part(choices: Choices, robot: int) -> RobotPart:
     space = choices.space
     steps = (space.layer_edges(layer).edges for layer in range(space.cost_of(0)[0], 0, -1))
     labels = [np.unique(space.robot_labels(robot, edges)).tolist() for edges in steps]
     own = int(choices.of_node[robot, space.starts[0]])
     subplans = choices.sets.size(own)
-    listed = choices.sets.sequences(own) if subplans <= few else ()
+    listed = choices.sets.sequences(own) if subplans <= FEW else ()
 
     def texts(used: Sequence[int]) -> Subplan:
         return [_own_text(space.model, robot, label) for label in used]

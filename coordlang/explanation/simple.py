@@ -36,15 +36,15 @@ _CONFLICTS = 120_000
 _PLACES = 400_000
 
 
-def simple(job: Job, found: Outcome, conflicts: int = _CONFLICTS) -> Outcome:
+def simple(job: Job, found: Outcome) -> Outcome:
     """A language with as many words as ``found`` has, with formulas that are as short or shorter.
 
     Anytime: out of time or memory, or interrupted, the best verified language so far is returned,
-    with the error in ``stopped``; after ``conflicts`` of the solver for one question, too.  Its
+    with the error in ``stopped``; where a question is too hard for the solver, too.  Its
     ``figures`` also hold ``terms`` and ``limits`` of the formulas, as ``.._before`` those of
     ``found``, and ``.._lower_bound``, that of limits for languages with so few terms.
     """
-    search = _Search(job, found, conflicts)
+    search = _Search(job, found)
     return search.outcome(run_until_stopped(search.run))
 
 
@@ -68,8 +68,8 @@ class _Search:
     ``bound``: no language with so many words has fewer terms, nor as few terms with fewer limits.
     """
 
-    def __init__(self, job: Job, found: Outcome, conflicts: int) -> None:
-        self._job, self._found, self._conflicts = job, found, conflicts
+    def __init__(self, job: Job, found: Outcome) -> None:
+        self._job, self._found = job, found
         self.best: Assignment = found.partition
         variables, value = valuation(job.candidates.model, job.candidates.rows[list(job.states)])
         self._value = dict(zip(job.states, value, strict=True))
@@ -103,7 +103,7 @@ class _Search:
             return
         with suppress(Undecided):  # a question is too hard
             close_bounds(lambda: (self.bound[0], self.lengths[0]), self._decide)
-            budget = Budget(maxsize, self._conflicts)
+            budget = Budget(maxsize, _CONFLICTS)
             while self.bound[1] < self.lengths[1]:
                 if not self._finds(self.lengths[0], self.lengths[1] - 1, budget):
                     self.bound = self.lengths
@@ -113,7 +113,7 @@ class _Search:
 
         False if the budget was not enough.
         """
-        if budget.conflicts > self._conflicts:
+        if budget.conflicts > _CONFLICTS:
             raise Undecided
         try:
             if not self._finds(terms, None, budget):

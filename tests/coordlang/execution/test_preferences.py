@@ -182,10 +182,11 @@ def test_random_graphs() -> None:
     assert seen[8] > 50
 
 
-def test_a_search_that_is_too_large_says_so() -> None:
+def test_a_search_that_is_too_large_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     task_language = shipped("grid/corners-4x4")[1]
+    monkeypatch.setattr("coordlang.execution.best_sentence.memory_left", lambda: 500)
     with pytest.raises(OutOfMemory, match="not decided yet"):
-        best_sentence(task_language, [read_preference(task_language, "most-plans")], most=2)
+        best_sentence(task_language, [read_preference(task_language, "most-plans")])
 
 
 def test_wishes_that_are_none() -> None:

@@ -78,7 +78,9 @@ def own_text(label: str, robot: str) -> str:
 
 
 @pytest.mark.parametrize("robots", [2, 3])
-def test_against_listed_plans(robots: int) -> None:
+def test_against_listed_plans(robots: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    few = 2
+    monkeypatch.setattr("coordlang.explanation.demands.FEW", few)
     seen: Counter[str] = Counter()
     for seed in range(20):
         domain, problem, options = random_model(seed, robots)
@@ -98,9 +100,8 @@ def test_against_listed_plans(robots: int) -> None:
             except naive.TooLarge:
                 continue
             for words, plans in groups.items():
-                few = 2
                 found = sentence_demands(
-                    task_language.plans_with(words), task_language.partition, formulas, few
+                    task_language.plans_with(words), task_language.partition, formulas
                 )
                 check(task_language, words, plans, found, few)
                 assert demands_text(found)

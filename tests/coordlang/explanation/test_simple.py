@@ -133,12 +133,13 @@ def test_stopped_searches_return_languages(phase: str, monkeypatch: pytest.Monke
     assert (phase == "limits") == bool(checked)
 
 
-def test_a_search_gives_up() -> None:
+def test_a_search_gives_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """With no conflicts to spend: the formulas that there were, and a bound that is true."""
     candidates, built = all_tasks("grid", "gw2-2x3"), two_rows()
     mapped = mapped_states(built.language, candidates.model)
     found = Outcome(dict(zip(built.job.states, mapped.word.tolist(), strict=True)), 5)
-    outcome = simple(built.job, found, conflicts=0)
+    monkeypatch.setattr("coordlang.explanation.simple._CONFLICTS", 0)
+    outcome = simple(built.job, found)
     assert outcome.stopped is None
     assert outcome.partition is found.partition
     assert outcome.figures["terms"] == outcome.figures["terms_before"]
