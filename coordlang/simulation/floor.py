@@ -115,9 +115,22 @@ def _walls(
         return ()
     if any(math.dist(points[a], points[b]) != 1 for a, b in links):
         return ()
+    found = []
+    for (is_upright, line), begins in _closed_sides(cells, links).items():
+        ends = {begin + 2 for begin in begins}
+        for begin, end in zip(sorted(begins - ends), sorted(ends - begins), strict=True):
+            # Whole micrometres, so that equal lengths are equal numbers.
+            at, low, high = (round(half * cell / 2, 6) for half in (line, begin, end))
+            found.append((at, low, at, high) if is_upright else (low, at, high, at))
+    return tuple(sorted(found))
+
+
+def _closed_sides(
+    cells: Mapping[Point, str], links: Sequence[tuple[str, str]]
+) -> dict[tuple[bool, float], set[float]]:
+    """In half cells, y up: whether they are upright, and on which line -> where sides begin."""
     open_sides = {frozenset(ends) for ends in links}
     left, top = min(x for x, _ in cells), max(y for _, y in cells)
-    # In half cells, y up: whether they are upright, and on which line -> where sides begin.
     sides: dict[tuple[bool, float], set[float]] = defaultdict(set)
     for (column, row), name in cells.items():
         x, y = 2 * (column - left), 2 * (top - row)
@@ -126,14 +139,7 @@ def _walls(
             if other is None or frozenset((name, other)) not in open_sides:
                 side, begin = ((True, x + dx), y - 1) if dx else ((False, y + dy), x - 1)
                 sides[side].add(begin)
-    found = []
-    for (is_upright, line), begins in sides.items():
-        ends = {begin + 2 for begin in begins}
-        for begin, end in zip(sorted(begins - ends), sorted(ends - begins), strict=True):
-            # Whole micrometres, so that equal lengths are equal numbers.
-            at, low, high = (round(half * cell / 2, 6) for half in (line, begin, end))
-            found.append((at, low, at, high) if is_upright else (low, at, high, at))
-    return tuple(sorted(found))
+    return sides
 
 
 class Human:
