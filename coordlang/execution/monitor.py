@@ -212,7 +212,7 @@ class Monitor:
         return self._value(self._here, text)
 
     def can(
-        self, visit: Texts = (), avoid: Texts = (), do: Texts = (), never: Texts = ()
+        self, *, visit: Texts = (), avoid: Texts = (), do: Texts = (), never: Texts = ()
     ) -> Answer:
         """Whether a detour can still be had, all of it, promises kept: ``can(visit="(at r1 c)")``.
 
@@ -235,7 +235,7 @@ class Monitor:
         return Answer(tuple(subplan), found.left)
 
     def commit(
-        self, visit: Texts = (), avoid: Texts = (), do: Texts = (), never: Texts = ()
+        self, *, visit: Texts = (), avoid: Texts = (), do: Texts = (), never: Texts = ()
     ) -> None:
         """Promise a detour: from now on only what keeps the promise is allowed.
 

@@ -136,7 +136,7 @@ def check_detours(
             )
         detour = random_detour(random, task_language, robot, left, known)
         expected = twin.fulfilling(robot, chosen[:here], detour, known) & left
-        answer = at.can(*detour)
+        answer = at.can(**detour._asdict())
         assert bool(answer) == bool(expected)
         assert answer.subplans == len(expected)
         seen["possible" if expected else "impossible"] += 1
@@ -144,13 +144,13 @@ def check_detours(
         if not expected:
             assert answer.subplan is None
             with pytest.raises(NotPossible):
-                at.commit(*detour)
+                at.commit(**detour._asdict())
             assert (at.allowed(), at.remaining, at.step) == before
             continue
         assert answer.subplan in {
             tuple(texts(task_language, robot, own[here:])) for own in expected
         }
-        at.commit(*detour)
+        at.commit(**detour._asdict())
         assert at.remaining == len(expected)
         assert subplans(at) == {tuple(texts(task_language, robot, own[here:])) for own in expected}
         seen["less is left"] += len(expected) < len(left)
