@@ -9,7 +9,7 @@ agree in some arguments, the *key*: ``(at r2 a), (at r2 b), ..`` have the key ``
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, combinations
 
@@ -183,7 +183,7 @@ def _mutex_groups(atoms: Sequence[Atom], holds: Bools, robots: Sequence[str]) ->
         own = owner(group)
         return own == len(robots), len(group.atoms) < 2, group.family[0][0], own, group.key
 
-    several = (g for g in _groups(atoms, holds) if g.exclusive and len(g.atoms) > 1)
+    several = (g for g in _candidates(atoms, holds) if g.exclusive and len(g.atoms) > 1)
     candidates = sorted(several, key=preference)
     for number, atom in enumerate(atoms):  # what is left is a fact of its own
         whole = atom.predicate, tuple(range(len(atom.args)))
@@ -208,31 +208,36 @@ def _by_shape(atoms: Sequence[Atom]) -> dict[_Shape, dict[tuple[str, ...], list[
     return shapes
 
 
-def _groups(atoms: Sequence[Atom], holds: Bools) -> Iterator[_Group]:
+def _candidates(atoms: Sequence[Atom], holds: Bools) -> Iterator[_Group]:
     """The groups of single shapes, and those of several that are one variable only together.
 
     The latter are two or three of different predicates, as ``(holds r b)`` and ``(free r)`` are: of
     these exactly one is true for each key.
     """
     shapes = _by_shape(atoms)
-
-    def groups(*family: _Shape) -> list[_Group]:
-        found = []
-        for key in sorted({key for shape in family for key in shapes[shape]}):
-            own = [number for shape in family for number in shapes[shape].get(key, ())]
-            true = holds[:, own].sum(axis=1)
-            found.append(_Group(family, key, own, bool(true.max() < 2), bool(true.min() > 0)))
-        return found
-
     incomplete = []
     for shape in sorted(shapes):
-        found = groups(shape)
-        yield from found
-        if shape[1] and all(g.exclusive for g in found) and not all(g.exhaustive for g in found):
+        groups = _groups((shape,), shapes, holds)
+        yield from groups
+        if shape[1] and all(g.exclusive for g in groups) and not all(g.exhaustive for g in groups):
             incomplete.append(shape)
     for family in chain(combinations(incomplete, 2), combinations(incomplete, 3)):
         lengths = {len(positions) for _, positions in family}
         if len({predicate for predicate, _ in family}) == len(family) and len(lengths) == 1:
-            found = groups(*family)
-            if all(g.exclusive and g.exhaustive for g in found):
-                yield from found
+            groups = _groups(family, shapes, holds)
+            if all(g.exclusive and g.exhaustive for g in groups):
+                yield from groups
+
+
+def _groups(
+    family: tuple[_Shape, ...],
+    shapes: Mapping[_Shape, Mapping[tuple[str, ...], list[int]]],
+    holds: Bools,
+) -> list[_Group]:
+    """The atoms of some shapes, by key."""
+    found = []
+    for key in sorted({key for shape in family for key in shapes[shape]}):
+        own = [number for shape in family for number in shapes[shape].get(key, ())]
+        true = holds[:, own].sum(axis=1)
+        found.append(_Group(family, key, own, bool(true.max() < 2), bool(true.min() > 0)))
+    return found
