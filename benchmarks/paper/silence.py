@@ -21,7 +21,6 @@ from coordlang.language.candidates import Candidates
 from coordlang.language.provenance import percent
 from coordlang.language.sentences import sentence_counts
 from coordlang.required.miscoordination import Inseparable
-from coordlang.vocabulary.annealing import AnnealingSettings
 from coordlang.vocabulary.few_words import few_words
 from coordlang.vocabulary.flexibility_bound import largest_boxes
 from coordlang.vocabulary.job import Assignment
@@ -40,8 +39,8 @@ WORLDS = (
 )
 #: Words up to which the curve is drawn where no language is found before.
 _MOST = 8
-#: How long each number of words is annealed.
-_ANNEALING = AnnealingSettings(least_moves=300, patience=1, work=5_000_000)
+#: Plans measured for each number of words.
+_WORK = 5_000_000
 
 
 def units(settings: Settings) -> list[Unit]:
@@ -93,12 +92,13 @@ def _points(
         if words == size and language is not None:
             yield _point(candidates, spaces, language, words, 0.0, 0.0, is_best=True)
             return
-        found = few_words(job, words, start=start, settings=_ANNEALING)
+        found, failures = few_words(job, words, start=start, work=_WORK)
         if found.stopped is not None:
             raise found.stopped
         start = found.partition
-        mean, worst = float(found.failures.mean), float(found.failures.worst)
-        yield _point(candidates, spaces, start, words, mean, worst, is_best=found.is_best)
+        mean, worst = float(failures.mean), float(failures.worst)
+        is_best = bool(found.figures["least_of_all_partitions"])
+        yield _point(candidates, spaces, start, words, mean, worst, is_best=is_best)
         if not worst:
             return
 

@@ -210,7 +210,7 @@ def _exit_code(
         return ended_early(stopped, _written(built, output, certificate))
     is_kept = certificate and isinstance(stopped, OutOfTime) and stopped is built.stopped
     short_of = "" if proved and exact else ", without proof"
-    best = "language" if built.few_words is None else "partition into words"
+    best = "partition into words" if built.few_words else "language"
     what = f"the best {best} so far is written{short_of}"
     ended_early(stopped, what, ", a part of it kept for the certificate" if is_kept else "")
     is_short = not proved or ended is not None if exact else stopped is not None

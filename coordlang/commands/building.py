@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
+from fractions import Fraction
 from functools import partial
 from itertools import count
 from math import inf
@@ -27,7 +28,7 @@ from coordlang.verification.certificate_file import Certificate
 from coordlang.verification.check_certificate import check as check_certificate
 from coordlang.verification.make_certificate import certify
 from coordlang.vocabulary import METHODS, Job, Outcome
-from coordlang.vocabulary.few_words import FewWords, few_words
+from coordlang.vocabulary.few_words import few_words
 from coordlang.vocabulary.first_differences import (
     FirstDifferences,
     differences,
@@ -143,25 +144,16 @@ def _few_words(making: Making, words: int, *, worst: bool, seed: int) -> Built:
     require_room(making.candidates.source)
     job = job_for_few_words(making, seed)
     making.note("coordination")
-    found = few_words(job, words, worst=worst)
+    outcome, failures = few_words(job, words, worst=worst)
     making.note("vocabulary")
-    stopped = found.stopped
-    if not found.failures.worst:
-        with little_time_after(stopped):
-            making.check(found.partition)
-        if not isinstance(stopped, KeyboardInterrupt):
-            stopped = None  # no search was left where nothing fails
+    if not failures.worst:
+        with little_time_after(outcome.stopped):
+            making.check(outcome.partition)
+        if not isinstance(outcome.stopped, KeyboardInterrupt):
+            outcome = replace(outcome, stopped=None)  # no search was left where nothing fails
     making.note("verify")
-    figures = {
-        "silence_mean": float(found.silence.mean),
-        "silence_worst": float(found.silence.worst),
-        "partitions_measured": found.measured,
-        "partitions_recounted": found.recounted,
-        "least_of_all_partitions": found.is_best,
-    }
-    outcome = Outcome(found.partition, job.lower_bound, figures, stopped)
-    failures = Failures(found.failures.mean, found.failures.worst)
-    return making.built(job, outcome, FEW_WORDS, failures=failures, few_words=found)
+    how_often = Failures(failures.mean, failures.worst)
+    return making.built(job, outcome, FEW_WORDS, failures=how_often)
 
 
 def job_for_few_words(making: Making, seed: int = 0) -> Job:
@@ -344,11 +336,11 @@ class _Old:
 class Built(Presented):
     """A language, verified by definition, and how it was made.
 
-    With a limit on the words it may be none: ``failures`` says how often robots then fail, and
-    ``few_words`` how it was found.  ``job`` is what words were looked for, ``outcome`` what the
-    method found, ``seconds`` the time by phase.  ``repaired`` says what became of the language that
-    it started from, ``fewest`` how many tasks would require coordination with the fewest actions
-    only; the time limit ends at ``deadline``.
+    With ``few_words``, as many as were asked for, it may be none: ``failures`` says how often
+    robots then fail.  ``job`` is what words were looked for, ``outcome`` what the method found,
+    ``seconds`` the time by phase.  ``repaired`` says what became of the language that it started
+    from, ``fewest`` how many tasks would require coordination with the fewest actions only; the
+    time limit ends at ``deadline``.
     """
 
     language: Language
@@ -358,7 +350,6 @@ class Built(Presented):
     seconds: Mapping[str, float]
     failures: Failures = NONE
     repaired: Repaired | None = None
-    few_words: FewWords | None = None
     fewest: int | None = None
     deadline: float = inf
     shown = ("tasks", "guarantee")
@@ -382,6 +373,11 @@ class Built(Presented):
     def guarantee(self) -> Guarantee:
         """The number of words, and the proved lower bound on it."""
         return self.language.guarantee
+
+    @property
+    def few_words(self) -> bool:
+        """Whether so many words were asked for, enough or not."""
+        return self.guarantee.method == FEW_WORDS
 
     @property
     def tasks(self) -> int:
@@ -446,7 +442,7 @@ class Built(Presented):
         proof, verified = f"at least {figures['lower_bound']} needed, ", "verified"
         if figures["proved_minimal"]:
             proof = "proved minimal, "
-        if self.few_words is not None and not figures["verified"]:
+        if self.few_words and not figures["verified"]:
             proof, verified = "", "no coordination language"
         words, tasks = counted(figures["words"], "word"), counted(figures["tasks"], "task")
         lines = [
@@ -478,16 +474,16 @@ class Built(Presented):
 
     def _how_often_robots_fail(self) -> Iterator[str]:
         """How often under as many words as were asked for, and how often in silence."""
-        found = self.few_words
-        if found is None:
+        if not self.few_words:
             return
         line = f"robots that choose by themselves {self.failures.text()}"
         if self.verdict.holds:
             line = "no robot fails: this is a coordination language"
-        elif found.is_best and len(self.language.words) > 1:
+        elif self.figures["least_of_all_partitions"] and len(self.language.words) > 1:
             line += " (the least of all partitions)"
         yield line
-        yield f"in silence they {Failures(found.silence.mean, found.silence.worst).text()}"
+        mean, worst = (Fraction(self.figures[f"silence_{of}"]) for of in ("mean", "worst"))
+        yield f"in silence they {Failures(mean, worst).text()}"
 
 
 def _optimised(figures: Mapping[str, Any]) -> Iterator[str]:

@@ -9,9 +9,10 @@ that takes too long, the best so far is verified, and the bound says how much sh
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import replace
+from itertools import pairwise
 from sys import maxsize
 
 import numpy as np
@@ -53,13 +54,9 @@ def formula_lengths(mapped: MappedStates) -> Lengths:
 
     Without those of the word with the longest formula, which is "every other state".
     """
-    formulas = all_covers(mapped).values()
-    lengths = [(len(f.terms), sum(map(len, f.terms))) for f in formulas]
-    longest = max(lengths)
-    return (
-        sum(terms for terms, _ in lengths) - longest[0],
-        sum(limits for _, limits in lengths) - longest[1],
-    )
+    lengths = [(len(f.terms), sum(map(len, f.terms))) for f in all_covers(mapped).values()]
+    shorter = sorted(lengths)[:-1]
+    return sum(terms for terms, _ in shorter), sum(limits for _, limits in shorter)
 
 
 class _Search:
@@ -80,14 +77,6 @@ class _Search:
         mapped = MappedStates(words, variables, value, word)
         self._before = self.lengths = formula_lengths(mapped)
         self.bound: Lengths = (found.size - 1, found.size - 1)  # each term limits a variable
-        self._languages: Languages | None = found.languages
-
-    @property
-    def languages(self) -> Languages:
-        """What tells languages from other partitions, with the clauses that are known."""
-        if self._languages is None:
-            self._languages = Languages.of(self._job)
-        return self._languages
 
     def outcome(self, stopped: BaseException | None) -> Outcome:
         """The best language, with what is known of it."""
@@ -101,6 +90,7 @@ class _Search:
         """Fewer terms, and then fewer variables in them, until none can be."""
         if self._found.size < 2 or len(self._job.states) * self.lengths[0] > _PLACES:
             return
+        self._languages = self._found.languages or Languages.of(self._job)
         with suppress(Undecided):  # a question is too hard
             close_bounds(lambda: (self.bound[0], self.lengths[0]), self._decide)
             budget = Budget(maxsize, _CONFLICTS)
@@ -124,18 +114,18 @@ class _Search:
 
     def _finds(self, terms: int, limits: int | None, budget: Budget) -> bool:
         """Whether there is a language with such formulas, which then is the best."""
-        clauses = without_implied(self.languages.clauses, _COMPARISONS)
+        clauses = without_implied(self._languages.clauses, _COMPARISONS)
         order = most_constrained_first(self._job.states, clauses)
         problem = FormulaProblem(order, self._found.size, self._value, self._sizes, terms, limits)
         with closing(problem):
             for _ in range(budget.rounds):
                 for clause in clauses:
                     problem.separate_one(clause)
-                seen = len(self.languages.clauses)
+                seen = len(self._languages.clauses)
                 partition = problem.solve(budget.conflicts)
                 if partition is None or self._is_accepted(partition, problem):
                     return partition is not None
-                clauses = self.languages.clauses[seen:]
+                clauses = self._languages.clauses[seen:]
         raise Undecided
 
     def _is_accepted(self, partition: dict[int, int], problem: FormulaProblem) -> bool:
@@ -144,9 +134,9 @@ class _Search:
         self._job.progress(
             f"{self._found.size} words with formulas of {self.bound[0]} to {self.lengths[0]} "
             f"terms: trying {lengths[0]} over {lengths[1]} variables, "
-            f"{len(self.languages.clauses):,} clauses"
+            f"{len(self._languages.clauses):,} clauses"
         )
-        if not self.languages.holds(partition):
+        if not self._languages.holds(partition):
             return False
         self._job.check(partition)
         self.best, self.lengths = partition, lengths
@@ -158,8 +148,9 @@ class FormulaProblem(PartitionProblem):
 
     A word's formula is a disjunction of terms; a term limits some variables to some of their
     values.  The formula is true in all states of the word and false in all others.  The word that
-    has none is that of every other state.  Variables: term allows value, term limits variable,
-    state is in term, term is of word.  Terms are ordered by their words, which breaks symmetry.
+    has none is that of the states in no term, which are together as if in one term more.
+    Variables: term allows value, term limits variable, state is in term, term is of word.  Terms
+    are ordered by their words, which breaks symmetry.
 
     ``order`` are numbers of states, in the order by which words are named, ``size`` the number of
     words, ``value`` for each state its value in each variable, ``values`` how many each variable
@@ -177,18 +168,17 @@ class FormulaProblem(PartitionProblem):
         limits: int | None = None,
     ) -> None:
         super().__init__(order, size)
-        self._first = np.cumsum([0, *values])[:-1]
-        self._allows = [[self._new() for _ in range(sum(values))] for _ in range(terms)]
-        self._limits = [[self._new() for _ in values] for _ in range(terms)]
-        self._of_word = [[self._new() for _ in range(size)] for _ in range(terms)]
-        for term in range(terms):
-            self._one_word(self._of_word[term])
-            # A term that does not allow all values of a variable limits it.
-            columns = np.repeat(np.arange(len(values)), values).tolist()
-            for allowed, variable in zip(self._allows[term], columns, strict=True):
-                self._solver.add_clause([allowed, self._limits[term][variable]])
-        self._order_terms()
-        self._say_states({state: value[state] for state in order})
+        self._values, self._limits = values, list[list[int]]()
+        first = np.cumsum([0, *values])[:-1]
+        columns = {state: (first + value[state]).tolist() for state in order}
+        of_word = self._words_of_terms(terms)
+        inside = [self._add_term(columns) for _ in range(terms)]
+        for state, words in self._word.items():
+            holds = [*(term[state] for term in inside), self._new()]
+            self._solver.add_clause(holds)
+            for in_term, own in zip(holds, of_word, strict=True):
+                for word, of_term in zip(words, own, strict=True):
+                    self._solver.add_clause([-in_term, -of_term, word])
         if limits is not None:
             variables = [variable for row in self._limits for variable in row]
             clauses, self._last = at_most(variables, limits, self._last)
@@ -200,34 +190,33 @@ class FormulaProblem(PartitionProblem):
         true = {v for v in self._solver.get_model() if v > 0}
         return len(self._limits), sum(v in true for row in self._limits for v in row)
 
-    def _order_terms(self) -> None:
-        for before, after in zip(self._of_word, self._of_word[1:], strict=False):
+    def _words_of_terms(self, terms: int) -> list[list[int]]:
+        """For each term, and last for no term, of which word it is: in order, the last apart."""
+        *of_terms, of_none = [[self._new() for _ in range(self.size)] for _ in range(terms + 1)]
+        for own in (*of_terms, of_none):
+            self._one_word(own)
+        for own in of_terms:
+            for word, none in zip(own, of_none, strict=True):
+                self._solver.add_clause([-word, -none])
+        for before, after in pairwise(of_terms):
             for word, later in enumerate(before):
                 for earlier in after[:word]:
                     self._solver.add_clause([-later, -earlier])
+        return [*of_terms, of_none]
 
-    def _say_states(self, value: dict[int, Ints]) -> None:
-        """A state in a term has the term's word, and one in no term the word that has none."""
-        other = [self._new() for _ in range(self.size)]
-        self._one_word(other)
-        for row in self._of_word:
-            for without, own in zip(other, row, strict=True):
-                self._solver.add_clause([-without, -own])
-        for state, numbers in value.items():
-            inside = [self._inside(term, numbers) for term in range(len(self._allows))]
-            for word, own in enumerate(self._word[state]):
-                self._solver.add_clause([-own, other[word], *inside])
-                for of_word, holds in zip(self._of_word, inside, strict=True):
-                    self._solver.add_clause([-holds, -of_word[word], own])
-            for holds in inside:
-                for word, own in enumerate(self._word[state]):
-                    self._solver.add_clause([-holds, -own, -other[word]])
-
-    def _inside(self, term: int, numbers: Ints) -> int:
-        """A variable that is true just where the term allows all values of a state."""
-        holds = self._new()
-        allowed = [self._allows[term][column] for column in (self._first + numbers).tolist()]
-        for variable in allowed:
-            self._solver.add_clause([-holds, variable])
-        self._solver.add_clause([holds, *(-variable for variable in allowed)])
-        return holds
+    def _add_term(self, columns: Mapping[int, Sequence[int]]) -> dict[int, int]:
+        """Add a term: for each state, which has these of all values, whether it is in the term."""
+        limits = [self._new() for _ in self._values]
+        allows = []
+        for limit, number in zip(limits, self._values, strict=True):
+            allows += [self._new() for _ in range(number)]
+            for allowed in allows[-number:]:
+                self._solver.add_clause([allowed, limit])  # it limits what it does not allow
+        self._limits.append(limits)
+        inside = {}
+        for state, own in columns.items():
+            holds = inside[state] = self._new()
+            for column in own:
+                self._solver.add_clause([-holds, allows[column]])
+            self._solver.add_clause([holds, *(-allows[column] for column in own)])
+        return inside

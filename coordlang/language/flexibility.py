@@ -41,17 +41,15 @@ class Flexibility:
     The tasks of all plan spaces, in their order.
 
     ``plans``: N, exact.  ``expected``: plans left open in expectation over a plan drawn uniformly.
-    ``first``: plans left open by the sentence of the first plan in our order.  ``most``: plans left
-    open by the sentence that leaves most. ``words`` and ``first_words``: words of a sentence, in
-    expectation and for the first plan.  ``steps``: joint steps of the task's plans.  Numbers of
-    plans are floats with a relative error below 1e-12; a task with more than `MANY` counts as one
-    with so many.
+    ``first``: plans left open by the sentence of the first plan in our order.  ``words`` and
+    ``first_words``: words of a sentence, in expectation and for the first plan.  ``steps``: joint
+    steps of the task's plans.  Numbers of plans are floats with a relative error below 1e-12; a
+    task with more than `MANY` counts as one with so many.
     """
 
     plans: tuple[int, ...]
     expected: Floats
     first: Floats
-    most: Floats
     words: Floats
     first_words: Floats
     steps: Ints
@@ -91,7 +89,6 @@ def _tasks(space: PlanSpace, word: Ints) -> Iterator[tuple[float, ...]]:
             plans,
             most * (sum(number**2 for number in said.values()) / plans**2),
             most * (said[first] / plans),
-            most * (max(said.values()) / plans),
             sum(number * len(words) for words, number in said.items()) / plans,
             float(len(first)),
             int(space.layer[start]),

@@ -11,14 +11,13 @@ from __future__ import annotations
 from contextlib import closing
 from dataclasses import replace
 
-from coordlang.vocabulary.annealing import AnnealingSettings
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Job, Outcome
 from coordlang.vocabulary.minimal import MinimalSearch
 from planners.system.errors import OutOfMemory
 from planners.system.limits import run_until_stopped
 
-#: Plans that annealing may measure for a unit of effort.
+#: Plans that local search may measure for a unit of effort.
 _MEASURED = 1_000_000
 
 
@@ -36,5 +35,5 @@ def best(job: Job) -> Outcome:
     if stopped is not None or job.candidates.count != 1:
         return outcome
     job.progress("leaving plans open")
-    freer = flexible(job, outcome, AnnealingSettings(work=_MEASURED * job.effort))
+    freer = flexible(job, outcome, _MEASURED * job.effort)
     return replace(freer, stopped=None) if isinstance(freer.stopped, OutOfMemory) else freer

@@ -25,7 +25,7 @@ def exhaustive(job: Job) -> Outcome:
     failing = sorted({tuple(sequences) for sequences in _failing(job)})
     tried = 0
     for size in range(1, len(job.states) + 1):
-        for words in _partitions(len(job.states), size):
+        for words in partitions(len(job.states), size):
             tried += 1
             word = dict(zip(job.states, words, strict=True))
             if not any(
@@ -55,8 +55,8 @@ def _mixture(plans: Sequence[Plan]) -> Plan:
     return tuple(tuple(own[robot] for robot, own in enumerate(step)) for step in steps)
 
 
-def _partitions(states: int, size: int) -> Iterator[Sequence[int]]:
-    """All partitions into exactly ``size`` blocks, as restricted growth strings."""
+def partitions(states: int, size: int) -> Iterator[Sequence[int]]:
+    """All partitions of so many states into ``size`` words, as restricted growth strings."""
 
     def extend(prefix: list[int], used: int) -> Iterator[Sequence[int]]:
         left = states - len(prefix)
@@ -65,7 +65,7 @@ def _partitions(states: int, size: int) -> Iterator[Sequence[int]]:
         if not left:
             yield prefix
             return
-        for block in range(min(used + 1, size)):
-            yield from extend([*prefix, block], max(used, block + 1))
+        for word in range(min(used + 1, size)):
+            yield from extend([*prefix, word], max(used, word + 1))
 
     return extend([], 0)

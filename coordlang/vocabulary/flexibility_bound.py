@@ -14,14 +14,13 @@ of docs/concepts.md).
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from coordlang.language.flexibility import MANY, Floats
 from coordlang.required.divergences import required_nodes
-from planners.joint.states import bits
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, counts
 
@@ -64,66 +63,47 @@ def _box_sizes(plans: Sequence[Plan]) -> list[int]:
     robots = len(plans[0][0])
     # With two robots both divisions are one table.
     divisions = range(robots) if robots > 2 else range(1)
-    sizes = [_Table.of(plans, robot).box_sizes() for robot in divisions]
+    sizes = [_of_division(plans, robot) for robot in divisions]
     return list(map(min, zip(*sizes, strict=True)))
 
 
-@dataclass(frozen=True, slots=True)
-class _Table:
-    """Plans as cells: rows are the parts of one robot, columns those of all others.
+def _of_division(plans: Sequence[Plan], robot: int) -> list[int]:
+    """For each plan the size of the largest box with it; no less where there are many boxes."""
+    cells, rows = _table(plans, robot)
+    maximal = _intersections(rows)
+    if maximal is None:
+        return [_shared(rows, *cell) for cell in cells]
 
-    ``cells[row, column]`` is the number of the plan, ``rows`` the columns of each row, as bits.
+    def size(columns: int) -> int:
+        return sum(row & columns == columns for row in rows) * columns.bit_count()
+
+    boxes = sorted(((size(columns), columns) for columns in maximal), reverse=True)
+    return [
+        next(n for n, columns in boxes if columns & column and not columns & ~rows[row])
+        for row, column in cells
+    ]
+
+
+def _shared(rows: Sequence[int], row: int, column: int) -> int:
+    """What the rows with a column share with one of them: no box with this cell is larger."""
+    return sum((rows[row] & other).bit_count() for other in rows if other & column)
+
+
+def _table(plans: Sequence[Plan], robot: int) -> tuple[list[tuple[int, int]], list[int]]:
+    """The row and the column of each plan, and the columns of each row; sets of columns are bits.
+
+    Rows are the parts of one robot, columns those of all others.
     """
-
-    cells: dict[tuple[int, int], int]
-    rows: list[int]
-
-    @classmethod
-    def of(cls, plans: Sequence[Plan], robot: int) -> _Table:
-        """The table for a robot."""
-        row_of: dict[tuple[int, ...], int] = {}
-        column_of: dict[tuple[tuple[int, ...], ...], int] = {}
-        cells: dict[tuple[int, int], int] = {}
-        for number, plan in enumerate(plans):
-            own = tuple(step[robot] for step in plan)
-            rest = tuple(step[:robot] + step[robot + 1 :] for step in plan)
-            row = row_of.setdefault(own, len(row_of))
-            cells[row, column_of.setdefault(rest, len(column_of))] = number
-        rows = [0] * len(row_of)
-        for row, column in cells:
-            rows[row] |= 1 << column
-        return cls(cells, rows)
-
-    def box_sizes(self) -> list[int]:
-        """For each plan the size of the largest box with it; no less where there are many boxes."""
-        maximal = _intersections(self.rows)
-        if maximal is None:
-            return self._shared()
-        boxes = [
-            (sum(row & columns == columns for row in self.rows) * columns.bit_count(), columns)
-            for columns in maximal
-        ]
-        sizes = [0] * len(self.cells)
-        left = list(self.rows)
-        for size, columns in sorted(boxes, reverse=True):
-            for number, row in enumerate(self.rows):
-                if row & columns == columns:
-                    for column in bits(left[number] & columns):
-                        sizes[self.cells[number, column]] = size
-                    left[number] &= ~columns
-        return sizes
-
-    def _shared(self) -> list[int]:
-        """For each plan: of the rows that have its column, the columns shared with its row.
-
-        No box with it is larger.
-        """
-        sizes = [0] * len(self.cells)
-        for (row, column), number in self.cells.items():
-            sizes[number] = sum(
-                (self.rows[row] & other).bit_count() for other in self.rows if other >> column & 1
-            )
-        return sizes
+    row_of: dict[tuple[int, ...], int] = {}
+    column_of: dict[tuple[tuple[int, ...], ...], int] = {}
+    cells, rows = [], defaultdict[int, int](int)
+    for plan in plans:
+        row = row_of.setdefault(tuple(step[robot] for step in plan), len(row_of))
+        rest = tuple(step[:robot] + step[robot + 1 :] for step in plan)
+        column = 1 << column_of.setdefault(rest, len(column_of))
+        rows[row] |= column
+        cells.append((row, column))
+    return cells, list(rows.values())
 
 
 def _intersections(rows: Iterable[int]) -> set[int] | None:

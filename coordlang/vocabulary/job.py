@@ -7,11 +7,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from coordlang.language.candidates import Candidates
 from coordlang.language.warping import Clause
 from coordlang.symmetry.group import Symmetry
 from coordlang.vocabulary.counterexamples import Counterexample
 from coordlang.vocabulary.first_differences import FirstDifferences
+from planners.joint.tables import Ints
 from planners.parallel.workers import Workers
 from planners.search.plan_space import PlanSpace
 
@@ -72,6 +75,20 @@ class Job:
     def lower_bound(self) -> int:
         """A bound that needs no search: plans that introduce RC need two words at least."""
         return 2 if self.first_differences.requiring else 1
+
+    def word(self, partition: Assignment) -> Ints:
+        """(states) the word of each state number; 0 for states that need none."""
+        word = np.zeros(len(self.candidates.rows), np.int64)
+        word[list(partition)] = list(partition.values())
+        return word
+
+    def of_nodes(self, word: Ints) -> list[Ints]:
+        """(nodes), for each plan space, the word of each node."""
+        return [word[space.state] for space in self.candidates.spaces]
+
+    def partition(self, word: Ints) -> dict[int, int]:
+        """The words of the states that need some."""
+        return dict(zip(self.states, word[list(self.states)].tolist(), strict=True))
 
 
 @dataclass(frozen=True, slots=True)

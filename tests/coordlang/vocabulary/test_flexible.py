@@ -59,7 +59,6 @@ def check_measures(candidates: Candidates, word: list[int]) -> int:
         assert measured.plans[number] == len(plans)
         assert measured.expected[number] == pytest.approx(float(want), rel=1e-12)
         assert measured.first[number] == pytest.approx(sizes[0], rel=1e-12)
-        assert measured.most[number] == pytest.approx(max(sizes), rel=1e-12)
         assert measured.words[number] == pytest.approx(sum(map(len, said)) / len(said), rel=1e-12)
         assert measured.first_words[number] == len(said[0])
         assert measured.steps[number] == steps == len(plans[0])

@@ -14,7 +14,7 @@ import pytest
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates
 from coordlang.required.composition_walk import DifferenceWalk
-from coordlang.vocabulary.exhaustive import _partitions
+from coordlang.vocabulary.exhaustive import partitions
 from coordlang.vocabulary.separations import constraints
 from tests.support import naive
 from tests.support.candidates import listed, requiring, small_candidates
@@ -56,7 +56,7 @@ def satisfies(word: dict[int, int], demand: Demand) -> bool:
 
 def least(states: list[int], wanted: set[Demand]) -> int:
     for size in range(1, len(states) + 1):
-        for words in _partitions(len(states), size):
+        for words in partitions(len(states), size):
             word = dict(zip(states, words, strict=True))
             if all(satisfies(word, demand) for demand in wanted):
                 return size

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Local search over partitions into a given number of words: simulated annealing.
+
+A move gives one state another word, or one word to all states that a symmetry takes it to.  What is
+minimised is an `Objective`: how many plans sentences rule out (`coordlang.vocabulary.flexible`), or
+how often robots fail (`coordlang.vocabulary.few_words`).  Necessary clauses may be constraints: a
+partition may violate some on the way, at a price.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import log
+from random import Random
+from typing import Protocol
+
+import numpy as np
+
+from coordlang.language.flexibility import Floats
+from coordlang.language.warping import Clause
+from coordlang.required.plan_table import PlanTable
+from planners.joint.tables import Ints
+
+#: Share of the moves that change the words of an orbit.
+_ORBITS = 0.2
+#: Moves of the first cooling for each pair of a state and a word.
+_MOVES = 10
+#: Heat at the start and at the end of a cooling, and the price of a violated clause at the start,
+#: in units of what the last moves cost on average.
+_HOT, _COLD, _PRICE, _LAST = 0.3, 0.01, 0.5, 100
+#: The price rises by this factor after a move to a partition that violates clauses, and else falls.
+_DEARER = 1.004
+#: Moves of the first cooling at least, and coolings that find nothing better after which the search
+#: ends; one that does is followed by one longer by half.
+_LEAST_MOVES, _PATIENCE = 1_000, 3
+#: Values that are equal but for rounding.
+_EQUAL = 1e-9
+#: Plans measured before the search ends, whatever it still finds, and what a move counts as.
+WORK, _MOVE = 60_000_000, 2_000
+
+
+class Objective(Protocol):
+    """What a local search minimises, and what becomes of the partitions that it finds.
+
+    Attributes
+    ----------
+    table
+        The plans by which partitions are measured.
+    norm
+        Minimised is this norm of the values of all tasks: 1 for their sum, more for the worst.
+    clauses
+        What must be separated, a list that only grows.
+    best, best_word
+        The value of the best partition so far, by which a cooling pays or not, and the word of each
+        state in it, from which the next one begins.
+    """
+
+    table: PlanTable
+    norm: int
+    clauses: Sequence[Clause]
+    best: float
+    best_word: Ints
+
+    def values(self, word: Ints, tasks: Ints) -> Floats:
+        """The value of some tasks, 0 or more, under the word of each state."""
+
+    def offer(self, word: Ints, values: Floats) -> None:
+        """Look at a partition that violates no clause; it may turn out to violate new ones."""
+
+    def settle(self) -> bool:
+        """Decide after a cooling which partition is the best; whether none can be better."""
+
+
+class LocalSearch:
+    """A partition into some number of words on its way.
+
+    Parameters
+    ----------
+    objective
+        What is minimised.
+    states, words
+        The states that need words, and how many words there are, two or more.
+    permutations
+        Where symmetries take each state.
+    random, work
+        What is drawn, and the plans that may be measured.
+
+    Attributes
+    ----------
+    moves
+        The moves so far.
+    """
+
+    def __init__(
+        self,
+        objective: Objective,
+        states: Sequence[int],
+        words: int,
+        permutations: Sequence[Sequence[int]],
+        random: Random,
+        work: int,
+    ) -> None:
+        self._objective, self._words, self._most = objective, words, work
+        self._random, self._permutations = random, permutations
+        self._tasks_of_state = objective.table.tasks_of_state
+        self._movable = [state for state in states if len(self._tasks_of_state[state])]
+        #: The pairs of states of all clauses, one after another, and the first of each clause.
+        self._pairs, self._first = np.zeros((0, 2), np.int64), np.zeros(0, np.int64)
+        self._violated = self.moves = self._work = 0
+        self._unit, self._price = 0.0, _PRICE
+
+    def run(self, word: Ints, progress: Callable[[str], None]) -> None:
+        """Cool again and again, first from these words, until that does not pay any more."""
+        objective, in_vain = self._objective, 0
+        moves = max(_LEAST_MOVES, _MOVES * len(self._movable) * self._words)
+        while in_vain < _PATIENCE and self._work < self._most and self._movable:
+            self._begin(word)
+            before = objective.best
+            self._cool(moves, progress)
+            if objective.settle():
+                return
+            word, in_vain = objective.best_word, in_vain + 1
+            if objective.best < before - _EQUAL:
+                moves, in_vain = moves + moves // 2, 0
+
+    def _begin(self, word: Ints) -> None:
+        self._word, self._values = word, self._measured(word, np.arange(len(self._objective.table)))
+        self._energy = self._norm(self._values)
+        self._violated = self._learn_clauses()
+
+    def _cool(self, moves: int, progress: Callable[[str], None]) -> None:
+        """Cool once, in so many moves."""
+        for number in range(moves):
+            if self._work >= self._most:
+                return
+            self._move(_HOT * (_COLD / _HOT) ** (number / moves))
+            self._price *= _DEARER if self._violated else 1 / _DEARER
+            if number % 50 == 0:
+                progress(f"annealing: {number:,} of {moves:,} moves")
+
+    def _move(self, heat: float) -> None:
+        """Try a random change, and keep it if its energy and the price of its clauses allow."""
+        self.moves += 1
+        states, word = self._changed()
+        violated = self._violated_by(word)
+        # So bad it may become (Metropolis); some of that is the price of violated clauses.
+        worse = -heat * log(1 - self._random.random())
+        worse -= self._price * (violated - self._violated)
+        most = self._energy + self._unit * worse
+        if most < 0:
+            return
+        tasks = np.unique(np.concatenate([self._tasks_of_state[state] for state in states]))
+        values = self._values.copy()
+        values[tasks] = self._measured(word, tasks)
+        energy = self._norm(values)
+        self._unit += (abs(energy - self._energy) - self._unit) / min(self.moves, _LAST)
+        if energy <= most:
+            self._word, self._values, self._energy = word, values, energy
+            self._violated = violated
+            if not violated:
+                self._objective.offer(word, values)
+                self._violated = self._learn_clauses()
+
+    def _changed(self) -> tuple[list[int], Ints]:
+        """States that get another word, and all words then.
+
+        One state, or those that a symmetry takes it to.
+        """
+        states = [self._random.choice(self._movable)]
+        other = self._random.randrange(self._words - 1)
+        other += other >= self._word[states[0]]
+        if self._permutations and self._random.random() < _ORBITS:
+            to = self._random.choice(self._permutations)
+            while (image := to[states[-1]]) != states[0]:
+                states.append(image)
+        word = self._word.copy()
+        word[states] = other
+        return states, word
+
+    def _learn_clauses(self) -> int:
+        """Know the clauses that are new; how many of all are violated."""
+        if new := [sorted(clause) for clause in self._objective.clauses[len(self._first) :]]:
+            sizes = np.array(list(map(len, new)))
+            first = len(self._pairs) + np.cumsum(sizes) - sizes
+            self._first = np.concatenate((self._first, first))
+            self._pairs = np.concatenate((self._pairs, *map(np.array, new)))
+        return self._violated_by(self._word)
+
+    def _violated_by(self, word: Ints) -> int:
+        """How many clauses have no pair of states in different words."""
+        first, second = word[self._pairs].T
+        separated = np.logical_or.reduceat(first != second, self._first)
+        return len(self._first) - int(separated.sum())
+
+    def _measured(self, word: Ints, tasks: Ints) -> Floats:
+        self._work += _MOVE + int(self._objective.table.plans[tasks].sum())
+        return self._objective.values(word, tasks)
+
+    def _norm(self, values: Floats) -> float:
+        return float(np.linalg.norm(values, self._objective.norm))
