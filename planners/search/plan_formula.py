@@ -9,20 +9,23 @@ only where an effect changes it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
 from planners.grounding.actions import GroundAction
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import FullState, JointModel, PlanningTask
-from planners.joint.step_clauses import clauses
 from planners.joint.tables import Ints, Rows
-from planners.pddl.formula_tree import negated
-from planners.pddl.lifted import TRUE, Formula
+from planners.pddl.lifted import TRUE, And, Atom, Formula, Not, Or, StepAtom, Truth
 from planners.search.mutexes import mutexes
 from planners.search.questions import FixedPlans, Literals
 from planners.search.state_variables import StateVariable
+
+#: Literals in the clauses of one condition at most.
+_MOST = 4_000
+
+Clause = frozenset[int]
 
 
 class TooManyClauses(Exception):
@@ -75,7 +78,7 @@ class PlanFormula:
         self._goal = _flat(
             [(fact + 1 if fact in goal.facts else -(fact + 1),) for fact in range(facts)]
             if isinstance(goal, FullState)
-            else self._saying(goal)
+            else map(sorted, self._saying(goal))
         )
 
     def plans(self, row: Rows, steps: int, effort: int) -> FixedPlans:
@@ -114,20 +117,35 @@ class PlanFormula:
             self.step += [(-before, so_far), (-variable, so_far)]
             before = so_far
 
-    def _literal(self, literal: tuple[int, ...]) -> int:
-        number = literal[0] + 1 if len(literal) == 2 else self._label(literal[0], literal[1])
-        return number if literal[-1] else -number
+    def _saying(
+        self, formula: Formula, robot: int = 0, label: int = 0, *, wanted: bool = True
+    ) -> list[Clause]:
+        """The clauses that say that a condition has this value, where a robot has this label.
 
-    def _saying(self, formula: Formula, robot: int = 0, label: int = 0) -> list[tuple[int, ...]]:
-        """The clauses of a condition, where a robot has this label."""
-        found = clauses(formula, self._model.evaluator, robot, label)
-        if found is None:
-            raise TooManyClauses
-        return [tuple(map(self._literal, sorted(clause))) for clause in found]
+        No clause: it has.  An empty one: it has not.
+        """
+        value, variable = isinstance(formula, Truth) and formula.value, 0
+        match formula:
+            case Not(part):
+                return self._saying(part, robot, label, wanted=not wanted)
+            case And(parts) | Or(parts):
+                every = [self._saying(part, robot, label, wanted=wanted) for part in parts]
+                return _all(every) if isinstance(formula, And) == wanted else _any(every)
+            case Atom():
+                variable = self._model.codec.facts.index.get(formula, -1) + 1
+            case StepAtom() if (known := self._model.evaluator.subactions.get(formula)) is not None:
+                value = known == (robot, label)
+                variable = 0 if known[0] == robot else self._label(*known)
+        if variable:
+            return [frozenset({variable if wanted else -variable})]
+        return [] if value == wanted else [frozenset()]
 
     def _action(self, robot: int, label: int, action: GroundAction) -> None:
         chosen = self._label(robot, label)
-        self.step += [(-chosen, *said) for said in self._saying(action.precondition, robot, label)]
+        self.step += [
+            (-chosen, *sorted(said, key=abs))
+            for said in self._saying(action.precondition, robot, label)
+        ]
         index = self._model.codec.facts.index
         for effect in action.effects:
             if effect.atom not in index:
@@ -141,9 +159,11 @@ class PlanFormula:
         """A variable for: the label is chosen, and the condition of an effect holds."""
         chosen, fires = self._label(robot, label), self._fresh()
         self.step.append((-fires, chosen))
-        self.step += [(-fires, *said) for said in self._saying(condition, robot, label)]
-        otherwise = self._saying(negated(condition), robot, label)
-        self.step += [(fires, -chosen, *said) for said in otherwise]
+        self.step += [
+            (-fires, *sorted(said, key=abs)) for said in self._saying(condition, robot, label)
+        ]
+        otherwise = self._saying(condition, robot, label, wanted=False)
+        self.step += [(fires, -chosen, *sorted(said, key=abs)) for said in otherwise]
         return fires
 
     def _apart(self, i: int, j: int) -> None:
@@ -180,3 +200,29 @@ class PlanFormula:
 def _flat(clauses: Iterable[Sequence[int]]) -> Ints:
     """Clauses one after another, each followed by 0."""
     return np.array([literal for clause in clauses for literal in (*clause, 0)], np.int64)
+
+
+def _all(parts: Iterable[list[Clause]]) -> list[Clause]:
+    return _few(clause for part in parts for clause in part)
+
+
+def _any(parts: Sequence[list[Clause]]) -> list[Clause]:
+    if [] in parts:
+        return []
+    found: list[Clause] = [frozenset()]
+    for part in parts:
+        if len(found) * len(part) > _MOST:
+            raise TooManyClauses
+        joined = (one | other for one, other in product(found, part))
+        found = _few(
+            clause for clause in joined if not any(-literal in clause for literal in clause)
+        )
+    return found
+
+
+def _few(clauses: Iterable[Clause]) -> list[Clause]:
+    """Different clauses; raises `TooManyClauses`."""
+    found = list(dict.fromkeys(clauses))
+    if sum(map(len, found)) > _MOST:
+        raise TooManyClauses
+    return found
