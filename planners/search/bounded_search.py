@@ -40,7 +40,7 @@ _TRIED = 4
 _MET, _GROWN = -1, -2
 #: States from which ways are tried, the ways that are followed from each, and the share of them
 #: that has to lead to the goal.
-_SAMPLED, _WAYS, _MOST = 50, 4, 0.5
+_SAMPLED, _WAYS, _MOST = 50, 8, 0.5
 
 
 def probe_size(model: JointModel, bound: int, pieces: PieceSizes) -> int:
