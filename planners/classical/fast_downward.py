@@ -14,8 +14,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -114,7 +113,8 @@ def total_cost(classical: ClassicalTask) -> int | None:
 
     See `optimal_cost`.
     """
-    with postponed_signals() as signals, _directory(classical) as directory:
+    with postponed_signals() as signals, ExitStack() as ended:
+        directory = _written(classical, ended)
         process = _started(directory)
         try:
             with signals.heard():
@@ -130,24 +130,18 @@ def total_cost(classical: ClassicalTask) -> int | None:
     return total
 
 
-@contextmanager
-def _directory(classical: ClassicalTask) -> Iterator[Path]:
-    """A directory with the task, and for all that Fast Downward writes."""
+def _written(classical: ClassicalTask, ended: ExitStack) -> Path:
+    """A directory with the task, for all that Fast Downward writes; it goes with ``ended``."""
     try:
-        directory = tempfile.TemporaryDirectory(prefix="coordlang-")
-        try:
-            for file, text in zip(("domain", "problem"), to_pddl(classical), strict=True):
-                Path(directory.name, f"{file}.pddl").write_text(text)
-        except OSError:
-            directory.cleanup()
-            raise
+        directory = Path(ended.enter_context(tempfile.TemporaryDirectory(prefix="coordlang-")))
+        for file, text in zip(("domain", "problem"), to_pddl(classical), strict=True):
+            (directory / f"{file}.pddl").write_text(text)
     except OSError as error:
         raise FastDownwardFailed(
             f"the task for Fast Downward cannot be written: {error.strerror}",
             remedy="Set TMPDIR to a folder with free space that you may write to.",
         ) from None
-    with directory as name:
-        yield Path(name)
+    return directory
 
 
 def _started(directory: Path) -> subprocess.Popen[bytes]:

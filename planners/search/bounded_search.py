@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planners.joint.model import Goal, JointModel, Options, PlanningTask
+from planners.joint.model import JointModel, Options, PlanningTask
 from planners.joint.tables import Ints, Rows
 from planners.search.exact_bound import ExactBound, exact_bound
 from planners.search.goals import FAR, searched
@@ -34,7 +34,7 @@ _FORMULA, _STEPS = 50_000, 20
 #: composed.
 _TOO_MANY = 10
 #: As many times more joint steps may be composed to see that no solver needs to be asked.
-_TRIED = 4
+_TRIED = 8
 #: How a round ended: the goal was met, or more joint steps were composed than are tried without
 #: exact bounds.
 _MET, _GROWN = -1, -2
@@ -121,14 +121,42 @@ class BoundedSearch(Exploration):
         most = _TRIED * self._probe
         self._limited = False
         at_least = self.bound if self.bound < FAR - 1 else 0
-        if self._model.cost == "makespan" and at_least:
-            last, left = self.layer, at_least - self.depth
-            if mostly_lead(self._model, self._task.goal, self._heuristic, last, left, most):
-                return at_least
+        is_makespan = self._model.cost == "makespan"
+        if is_makespan and at_least and self._mostly_lead(at_least - self.depth, most):
+            return at_least
         self.exact = exact_bound(self._model, self._task, self._variables, at_least, self._pieces)
-        if self.exact is None:
-            return self.bound
-        return self.exact.makespan
+        return self.bound if self.exact is None else self.exact.makespan
+
+    def _mostly_lead(self, left: int, most: int) -> bool:
+        """Whether more than half of the last layer has a way to the goal in ``left`` joint steps.
+
+        Where they do and costs do not count, hardly a state within the bound is useless, and a
+        solver that is asked which labels optimal plans have can leave nothing out (robots on open
+        grids).  A way that is found is one; that none was found proves nothing.  No, too, once
+        about ``most`` joint steps are composed.  Some of the states are asked for, evenly.
+        """
+        assert self._heuristic.value is not None
+        rows = self.layer[:: -(-len(self.layers[-1]) // _SAMPLED)]
+        begin, composed = np.arange(len(rows)), 0
+        leads = np.zeros(len(rows), np.bool_)
+        while left and len(begin) and composed <= most:
+            left -= 1
+
+            def only(states: Rows, options: Options, left: int = left) -> Options:
+                return self._heuristic.in_time(states, options, left)[0]
+
+            steps = self._model.successors(rows, only)
+            composed += len(steps)
+            begin, bounds = begin[steps.source], self._heuristic.value(steps.result)
+            # Of the joint steps from each beginning that are in time those with the least bounds.
+            best = np.flatnonzero(bounds <= left)
+            best = best[np.lexsort((bounds[best], begin[best]))]
+            best = best[np.arange(len(best)) - np.searchsorted(begin[best], begin[best]) < _WAYS]
+            begin, rows = begin[best], steps.result[best]
+            leads[begin[self._model.holds(self._task.goal, rows)]] = True
+            open_ = ~leads[begin]
+            begin, rows = begin[open_], rows[open_]
+        return bool(leads.mean() > _MOST)
 
     @property
     def bounded_by(self) -> str:
@@ -201,9 +229,8 @@ class BoundedSearch(Exploration):
                 raise _GrownError
             if self.exact is not None:
                 options = self.exact.only(depth - 1, rows, options)
-            if self._heuristic.in_time is not None:
-                options, low = self._heuristic.in_time(rows, options, self.bound - depth)
-                beyond = min(beyond, low + depth)
+            options, low = self._heuristic.in_time(rows, options, self.bound - depth)
+            beyond = min(beyond, low + depth)
             return options
 
         for numbers, steps in self.steps(only, *((_FIRST_PROBED, self._probe) * self._limited)):
@@ -235,37 +262,3 @@ def _combinations(options: Options) -> float:
     for first, _ in options:
         counts *= np.diff(first)
     return float(counts.sum())
-
-
-def mostly_lead(
-    model: JointModel, goal: Goal, heuristic: Heuristic, rows: Rows, left: int, most: int
-) -> bool:
-    """Whether more than half of some states have a way to the goal in ``left`` joint steps.
-
-    Where they do and costs do not count, hardly a state within the bound is useless, and a solver
-    that is asked which labels optimal plans have can leave nothing out (robots on open grids).  A
-    way that is found is one; that none was found proves nothing.  No, too, once about ``most``
-    joint steps are composed.  Some of the states, ``rows``, are asked for, evenly.
-    """
-    assert heuristic.value is not None
-    rows = rows[:: -(-len(rows) // _SAMPLED)]
-    begin, composed = np.arange(len(rows)), 0
-    leads = np.zeros(len(rows), np.bool_)
-    while left and len(begin) and composed <= most:
-        left -= 1
-
-        def only(states: Rows, options: Options, left: int = left) -> Options:
-            return heuristic.in_time(states, options, left)[0] if heuristic.in_time else options
-
-        steps = model.successors(rows, only)
-        composed += len(steps)
-        begin, bounds = begin[steps.source], heuristic.value(steps.result)
-        # Of the joint steps from each beginning that are in time those with the least bounds.
-        best = np.flatnonzero(bounds <= left)
-        best = best[np.lexsort((bounds[best], begin[best]))]
-        best = best[np.arange(len(best)) - np.searchsorted(begin[best], begin[best]) < _WAYS]
-        begin, rows = begin[best], steps.result[best]
-        leads[begin[model.holds(goal, rows)]] = True
-        open_ = ~leads[begin]
-        begin, rows = begin[open_], rows[open_]
-    return bool(leads.mean() > _MOST)

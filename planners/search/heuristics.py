@@ -63,7 +63,10 @@ class Heuristic:
 
     name: str
     value: Values | None = None
-    in_time: Callable[[Rows, Options, int], tuple[Options, int]] | None = None
+    in_time: Callable[[Rows, Options, int], tuple[Options, int]] = lambda _, every, _left: (
+        every,
+        FAR,
+    )
     exact: bool = False
 
 

@@ -44,8 +44,6 @@ def explore_within(
         return f"{found.states:,} states within {found.depth} of {steps} steps of {task.name}"
 
     def only(rows: Rows, options: Options) -> Options:
-        if heuristic.in_time is None:
-            return options
         return heuristic.in_time(rows, options, steps - found.depth - 1)[0]
 
     with reaching(so_far, "less slack"):
