@@ -34,6 +34,12 @@ def ranges(starts: Ints, counts: Ints) -> Ints:
     return within
 
 
+def kept_runs(first: Ints, kept: Bools) -> Ints:
+    """The bounds of the runs of a CSR table (runs + 1) of whose entries only some are kept."""
+    bounds: Ints = np.concatenate(([0], np.cumsum(kept)))[first]
+    return bounds
+
+
 def spans(sizes: NDArray[np.float64], most: int) -> Iterator[slice]:
     """Cut a table so that the sizes of each piece sum to at most ``most``.
 

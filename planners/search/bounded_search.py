@@ -228,7 +228,7 @@ class BoundedSearch(Exploration):
             if self._limited and many:
                 raise _GrownError
             if self.exact is not None:
-                options = self.exact.only(depth - 1, rows, options)
+                options = self.exact.only(depth - 1, options)
             options, low = self._heuristic.in_time(rows, options, self.bound - depth)
             beyond = min(beyond, low + depth)
             return options

@@ -20,7 +20,7 @@ import numpy as np
 from planners.joint.composition import ComposingStepper
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, PlanningTask
-from planners.joint.tables import Bools, Ints, Rows
+from planners.joint.tables import Bools, Ints, kept_runs
 from planners.search.goals import goal_facts
 from planners.search.plan_formula import PlanFormula, TooManyClauses
 from planners.search.questions import FixedPlans, Literals, OutOfEffort, Plan
@@ -59,14 +59,12 @@ class ExactBound:
         self._source: Ints = np.zeros(0, np.int64)
         self._labels: Labels = np.zeros((0, plans.first.shape[1]), np.int32)
 
-    def only(self, depth: int, rows: Rows, options: Options) -> Options:
+    def only(self, depth: int, options: Options) -> Options:
         """The robots' options in states after ``depth`` steps, without labels that are not used."""
-        found = []
-        for (first, label), used in zip(options, self._used[depth], strict=True):
-            good = used[label]
-            state = np.repeat(np.arange(len(rows)), np.diff(first))[good]
-            found.append((np.searchsorted(state, np.arange(len(rows) + 1)), label[good]))
-        return found
+        return [
+            (kept_runs(first, used[label]), label[used[label]])
+            for (first, label), used in zip(options, self._used[depth], strict=True)
+        ]
 
     def left_out(self, edges: Edges, depth: int, states: int) -> Ints:
         """States of the layer that ``edges`` lead to through which no optimal plan passes.

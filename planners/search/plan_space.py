@@ -18,7 +18,7 @@ import numpy as np
 
 from planners.joint.conditions import Labels
 from planners.joint.model import Goal, JointModel
-from planners.joint.tables import Bools, Ints, Rows, ranges
+from planners.joint.tables import Bools, Ints, Rows, kept_runs, ranges
 
 #: More than any sum of costs, of nodes from which no way leads to a goal.
 _NO_WAY = np.iinfo(np.int64).max // 4
@@ -284,7 +284,7 @@ class PlanSpace:
         """The part of the graph that paths over these edges (a mask) reach from the starts."""
         fewer = replace(
             self,
-            first=np.concatenate(([0], np.cumsum(edges)))[self.first],
+            first=kept_runs(self.first, edges),
             target=self.target[edges],
             labels=self.labels[edges],
             cost=self.cost[edges],

@@ -17,7 +17,7 @@ import numpy as np
 
 from planners.joint.model import Goal, JointModel, Options
 from planners.joint.states import TrueFacts
-from planners.joint.tables import Ints, Rows
+from planners.joint.tables import Ints, Rows, kept_runs
 from planners.search.goals import FAR, goal_facts
 from planners.search.state_variables import StateVariable
 
@@ -79,7 +79,7 @@ class Projections:
                 need = np.maximum(need, np.where(after >= 0, after, here[state]))
             good = need <= left
             beyond = min(beyond, int(need[~good].min(initial=FAR)))
-            kept.append((np.searchsorted(state[good], np.arange(len(rows) + 1)), label[good]))
+            kept.append((kept_runs(first, good), label[good]))
         return kept, beyond
 
 
