@@ -218,31 +218,25 @@ def manhattan(model: JointModel, goal: Goal, variables: Sequence[StateVariable])
 
     Raises `UsageError` if the goal wants nothing at a place.
     """
-    wanted, facts = goal_facts(model, goal), list(map(_place, model.codec.facts))
-    bounds = np.zeros(len(facts), np.int64)
-    some = False
+    wanted, places = goal_facts(model, goal), list(map(_place, model.codec.facts))
+    bounds: dict[int, int] = {}
     for variable in variables:
-        goals = [place for fact in variable.facts if fact in wanted and (place := facts[fact])]
-        moves = [
-            (facts[needs[0]], place)
-            for needs, value in variable.changes.values()
-            if (place := facts[value]) is not None
-        ]
-        if len(goals) == 1 and all(before for before, _ in moves):
-            some = True
-            speed = max([1, *(_distance(before, after) for before, after in moves if before)])
+        goals = [place for fact in variable.facts if fact in wanted and (place := places[fact])]
+        speed = _speed(variable, places)
+        if len(goals) == 1 and speed is not None:
             for fact in variable.facts:
-                place = facts[fact]
+                place = places[fact]
                 bounds[fact] = -(-_distance(place, goals[0]) // speed) if place else FAR
-    if not some:
+    if not bounds:
         raise UsageError(
             "the Manhattan heuristic needs a goal with places such as c2-3",
             remedy="Use --heuristic relaxed: it needs no names.",
         )
+    of_fact = np.array([bounds.get(fact, 0) for fact in range(len(places))])
 
     def value(rows: Rows) -> Ints:
         true = TrueFacts.of(model.codec.facts_part(rows))
-        found: Ints = true.reduced(np.maximum, bounds, 0)
+        found: Ints = true.reduced(np.maximum, of_fact, 0)
         return found
 
     return value
@@ -252,6 +246,18 @@ def _place(atom: Atom) -> tuple[int, int] | None:
     """The place that an atom speaks of, if there is exactly one."""
     found = [m for arg in atom.args if (m := re.search(r"(?<!\d)(\d{1,9})\D+(\d{1,9})$", arg))]
     return (int(found[0][1]), int(found[0][2])) if len(found) == 1 else None
+
+
+def _speed(variable: StateVariable, places: Sequence[tuple[int, int] | None]) -> int | None:
+    """How far one joint step moves a thing at most; None if it may turn up anywhere."""
+    speed = 1
+    for needs, value in variable.changes.values():
+        before, after = places[needs[0]], places[value]
+        if after is not None and before is None:
+            return None
+        if after is not None and before is not None:
+            speed = max(speed, _distance(before, after))
+    return speed
 
 
 def _distance(one: tuple[int, int], other: tuple[int, int]) -> int:

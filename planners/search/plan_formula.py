@@ -15,7 +15,7 @@ import numpy as np
 
 from planners.grounding.actions import GroundAction
 from planners.joint.composition import ComposingStepper
-from planners.joint.model import FullState, JointModel, PlanningTask
+from planners.joint.model import FullState, Goal, JointModel, PlanningTask
 from planners.joint.tables import Ints, Rows
 from planners.pddl.lifted import TRUE, And, Atom, Formula, Not, Or, StepAtom, Truth
 from planners.search.mutexes import mutexes
@@ -66,20 +66,9 @@ class PlanFormula:
                     self._action(robot, label, action)
         for i, j in combinations(range(len(model.robots)), 2):
             self._apart(i, j)
-        known = {fact: number for number, own in enumerate(variables) for fact in own.facts}
-        for one, other in mutexes(model, task.init):
-            if one == other:
-                self.step.append((-(one + 1),))
-            elif one not in known or known[one] != known.get(other):
-                self.step.append((-(one + 1), -(other + 1)))
+        self._never_together(variables, task.init)
         self._facts_follow()
-        goal = task.goal
-        self._flat_step = _flat(self.step)
-        self._goal = _flat(
-            [(fact + 1 if fact in goal.facts else -(fact + 1),) for fact in range(facts)]
-            if isinstance(goal, FullState)
-            else map(sorted, self._saying(goal))
-        )
+        self._flat_step, self._goal = _flat(self.step), _flat(self._goal_clauses(task.goal))
 
     def plans(self, row: Rows, steps: int, effort: int) -> FixedPlans:
         """The plans of so many steps from a state to the goal, as a formula to be closed.
@@ -187,6 +176,15 @@ class PlanFormula:
             ]
         return self._implied[key]
 
+    def _never_together(self, variables: Sequence[StateVariable], init: Rows) -> None:
+        """Pairs of facts that exclude each other, of different variables."""
+        known = {fact: number for number, own in enumerate(variables) for fact in own.facts}
+        for one, other in mutexes(self._model, init):
+            if one == other:
+                self.step.append((-(one + 1),))
+            elif one not in known or known[one] != known.get(other):
+                self.step.append((-(one + 1), -(other + 1)))
+
     def _facts_follow(self) -> None:
         """What is true in the next state; added facts are, whatever deletes them, too."""
         for fact in range(len(self._adders)):
@@ -195,6 +193,12 @@ class PlanFormula:
             self.step += [(-adder, then) for adder in adders]
             self.step += [(-deleter, *adders, -then) for deleter in deleters]
             self.step += [(-then, now, *adders), (then, -now, *deleters)]
+
+    def _goal_clauses(self, goal: Goal) -> list[list[int]]:
+        if isinstance(goal, FullState):
+            facts = range(len(self._adders))
+            return [[fact + 1 if fact in goal.facts else -(fact + 1)] for fact in facts]
+        return [sorted(clause, key=abs) for clause in self._saying(goal)]
 
 
 def _flat(clauses: Iterable[Sequence[int]]) -> Ints:
