@@ -131,7 +131,7 @@ class StateTable:
             left = left[(self._rows[number[left]] != rows[left]).any(axis=1)]
             at[left] = (at[left] + 1) % len(self._slots)
         # Of equal new states one was numbered, and these numbers have gaps.
-        new = np.unique(number[number >= size])
+        new = size + np.flatnonzero(number == size + np.arange(len(rows)))
         self._size += len(new)
         self._slots[at[new - size]] = np.arange(size, self._size)
         self._rows[size : self._size] = self._rows[new]
@@ -213,7 +213,8 @@ class Exploration:
     def __init__(self, model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> None:
         self._model, self._pieces = model, pieces
         self.table = StateTable(model.codec.width)
-        self.layers: list[Ints] = [np.unique(self.table.add(inits))]
+        self.table.add(inits)
+        self.layers: list[Ints] = [np.arange(len(self.table))]
         self.edges: list[Edges] = []
         self.composed = 0
 
