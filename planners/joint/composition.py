@@ -14,9 +14,9 @@ from planners.joint.conditions import Evaluator, Labels, Operators, speaks_of_st
 from planners.joint.interference import Choices, compatible, conflict
 from planners.joint.model import Options, Stepper, Steps
 from planners.joint.states import StateCodec
-from planners.joint.tables import Bools, Ints, Rows, ranges, spans
-from planners.pddl.formula_tree import conjuncts, formula_text, signed, substituted
-from planners.pddl.lifted import FALSE, And, Atom, Formula, StepAtom, Truth
+from planners.joint.tables import Bools, Ints, Numbers, Rows, ranges, spans
+from planners.pddl.formula_tree import conjuncts, formula_text, joined, signed, substituted
+from planners.pddl.lifted import FALSE, And, Atom, Formula, Or, StepAtom, Truth
 from planners.pddl.model_options import Cost
 from planners.system.errors import BadInput, OutOfMemory, Position
 from planners.system.limits import memory_left, more_memory
@@ -94,8 +94,9 @@ class ComposingStepper(Stepper):
         sizes = np.ones(len(rows))
         for first, _ in chosen:
             sizes *= np.diff(first)
+        waits = [own.waits(rows, *its) for own, its in zip(self._robot, chosen, strict=True)]
         for span in list(spans(sizes, self.piece)) or [slice(0, 0)]:
-            yield self._compose(rows, chosen, span)
+            yield self._compose(rows, chosen, waits, span)
 
     def choices(self, rows: Rows) -> Options:
         """For each robot the labels whose conditions on the state hold, by state (CSR)."""
@@ -163,7 +164,9 @@ class ComposingStepper(Stepper):
             for a, b in np.argwhere(~self.tables[i, j][np.ix_(mine, theirs)]).tolist():
                 yield i, j, int(mine[a]), int(theirs[b])
 
-    def _compose(self, rows: Rows, options: Options, span: slice) -> tuple[Ints, Labels]:
+    def _compose(
+        self, rows: Rows, options: Options, waits: Sequence[Bools], span: slice
+    ) -> tuple[Ints, Labels]:
         source = np.arange(span.start, span.stop)
         # By robot its option in each combination so far.
         picked: list[Ints] = []
@@ -184,7 +187,8 @@ class ComposingStepper(Stepper):
         labels = np.stack(columns, axis=1, dtype=np.int32, casting="same_kind")
         fits = np.ones(len(source), np.bool_)
         for i, robot in enumerate(self._robot):
-            robot.drop_unmet(fits, i, rows, source, labels)
+            asking = np.flatnonzero(fits & waits[i][picked[i]])
+            robot.drop_unmet(fits, asking, i, rows, source, labels)
         return (source, labels) if fits.all() else (source[fits], labels[fits])
 
     def _require_room(self, combinations: int, robot: int, states: int) -> None:
@@ -230,23 +234,44 @@ class _Subactions:
         # A shared subaction is paid once, by the first of its owners.
         own = [a.second_cost(cost) if a.owners[0] == robot else 0 for a in actions if a]
         self.cost = np.array([idling_cost, *own], np.int64)
-        #: By label what it asks of the step.
-        self._formulas = {
-            label: _known(And(tuple(formulas)), evaluator, robot, label)
-            for label, formulas in self.operators.step_formulas.items()
-        }
+        #: By label what it asks of the step, and what of the state is enough for that.
+        self._formulas: dict[int, tuple[Formula, Formula]] = {}
+        for label, formulas in self.operators.step_formulas.items():
+            formula = _known(And(tuple(formulas)), evaluator, robot, label)
+            self._formulas[label] = formula, _enough(formula)
         self._asks = np.zeros(len(actions), np.bool_)
         self._asks[list(self._formulas)] = True
 
-    def drop_unmet(self, fits: Bools, robot: int, rows: Rows, source: Ints, labels: Labels) -> None:
-        """Clear ``fits`` where a formula about the step is not met."""
+    def waits(self, rows: Rows, first: Ints, label: Ints) -> Bools:
+        """Which options in the states of a table (CSR) depend on what the others choose."""
+        found = self._asks[label]
+        row = np.repeat(np.arange(len(rows)), np.diff(first))
+        for there in _by_value(np.flatnonzero(found), label):
+            _, enough = self._formulas[int(label[there[0]])]
+            found[there] = ~self._evaluator.holds(enough, rows, row[there])
+        return found
+
+    def drop_unmet(
+        self, fits: Bools, asking: Ints, robot: int, rows: Rows, source: Ints, labels: Labels
+    ) -> None:
+        """Clear ``fits`` where a formula about the step is not met, of the items ``asking``."""
         own = labels[:, robot]
-        asking = np.flatnonzero(fits & self._asks[own])
-        asking = asking[np.argsort(own[asking], kind="stable")]
-        for there in np.split(asking, np.flatnonzero(np.diff(own[asking])) + 1):
-            if len(there):
-                formula = self._formulas[int(own[there[0]])]
-                fits[there] = self._evaluator.holds(formula, rows, source[there], labels[there])
+        for there in _by_value(asking, own):
+            formula, _ = self._formulas[int(own[there[0]])]
+            fits[there] = self._evaluator.holds(formula, rows, source[there], labels[there])
+
+
+def _by_value(items: Ints, values: Numbers) -> list[Ints]:
+    """The items in groups of equal values."""
+    items = items[np.argsort(values[items], kind="stable")]
+    return np.split(items, np.flatnonzero(np.diff(values[items])) + 1) if len(items) else []
+
+
+def _enough(formula: Formula) -> Formula:
+    """What of the state makes a formula in negation normal form true, whatever the step is."""
+    if isinstance(formula, And | Or):
+        return joined(type(formula), map(_enough, formula.parts))
+    return FALSE if isinstance(signed(formula)[0], StepAtom) else formula
 
 
 def _known(formula: Formula, evaluator: Evaluator, robot: int, label: int) -> Formula:
