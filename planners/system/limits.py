@@ -49,6 +49,11 @@ _NO_REASON = ("without exception set", "without setting an exception")
 _LONGER = "Use a larger --time-limit."
 #: Of the memory that is free, what a process takes that is given no limit.
 _SHARE = 0.8
+#: Where Linux says what the machine has and what a process takes; elsewhere psutil knows, which
+#: takes as long to load as a small task to solve.
+_MEMORY_OF_MACHINE = Path("/proc/meminfo")
+_MEMORY_OF_PROCESS = Path("/proc/self/statm")
+_AVAILABLE = re.compile(r"^MemAvailable:\s*(\d+) kB$", re.MULTILINE)
 #: Where control groups (version 2) are.
 _GROUPS = Path("/sys/fs/cgroup")
 
@@ -263,9 +268,18 @@ def address_space_left() -> float:
 
 def _available() -> int:
     """Bytes that the machine, or the process's control group, has free or can free at once."""
+    return min(_machine_memory_left(), _group_memory_left())
+
+
+def _machine_memory_left() -> int:
+    """Bytes that the machine has free or can free at once."""
+    with suppress(OSError):
+        found = _AVAILABLE.search(_MEMORY_OF_MACHINE.read_text())
+        if found is not None:
+            return int(found[1]) * 2**10
     import psutil
 
-    return min(int(psutil.virtual_memory().available), _group_memory_left())
+    return int(psutil.virtual_memory().available)
 
 
 def _group_memory_left() -> int:
@@ -291,6 +305,8 @@ def _memory_groups() -> Iterator[Path]:
 
 def address_space() -> int:
     """Bytes of address space that this process has."""
+    with suppress(OSError):
+        return int(_MEMORY_OF_PROCESS.read_text().split()[0]) * resource.getpagesize()
     import psutil
 
     return int(psutil.Process().memory_info().vms)
