@@ -12,7 +12,7 @@ of what was found only then.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from random import Random
 
@@ -132,14 +132,13 @@ def many_counterexamples(
     random = Random(0)  # always the same ones
     found: dict[int, list[_Plans]] = {}
     effort = sys.maxsize
-    for node in mixtures.suspects_first(nodes):
+    for node in nodes:
         failing = mixtures.failing(node)
         if failing is not None:
             found[node] = [mixtures.near_plans(node, failing, random)]
             effort = min(effort, mixtures.visited + _EFFORT * most)
         if len(found) >= most or mixtures.visited > effort:
             break
-    mixtures.suspect(found)
     effort = mixtures.visited + _EFFORT * most
     for node, plans in found.items():
         if mixtures.visited > effort:
@@ -173,8 +172,6 @@ class Mixtures:
     def __init__(self, choices: Choices) -> None:
         self._choices, self._space = choices, choices.space
         self._edges = EdgeTrees(choices.space)
-        self._suspects: dict[int, int] = {}
-        self._turn = 0
         self._forget()
 
     def _forget(self) -> None:
@@ -185,15 +182,6 @@ class Mixtures:
         #: How often the next steps of a mixture were looked at.
         self.visited = 0
         self._steps_left = sys.maxsize
-
-    def suspects_first(self, nodes: Sequence[int]) -> list[int]:
-        """Some nodes, those first from which mixtures failed last."""
-        return sorted(nodes, key=lambda node: -self._suspects.get(node, -1))
-
-    def suspect(self, nodes: Iterable[int]) -> None:
-        """Remember that mixtures from these nodes have failed."""
-        self._turn += 1
-        self._suspects.update(dict.fromkeys(nodes, self._turn))
 
     @property
     def choices(self) -> Choices:
@@ -212,7 +200,7 @@ class Mixtures:
 
         The first one, found soon as many nodes lead to the same mixtures, or one that is drawn.
         """
-        return self._failing(node, tuple(((), own) for own in self._spoken.of_node[node]), random)
+        return self._failing(node, tuple(((), own) for own in self._spoken.of_node(node)), random)
 
     def _failing(self, node: int, ahead: _Ahead, random: Random | None) -> _Failing | None:
         """The same where the robots are ahead of each other in what they say."""
@@ -393,7 +381,7 @@ class Mixtures:
     def _can_say(self, node: int, robot: int, codes: list[int], sentence: Words) -> bool:
         """Whether some plan from a node has a robot's first steps and a sentence."""
         spoken = self._spoken
-        after = spoken.after(spoken.of_node[node][robot], codes)
+        after = spoken.after(spoken.of_node(node)[robot], codes)
         if after is None:
             return False
         said = tuple(word for code in codes for word in spoken.entered_by(code))

@@ -96,11 +96,6 @@ class FailingTuples:
         """Count the tuples, one for all their images."""
         return sum(len(table.states) for table in self._tables.values())
 
-    def copy(self) -> FailingTuples:
-        """The same tuples, to which others are added."""
-        tables, batches = dict(self._tables), list(self._batches)
-        return FailingTuples(self.group, self.states, tables, batches, self._keys)
-
     @property
     def images(self) -> Sequence[Ints]:
         """Where the identity and each symmetry take every state."""

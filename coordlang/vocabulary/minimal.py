@@ -23,7 +23,6 @@ from coordlang.vocabulary.loop import Budget, Languages, between, close_bounds, 
 from coordlang.vocabulary.merging import merged
 from coordlang.vocabulary.partitions import Partitions, Refutation
 from coordlang.vocabulary.sat import Undecided
-from coordlang.vocabulary.stutter_free import StutterFree
 from planners.system.limits import run_until_stopped
 
 if TYPE_CHECKING:  # they load networkx
@@ -41,9 +40,10 @@ _PAIRS, _FIRST_PAIRS = 1_000, 30
 _BEGINNING = 10
 #: What may be spent on each number at first.
 _SOON = Budget(rounds=10, conflicts=2_000)
-#: Stutter-free partitions of one number that are looked at in one go before others are.
-_LONG = 40
-#: They have fewer words than the best language by this part at least.
+#: Rounds that partitions of a kind are given for one task at first, which is enough for the first
+#: kind, and until they are so many ..
+_FEW, _LONG = 5, 10
+#: .. with fewer words than the best language by this part at least.
 _FEWER_WORDS = 5
 #: Merges in a row that fail before something else is tried.
 _VAIN = 15
@@ -100,7 +100,6 @@ class MinimalSearch:
         self._most = sys.maxsize if effort is None else effort * _UNIT
         self._merges = 0
         self._merging: tuple[Assignment, Iterator[Assignment]] | None = None
-        self._least_stutter_free = 2
         self.lower = job.lower_bound
         self.best: Assignment | None = job.incumbent
         self.refuting = Refutation(1, {}, 0)
@@ -114,9 +113,8 @@ class MinimalSearch:
 
     @cached_property
     def _partitions(self) -> Partitions:
-        known, spaces = self.languages.known, self._job.candidates.spaces
-        stutter_free = StutterFree(spaces[0]) if self._is_one_task else None
-        return Partitions(self._job.states, known.clauses, known.group.permutations, stutter_free)
+        known = self.languages.known
+        return Partitions(self._job.states, known.clauses, known.group.permutations)
 
     @cached_property
     def _tied(self) -> TiedWords:
@@ -148,10 +146,10 @@ class MinimalSearch:
         if self._pairs // _FIRST_PAIRS > _BEGINNING * self._most:
             return
         if self._is_one_task:
-            budget = _SOON
-            while self._least_stutter_free < self.upper and budget.rounds <= _LONG:
-                self._find_stutter_free(budget)
-                budget = budget.doubled()
+            rounds = _FEW
+            while self.lower < self.upper and rounds <= _LONG:
+                self._find_decided(rounds)
+                rounds *= 2
         while self.lower < self.upper and not self._is_spent and self.decide(self.lower, _SOON):
             pass
         if not self._is_one_task:
@@ -173,24 +171,16 @@ class MinimalSearch:
             if not self._find_or_refute(between(self.lower, self.upper), budget):
                 return
 
-    def _find_stutter_free(self, budget: Budget) -> None:
-        """Look for a stutter-free language with fewer words than the best one.
+    def _find_decided(self, rounds: int) -> None:
+        """Look for a language with fewer words than the best one, by few facts that decide them.
 
-        From below, where partitions are refuted soonest and most is learnt of the others, too; then
-        nearer and nearer to the number that suffices.
+        Between the number that was tried last and the one that suffices, nearer to the lower one.
         """
-        size = max(self.lower, self._least_stutter_free)
-        while size <= self.upper - max(1, self.upper // _FEWER_WORDS) and not self._is_spent:
-            try:
-                found = self._find_within(self._partitions.find_stutter_free, size, budget)
-            except Undecided:
-                size = max(size + 1, between(size, self.upper))
-                continue
-            self._partitions.drop_stutter_free(size)
-            if found is not None:
-                self._offer(found)
-                return
-            size = self._least_stutter_free = size + 1
+        least = self.lower
+        while least <= self.upper - max(1, self.upper // _FEWER_WORDS) and not self._is_spent:
+            size = between(least, self.upper)
+            if not self._finds_tied(size, rounds):
+                least = size + 1
 
     @cached_property
     def _pairs(self) -> int:
@@ -241,7 +231,7 @@ class MinimalSearch:
             return self.decide(size, budget)
         bounds = self.lower, self.upper
         if self._is_one_task:
-            self._find_stutter_free(budget)
+            self._find_decided(budget.rounds)
         if bounds == (self.lower, self.upper):
             self.merge(_VAIN)
         return bounds != (self.lower, self.upper) or self.decide(size, budget)

@@ -19,7 +19,6 @@ from coordlang.vocabulary.job import Evidence
 from coordlang.vocabulary.loop import ProblemsBySize
 from coordlang.vocabulary.necessary_clauses import NecessaryClauses
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
-from coordlang.vocabulary.stutter_free import StutterFree
 from planners.search.sat import SolverName
 
 #: Conflicts within which most partitions are found; after so many the solver is likely on the way
@@ -55,10 +54,10 @@ class Refutation:
 
 
 class Partitions:
-    """Partitions that satisfy all known clauses, by three solvers.
+    """Partitions that satisfy all known clauses, by two solvers.
 
     The second one is allowed only one of symmetric partitions: proofs are ten times shorter, but
-    partitions harder to find.  The third one is allowed only stutter-free partitions.
+    partitions harder to find.
 
     Parameters
     ----------
@@ -68,8 +67,6 @@ class Partitions:
         The known clauses about these states, a list that only grows.
     permutations
         Where symmetries take each state; the images of every clause must be clauses.
-    stutter_free
-        What stutter-free partitions have in common, where they are asked for.
 
     Attributes
     ----------
@@ -82,17 +79,14 @@ class Partitions:
         states: Sequence[int],
         clauses: Sequence[Clause],
         permutations: Sequence[Sequence[int]],
-        stutter_free: StutterFree | None = None,
     ) -> None:
         self._states, self._clauses, self._permutations = states, clauses, permutations
-        self._stutter_free = stutter_free
         self.conflicts = 0
         require = PartitionProblem.separate_one
         #: Numbers of words with which partitions are so few that the first solver finds none.
         self._hard: set[int] = set()
         self._all = ProblemsBySize(self._start, require)
         self._up_to_symmetry = ProblemsBySize(self._start_up_to_symmetry, require)
-        self._without_stutter = ProblemsBySize(self._start_stutter_free, require)
 
     def find(self, size: int, conflicts: int) -> dict[int, int] | None:
         """A partition into ``size`` words, or None if there is none.
@@ -116,10 +110,6 @@ class Partitions:
             self._all.drop(size)
         return self._solved(self._up_to_symmetry.under(size, self._clauses), conflicts)
 
-    def find_stutter_free(self, size: int, conflicts: int) -> dict[int, int] | None:
-        """`find` among stutter-free partitions."""
-        return self._solved(self._without_stutter.under(size, self._clauses), conflicts)
-
     def _solved(self, problem: PartitionProblem, conflicts: int) -> dict[int, int] | None:
         before = problem.conflicts
         try:
@@ -127,18 +117,14 @@ class Partitions:
         finally:
             self.conflicts += problem.conflicts - before
 
-    def drop_stutter_free(self, size: int) -> None:
-        """`drop` among stutter-free partitions."""
-        self._without_stutter.drop(size)
-
     def drop(self, size: int) -> None:
         """Forget a number of words that is decided."""
-        for problems in (self._all, self._up_to_symmetry, self._without_stutter):
+        for problems in (self._all, self._up_to_symmetry):
             problems.drop(size)
 
     def close(self) -> None:
         """Give back what the solvers hold."""
-        for problems in (self._all, self._up_to_symmetry, self._without_stutter):
+        for problems in (self._all, self._up_to_symmetry):
             problems.close()
 
     def _start(
@@ -157,14 +143,4 @@ class Partitions:
         problem = self._start(size, known, "glucose42")
         pairs = most_frequent_pairs(known, _COMPARED_PAIRS)
         problem.add_lex_leaders(self._permutations, pairs)
-        return problem
-
-    def _start_stutter_free(self, size: int, known: Sequence[Clause]) -> PartitionProblem:
-        assert self._stutter_free is not None, "only asked for one task"
-        problem = PartitionProblem(self._states, size, "glucose42", named=False)
-        for states in self._stutter_free.pairs:
-            problem.separate_one([states])
-        problem.prefer(self._stutter_free.preferred(size))
-        for clause in known:
-            problem.separate_one(clause)
         return problem

@@ -9,7 +9,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from copy import copy, deepcopy
 from dataclasses import dataclass
 from random import Random
 
@@ -111,14 +110,6 @@ class Refuter:
             for walked, table in zip(self._parts, tables, strict=True):
                 self._add(walked, _read(table))
                 progress(f"collecting plans whose mixture fails: {len(self.pool):,}")
-
-    def copy(self) -> Refuter:
-        """The same, which then goes its own way: what one meets the other does not."""
-        other = copy(self)
-        other.pool = self.pool.copy()
-        other._random = deepcopy(self._random)
-        other._parts = list(self._parts)
-        return other
 
     def agreeing(
         self,

@@ -32,15 +32,13 @@ class SpokenChoices:
 
     Attributes
     ----------
-    of_node
-        For each node the number of each robot's set, under the words of `say`.
     words
         The sets of sentences.
     """
 
     def __init__(self, choices: Choices) -> None:
         self.space, self.words = choices.space, SentenceSets()
-        self.of_node: list[tuple[int, ...]] = []
+        self._of_node: list[tuple[int, ...]] = []
         self.word: list[int] = []
         self.labels: list[list[int]] = self.space.labels.tolist()
         self.targets: list[int] = self.space.targets().tolist()
@@ -56,7 +54,7 @@ class SpokenChoices:
         return len(self._sets)
 
     def say(self, word: Ints) -> None:
-        """Set the words (nodes), and find the sets of all nodes from the goals up.
+        """Set the words (nodes).
 
         A word is called by the least of its states: sets without a word that has changed are the
         same as before.
@@ -65,16 +63,19 @@ class SpokenChoices:
         least = np.full(len(words), len(self.space.rows))
         np.minimum.at(least, number, self.space.state)
         self.word = least[number].tolist()
-        self.of_node = []
+        self._of_node = []
+
+    def of_node(self, wanted: int) -> tuple[int, ...]:
+        """For a node the number of each robot's set; found from the goals up, as far as asked."""
         robots = range(self.space.robots)
-        for node in range(len(self.space)):
+        for node in range(len(self._of_node), wanted + 1):
             moves: list[dict[int, set[int]]] = [{} for _ in robots]
             for edge in self.space.out_edges(node):
-                below = self.of_node[self.targets[edge]]
+                below = self._of_node[self.targets[edge]]
                 for robot in robots:
                     code = self.code(robot, edge, node)
                     moves[robot].setdefault(code, set()).add(below[robot])
-            self.of_node.append(
+            self._of_node.append(
                 tuple(
                     self._sets.of_moves(
                         {code: reduce(self._sets.union, sorted(sets)) for code, sets in own.items()}
@@ -82,6 +83,7 @@ class SpokenChoices:
                     for own in moves
                 )
             )
+        return self._of_node[wanted]
 
     def entered(self, edge: int, node: int) -> Words:
         """The word that a plan enters by an edge out of a node, if it does."""

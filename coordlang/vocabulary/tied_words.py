@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Languages in which some states have the words of others.
+"""Languages among partitions of a kind, of which there are fewer than of all.
 
-States that an abstraction takes for one (`coordlang.vocabulary.abstractions`), or that a symmetry
-takes to each other, share a word.  There are fewer partitions of such a kind than of all, and one
-of them often is a language where the loop finds none.  **What is not found here proves nothing
+States share a word that an abstraction takes for one (`coordlang.vocabulary.abstractions`), or that
+a symmetry takes to each other; in one task those of which a few facts say the same
+(`coordlang.vocabulary.deciding_facts`), or words are stutter-free.  One of these partitions often
+is a language where the loop finds none.  **What is not found here proves nothing
 about numbers of words**: that no partition of a kind is a language says nothing of the others
 (Proposition 18 of docs/concepts.md).
 """
@@ -11,14 +12,17 @@ about numbers of words**: that no partition of a kind is a language says nothing
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import islice
 
 import numpy as np
 
 from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
+from coordlang.vocabulary.deciding_facts import classes_by_facts
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.loop import Budget, Languages, find
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
+from coordlang.vocabulary.stutter_free import StutterFree
 from planners.joint.tables import Ints
 
 #: Clauses that are taken of a refuted partition, before their images; and failing tuples after
@@ -26,6 +30,9 @@ from planners.joint.tables import Ints
 _AT_ONCE, _ENOUGH = 100, 300
 #: What may be spent on each kind at first, and then twice as much each time.
 _FIRST = Budget(rounds=50, conflicts=2_000)
+#: (states) the class of each state, which shares a word, and what makes words stutter-free if
+#: they are to be.
+_Classes = tuple[Ints, StutterFree | None]
 #: Refuted partitions of all kinds for each of the budget, so many conflicts counted as one.
 _TOGETHER, _CONFLICTS = 8, 250
 
@@ -48,26 +55,42 @@ class TiedWords:
 
     def __init__(self, job: Job, languages: Languages) -> None:
         self._states, self._languages = np.array(job.states), languages
-        self._refuter = languages.refuter.copy()
+        self._refuter = languages.refuter
         self._random = np.random.default_rng(job.seed)
-        images = languages.refuter.pool.images
-        tied = [*abstractions(job.candidates, job.states), *map(_orbits, images[1:])]
-        tied.sort(key=lambda classes: len(np.unique(classes[self._states])))
-        self._tied = up_to_symmetry(tied, images)
+        self._images = languages.refuter.pool.images
+        self._tied: list[_Classes] = []
+        self._untied = self._classes(job)
         self.conflicts = 0
+        #: Of each number of words the kinds that are undecided, and how many were looked at.
         self._kinds: dict[int, deque[_Kind]] = {}
+        self._begun: dict[int, int] = {}
+
+    def _classes(self, job: Job) -> Iterator[_Classes]:
+        """Which states share a word, kind by kind: those with few classes first.
+
+        For one task: as few facts as possible decide it, or no state need share its word and words
+        are stutter-free, or more and more facts decide it.
+        """
+        if job.candidates.count == 1:
+            found = classes_by_facts(job.candidates, self._refuter)
+            stutter_free = StutterFree(job.candidates.spaces[0])
+            yield from ((classes, None) for classes in islice(found, 1))
+            yield np.arange(len(self._images[0])), stutter_free
+        else:
+            tied = [*abstractions(job.candidates, job.states), *map(_orbits, self._images[1:])]
+            tied.sort(key=lambda classes: len(np.unique(classes[self._states])))
+            found = iter(up_to_symmetry(tied, self._images))
+        yield from ((classes, None) for classes in found)
 
     def find(self, size: int, rounds: int) -> Assignment | None:
         """A language with at most ``size`` words; None if none was found with some effort.
 
         The next call with this size goes on, and spends more on what was looked at before.
         """
-        if size not in self._kinds:
-            images = self._refuter.pool.images
-            self._kinds[size] = deque(_Kind(self._states, t, size, images) for t in self._tied)
-        kinds, until = self._kinds[size], self._spent + _TOGETHER * rounds
-        while kinds and self._spent < until:
-            kind = kinds.popleft()
+        kinds, until = self._kinds.setdefault(size, deque()), self._spent + _TOGETHER * rounds
+        while self._spent < until:
+            if (kind := self._next_kind(size)) is None:
+                return None
             before = kind.problem.conflicts
             try:
                 found = self._of_kind(kind)
@@ -81,6 +104,17 @@ class TiedWords:
                 self.drop(size)
                 return found
         return None
+
+    def _next_kind(self, size: int) -> _Kind | None:
+        """One that was not looked at with so many words yet, or else one that is undecided."""
+        begun = self._begun.get(size, 0)
+        if begun == len(self._tied):
+            self._tied += islice(self._untied, 1)
+        if begun < len(self._tied):
+            self._begun[size] = begun + 1
+            return _Kind(self._states, self._tied[begun], size, self._images)
+        kinds = self._kinds[size]
+        return kinds.popleft() if kinds else None
 
     @property
     def _spent(self) -> int:
@@ -118,7 +152,7 @@ class TiedWords:
 
 
 class _Kind:
-    """One kind of partitions: states with the same number in ``tied`` (states) share a word.
+    """One kind of partitions: states of one class share a word.
 
     Attributes
     ----------
@@ -130,7 +164,8 @@ class _Kind:
         The partitions that are left, what may be spent on them, and those refuted so far.
     """
 
-    def __init__(self, states: Ints, tied: Ints, size: int, images: Sequence[Ints]) -> None:
+    def __init__(self, states: Ints, classes: _Classes, size: int, images: Sequence[Ints]) -> None:
+        tied, stutter_free = classes
         _, number, of_state = np.unique(tied[states], return_index=True, return_inverse=True)
         self.first = np.arange(len(tied))
         self.first[states] = states[number[of_state]]
@@ -139,6 +174,10 @@ class _Kind:
         free = np.unique(self.first[states]).tolist()
         # A solver that is quick on many easy problems with many solutions.
         self.problem = PartitionProblem(free, size, "minisat22", named=False)
+        if stutter_free is not None:
+            for states_of_step in stutter_free.pairs:
+                self.problem.separate_one([states_of_step])
+            self.problem.prefer(stutter_free.preferred(size))
         self.effort, self.rounds = _FIRST, 0
 
     def separate_one_of_each(self, codes: Ints) -> None:
