@@ -239,5 +239,5 @@ def _groups(
     for key in sorted({key for shape in family for key in shapes[shape]}):
         own = [number for shape in family for number in shapes[shape].get(key, ())]
         true = holds[:, own].sum(axis=1)
-        found.append(_Group(family, key, own, bool(true.max() < 2), bool(true.min() > 0)))
+        found.append(_Group(family, key, own, bool((true < 2).all()), bool((true > 0).all())))
     return found
