@@ -21,8 +21,9 @@ from coordlang.language.candidates import Candidates
 from coordlang.vocabulary.refuter import Refuter
 from planners.joint.tables import Bools, Ints
 
-#: Failing tuples after which longer ones are not looked at for what they differ in.
-_ENOUGH = 2_000
+#: Failing tuples of one length, under one symmetry, that are looked at for what they differ in, and
+#: after which longer ones are not.
+_ENOUGH = 500
 
 
 def classes_by_facts(candidates: Candidates, refuter: Refuter) -> Iterator[Ints]:
@@ -58,7 +59,7 @@ def _deciding(facts: Bools, left: Bools, steps: Ints, refuter: Refuter) -> list[
         chosen: list[int] = []
         while agreeing := refuter.agreeing(_classes(steps, facts[chosen]), None, _ENOUGH):
             for found in agreeing:
-                sequences = refuter.pool.sequences(found, found.rows)
+                sequences = refuter.pool.sequences(found, found.rows[:_ENOUGH])
                 for differing in _differing(facts, sequences):
                     if not (differing & left).any():
                         return None

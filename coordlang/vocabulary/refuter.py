@@ -142,8 +142,9 @@ class Refuter:
         for number, walked in enumerate(self._parts):
             if known:
                 break
-            mine = images or [self.pool.images[image] for image in walked.images]
-            if any(self._walk(walked, word[to], steps) for to in mine):
+            words = [word[self.pool.images[image]] for image in walked.images]
+            different = {own.tobytes(): own for own in words}.values()
+            if any(self._walk(walked, own, steps) for own in different):
                 known = self.pool.agreeing(word, images, enough)
                 assert known, "plans that a walk has found are known"
                 self._parts.insert(0, self._parts.pop(number))

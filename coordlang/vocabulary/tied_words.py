@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import islice
 
 import numpy as np
@@ -29,12 +30,29 @@ from planners.joint.tables import Ints
 #: which longer ones are not looked for.
 _AT_ONCE, _ENOUGH = 100, 300
 #: What may be spent on each kind at first, and then twice as much each time.
-_FIRST = Budget(rounds=50, conflicts=2_000)
-#: (states) the class of each state, which shares a word, and what makes words stutter-free if
-#: they are to be.
-_Classes = tuple[Ints, StutterFree | None]
+_FIRST = Budget(rounds=25, conflicts=2_000)
 #: Refuted partitions of all kinds for each of the budget, so many conflicts counted as one.
 _TOGETHER, _CONFLICTS = 8, 250
+
+
+@dataclass(frozen=True, slots=True)
+class _Ties:
+    """What the words of a kind have in common.
+
+    Attributes
+    ----------
+    classes
+        (states) the class of each state: those of one class share a word.
+    stutter_free
+        What makes the words stutter-free, None if they need not be.
+    clauses
+        Those of refuted partitions, whatever the number of words: (clauses, pairs) codes
+        ``a * states + b``, -1 for no pair.
+    """
+
+    classes: Ints
+    stutter_free: StutterFree | None = None
+    clauses: list[Ints] = field(default_factory=list)
 
 
 class TiedWords:
@@ -58,14 +76,14 @@ class TiedWords:
         self._refuter = languages.refuter
         self._random = np.random.default_rng(job.seed)
         self._images = languages.refuter.pool.images
-        self._tied: list[_Classes] = []
+        self._tied: list[_Ties] = []
         self._untied = self._classes(job)
         self.conflicts = 0
         #: Of each number of words the kinds that are undecided, and how many were looked at.
         self._kinds: dict[int, deque[_Kind]] = {}
         self._begun: dict[int, int] = {}
 
-    def _classes(self, job: Job) -> Iterator[_Classes]:
+    def _classes(self, job: Job) -> Iterator[_Ties]:
         """Which states share a word, kind by kind: those with few classes first.
 
         For one task: as few facts as possible decide it, or no state need share its word and words
@@ -74,13 +92,13 @@ class TiedWords:
         if job.candidates.count == 1:
             found = classes_by_facts(job.candidates, self._refuter)
             stutter_free = StutterFree(job.candidates.spaces[0])
-            yield from ((classes, None) for classes in islice(found, 1))
-            yield np.arange(len(self._images[0])), stutter_free
+            yield from map(_Ties, islice(found, 1))
+            yield _Ties(np.arange(len(self._images[0])), stutter_free)
         else:
             tied = [*abstractions(job.candidates, job.states), *map(_orbits, self._images[1:])]
             tied.sort(key=lambda classes: len(np.unique(classes[self._states])))
             found = iter(up_to_symmetry(tied, self._images))
-        yield from ((classes, None) for classes in found)
+        yield from map(_Ties, found)
 
     def find(self, size: int, rounds: int) -> Assignment | None:
         """A language with at most ``size`` words; None if none was found with some effort.
@@ -140,9 +158,11 @@ class TiedWords:
                 kind.rounds += 1
                 self._languages.rounds += 1
                 codes = self._refuter.pool.codes(word, agreeing, _AT_ONCE, self._random)
-                kind.separate_one_of_each(codes)
+                kind.ties.clauses.append(codes)
+                kind.require_clauses()
             return not agreeing
 
+        kind.require_clauses()
         left = Budget(kind.effort.rounds - kind.rounds, kind.effort.conflicts)
         found = find(kind.problem.solve, holds, left)
         if found is None:
@@ -152,10 +172,12 @@ class TiedWords:
 
 
 class _Kind:
-    """One kind of partitions: states of one class share a word.
+    """One kind of partitions into a number of words.
 
     Attributes
     ----------
+    ties
+        What they have in common.
     first
         (states) the first state that has the same word, of those that need one.
     images
@@ -164,8 +186,8 @@ class _Kind:
         The partitions that are left, what may be spent on them, and those refuted so far.
     """
 
-    def __init__(self, states: Ints, classes: _Classes, size: int, images: Sequence[Ints]) -> None:
-        tied, stutter_free = classes
+    def __init__(self, states: Ints, ties: _Ties, size: int, images: Sequence[Ints]) -> None:
+        self.ties, tied = ties, ties.classes
         _, number, of_state = np.unique(tied[states], return_index=True, return_inverse=True)
         self.first = np.arange(len(tied))
         self.first[states] = states[number[of_state]]
@@ -174,13 +196,19 @@ class _Kind:
         free = np.unique(self.first[states]).tolist()
         # A solver that is quick on many easy problems with many solutions.
         self.problem = PartitionProblem(free, size, "minisat22", named=False)
-        if stutter_free is not None:
-            for states_of_step in stutter_free.pairs:
+        if ties.stutter_free is not None:
+            for states_of_step in ties.stutter_free.pairs:
                 self.problem.separate_one([states_of_step])
-            self.problem.prefer(stutter_free.preferred(size))
-        self.effort, self.rounds = _FIRST, 0
+            self.problem.prefer(ties.stutter_free.preferred(size))
+        self.effort, self.rounds, self._required = _FIRST, 0, 0
 
-    def separate_one_of_each(self, codes: Ints) -> None:
+    def require_clauses(self) -> None:
+        """Require what was met since the last time, at whatever number of words."""
+        for codes in self.ties.clauses[self._required :]:
+            self._require(codes)
+        self._required = len(self.ties.clauses)
+
+    def _require(self, codes: Ints) -> None:
         """Require that one pair of each clause has different words, and of each clause's images.
 
         ``codes`` (clauses, pairs) are ``a * states + b``, -1 for no pair.

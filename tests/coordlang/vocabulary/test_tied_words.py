@@ -18,7 +18,7 @@ from coordlang.verification.by_definition import verify_candidates
 from coordlang.vocabulary.abstractions import abstractions
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.loop import Budget, Languages
-from coordlang.vocabulary.tied_words import TiedWords, _Kind, _orbits
+from coordlang.vocabulary.tied_words import TiedWords, _Kind, _orbits, _Ties
 from planners.parallel.workers import Workers
 from tests.support.domains import all_tasks
 
@@ -79,13 +79,14 @@ def test_partitions_of_a_kind_are_found_iff_there_are_some() -> None:
     images = [np.arange(6), one, other, one[other]]
     answers = Counter[bool]()
     for tied in [_orbits(one), _orbits(other), np.array([0, 1, 0, 1, 2, 3])] * 10:
-        kind = _Kind(np.arange(6), (tied, None), 2, images)
+        kind = _Kind(np.arange(6), _Ties(tied), 2, images)
         firsts = kind.first.tolist()
         left = [w for w in product(range(2), repeat=6) if w == tuple(w[s] for s in firsts)]
         for _ in range(4):
             clauses = [[random.sample(range(6), 2) for _ in range(2)] for _ in range(2)]
             codes = [[min(pair) * 6 + max(pair) for pair in clause] for clause in clauses]
-            kind.separate_one_of_each(np.array([[*row, -1] for row in codes]))
+            kind.ties.clauses.append(np.array([[*row, -1] for row in codes]))
+            kind.require_clauses()
             left = [
                 word
                 for word in left
