@@ -46,8 +46,8 @@ class _Ties:
     stutter_free
         What makes the words stutter-free, None if they need not be.
     clauses
-        Those of refuted partitions, whatever the number of words: (clauses, pairs) codes
-        ``a * states + b``, -1 for no pair.
+        Those of refuted partitions, of one task whatever the number of words: (clauses, pairs)
+        codes ``a * states + b``, -1 for no pair.
     """
 
     classes: Ints
@@ -76,6 +76,7 @@ class TiedWords:
         self._refuter = languages.refuter
         self._random = np.random.default_rng(job.seed)
         self._images = languages.refuter.pool.images
+        self._is_one_task = job.candidates.count == 1
         self._tied: list[_Ties] = []
         self._untied = self._classes(job)
         self.conflicts = 0
@@ -89,7 +90,7 @@ class TiedWords:
         For one task: as few facts as possible decide it, or no state need share its word and words
         are stutter-free, or more and more facts decide it.
         """
-        if job.candidates.count == 1:
+        if self._is_one_task:
             found = classes_by_facts(job.candidates, self._refuter)
             stutter_free = StutterFree(job.candidates.spaces[0])
             yield from map(_Ties, islice(found, 1))
@@ -130,7 +131,11 @@ class TiedWords:
             self._tied += islice(self._untied, 1)
         if begun < len(self._tied):
             self._begun[size] = begun + 1
-            return _Kind(self._states, self._tied[begun], size, self._images)
+            ties = self._tied[begun]
+            if self._is_one_task:
+                return _Kind(self._states, ties, size, self._images)
+            # What other numbers met is too much for the solver: open 3x4 took a third longer.
+            return _Kind(self._states, _Ties(ties.classes), size, self._images)
         kinds = self._kinds[size]
         return kinds.popleft() if kinds else None
 
