@@ -29,8 +29,8 @@ from planners.joint.tables import Ints
 #: Clauses that are taken of a refuted partition, before their images; and failing tuples after
 #: which longer ones are not looked for.
 _AT_ONCE, _ENOUGH = 100, 300
-#: What may be spent on each kind at first, and then twice as much each time.
-_FIRST = Budget(rounds=25, conflicts=2_000)
+#: What may be spent on each kind of one task, and of many, at first; then twice as much each time.
+_OF_ONE, _OF_MANY = Budget(rounds=25, conflicts=2_000), Budget(rounds=50, conflicts=2_000)
 #: Refuted partitions of all kinds for each of the budget, so many conflicts counted as one.
 _TOGETHER, _CONFLICTS = 8, 250
 
@@ -133,9 +133,9 @@ class TiedWords:
             self._begun[size] = begun + 1
             ties = self._tied[begun]
             if self._is_one_task:
-                return _Kind(self._states, ties, size, self._images)
+                return _Kind(self._states, ties, size, self._images, _OF_ONE)
             # What other numbers met is too much for the solver: open 3x4 took a third longer.
-            return _Kind(self._states, _Ties(ties.classes), size, self._images)
+            return _Kind(self._states, _Ties(ties.classes), size, self._images, _OF_MANY)
         kinds = self._kinds[size]
         return kinds.popleft() if kinds else None
 
@@ -191,7 +191,14 @@ class _Kind:
         The partitions that are left, what may be spent on them, and those refuted so far.
     """
 
-    def __init__(self, states: Ints, ties: _Ties, size: int, images: Sequence[Ints]) -> None:
+    def __init__(
+        self,
+        states: Ints,
+        ties: _Ties,
+        size: int,
+        images: Sequence[Ints],
+        effort: Budget = _OF_MANY,
+    ) -> None:
         self.ties, tied = ties, ties.classes
         _, number, of_state = np.unique(tied[states], return_index=True, return_inverse=True)
         self.first = np.arange(len(tied))
@@ -205,7 +212,7 @@ class _Kind:
             for states_of_step in ties.stutter_free.pairs:
                 self.problem.separate_one([states_of_step])
             self.problem.prefer(ties.stutter_free.preferred(size))
-        self.effort, self.rounds, self._required = _FIRST, 0, 0
+        self.effort, self.rounds, self._required = effort, 0, 0
 
     def require_clauses(self) -> None:
         """Require what was met since the last time, at whatever number of words."""
