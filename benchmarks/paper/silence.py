@@ -10,8 +10,6 @@ from math import log2
 from statistics import fmean
 from typing import Any
 
-import numpy as np
-
 from benchmarks.frame import markdown
 from benchmarks.paper.plots import MARKERS, Lines, Series, lines
 from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
@@ -23,7 +21,7 @@ from coordlang.language.sentences import sentence_counts
 from coordlang.required.miscoordination import Inseparable
 from coordlang.vocabulary.few_words import few_words
 from coordlang.vocabulary.flexibility_bound import largest_boxes
-from coordlang.vocabulary.job import Assignment
+from coordlang.vocabulary.job import Assignment, words_of_states
 from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
@@ -131,8 +129,7 @@ def _point(
     *,
     is_best: bool,
 ) -> Result:
-    word = np.zeros(len(candidates.rows), np.int64)
-    word[list(partition)] = list(partition.values())
+    word = words_of_states(partition, len(candidates.rows))
     bits = sentence_bits(spaces, [word[space.state] for space in spaces])
     return {
         "words": words,

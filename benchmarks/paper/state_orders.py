@@ -6,11 +6,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from random import Random
 
-import numpy as np
-
 from coordlang.language.candidates import Candidates
 from coordlang.vocabulary.first_differences import first_differences
 from coordlang.vocabulary.greedy import greedy_partition
+from coordlang.vocabulary.job import words_of_states
 from coordlang.vocabulary.separations import separations
 from planners.joint.tables import Ints, find_rows
 
@@ -45,9 +44,7 @@ def greedy_partitions(
         found[f"random {number}"] = random.sample(states, len(states))
     for name, order in found.items():
         filled = greedy_partition(order, constraints)
-        words = np.zeros(len(candidates.rows), np.int64)
-        words[list(filled)] = list(filled.values())
-        yield name, words
+        yield name, words_of_states(filled, len(candidates.rows))
 
 
 def systematic_orders(candidates: Candidates, states: list[int]) -> Mapping[str, list[int]]:

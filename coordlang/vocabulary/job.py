@@ -30,6 +30,13 @@ def word_count(partition: Assignment) -> int:
     return len(set(partition.values()))
 
 
+def words_of_states(partition: Assignment, states: int) -> Ints:
+    """(states) the word of each of so many state numbers; 0 for states that need none."""
+    word = np.zeros(states, np.int64)
+    word[list(partition)] = list(partition.values())
+    return word
+
+
 @dataclass(frozen=True, slots=True)
 class Job:
     """A partition to find.
@@ -78,9 +85,7 @@ class Job:
 
     def word(self, partition: Assignment) -> Ints:
         """(states) the word of each state number; 0 for states that need none."""
-        word = np.zeros(len(self.candidates.rows), np.int64)
-        word[list(partition)] = list(partition.values())
-        return word
+        return words_of_states(partition, len(self.candidates.rows))
 
     def of_nodes(self, word: Ints) -> list[Ints]:
         """(nodes), for each plan space, the word of each node."""

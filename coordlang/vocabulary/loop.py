@@ -13,11 +13,9 @@ from dataclasses import dataclass
 from math import isqrt
 from typing import Generic, TypeVar
 
-import numpy as np
-
 from coordlang.language.warping import Clause
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
-from coordlang.vocabulary.job import Assignment, Job
+from coordlang.vocabulary.job import Assignment, Job, words_of_states
 from coordlang.vocabulary.necessary_clauses import NecessaryClauses
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
@@ -89,9 +87,7 @@ class Languages:
 
     def word(self, partition: Assignment) -> Ints:
         """(states) the word of each state number; 0 for states that need none."""
-        word = np.zeros(self._states, np.int64)
-        word[list(partition)] = list(partition.values())
-        return word
+        return words_of_states(partition, self._states)
 
     def holds(self, partition: Assignment) -> bool:
         """Whether it is a language; if not, the clauses that it violates are known afterwards."""

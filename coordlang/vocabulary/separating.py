@@ -237,8 +237,7 @@ class _AlphaOrBeta:
 
     def broken(self, partition: Assignment) -> list[Constraint]:
         """Constraints that a partition breaks, and their images, as far as they are new."""
-        word = np.zeros(len(self._job.candidates.rows), np.int64)
-        word[list(partition)] = list(partition.values())
+        word = self._job.word(partition)
         return [
             constraint
             for walk in self._walks
