@@ -19,7 +19,8 @@ import numpy as np
 
 from coordlang.language.candidates import Candidates
 from coordlang.vocabulary.refuter import Refuter
-from planners.joint.tables import Bools, Ints
+from planners.joint.tables import Bools, Ints, unique_tuples
+from planners.search.plan_space import PlanSpace
 
 #: Failing tuples of one length, under one symmetry, that are looked at for what they differ in, and
 #: after which longer ones are not.
@@ -36,11 +37,12 @@ def classes_by_facts(candidates: Candidates, refuter: Refuter) -> Iterator[Ints]
     Parameters
     ----------
     candidates
-        The tasks; one if anything is to be found.
+        One task.
     refuter
         Tells what is wrong with a partition.
     """
-    steps = _steps_to_go(candidates)
+    (space,) = candidates.spaces
+    steps = _steps_to_go(space)
     if steps is None:
         return
     facts, chosen = _changing_facts(candidates), list[int]()
@@ -83,19 +85,14 @@ def _changing_facts(candidates: Candidates) -> Bools:
     return np.array([column for column in columns if column.any() and not column.all()], np.bool_)
 
 
-def _steps_to_go(candidates: Candidates) -> Ints | None:
-    """(states) how many steps are to go; None if some state is met with several numbers."""
-    least = np.full(len(candidates.rows), np.iinfo(np.int64).max)
-    most = np.full(len(candidates.rows), -1)
-    for space in candidates.spaces:
-        np.minimum.at(least, space.state, space.layer)
-        np.maximum.at(most, space.state, space.layer)
-    return most if (least >= most).all() else None
+def _steps_to_go(space: PlanSpace) -> Ints | None:
+    """(states) how many steps are to go, -1 where no plan passes; None: several numbers for one."""
+    steps = np.full(len(space.rows), -1)
+    steps[space.state] = space.layer
+    return steps if (steps[space.state] == space.layer).all() else None
 
 
 def _classes(steps: Ints, facts: Bools) -> Ints:
     """(states) a number for each different combination of steps to go and values of facts."""
-    number = steps
-    for fact in facts:
-        _, number = np.unique(2 * number + fact, return_inverse=True)
-    return number
+    bounds = [int(steps.max()) + 2, *[2] * len(facts)]
+    return unique_tuples(np.column_stack((steps + 1, *facts)), bounds)[1]

@@ -40,9 +40,8 @@ _PAIRS, _FIRST_PAIRS = 1_000, 30
 _BEGINNING = 10
 #: What may be spent on each number at first.
 _SOON = Budget(rounds=10, conflicts=2_000)
-#: Rounds that partitions of a kind are given for one task at first, which is enough for the first
-#: kind, and until they are so many ..
-_FEW, _LONG = 5, 10
+#: Rounds that partitions of a kind are given for one task at first, one time after another ..
+_FOR_KINDS = 5, 10
 #: .. with fewer words than the best language by this part at least.
 _FEWER_WORDS = 5
 #: Merges in a row that fail before something else is tried.
@@ -146,10 +145,8 @@ class MinimalSearch:
         if self._pairs // _FIRST_PAIRS > _BEGINNING * self._most:
             return
         if self._is_one_task:
-            rounds = _FEW
-            while self.lower < self.upper and rounds <= _LONG:
-                self._find_decided(rounds)
-                rounds *= 2
+            for rounds in _FOR_KINDS:
+                self._find_fewer_tied(rounds)
         while self.lower < self.upper and not self._is_spent and self.decide(self.lower, _SOON):
             pass
         if not self._is_one_task:
@@ -171,8 +168,8 @@ class MinimalSearch:
             if not self._find_or_refute(between(self.lower, self.upper), budget):
                 return
 
-    def _find_decided(self, rounds: int) -> None:
-        """Look for a language with fewer words than the best one, by few facts that decide them.
+    def _find_fewer_tied(self, rounds: int) -> None:
+        """Look for a language of some kind with fewer words than the best one.
 
         Between the number that was tried last and the one that suffices, nearer to the lower one.
         """
@@ -231,7 +228,7 @@ class MinimalSearch:
             return self.decide(size, budget)
         bounds = self.lower, self.upper
         if self._is_one_task:
-            self._find_decided(budget.rounds)
+            self._find_fewer_tied(budget.rounds)
         if bounds == (self.lower, self.upper):
             self.merge(_VAIN)
         return bounds != (self.lower, self.upper) or self.decide(size, budget)

@@ -11,6 +11,7 @@ one for each path.  On published tasks languages of this kind are found with a t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -23,13 +24,13 @@ from planners.search.plan_space import PlanSpace
 _FORBIDDEN = 1 << 30
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class StutterFree:
     """What stutter-free partitions of the states of a plan space of one task have in common."""
 
     space: PlanSpace
 
-    @property
+    @cached_property
     def pairs(self) -> list[Pair]:
         """The pairs of states that some step joins: each lies in different words."""
         space = self.space

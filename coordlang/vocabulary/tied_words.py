@@ -77,6 +77,7 @@ class TiedWords:
         self._random = np.random.default_rng(job.seed)
         self._images = languages.refuter.pool.images
         self._is_one_task = job.candidates.count == 1
+        self._first = _OF_ONE if self._is_one_task else _OF_MANY
         self._tied: list[_Ties] = []
         self._untied = self._classes(job)
         self.conflicts = 0
@@ -131,11 +132,9 @@ class TiedWords:
             self._tied += islice(self._untied, 1)
         if begun < len(self._tied):
             self._begun[size] = begun + 1
-            ties = self._tied[begun]
-            if self._is_one_task:
-                return _Kind(self._states, ties, size, self._images, _OF_ONE)
-            # What other numbers met is too much for the solver: open 3x4 took a third longer.
-            return _Kind(self._states, _Ties(ties.classes), size, self._images, _OF_MANY)
+            # With many tasks what other numbers met slows the solver: open 3x4 by a third.
+            own = self._tied[begun] if self._is_one_task else _Ties(self._tied[begun].classes)
+            return _Kind(self._states, own, size, self._images, self._first)
         kinds = self._kinds[size]
         return kinds.popleft() if kinds else None
 
@@ -197,7 +196,7 @@ class _Kind:
         ties: _Ties,
         size: int,
         images: Sequence[Ints],
-        effort: Budget = _OF_MANY,
+        effort: Budget,
     ) -> None:
         self.ties, tied = ties, ties.classes
         _, number, of_state = np.unique(tied[states], return_index=True, return_inverse=True)

@@ -79,7 +79,7 @@ def test_partitions_of_a_kind_are_found_iff_there_are_some() -> None:
     images = [np.arange(6), one, other, one[other]]
     answers = Counter[bool]()
     for tied in [_orbits(one), _orbits(other), np.array([0, 1, 0, 1, 2, 3])] * 10:
-        kind = _Kind(np.arange(6), _Ties(tied), 2, images)
+        kind = _Kind(np.arange(6), _Ties(tied), 2, images, Budget())
         firsts = kind.first.tolist()
         left = [w for w in product(range(2), repeat=6) if w == tuple(w[s] for s in firsts)]
         for _ in range(4):
