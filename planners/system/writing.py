@@ -11,7 +11,7 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from planners.system.errors import UsageError
@@ -68,8 +68,11 @@ def write_atomically(path: str | Path, data: bytes, *, outdated: str | Path | No
                 file.write(data)
             return
         target = Path(os.path.realpath(path))
-        with postponed_signals(), _written_beside(target, data) as beside:
-            remove_file(outdated)
+        with (
+            postponed_signals(),
+            _written_beside(target, data) as beside,
+            _set_aside(outdated),
+        ):
             os.replace(beside, target)
     except BrokenPipeError:
         raise
@@ -105,8 +108,8 @@ def write_texts(folder: str | Path, texts: Mapping[str, str]) -> None:
 def copy_folders(folders: Sequence[str | Path], target: str | Path) -> None:
     """Copy folders with all files in them into one, which is made if it is missing.
 
-    They are copied beside, and then renamed, so that what is there is whole.  Signals wait until
-    that is done.  Raises `UsageError` if one cannot be written, or is there already.
+    They are copied beside, and then renamed: all of them are there, and whole, or none.  Signals
+    wait until that is done.  Raises `UsageError` if one cannot be written, or is there already.
     """
     into = Path(target)
     try:
@@ -114,13 +117,25 @@ def copy_folders(folders: Sequence[str | Path], target: str | Path) -> None:
             into.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryDirectory(prefix=".coordlang.", dir=into) as beside:
                 for folder in map(Path, folders):
-                    shutil.copytree(folder, Path(beside, folder.name))
-                for folder in map(Path, folders):
-                    os.rename(Path(beside, folder.name), into / folder.name)
+                    shutil.copytree(folder, Path(beside, folder.name), copy_function=_copy_file)
+                with ExitStack() as undone:
+                    for folder in map(Path, folders):
+                        copy, place = Path(beside, folder.name), into / folder.name
+                        os.rename(copy, place)
+                        undone.callback(os.rename, place, copy)
+                    undone.pop_all()
     except shutil.Error as error:  # of many files; the first says why
         raise _cannot(into, error.args[0][0][2]) from None
     except OSError as error:
         raise _cannot(into, error.strerror or str(error)) from None
+
+
+def _copy_file(source: str, copy: str) -> None:
+    """Write a file again, to the disk."""
+    with open(copy, "wb") as file:
+        file.write(Path(source).read_bytes())
+        file.flush()
+        os.fsync(file.fileno())
 
 
 @contextmanager
@@ -130,7 +145,7 @@ def _written_beside(target: Path, data: bytes) -> Iterator[Path]:
     Its permissions are those of the target, or of any new file; until it is written only the owner
     may read it if the target exists.
     """
-    beside = target.parent / f".{target.name[:_REPEATED]}.{secrets.token_hex(4)}"
+    beside = _beside(target)
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
     handle = os.open(beside, flags, 0o600 if target.exists() else 0o666)
     try:
@@ -143,6 +158,31 @@ def _written_beside(target: Path, data: bytes) -> Iterator[Path]:
         yield beside
     finally:
         beside.unlink(missing_ok=True)
+
+
+@contextmanager
+def _set_aside(path: str | Path | None) -> Iterator[None]:
+    """Rename a file away for the block; it is gone after it, and stands there again if that fails.
+
+    Nothing for None, for what is missing, and for a device or a pipe.
+    """
+    if path is None or not os.path.isfile(path):
+        yield
+        return
+    old = Path(os.path.realpath(path))
+    aside = _beside(old)
+    os.replace(old, aside)
+    try:
+        yield
+    except OSError:
+        os.replace(aside, old)
+        raise
+    aside.unlink()
+
+
+def _beside(target: Path) -> Path:
+    """A new name in the folder of a file."""
+    return target.parent / f".{target.name[:_REPEATED]}.{secrets.token_hex(4)}"
 
 
 def _cannot(path: str | Path, reason: str) -> UsageError:

@@ -180,14 +180,16 @@ def test_work_that_is_stopped_leaves_no_old_certificate(
     assert end.format("") in outcome.err if code == 130 else read_certificate("c.json").refuted == 1
 
 
-#: The last rename (the language, its certificate; the old one is removed before) comes, or ends
+#: The last rename (the old certificate goes aside, the language, the certificate) comes, or ends
 #: the command before it: what stands there if the command is killed then.  If it is interrupted,
 #: all is written.  `test_broken_writing` fills the disk there.
 LAST = {
-    (1, False): "old, alone",
-    (1, True): "new, alone",
-    (2, False): "new, alone",
-    (2, True): "new",
+    (1, False): "old",
+    (1, True): "old, alone",
+    (2, False): "old, alone",
+    (2, True): "new, alone",
+    (3, False): "new, alone",
+    (3, True): "new",
 }
 
 
