@@ -196,6 +196,8 @@ def _why_not_replaced(text: str, mode: int) -> str | None:
     """Why a file that exists is not replaced, or a device not written to; None if it can be."""
     if stat.S_ISDIR(mode):
         return os.strerror(errno.EISDIR)
+    if stat.S_ISSOCK(mode):
+        return os.strerror(errno.ENXIO)
     if not stat.S_ISREG(mode):
         return _denied(text, os.W_OK)
     if not mode & 0o222:  # asked of the file itself: the superuser may write to any

@@ -9,6 +9,7 @@ import json
 import os
 import shlex
 import shutil
+import socket
 from pathlib import Path
 
 import pytest
@@ -115,6 +116,7 @@ UNWRITABLE = {
     "loop": "Too many levels of symbolic links",
     "readonly": "the file is read-only",
     "link": "the file is read-only",
+    "socket": "No such device or address",
 }
 
 
@@ -136,6 +138,8 @@ def test_the_place_is_looked_at_before_the_work(
     Path("readonly").write_text("precious")
     Path("readonly").chmod(0o444)
     Path("link").symlink_to("readonly")
+    with socket.socket(socket.AF_UNIX) as made:
+        made.bind("socket")
     before = sorted(Path().rglob("*"))
     reason = f"cannot be written: {UNWRITABLE[place]}"
     said = f"{line.split()[-1]} {place} {reason}\n  Name a file"
