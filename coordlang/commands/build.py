@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, replace
 from importlib.metadata import version
 from os import PathLike, fspath
@@ -37,7 +37,7 @@ from planners.system.errors import OutOfTime, ProvedImpossible, UsageError
 from planners.system.limits import run_until_stopped, start_clock, stop_clock, time_left
 from planners.system.messages import visible
 from planners.system.notebook import counted
-from planners.system.signals import postponed_signals
+from planners.system.signals import Postponed, postponed_signals
 from planners.system.writing import is_device, remove_file
 
 #: Share of the time that a search leaves for its certificate.
@@ -141,36 +141,45 @@ def show_build(built: Built, options: BuildOptions) -> int:
     note_single_robot(built.candidates.model.robots)
     proof, stopped = _certificate(built) if certificate else (None, None)
     stop_clock()  # the work is done; from here on it is saved
-    may_block = output == "-" or any(map(is_device, filter(None, (output, certificate))))
+    is_written = False
     try:
-        with nullcontext() if may_block else postponed_signals():
-            _save(built, proof, output, certificate)
+        with postponed_signals() as signals:
+            with _heard_at_pipe(signals, output):
+                _save(built, output, certificate)
+            is_written = True
+            if certificate is not None and proof is not None:
+                with _heard_at_pipe(signals, certificate):
+                    _write_certificate(built, proof, output, certificate)
         if options.as_json and output != "-":
             echo(json.dumps(built.data()))
         else:
             place = "stdout" if output == "-" else visible(output)
             echo(f"{built.text()}\nwritten to {place}", err=output == "-", fit=True)
     except KeyboardInterrupt as error:
-        if may_block:
-            raise  # it may be that a part of it is written
+        if not is_written:
+            raise  # it may be that a part of it is
         stopped = error
     return _exit_code(built, output, certificate, stopped)
 
 
-def _save(built: Built, proof: Certificate | None, output: str, certificate: str | None) -> None:
-    """Write the language in place of the one before, whose certificate goes with it, and its own.
+def _heard_at_pipe(signals: Postponed, path: str) -> AbstractContextManager[None]:
+    """Hear signals while a pipe or a device is written to, which may block."""
+    return signals.heard() if path == "-" or is_device(path) else nullcontext()
 
-    An error of the certificate says that the language is written.
-    """
+
+def _save(built: Built, output: str, certificate: str | None) -> None:
+    """Write the language in place of the one before, whose certificate goes with it."""
     if output == "-":
         remove_file(certificate)
         echo(to_bytes(built.language).decode(), nl=False)
     else:
         write_language(built.language, output, outdated=certificate)
-    if certificate is None or proof is None:
-        return
+
+
+def _write_certificate(built: Built, proof: Certificate, output: str, path: str) -> None:
+    """Write the certificate; an error says that the language is written."""
     try:
-        write_certificate(proof, certificate)
+        write_certificate(proof, path)
     except UsageError as error:
         error.reached = _written(built, output)
         raise

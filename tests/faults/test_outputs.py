@@ -3,16 +3,20 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 from collections.abc import Callable
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 import pytest
 
 from coordlang.commands.building import Built
+from coordlang.language import file
 from coordlang.language.file import read_language
+from coordlang.language.words import Language
 from coordlang.verification.certificate_file import read_certificate
 from coordlang.vocabulary.loop import Budget
 from coordlang.vocabulary.minimal import MinimalSearch
@@ -220,3 +224,35 @@ def test_every_rename_may_be_the_last_one(
     assert sorted(os.listdir()) == sorted(OLD)
     said = "the language is written to l.json: it is verified and proved minimal; and so is its"
     assert f"{said} certificate" in ended.err
+
+
+def test_an_interrupt_of_a_full_disk_says_of_no_language_that_it_is_written(old_pair: Path) -> None:
+    def fail(_source: str, _target: str) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    def before() -> None:
+        os.replace = fail  # type: ignore[assignment]
+
+    ended = fork_command(*BUILD, *PAIR, before=before).join()
+    assert (ended.code, _pair(old_pair)) == (130, "old")
+    assert ended.err.strip() == "coordlang: interrupted"
+
+
+@pytest.mark.parametrize("device", ["-o", "--certificate"])
+def test_signals_are_heard_while_a_pipe_is_written_to(device: str, here: Path) -> None:
+    """A language that goes into a file waits for no pipe, and is lost by no interrupt."""
+    made = file.to_bytes
+
+    def interrupted(language: Language) -> bytes:
+        os.kill(os.getpid(), signal.SIGINT)
+        return made(language)
+
+    def before() -> None:
+        file.to_bytes = interrupted
+
+    places = {"-o": "l.json", "--certificate": "c.json", device: "/dev/null"}
+    ended = fork_command(*BUILD, *chain(*places.items()), before=before).join()
+    assert ended.code == 130
+    assert os.listdir() == ([] if device == "-o" else ["l.json"])
+    assert ("; the language is written to l.json" in ended.err) == (device == "--certificate")
