@@ -75,6 +75,7 @@ def make_report(
         "domain": domain.name,
         "sha256": domain_sha256(domain),
         "problems": [problem.name for problem in problems],
+        "robots": model.robots,
         "words": rows,
         "in_order": in_order,
         "features": lifted.data()["features"] if lifted else (),

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import prod
 from pathlib import Path
 from random import Random
@@ -184,6 +185,13 @@ def test_a_language_that_is_none_is_said_to_be_none() -> None:
         task = data_of(make_report(shown, domain, [problem], tasks_shown=1).html)["tasks"][0]
         assert task["verified"] is holds
         assert (task["violation"] is None) == holds
+
+
+def test_a_file_need_not_name_the_robots() -> None:
+    language, domain, problem = make_language("t-map", "problem")
+    unnamed = replace(language, provenance=replace(language.provenance, robots=()))
+    pages = {make_report(one, domain, [problem], tasks_shown=1).html for one in (language, unnamed)}
+    assert len(pages) == 1
 
 
 def test_plans_within_slack_are_called_so() -> None:
