@@ -122,14 +122,7 @@ class StateTable:
         size = self._size
         self._make_room(size + len(rows))
         self._rows[size : size + len(rows)] = rows
-        number = np.zeros(len(rows), np.int64)
-        left, at = np.arange(len(rows)), self._first_slots(rows)
-        while len(left):
-            free = left[self._slots[at[left]] < 0]
-            self._slots[at[free]] = size + free
-            number[left] = self._slots[at[left]]
-            left = left[(self._rows[number[left]] != rows[left]).any(axis=1)]
-            at[left] = (at[left] + 1) % len(self._slots)
+        number, at = self._in_slots(size, size + len(rows))
         # Of equal new states one was numbered, and these numbers have gaps.
         new = size + np.flatnonzero(number == size + np.arange(len(rows)))
         self._size += len(new)
@@ -143,12 +136,20 @@ class StateTable:
             self._rows = np.resize(self._rows, (2 * size, self._rows.shape[1]))
         if 2 * size > len(self._slots):
             self._slots = np.full(4 * size, -1)
-            left, at = np.arange(self._size), self._first_slots(self._rows[: self._size])
-            while len(left):
-                free = left[self._slots[at[left]] < 0]
-                self._slots[at[free]] = free
-                left = left[self._slots[at[left]] != left]
-                at[left] = (at[left] + 1) % len(self._slots)
+            self._in_slots(0, self._size)
+
+    def _in_slots(self, first: int, end: int) -> tuple[Ints, Ints]:
+        """The numbers of the states in these rows, and their slots; a new one's is its row."""
+        rows, number = self._rows[first:end], np.zeros(end - first, np.int64)
+        left, at = np.arange(len(rows)), self._first_slots(rows)
+        while len(left):
+            free = left[self._slots[at[left]] < 0]
+            self._slots[at[free]] = first + free
+            number[left] = self._slots[at[left]]
+            left = left[number[left] != first + left]
+            left = left[(self._rows[number[left]] != rows[left]).any(axis=1)]
+            at[left] = (at[left] + 1) % len(self._slots)
+        return number, at
 
     def _first_slots(self, rows: Rows) -> Ints:
         code = np.zeros(len(rows), np.uint64)
