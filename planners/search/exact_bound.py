@@ -117,8 +117,7 @@ class ExactBound:
     def _enter(self, edges: Edges, states: int) -> Ints:
         """Note cheapest ways to the different states that edges lead to, and return these."""
         self._paid, self._source = grown(self._paid, states, 0), grown(self._source, states, 0)
-        missing = len(self._paid) - len(self._labels)
-        self._labels = np.pad(self._labels, ((0, missing), (0, 0)))
+        self._labels = grown(self._labels, states, 0)
         paid = self._paid[edges.source] + edges.cost
         order = np.lexsort((paid, edges.target))
         new, first = np.unique(edges.target[order], return_index=True)

@@ -5,8 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, Steps
@@ -20,6 +22,8 @@ from planners.joint.tables import (
     unique_rows,
 )
 from planners.system.limits import reaching
+
+T = TypeVar("T", bound=np.generic)
 
 #: States expanded first; from the joint steps that they have the next numbers of states follow.
 _FIRST = 500
@@ -132,8 +136,7 @@ class StateTable:
 
     def _make_room(self, size: int) -> None:
         """Let so many states fit, with as many slots without a state at least."""
-        if size > len(self._rows):
-            self._rows = np.resize(self._rows, (2 * size, self._rows.shape[1]))
+        self._rows = grown(self._rows, size, 0)
         if 2 * size > len(self._slots):
             self._slots = np.full(4 * size, -1)
             self._in_slots(0, self._size)
@@ -159,10 +162,12 @@ class StateTable:
         return (code % np.uint64(len(self._slots))).astype(np.int64)
 
 
-def grown(values: Ints, size: int, empty: int) -> Ints:
-    """An array with room for so many values; there is as much again for more."""
+def grown(values: NDArray[T], size: int, empty: int) -> NDArray[T]:
+    """A table with room for so many entries; there is as much again for more."""
+    if size <= len(values):
+        return values
     more = max(size - len(values), len(values))
-    return np.concatenate((values, np.full(more, empty))) if size > len(values) else values
+    return np.concatenate((values, np.full((more, *values.shape[1:]), empty, values.dtype)))
 
 
 @dataclass(frozen=True, slots=True)
