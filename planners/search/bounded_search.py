@@ -224,8 +224,9 @@ class BoundedSearch(Exploration):
         def only(rows: Rows, options: Options) -> Options:
             """Leave out choices after which too few steps are left."""
             nonlocal beyond
-            many = self.composed > self._probe or _combinations(options) > _TOO_MANY * self._probe
-            if self._limited and many:
+            if self._limited and (
+                self.composed > self._probe or _combinations(options) > _TOO_MANY * self._probe
+            ):
                 raise _GrownError
             if self.exact is not None:
                 options = self.exact.only(depth - 1, options)

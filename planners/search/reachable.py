@@ -284,7 +284,8 @@ class Exploration:
         """How far it got, for messages."""
         return (
             f"{self.states:,} states within {self.depth} steps of the initial states, "
-            f"{self.composed:,} joint steps; {len(self.layer):,} states are new in the last step"
+            f"{self.composed:,} joint steps; "
+            f"{len(self.layers[-1]):,} states are new in the last step"
         )
 
     def space(self) -> Space:
