@@ -79,20 +79,22 @@ def search_heuristic(
     if name == "blind":
         return Heuristic(name)
     projections = Projections(model, task.goal, variables)
+    exact = name == "auto" and isinstance(model.stepper, ComposingStepper)
+    alone = Heuristic("projections", projections.value, projections.in_time, exact)
+    if name == "projections":
+        return alone
     chosen = "relaxed" if name == "auto" else name
     own = HEURISTICS[chosen](model, task.goal, variables)
-    exact = name == "auto" and isinstance(model.stepper, ComposingStepper)
     start = task.init[None, :]
     if name == "auto" and not max(own(start)[0], projections.value(start)[0]):
         return Heuristic("blind", exact=exact)
     if name == "auto" and _as_good(model, task, projections.value, own):
-        chosen = "projections"
+        return alone
 
     def both(rows: Rows) -> Ints:
         return np.maximum(projections.value(rows), own(rows))
 
-    value = projections.value if chosen == "projections" else both
-    return Heuristic(chosen, value, projections.in_time, exact)
+    return Heuristic(chosen, both, projections.in_time, exact)
 
 
 def _as_good(model: JointModel, task: PlanningTask, one: Values, other: Values) -> bool:
