@@ -102,8 +102,8 @@ def _shared_plans(space: PlanSpace, start: int, steps: Sequence[Labels]) -> list
     return [of_robot[robot] for robot in range(space.robots)]
 
 
-def through_same_states(space: PlanSpace, trail: Trail, step: int) -> Trail:
-    """The plans of a trail through the same states, whose mixture breaks at a step, made few.
+def through_same_states(space: PlanSpace, trail: Trail) -> Trail:
+    """The plans of a trail through the same states, made few, up to the step that breaks.
 
     As many robots as is easily possible follow the same plan.
     """
@@ -111,15 +111,22 @@ def through_same_states(space: PlanSpace, trail: Trail, step: int) -> Trail:
     on[space.nodes_on(trail.start, [edges[0] for edges in trail.edges])] = True
     task = np.flatnonzero(space.starts == trail.start)[:1]
     fits = replace(space, starts=space.starts[task], second=space.second[task]).within(on)
-    mixture = [_mixed(space, edges) for edges in trail.edges[: step + 1]]
+    _, mixture = _mixture(space, trail)
     plans = _shared_plans(fits, int(fits.starts[0]), mixture)
     paths = (space.path_with(trail.start, list(map(fits.labels_of, plan))) for plan in plans)
     return Trail(trail.start, tuple(zip(*(path for path in paths if path), strict=True)))
 
 
-def _mixed(space: PlanSpace, edges: Sequence[int]) -> Labels:
-    """The labels of one step of a mixture, of the edges that the plans take."""
-    return tuple(space.labels_of(edge)[robot] for robot, edge in enumerate(edges))
+def _mixture(space: PlanSpace, trail: Trail) -> tuple[list[int], list[Labels]]:
+    """The nodes that the mixture of a trail passes, and its steps up to the one that breaks."""
+    nodes, steps = [trail.start], list[Labels]()
+    for edges in trail.edges:
+        steps.append(tuple(space.labels_of(edge)[robot] for robot, edge in enumerate(edges)))
+        mixed = space.edge_with(nodes[-1], steps[-1])
+        if mixed is None:
+            break
+        nodes.append(space.target_of(mixed))
+    return nodes, steps
 
 
 def way_to(space: PlanSpace, node: int) -> tuple[int, list[int]]:
@@ -220,13 +227,7 @@ def describe_failure(
         [*edges, *space.first_path(space.target_of(edges[-1]))]
         for edges in zip(*trail.edges, strict=True)
     ]
-    nodes, mixture = [trail.start], list[tuple[int, ...]]()
-    for edges in trail.edges:
-        mixture.append(_mixed(space, edges))
-        mixed = space.edge_with(nodes[-1], mixture[-1])
-        if mixed is None:
-            break
-        nodes.append(space.target_of(mixed))
+    nodes, mixture = _mixture(space, trail)
 
     def keys(passed: Sequence[int]) -> tuple[str, ...]:
         return tuple(model.codec.key(space.rows[space.state[node]]) for node in passed)

@@ -107,10 +107,9 @@ def inseparable(space: PlanSpace) -> Miscoordination | None:
     if goal is None:
         return None
     part, trail, _ = _violation(space, apart, goal)
-    shown = describe_failure(part, trail)
-    if space.model.hides_slack:
-        return shown
-    return describe_failure(part, through_same_states(part, trail, shown.step))
+    if not space.model.hides_slack:
+        trail = through_same_states(part, trail)
+    return describe_failure(part, trail)
 
 
 def parting_nodes(space: PlanSpace, word: Ints) -> Ints:
