@@ -35,6 +35,7 @@ from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from planners.joint.tables import Bools, Ints
 from planners.parallel.workers import Workers
+from planners.search.sat import whole
 from planners.system.errors import Position, ProvedImpossible
 from planners.system.limits import run_until_stopped
 
@@ -60,7 +61,7 @@ def simplest_hitting(sets: Sequence[Bools], weights: Ints) -> list[int]:
         formula.append((np.flatnonzero(members) + 1).tolist())
     for member, weight in enumerate(weights[useful].tolist(), 1):
         formula.append([-member], weight=weight)
-    with RC2(formula, solver="minisat22") as solver:
+    with whole(RC2)(formula, solver="minisat22") as solver:
         found = [member - 1 for member in solver.compute() if 0 < member <= len(useful)]
     chosen: list[int] = useful[found].tolist()
     return chosen

@@ -21,6 +21,7 @@ from coordlang.language.candidates import Candidates
 from coordlang.vocabulary.refuter import Refuter
 from planners.joint.tables import Bools, Ints, unique_tuples
 from planners.search.plan_space import PlanSpace
+from planners.search.sat import whole
 
 #: Failing tuples of one length, under one symmetry, that are looked at for what they differ in, and
 #: after which longer ones are not.
@@ -57,7 +58,7 @@ def _deciding(facts: Bools, left: Bools, steps: Ints, refuter: Refuter) -> list[
     """Facts that suffice, of those that are ``left``, by number; None if all do not."""
     from pysat.examples.hitman import Hitman
 
-    with Hitman(htype="lbx") as hitting:
+    with whole(Hitman)(htype="lbx") as hitting:
         chosen: list[int] = []
         while agreeing := refuter.agreeing(_classes(steps, facts[chosen]), None, _ENOUGH):
             for found in agreeing:

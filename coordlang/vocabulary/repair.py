@@ -20,6 +20,7 @@ from coordlang.vocabulary.clauses import most_constrained_first, without_implied
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.loop import Budget, Languages, ProblemsBySize, close_bounds, find
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
+from planners.search.sat import whole
 from planners.system.limits import run_until_stopped
 
 #: Comparisons of clauses to find which are implied, a second's work: the solver finds the others.
@@ -153,7 +154,7 @@ class _Repair:
         from pysat.examples.hitman import Hitman
 
         seen, changed = 0, set[int]()
-        with Hitman(htype="sorted") as hitting:
+        with whole(Hitman)(htype="sorted") as hitting:
             while not self._holds(self._apart(changed)):
                 for states in self._violated_sets(seen):
                     hitting.hit(sorted(states))

@@ -78,17 +78,26 @@ def split_clauses(clauses: array[int] | Ints, block: int = _BLOCK) -> Iterator[l
 
 @cache
 def _solver_class() -> Any:
-    """The solvers of python-sat, which from now on leave SIGINT to Python.
+    from pysat.solvers import Solver
 
-    In the main thread they would be left at SIGINT by ``longjmp`` from wherever they are, the
-    allocation of memory included, and leave a handler behind: the process crashes or hangs.
+    return whole(Solver)
+
+
+@cache
+def whole(kind: Any) -> Any:
+    """A class of python-sat whose objects a signal at any moment leaves whole.
+
+    ``kind`` is freed by ``delete()``: a solver, or what is made of solvers.  All solvers of
+    python-sat leave SIGINT to Python from now on.  In the main thread they would be left at SIGINT
+    by ``longjmp`` from wherever they are, the allocation of memory included, and leave a handler
+    behind: the process crashes or hangs.
     """
-    from pysat.solvers import MainThread, Solver
+    from pysat.solvers import MainThread
 
     MainThread.check = staticmethod(lambda: False)
 
-    class Whole(Solver):  # type: ignore[misc]
-        """A solver that is freed once, though a signal arrives when it has just been freed."""
+    class Whole(kind):  # type: ignore[misc]
+        """One that is freed once, though a signal arrives when it has just been freed."""
 
         def delete(self) -> None:
             with postponed_signals():

@@ -15,9 +15,11 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, get_args
 
+import numpy as np
 import pysolvers
 import pytest
 
+from coordlang.lifted.learning import simplest_hitting
 from planners.search.sat import SolverName, sat_solver, solve_slice
 from planners.system.errors import OutOfTime
 from planners.system.limits import time_left, time_limit
@@ -192,6 +194,40 @@ def test_a_solver_is_freed_once(
 
     ended = fork(work).join()
     assert (ended.code, said in ended.err) == (70, True), ended
+
+
+def lightest() -> None:
+    assert simplest_hitting([np.array([True, True, False])], np.array([2, 1, 1])) == [1]
+
+
+def test_what_is_made_of_solvers_is_freed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    free = pysolvers.minisat22_del
+
+    def freed(*arguments: object) -> None:
+        free(*arguments)
+        signal.raise_signal(signal.SIGINT)
+
+    def work() -> None:
+        Interruptions()
+        monkeypatch.setattr(pysolvers, "minisat22_del", freed)
+        lightest()
+
+    ended = fork(work).join()
+    assert (ended.code, "Interrupted: SIGINT" in ended.err) == (70, True), ended
+
+
+def test_what_is_made_of_solvers_is_not_left_by_longjmp(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = []
+    real = pysolvers.minisat22_solve_lim
+
+    def noted(*arguments: object) -> object:
+        given.append(arguments[2])
+        return real(*arguments)
+
+    monkeypatch.setattr(pysolvers, "minisat22_solve_lim", noted)
+    lightest()
+    assert given
+    assert not any(given)
 
 
 @pytest.mark.parametrize("solver", OURS)
