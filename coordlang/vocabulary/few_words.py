@@ -142,11 +142,10 @@ class _Search:
             return search.best
 
     def _try_all(self) -> None:
-        every, states = np.arange(len(self.table)), self._job.states
+        states = self._job.states
         for size in range(1, self._words + 1):
             for chosen in partitions(len(states), size):
-                word = self._job.word(dict(zip(states, chosen, strict=True)))
-                self.offer(word, self.values(word, every))
+                self._look_at(self._job.word(dict(zip(states, chosen, strict=True))))
                 if self._measured % 1_000 == 0:
                     self._job.progress(f"trying all partitions: {self._measured:,} so far")
         self.settle()
@@ -161,7 +160,12 @@ class _Search:
             into = {word: random.randrange(self._words) for word in into}
         permutations = symmetry_group(job.candidates).permutations
         search = LocalSearch(self, job.states, self._words, permutations, random, work)
-        search.run(job.word({state: into[begin[state]] for state in job.states}), job.progress)
+        word = job.word({state: into[begin[state]] for state in job.states})
+        self._look_at(word)
+        search.run(word, job.progress)
+
+    def _look_at(self, word: Ints) -> None:
+        self.offer(word, self.values(word, np.arange(len(self.table))))
 
     def values(self, word: Ints, tasks: Ints) -> Floats:
         """How often robots fail in some tasks."""
