@@ -29,7 +29,8 @@ class PartitionProblem:
         A solver of python-sat, by name.
     named
         Whether words are named in the order of the states: proofs are shorter, and partitions are
-        harder to find.
+        harder to find.  If not, only `separate_one` may be asked for: a state may have several
+        words then, and those of two separated states all differ.
     """
 
     def __init__(
@@ -48,7 +49,9 @@ class PartitionProblem:
         self._equivalent: set[Pair] = set()
         self._all_separated: dict[Clause, int] = {}
         for variables in self._word.values():
-            self._one_word(variables)
+            self._solver.add_clause(variables)
+            if named:
+                self._at_most_one(variables)
         if named:
             self._name_words_in_order()
 
@@ -136,8 +139,7 @@ class PartitionProblem:
         self._last += 1
         return self._last
 
-    def _one_word(self, variables: list[int]) -> None:
-        self._solver.add_clause(variables)
+    def _at_most_one(self, variables: list[int]) -> None:
         for n, b in enumerate(variables):
             for a in variables[:n]:
                 self._solver.add_clause([-a, -b])

@@ -31,6 +31,7 @@ from planners.joint.tables import Ints
 _AT_ONCE, _ENOUGH = 100, 300
 #: What may be spent on each kind of one task, and of many, at first; then twice as much each time.
 _OF_ONE, _OF_MANY = Budget(rounds=25, conflicts=2_000), Budget(rounds=50, conflicts=2_000)
+_STUTTER_FREE = Budget(rounds=8, conflicts=2_000)
 #: Refuted partitions of all kinds for each of the budget, so many conflicts counted as one.
 _TOGETHER, _CONFLICTS = 8, 250
 
@@ -88,13 +89,12 @@ class TiedWords:
     def _classes(self, job: Job) -> Iterator[_Ties]:
         """Which states share a word, kind by kind: those with few classes first.
 
-        For one task: as few facts as possible decide it, or no state need share its word and words
-        are stutter-free, or more and more facts decide it.
+        For one task: no state need share its word and words are stutter-free, or as few facts as
+        possible decide it, then more and more.
         """
         if self._is_one_task:
             found = classes_by_facts(job.candidates, self._refuter)
             stutter_free = StutterFree(job.candidates.spaces[0])
-            yield from map(_Ties, islice(found, 1))
             yield _Ties(np.arange(len(self._images[0])), stutter_free)
         else:
             tied = [*abstractions(job.candidates, job.states), *map(_orbits, self._images[1:])]
@@ -134,7 +134,8 @@ class TiedWords:
             self._begun[size] = begun + 1
             # With many tasks what other numbers met slows the solver: open 3x4 by a third.
             own = self._tied[begun] if self._is_one_task else _Ties(self._tied[begun].classes)
-            return _Kind(self._states, own, size, self._images, self._first)
+            first = _STUTTER_FREE if own.stutter_free is not None else self._first
+            return _Kind(self._states, own, size, self._images, first)
         kinds = self._kinds[size]
         return kinds.popleft() if kinds else None
 
