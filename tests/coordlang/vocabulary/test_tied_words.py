@@ -4,20 +4,25 @@
 from __future__ import annotations
 
 from collections import Counter
+from contextlib import closing
 from importlib import import_module
-from itertools import product
+from itertools import combinations, product
 from random import Random
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates
 from coordlang.language.partition import Partition
+from coordlang.language.warping import Pair
 from coordlang.verification.by_definition import verify_candidates
 from coordlang.vocabulary.abstractions import abstractions
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.loop import Budget, Languages
+from coordlang.vocabulary.sat import PartitionProblem
 from coordlang.vocabulary.tied_words import TiedWords, _Kind, _orbits, _Ties
 from planners.parallel.workers import Workers
 from tests.support.domains import all_tasks
@@ -31,6 +36,23 @@ def found(candidates: Candidates, size: int) -> tuple[Job, Languages, Assignment
         return job, languages, search.find(size, 60)
     finally:
         search.close()
+
+
+PAIRS = list(combinations(range(6), 2))
+
+
+@given(st.lists(st.lists(st.sampled_from(PAIRS), min_size=1, max_size=3), max_size=12))
+def test_states_may_have_several_words_where_they_need_no_names(clauses: list[list[Pair]]) -> None:
+    """A partition is found iff one is found where each has one word, and satisfies all clauses."""
+    found = []
+    for named in (True, False):
+        with closing(PartitionProblem(range(6), 3, "minisat22", named=named)) as problem:
+            for clause in clauses:
+                problem.separate_one(clause)
+            found.append(problem.solve())
+    one, several = found
+    assert (one is None) == (several is None)
+    assert several is None or all(any(several[a] != several[b] for a, b in c) for c in clauses)
 
 
 @pytest.mark.parametrize(("stem", "least"), [("gw1-2x2", 3), ("gw2-2x3", 5), ("gwb2-3x3", 3)])
