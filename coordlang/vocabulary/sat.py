@@ -49,9 +49,10 @@ class PartitionProblem:
         self._equivalent: set[Pair] = set()
         self._all_separated: dict[Clause, int] = {}
         for variables in self._word.values():
-            self._solver.add_clause(variables)
             if named:
-                self._at_most_one(variables)
+                self._one_word(variables)
+            else:
+                self._solver.add_clause(variables)
         if named:
             self._name_words_in_order()
 
@@ -139,7 +140,8 @@ class PartitionProblem:
         self._last += 1
         return self._last
 
-    def _at_most_one(self, variables: list[int]) -> None:
+    def _one_word(self, variables: list[int]) -> None:
+        self._solver.add_clause(variables)
         for n, b in enumerate(variables):
             for a in variables[:n]:
                 self._solver.add_clause([-a, -b])
