@@ -32,7 +32,7 @@ from coordlang.sites.coordinates import Point
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.verification.by_definition import inseparable, verify_candidates
 from coordlang.vocabulary.refuter import Refuter
-from coordlang.vocabulary.sat import PartitionProblem, Undecided
+from coordlang.vocabulary.sat import PartitionProblem, Undecided, satisfiable
 from planners.joint.tables import Bools, Ints
 from planners.parallel.workers import Workers
 from planners.search.sat import whole
@@ -47,7 +47,7 @@ def simplest_hitting(sets: Sequence[Bools], weights: Ints) -> list[int]:
     """The members of least weight that meet all sets, in order.
 
     Each of ``sets``, none of them empty, is a table of what is in it; ``weights`` (members) are
-    positive.
+    positive.  Signals are heard between slices of the solver's work.
     """
     from pysat.examples.rc2 import RC2
     from pysat.formula import WCNF
@@ -62,6 +62,7 @@ def simplest_hitting(sets: Sequence[Bools], weights: Ints) -> list[int]:
     for member, weight in enumerate(weights[useful].tolist(), 1):
         formula.append([-member], weight=weight)
     with whole(RC2)(formula, solver="minisat22") as solver:
+        solver._call_oracle = lambda assumptions, **_: satisfiable(solver.oracle, assumptions)
         found = [member - 1 for member in solver.compute() if 0 < member <= len(useful)]
     chosen: list[int] = useful[found].tolist()
     return chosen

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from itertools import combinations
 from random import Random
+from typing import Any
 
 import families
 import numpy as np
@@ -19,9 +20,11 @@ from coordlang.lifted.features import Feature
 from coordlang.lifted.learning import Instance, Learned, learn, simplest_hitting
 from coordlang.lifted.pool import pool_of
 from coordlang.verification.by_definition import verify
+from coordlang.vocabulary import sat
 from planners.joint.tables import Ints
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.sexpr import Source
+from planners.search.sat import solve_slice
 from tests.support.domains import DOMAINS, all_tasks
 
 
@@ -45,6 +48,24 @@ def test_the_lightest_members_that_meet_all_sets() -> None:
             )
             assert all(one & set(found) for one in sets[:known])
             assert sum(weights[k] for k in found) == least
+
+
+def test_signals_are_heard_between_slices_of_the_search_for_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Else one call of the solver may take minutes, deaf to time limits and interrupts."""
+    choice, answers = Random(3), []
+
+    def noted(*arguments: Any) -> bool | None:
+        answers.append(solve_slice(*arguments))
+        return answers[-1]
+
+    monkeypatch.setattr(sat, "solve_slice", noted)
+    monkeypatch.setattr(sat, "_SLICE", 1)
+    tables = [np.isin(np.arange(20), choice.sample(range(20), 4)) for _ in range(30)]
+    found = simplest_hitting(tables, np.ones(20, np.int64))
+    assert all(table[found].any() for table in tables)
+    assert {*answers} == {None, False, True}
 
 
 @pytest.mark.thorough
