@@ -22,6 +22,7 @@ from planners.pddl.formula_tree import (
     literals,
     negated,
     required_atoms,
+    step_atoms,
 )
 from planners.pddl.formulas import MAX_COST
 from planners.pddl.lifted import (
@@ -189,7 +190,7 @@ def idling_schemas(domain: Domain) -> frozenset[str]:
     """
     if domain.is_joint_action:
         return frozenset()
-    named = {atom.action for schema in domain.schemas for atom in _step_atoms(schema)}
+    named = {atom.action for schema in domain.schemas for atom in step_atoms(schema)}
     named |= {name for constraint in domain.constraints for name, _ in constraint.actions}
     return frozenset(s.name for s in domain.schemas if not s.effects) - named
 
@@ -420,8 +421,3 @@ class _Grounder:
 
 def _truth(value: bool) -> Truth:
     return TRUE if value else FALSE
-
-
-def _step_atoms(schema: Schema) -> Iterator[StepAtom]:
-    for formula in (schema.precondition, *(e.condition for e in schema.effects)):
-        yield from (leaf for leaf, _ in literals(formula) if isinstance(leaf, StepAtom))

@@ -10,6 +10,7 @@ from graphlib import CycleError, TopologicalSorter
 from itertools import chain
 from pathlib import Path
 
+from planners.pddl.formula_tree import step_atoms
 from planners.pddl.formulas import read_effects, read_formula
 from planners.pddl.lifted import (
     TRUE,
@@ -74,8 +75,7 @@ def parse_domain(source: Source) -> Domain:
         names, functions=_arities(_read_signatures(functions, types)), objects=constants
     )
     heads = _read_heads(names, root, sections)
-    if not any(head.item.comments for head in heads):  # a joint action is part of no other one
-        names = replace(names, actions={head.name.text: len(head.parameters) for head in heads})
+    names = replace(names, actions={head.name.text: len(head.parameters) for head in heads})
     schemas = tuple(_read_schema(names, head) for head in heads)
     _check_parts(schemas, heads)
     constraints, dependences = _read_network(names, schemas, sections)
@@ -297,7 +297,7 @@ def _read_part(names: Names, comment: Token) -> Part:
 
 
 def _check_parts(schemas: Sequence[Schema], heads: Sequence[_Head]) -> None:
-    """Raise `BadInput` where some schemas have subaction comments and others have none."""
+    """Raise `BadInput` for a domain that says what robots do in comments and in other ways."""
     if not any(schema.parts for schema in schemas):
         return
     for schema, head in zip(schemas, heads, strict=True):
@@ -310,6 +310,11 @@ def _check_parts(schemas: Sequence[Schema], heads: Sequence[_Head]) -> None:
             what += " has both ':agent' and subaction comments"
             remedy = "Remove ':agent', or the comments: a joint action says what every robot does."
             raise head.item.fail(what, remedy)
+        for atom in step_atoms(schema):
+            raise head.item.fail(
+                f"action {echoed(atom.action)} is used as a formula in a joint-action domain",
+                "A joint action already says what every robot does: use predicates only.",
+            )
 
 
 #: What a constraint looks like.

@@ -20,6 +20,7 @@ from planners.pddl.lifted import (
     Formula,
     Not,
     Or,
+    Schema,
     StepAtom,
     Term,
     Truth,
@@ -57,6 +58,12 @@ def literals(formula: Formula) -> tuple[tuple[Atom | StepAtom | Equal, bool], ..
     found: list[tuple[Atom | StepAtom | Equal, bool]] = []
     _collect(formula, True, found)
     return tuple(found)
+
+
+def step_atoms(schema: Schema) -> Iterator[StepAtom]:
+    """The actions of the same joint step that an action's formulas speak of."""
+    for formula in (schema.precondition, *(e.condition for e in schema.effects)):
+        yield from (leaf for leaf, _ in literals(formula) if isinstance(leaf, StepAtom))
 
 
 def _collect(

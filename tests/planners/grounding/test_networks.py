@@ -187,3 +187,15 @@ def test_a_network_of_joint_actions_is_refused() -> None:
       (:concurrency-constraint v :parameters () :bounds (2 2) :actions ((x))))"""
     with pytest.raises(BadInput, match="a concurrency network in a joint-action domain"):
         parse_domain(Source("d", text))
+
+
+def test_an_action_in_a_formula_of_joint_actions_is_refused() -> None:
+    text = """(define (domain d) (:predicates (p))
+      (:action x :parameters ()
+        ; subaction r1 (do)
+        :effect (when (not (y)) (p)))
+      (:action y :parameters ()
+        ; subaction r1 (do-not)
+        :effect (p)))"""
+    with pytest.raises(BadInput, match="d:2:7: action 'y' is used as a formula in a joint-action"):
+        parse_domain(Source("d", text))

@@ -303,6 +303,10 @@ CASES: dict[str, Case] = {
     "a comment about subactions": case(
         2, d(":precondition", "; subactions of one robot\n :precondition")
     ),
+    "a comment about the subaction of one action": case(
+        (31, "action 'go' has no '; subaction' comment"),
+        with_action("wait :agent ?r - robot ; subaction r1 (wait)\n", where("(not (wait ?r))")),
+    ),
     "no spaces that are not needed": case(2, d(" (", "("), p(" (", "(")),
     # costs
     "costs do not count by themselves": case(2, COSTLY),
