@@ -227,9 +227,9 @@ def parse(source: Source) -> Group:
     top: Group | None = None
     lists: list[_Open] = []
     for match in _TOKEN.finditer(source.text):
-        text, offset = match[0].lower(), match.start()
+        text, offset = match[0], match.start()
         if text[0] == ";":
-            said = text.lstrip(";").strip()
+            said = text.lstrip(";").strip().lower()
             if len(lists) > 1 and said.split()[:1] == [SUBACTION]:
                 lists[1][2].append(Token(said, offset, source))
         elif wrong := _misplaced(source, text, offset, lists, top):
@@ -244,7 +244,7 @@ def parse(source: Source) -> Group:
             else:
                 top = group
         else:
-            lists[-1][1].append(Token(text, offset, source))
+            lists[-1][1].append(Token(text.lower(), offset, source))
     if lists:
         raise _unclosed(source, lists)
     if top is None:
@@ -277,7 +277,7 @@ def _misplaced(
     source: Source, text: str, offset: int, lists: Sequence[_Open], top: Group | None
 ) -> BadInput | None:
     """The error for a token that cannot stand in the lists that are open."""
-    if top is None and lists and len(lists) < MAX_DEPTH and text not in _SECTIONS:
+    if top is None and lists and len(lists) < MAX_DEPTH and text.lower() not in _SECTIONS:
         return None
     here = Token(text, offset, source)
     if top is not None:
@@ -292,10 +292,10 @@ def _misplaced(
         return here.fail("')' without a '('", remedy)
     if not lists:
         return here.fail(f"expected '(define ...', found {echoed(text)}", _NO_PDDL)
-    if text in _SECTIONS and len(lists) > 2 and not lists[-1][1]:
+    if text.lower() in _SECTIONS and len(lists) > 2 and not lists[-1][1]:
         start, items, _ = lists[1]
         return replace(here, offset=lists[-1][0]).fail(
-            f"{text!r} begins inside of another list: a ')' is missing before it",
+            f"{text.lower()!r} begins inside of another list: a ')' is missing before it",
             f"'({first_text(items)}' opens at {source.position(start)} and is not closed: "
             f"add {len(lists) - 2} ')' before this position.",
         )

@@ -368,3 +368,9 @@ def test_capital_letters_with_accents_are_the_small_ones() -> None:
     accent = "r\N{LATIN SMALL LETTER E WITH ACUTE}"
     text = PROBLEM.replace("r1", accent).replace(accent, accent.upper(), 1)
     assert parse(Source("problem.pddl", text))
+
+
+@pytest.mark.parametrize("text", ["PK", "(define (domain d)) PK"])
+def test_what_is_no_pddl_is_shown_as_it_stands_in_the_file(text: str) -> None:
+    with pytest.raises(BadInput, match="'PK'"):
+        parse(Source("d", text))
