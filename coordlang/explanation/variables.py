@@ -66,7 +66,7 @@ def valuation(model: JointModel, rows: Rows) -> tuple[tuple[Variable, ...], Ints
     _, everywhere = truth(model, _surroundings(model, rows))
     sometimes, always = np.asarray(holds.any(axis=0)), np.asarray(holds.all(axis=0))
     variables: list[Variable] = []
-    value = np.zeros((len(rows), 0), np.int64)
+    columns: list[Ints] = []
     for group in _mutex_groups(atoms, everywhere, model.robots):
         used = [number for number in group.atoms if sometimes[number]]
         if not used or always[used[0]]:
@@ -74,9 +74,9 @@ def valuation(model: JointModel, rows: Rows) -> tuple[tuple[Variable, ...], Ints
         none = not everywhere[:, group.atoms].any(axis=1).all()
         variables.append(_variable(group, used, atoms, none))
         true = holds[:, used]
-        column = np.where(true.any(axis=1), true.argmax(axis=1), len(used))
-        value = np.column_stack((value, column))
-    return tuple(variables), value
+        columns.append(np.where(true.any(axis=1), true.argmax(axis=1), len(used)))
+    value = np.array(columns, np.int64).reshape(len(columns), len(rows))
+    return tuple(variables), value.T
 
 
 def truth(model: JointModel, rows: Rows) -> tuple[tuple[Atom, ...], Bools]:
@@ -153,7 +153,7 @@ _Shape = tuple[str, tuple[int, ...]]
 class _Group:
     """The numbers of atoms of some shapes, of different predicates, that agree in the ``key``.
 
-    ``exclusive``, ``exhaustive``: at most, at least one of them is true in every state.
+    ``exclusive``: at most one of them is true in every state; ``exhaustive``: exactly one.
     """
 
     family: tuple[_Shape, ...]
@@ -215,29 +215,32 @@ def _candidates(atoms: Sequence[Atom], holds: Bools) -> Iterator[_Group]:
     these exactly one is true for each key.
     """
     shapes = _by_shape(atoms)
+    weights = holds.astype(np.float32)
+    together = (weights.T @ weights).astype(np.int64)
     incomplete = []
     for shape in sorted(shapes):
-        groups = _groups((shape,), shapes, holds)
+        groups = list(_groups((shape,), shapes, together, len(holds)))
         yield from groups
         if shape[1] and all(g.exclusive for g in groups) and not all(g.exhaustive for g in groups):
             incomplete.append(shape)
     for family in chain(combinations(incomplete, 2), combinations(incomplete, 3)):
         lengths = {len(positions) for _, positions in family}
         if len({predicate for predicate, _ in family}) == len(family) and len(lengths) == 1:
-            groups = _groups(family, shapes, holds)
-            if all(g.exclusive and g.exhaustive for g in groups):
-                yield from groups
+            found = _groups(family, shapes, together, len(holds))
+            if all(g.exclusive and g.exhaustive for g in found):  # mostly the first one is not
+                yield from _groups(family, shapes, together, len(holds))
 
 
 def _groups(
     family: tuple[_Shape, ...],
     shapes: Mapping[_Shape, Mapping[tuple[str, ...], list[int]]],
-    holds: Bools,
-) -> list[_Group]:
-    """The atoms of some shapes, by key."""
-    found = []
+    together: Ints,
+    states: int,
+) -> Iterator[_Group]:
+    """The atoms of some shapes, by key; ``together``: in how many ``states`` two atoms are true."""
     for key in sorted({key for shape in family for key in shapes[shape]}):
         own = [number for shape in family for number in shapes[shape].get(key, ())]
-        true = holds[:, own].sum(axis=1)
-        found.append(_Group(family, key, own, bool((true < 2).all()), bool((true > 0).all())))
-    return found
+        true = together[np.ix_(own, own)]
+        alone = np.trace(true)
+        exclusive = bool(true.sum() == alone)
+        yield _Group(family, key, own, exclusive, exclusive and bool(alone == states))
