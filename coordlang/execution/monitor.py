@@ -170,6 +170,30 @@ class Monitor:
 
     __copy__ = copy
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What is open in a list: `pickle` and `deepcopy` would follow states too deeply."""
+        states, number = [self._here], {self._here: 0}
+        for state in states:  # which grows meanwhile
+            for to in state.moves.values():
+                if number.setdefault(to, len(states)) == len(states):
+                    states.append(to)
+        table = [
+            (
+                state.step,
+                state.known,
+                [(t, number[to]) for t, to in state.moves.items()],
+                state.left,
+            )
+            for state in states
+        ]
+        return {**self.__dict__, "_start": table, "_here": None}
+
+    def __setstate__(self, data: dict[str, Any]) -> None:
+        states = [_State(step, known, {}, left) for step, known, _, left in data["_start"]]
+        for state, (_, _, moves, _) in zip(states, data["_start"], strict=True):
+            state.moves = {text: states[to] for text, to in moves}
+        self.__dict__.update({**data, "_start": states[0], "_here": states[0]})
+
     @property
     def step(self) -> int:
         """How many steps are done."""

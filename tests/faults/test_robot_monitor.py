@@ -7,6 +7,7 @@ import copy
 import gc
 import gzip
 import json
+import pickle
 import subprocess
 import sys
 import tracemalloc
@@ -104,6 +105,21 @@ def test_steps_take_constant_memory_and_wake_no_garbage_collector() -> None:
     finally:
         tracemalloc.stop()
     assert max(grown) < 20_000
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda at: pickle.loads(pickle.dumps(at))])
+def test_a_monitor_of_many_steps_goes_to_another_process(
+    copied: Callable[[Monitor], Monitor],
+) -> None:
+    at = Monitor(choices_file(2000))
+    one_step(at)
+    at.commit(visit="(at r1 c3)")
+    other = copied(at)
+    for _ in range(20):
+        now = (at.step, at.remaining, at.allowed(), at.known("(at r1 c3)"))
+        assert now == (other.step, other.remaining, other.allowed(), other.known("(at r1 c3)"))
+        one_step(at)
+        one_step(other)
 
 
 def test_the_loop_opens_and_imports_nothing(tmp_path: Path) -> None:
