@@ -10,16 +10,15 @@ whatever the words are (Proposition 14 of docs/concepts.md), and where sentences
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from coordlang.required.choices import Choices
-from coordlang.required.composition_walk import Moves, can_fail, layered, move_counts, moves
+from coordlang.required.composition_walk import Moves, can_fail, layered, moves
 from coordlang.vocabulary.counterexamples import Counterexamples
-from coordlang.vocabulary.sat import Undecided
-from planners.joint.tables import Bools, Ints, unique_tuples
+from planners.joint.tables import Bools, Ints
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 
@@ -30,8 +29,6 @@ _NO_LEAD, _PARTED, _NO_WORD = 0, -1, -1
 _FAR = np.iinfo(np.int64).max // 4
 #: Random ways to a violation that are taken from one start at most.
 _RANDOM_WAYS = 40
-#: Moves of a step of a walk of one robot beside all others, at most: half a second.
-_AT_ONCE = 2_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,72 +82,24 @@ class CounterexampleWalk:
     def __init__(self, choices: Choices) -> None:
         self._choices, self._index = choices, EdgeIndex.of(choices.space)
 
-    def failing(
-        self, word: Ints, most: int, ways: int = 1, at_once: float = np.inf
-    ) -> list[Counterexamples]:
+    def failing(self, word: Ints, most: int, ways: int = 1) -> list[Counterexamples]:
         """Those that differ at the fewest steps, and drawn ones; one table for a number of steps.
 
-        See `many_counterexamples`.  `Undecided` if a step of the walk has more moves than
-        ``at_once``.
+        See `many_counterexamples`.
         """
         space = self._choices.space
         if not self._choices.requires[space.starts].any():
             return []
-        layers = _Walk(self._choices, self._index, word, at_once).layers()
+        layers = _Walk(self._choices, self._index, word).layers()
         _backward(space, layers)
         return _retrace(space, layers, most, ways * _RANDOM_WAYS)
-
-
-class TwoPlans:
-    """Finds failing tuples of plans of which all but one are the same: two plans walked in step.
-
-    One robot does its part of one plan, all others theirs of the other.  That few such plans have
-    one sentence is seen at once where words tell states apart; where none has, other tuples may.
-
-    Parameters
-    ----------
-    space
-        A plan space of any number of robots.
-    """
-
-    def __init__(self, space: PlanSpace) -> None:
-        self._robots = space.robots
-        self._walks = [_one_and_others(space, robot) for robot in range(space.robots)]
-
-    def failing(self, word: Ints, most: int) -> list[Counterexamples]:
-        """Some of them, about ``most`` for each robot; see `CounterexampleWalk.failing`.
-
-        Raises
-        ------
-        Undecided
-            If there is too much to walk.
-        """
-        found = []
-        for robot, (edges, walk) in enumerate(self._walks):
-            plan = np.full(self._robots, 1)
-            plan[robot] = 0
-            for two in walk.failing(word, most, at_once=_AT_ONCE):
-                all_edges = edges[two.edges[:, :, plan]]
-                found.append(Counterexamples(two.start, all_edges, two.states[:, plan]))
-        return found
-
-
-def _one_and_others(space: PlanSpace, robot: int) -> tuple[Ints, CounterexampleWalk]:
-    """A walk with all robots but one taken for one, and the edge that each of its edges is."""
-    rest = np.delete(space.labels, robot, axis=1).astype(np.int64)
-    _, others = unique_tuples(rest, [int(column.max(initial=0)) + 1 for column in rest.T])
-    labels = np.column_stack((space.labels[:, robot], others)).astype(space.labels.dtype)
-    order = np.lexsort((labels[:, 1], labels[:, 0], space.sources))
-    two = replace(space, labels=labels[order], target=space.target[order], cost=space.cost[order])
-    return order, CounterexampleWalk(Choices(two))
 
 
 class _Walk:
     """The nodes from which some mixture can fail and the plans' sentences can agree."""
 
-    def __init__(self, choices: Choices, index: EdgeIndex, word: Ints, at_once: float) -> None:
-        self._choices, self._index, self._at_once = choices, index, at_once
-        self._space = choices.space
+    def __init__(self, choices: Choices, index: EdgeIndex, word: Ints) -> None:
+        self._choices, self._index, self._space = choices, index, choices.space
         before, after = word[self._space.sources], word[self._space.targets()]
         #: (edges): the word that a plan enters, `_NO_WORD` where it goes on in its word.
         self._entered = np.where(before == after, _NO_WORD, after)
@@ -179,9 +128,6 @@ class _Walk:
     def _expand(self, nodes: Ints) -> tuple[_Layer, Ints]:
         """A layer with the moves out of its nodes, and the nodes that they lead to."""
         robots = self._space.robots
-        limited = self._at_once < np.inf
-        if limited and move_counts(self._space, nodes[:, :robots]).sum() > self._at_once:
-            raise Undecided
         sources: list[Ints] = [np.zeros(0, np.int64)]
         edges: list[Ints] = [np.zeros((0, robots), np.int64)]
         children: list[Ints] = [np.zeros((0, 2 * robots), np.int64)]

@@ -41,7 +41,7 @@ _BEGINNING = 10
 #: What may be spent on each number at first.
 _SOON = Budget(rounds=10, conflicts=2_000)
 #: Rounds that partitions of a kind are given for one task at first, one time after another ..
-_FOR_KINDS = 5, 10
+_FOR_KINDS = 1, 2, 5, 10
 #: .. with fewer words than the best language by this part at least.
 _FEWER_WORDS = 5
 #: Merges in a row that fail before something else is tried.
@@ -171,13 +171,14 @@ class MinimalSearch:
     def _find_fewer_tied(self, rounds: int) -> None:
         """Look for a language of some kind with fewer words than the best one.
 
-        Between the number that was tried last and the one that suffices, nearer to the lower one.
+        From below, where partitions are refuted soonest and most is learnt of the others, too; then
+        nearer and nearer to the number that suffices.
         """
-        least = self.lower
-        while least <= self.upper - max(1, self.upper // _FEWER_WORDS) and not self._is_spent:
-            size = between(least, self.upper)
-            if not self._finds_tied(size, rounds):
-                least = size + 1
+        size = self.lower
+        while size <= self.upper - max(1, self.upper // _FEWER_WORDS) and not self._is_spent:
+            if self._finds_tied(size, rounds):
+                return
+            size = max(size + 1, between(size, self.upper))
 
     @cached_property
     def _pairs(self) -> int:

@@ -5,25 +5,20 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 from coordlang.language.warping import Clause
 from coordlang.required.choices import Choices
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.clauses import without_implied
-from coordlang.vocabulary.counterexample_walk import CounterexampleWalk, TwoPlans
+from coordlang.vocabulary.counterexample_walk import CounterexampleWalk
 from coordlang.vocabulary.counterexamples import Counterexamples, Mixtures, many_counterexamples
 from coordlang.vocabulary.job import Evidence
-from coordlang.vocabulary.sat import Undecided
 from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
 
 #: So many failing tuples are always wanted of a walk, which finds many in one go.
 _OF_WALK = 20_000
-#: So many of two plans, for each robot that does its part of one of them alone.
-_OF_TWO_PLANS = 1_000
 
 
 @dataclass(frozen=True)
@@ -35,8 +30,7 @@ class TaskPart:
     choices
         The robots' choices in the plan space of just these tasks.
     finder
-        Finds those of its plans that fail: for two robots a walk, else sets; where every step of
-        more than two robots enters another word, after a walk of two plans.
+        Finds those of its plans that fail: for two robots a walk, else sets.
     """
 
     choices: Choices
@@ -53,10 +47,6 @@ class TaskPart:
     def space(self) -> PlanSpace:
         """The plan space of the tasks."""
         return self.choices.space
-
-    @cached_property
-    def _two_plans(self) -> TwoPlans:
-        return TwoPlans(self.space)
 
     def failing(
         self, word: Ints, most: int, ways: int = 1, steps: int = sys.maxsize
@@ -84,10 +74,6 @@ class TaskPart:
         nodes = word[self.space.state]
         if isinstance(self.finder, CounterexampleWalk):
             return self.finder.failing(nodes, max(most, _OF_WALK), ways)
-        if (nodes[self.space.sources] != nodes[self.space.targets()]).all():
-            with suppress(Undecided):
-                if two_plans := self._two_plans.failing(nodes, _OF_TWO_PLANS):
-                    return two_plans
         return many_counterexamples(self.finder, nodes, most, ways, steps)
 
 

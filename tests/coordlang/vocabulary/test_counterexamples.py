@@ -13,7 +13,7 @@ import pytest
 
 from coordlang.language.candidates import from_problems
 from coordlang.required.choices import Choices
-from coordlang.vocabulary.counterexample_walk import CounterexampleWalk, TwoPlans
+from coordlang.vocabulary.counterexample_walk import CounterexampleWalk
 from coordlang.vocabulary.counterexamples import Counterexample, Mixtures, many_counterexamples
 from coordlang.vocabulary.stutter_free import StutterFree
 from planners.search.plan_space import PlanSpace
@@ -56,10 +56,6 @@ def compared(spaces: Iterator[PlanSpace], random: Random) -> Counter[bool]:
                 assert bool(walk.failing(nodes, 20)) != holds
                 found += walk.failing(nodes, 20)
             assert bool(found) != holds
-            two_plans = TwoPlans(space).failing(nodes, 20)
-            assert not (two_plans and holds)
-            assert space.robots > 2 or bool(two_plans) != holds
-            found += two_plans
             for table in found:
                 for row in range(len(table)):
                     check(space, table.one(row), word)
@@ -96,7 +92,7 @@ def test_stutter_free_words_are_refuted_where_listing_refutes_them(
     random = Random(seeds.start)
     answers: Counter[bool] = Counter()
     for _, space in random_spaces(seeds, robots, 3_000):
-        mixtures, walk = Mixtures(Choices(space)), TwoPlans(space)
+        mixtures = Mixtures(Choices(space))
         for words in (2, 3, 4):
             word = stutter_free(space, words, random)
             if word is None:
@@ -106,10 +102,9 @@ def test_stutter_free_words_are_refuted_where_listing_refutes_them(
             except naive.TooLarge:
                 break
             nodes = np.array(word)[space.state]
-            found, two_plans = many_counterexamples(mixtures, nodes, 20), walk.failing(nodes, 20)
+            found = many_counterexamples(mixtures, nodes, 20)
             assert bool(found) != holds
-            assert bool(two_plans) != holds if space.robots == 2 else not (two_plans and holds)
-            for table in (*found, *two_plans):
+            for table in found:
                 for row in range(len(table)):
                     check(space, table.one(row), word)
             answers[holds] += 1
