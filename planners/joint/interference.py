@@ -164,8 +164,8 @@ def _meeting(left: Choices, right: Choices, one: str, other: str) -> Bools:
     for first, second in ((one, other), (other, one)):
         rows, columns = left.labels(first), right.labels(second)
         for leaf in min(rows, columns, key=len):
-            for row in rows[leaf] if leaf in rows and leaf in columns else ():
-                found[row, columns[leaf]] = True
+            if leaf in rows and leaf in columns:
+                found[np.array(rows[leaf])[:, None], columns[leaf]] = True
     return found
 
 
