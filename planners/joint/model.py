@@ -147,6 +147,7 @@ class JointModel:
     slack: int = 0
     slack_facts: tuple[int, ...] = ()
     impossible: tuple[Impossible, ...] = ()
+    is_asynchronous: bool = False
 
     @property
     def kept_plan(self) -> str:

@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What waits for what where robots keep no common step.
+
+Two subactions of different robots *interfere* if one adds or deletes a fact that the other reads or
+writes, or a condition of one names the other; all others may be done in either order, or at once.
+The *events* of a joint step are the subactions that are not idle.  Those that interfere are done in
+*blocks*, one after another: as many as lead to the same state.  The robots of a block start it
+together: it is a *meeting*.  See docs/asynchronous.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence, Set
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from planners.grounding.actions import GroundAction
+from planners.joint.composition import ComposingStepper
+from planners.joint.model import JointModel, Options
+from planners.joint.tables import Bools, Rows
+from planners.pddl.formula_tree import literals
+from planners.pddl.lifted import Atom, StepAtom
+
+#: The label number of each robot; 0 is idling.
+Step = tuple[int, ...]
+#: Robots that start together.
+Block = tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """One of a robot's events, with what it waits for.
+
+    Attributes
+    ----------
+    label
+        The number of the subaction.
+    waits
+        For each robot how many of its events that interfere with this one come before it.
+    meets
+        The other robots of its meeting, each with the number of its subaction.
+    """
+
+    label: int
+    waits: tuple[int, ...]
+    meets: tuple[tuple[int, int], ...]
+
+
+class Traces:
+    """The events of a model's joint steps, in order.
+
+    Attributes
+    ----------
+    interfering
+        For robots ``i`` and ``j`` a table (labels of i, labels of j).
+    """
+
+    def __init__(self, model: JointModel) -> None:
+        self._model = model
+        self._robots = range(len(model.robots))
+        self.interfering = _interfering(model)
+        self._results: dict[tuple[bytes, Step], Rows | None] = {}
+        self._blocks: dict[tuple[bytes, Step], tuple[Block, ...]] = {}
+
+    def result(self, row: Rows, step: Step) -> Rows | None:
+        """What a joint step leads to; None if it is none in this state."""
+        key = row.tobytes(), step
+        if key not in self._results:
+
+            def only(_: Rows, options: Options) -> Options:
+                return [_only(own, label) for own, label in zip(options, step, strict=True)]
+
+            found = self._model.successors(row[None, :], only)
+            mine = np.flatnonzero((found.labels == step).all(axis=1))
+            self._results[key] = found.result[mine[0]] if len(mine) else None
+        return self._results[key]
+
+    def blocks(self, row: Rows, step: Step) -> tuple[Block, ...]:
+        """The events of a joint step in blocks: those that interfere in their order."""
+        key = row.tobytes(), step
+        if key not in self._blocks:
+            found: list[Block] = []
+            for together in self._joined(step):
+                found += self._finest(row, step, together)
+            self._blocks[key] = tuple(found)
+        return self._blocks[key]
+
+    def before(self, row: Rows, step: Step) -> list[tuple[tuple[int, ...], Block]]:
+        """For each robot the others whose events of a step come before its own, and its block.
+
+        Those alone that interfere.  Nothing for robots that idle.
+        """
+        found: list[tuple[tuple[int, ...], Block]] = [((), ()) for _ in self._robots]
+        done: list[int] = []
+        for block in self.blocks(row, step):
+            for robot in block:
+                tables = self.interfering
+                earlier = [o for o in done if tables[robot, o][step[robot], step[o]]]
+                found[robot] = tuple(sorted(earlier)), block
+            done += block
+        return found
+
+    def events(self, row: Rows, steps: Sequence[Step]) -> list[list[Event]]:
+        """Each robot's events in joint steps one after another, with what they wait for.
+
+        Of events before these steps nothing is said.
+        """
+        done: list[list[Event]] = [[] for _ in self._robots]
+        for step in steps:
+            new = {}
+            for robot, (earlier, block) in enumerate(self.before(row, step)):
+                if block:
+                    waits = tuple(
+                        self._count(robot, step[robot], other, done[other]) + (other in earlier)
+                        for other in self._robots
+                    )
+                    new[robot] = Event(step[robot], waits, meeting(robot, step, block))
+            for robot, event in new.items():
+                done[robot].append(event)
+            after = self.result(row, step)
+            assert after is not None, "it is a joint step"
+            row = after
+        return done
+
+    def _count(self, robot: int, label: int, other: int, done: Sequence[Event]) -> int:
+        if robot == other:
+            return 0
+        row = self.interfering[robot, other][label]
+        return sum(bool(row[event.label]) for event in done)
+
+    def _joined(self, step: Step) -> list[Block]:
+        """Robots whose events interfere, by way of others too, together."""
+        found: list[set[int]] = []
+        for robot in self._robots:
+            if step[robot]:
+                tables = self.interfering
+                own = [
+                    one
+                    for one in found
+                    if any(tables[robot, other][step[robot], step[other]] for other in one)
+                ]
+                found = [one for one in found if one not in own] + [{robot}.union(*own)]
+        return sorted(tuple(sorted(one)) for one in found)
+
+    def _finest(self, row: Rows, step: Step, together: Block) -> tuple[Block, ...]:
+        if len(together) == 1 or not isinstance(self._model.stepper, ComposingStepper):
+            return (together,)
+        result = self.result(row, alone(together, step))
+        assert result is not None, "what it does not interfere with is not needed"
+        for number in range(len(together), 0, -1):
+            for blocks in ordered_partitions(together, number):
+                here: Rows | None = row
+                for block in blocks:
+                    here = None if here is None else self.result(here, alone(block, step))
+                if here is not None and (here == result).all():
+                    return blocks
+        raise AssertionError("one block is the step itself")
+
+
+def alone(block: Block, step: Step) -> Step:
+    """What some robots do in a step, while all others idle."""
+    return tuple(label if robot in block else 0 for robot, label in enumerate(step))
+
+
+def meeting(robot: int, step: Step, block: Block) -> tuple[tuple[int, int], ...]:
+    """The other robots of a block with the numbers of their subactions."""
+    return tuple((other, step[other]) for other in block if other != robot)
+
+
+def ordered_partitions(robots: Block, number: int) -> Iterator[tuple[Block, ...]]:
+    """The ways to put robots into so many blocks one after another, by the order of robots."""
+    if number == 1:
+        yield (robots,)
+        return
+    for size in range(1, len(robots) - number + 2):
+        for first in combinations(robots, size):
+            rest = tuple(robot for robot in robots if robot not in first)
+            yield from ((first, *others) for others in ordered_partitions(rest, number - 1))
+
+
+def _only(options: tuple[np.ndarray, np.ndarray], label: int):  # type: ignore[no-untyped-def,type-arg]
+    """Of what a robot may choose in one state one label."""
+    _, labels = options
+    chosen = labels[labels == label]
+    return np.array([0, len(chosen)]), chosen
+
+
+def _interfering(model: JointModel) -> dict[tuple[int, int], Bools]:
+    stepper, robots = model.stepper, range(len(model.robots))
+    pairs = [(i, j) for i in robots for j in robots if i != j]
+    if not isinstance(stepper, ComposingStepper):
+        # Nothing says whose part of a joint action does what.
+        sizes = [len(own) for own in model.labels]
+        return {(i, j): np.ones((sizes[i], sizes[j]), np.bool_) for i, j in pairs}
+    touched = [[_touches(action) for action in own] for own in stepper.labelled]
+    leaves = sorted(
+        {leaf for own in touched for one in own for part in one for leaf in part}, key=str
+    )
+    number = {leaf: n for n, leaf in enumerate(leaves)}
+    reads, writes, names, selves = (
+        [_incidence([one[part] for one in own], number) for own in touched] for part in range(4)
+    )
+    found = {}
+    for i, j in pairs:
+        meets = writes[i] @ (reads[j] | writes[j]).T | reads[i] @ writes[j].T
+        found[i, j] = meets | names[i] @ selves[j].T | selves[i] @ (names[j] | selves[j]).T
+    return found
+
+
+#: What an action reads and writes, the actions that it names, and itself.
+_Touched = tuple[Set[object], Set[object], Set[object], Set[object]]
+
+
+def _touches(action: GroundAction | None) -> _Touched:
+    if action is None:
+        return frozenset(), frozenset(), frozenset(), frozenset()
+    formulas = [action.precondition, *(effect.condition for effect in action.effects)]
+    found = {leaf for formula in formulas for leaf, _ in literals(formula)}
+    names = {leaf for leaf in found if isinstance(leaf, StepAtom)} | action.links
+    reads = {leaf for leaf in found if isinstance(leaf, Atom)}
+    writes = {effect.atom for effect in action.effects}
+    return reads, writes, names, {StepAtom(action.schema, action.args)}
+
+
+def _incidence(sets: Sequence[Set[object]], number: dict[object, int]) -> Bools:
+    table = np.zeros((len(sets), len(number)), np.bool_)
+    for row, own in enumerate(sets):
+        table[row, [number[leaf] for leaf in own]] = True
+    return table

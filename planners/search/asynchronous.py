@@ -1,0 +1,340 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The optimal plans of robots that keep no common step, as paths of one layered graph.
+
+A robot's *part* of a plan is its events in order, each with what it waits for
+(`planners.joint.traces`).  Plans with equal parts differ in timing alone: they are one plan, whose
+states are those of the one that does everything as soon as possible.  In the graph made here a
+path is such a plan: edge k has the k-th event of each robot, 0 where it has no more, and leads to
+the state after step k.  So what is asked of label sequences is asked of parts, and all that builds,
+verifies and explains languages in step does so without one (docs/asynchronous.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from planners.joint.model import JointModel
+from planners.joint.tables import Bools, Ints
+from planners.joint.traces import Event, Step, Traces, meeting
+from planners.search.plan_space import PlanSpace
+from planners.system.errors import BadInput
+
+#: The events that robots have said they will do and have not done: for each robot some, in order.
+_Queues = tuple[tuple[int, ...], ...]
+
+
+def asynchronous(space: PlanSpace) -> PlanSpace:
+    """The optimal plans of a plan space as plans of robots that keep no common step.
+
+    Raises
+    ------
+    BadInput
+        If a state changes in a joint step in which all robots idle.
+    """
+    return _Unfolding(space).run()
+
+
+@dataclass(slots=True)
+class _Node:
+    """A node of the plan space, with what the past says about what may follow.
+
+    Attributes
+    ----------
+    node
+        The node of the plan space.
+    past
+        How many events were met that later ones may wait for, by `_Waits`.
+    idles
+        Of each robot that has events to come how often it has idled; 0 for others.
+    allowed
+        The edges out of it; others do later what can be done at once.
+    moves
+        The numbers of the robots' events, 0 where one idles; the edge; and where it leads.
+    queues
+        What robots say next on the plans from here, as many events as each has idled: each choice
+        with a node of the graph that is made.
+    """
+
+    node: int
+    past: Ints
+    idles: tuple[int, ...]
+    allowed: Sequence[int]
+    moves: list[tuple[Step, int, _Node]] = field(default_factory=list)
+    queues: dict[_Queues, int] = field(default_factory=dict)
+
+
+class _Unfolding:
+    """Makes the graph: down from the starts with all pasts, and up again from the goals."""
+
+    def __init__(self, space: PlanSpace) -> None:
+        self._space, self._robots = space, range(space.robots)
+        self._traces = Traces(space.model)
+        self._waits = _Waits(space, self._traces)
+        self._labels: list[Step] = [tuple(row) for row in space.labels.tolist()]
+        self._targets: list[int] = space.targets().tolist()
+        self._allowed: dict[int, Sequence[int]] = {}
+        self.events: list[dict[Event, int]] = [{} for _ in self._robots]
+        self._layers: list[dict[object, _Node]] = [{} for _ in space.layers]
+
+    def run(self) -> PlanSpace:
+        idle = (0,) * len(self._robots)
+        starts = []
+        for node in self._space.starts.tolist():
+            out = self._space.out_edges(node)
+            starts.append(self._node(node, self._waits.none, idle, out))
+        for layer in self._layers[:0:-1]:
+            for node in layer.values():
+                self._extend(node)
+        graph = _Graph(self._space.robots)
+        for layer in self._layers:
+            for node in layer.values():
+                self._retract(node, graph)
+        nothing: _Queues = ((),) * len(self._robots)
+        return graph.space(self._space, [s.queues[nothing] for s in starts], self._texts())
+
+    def _node(self, node: int, past: Ints, idles: Step, allowed: Sequence[int]) -> _Node:
+        past = past * self._waits.matter[node]
+        idles = tuple(
+            number if acts else 0
+            for number, acts in zip(idles, self._waits.acting[node], strict=True)
+        )
+        key = node, past.tobytes(), idles, tuple(allowed)
+        layer = self._layers[int(self._space.layer[node])]
+        if key not in layer:
+            layer[key] = _Node(node, past, idles, allowed)
+        return layer[key]
+
+    # ---- down: which events follow each other as soon as possible
+
+    def _extend(self, here: _Node) -> None:
+        row = self._space.rows[self._space.state[here.node]]
+        for edge in here.allowed:
+            step = self._labels[edge]
+            if not any(step):
+                self._require_no_change(edge, here.node)
+            numbers = []
+            for robot, (earlier, block) in enumerate(self._traces.before(row, step)):
+                if block:
+                    waits = self._waits.of(here.past, robot, step[robot], earlier)
+                    event = Event(step[robot], waits, meeting(robot, step, block))
+                    numbers.append(
+                        self.events[robot].setdefault(event, len(self.events[robot]) + 1)
+                    )
+                else:
+                    numbers.append(0)
+            past = here.past + self._waits.added(step)
+            idles = tuple(n + (not own) for n, own in zip(here.idles, step, strict=True))
+            after = self._node(self._targets[edge], past, idles, self._next(edge, here.node))
+            here.moves.append((tuple(numbers), edge, after))
+
+    def _next(self, edge: int, source: int) -> Sequence[int]:
+        """The edges after one of which no event could be done in its step already."""
+        if edge not in self._allowed:
+            out = self._space.out_edges(self._targets[edge])
+            self._allowed[edge] = [after for after in out if not self._is_late(source, edge, after)]
+        return self._allowed[edge]
+
+    def _is_late(self, source: int, edge: int, after: int) -> bool:
+        """Whether some events of a step may be done in the step before, and it is the same plan."""
+        first, second = self._labels[edge], self._labels[after]
+        idle = [robot for robot in self._robots if second[robot] and not first[robot]]
+        if not idle:
+            return False
+        space, traces = self._space, self._traces
+        row, middle, end = (
+            space.rows[space.state[node]]
+            for node in (source, self._targets[edge], self._targets[after])
+        )
+        for block in traces.blocks(middle, second):
+            if set(block) <= set(idle):
+                sooner = tuple(
+                    second[robot] if robot in block else first[robot] for robot in self._robots
+                )
+                rest = tuple(0 if robot in block else second[robot] for robot in self._robots)
+                between = traces.result(row, sooner)
+                if between is not None and any(rest):
+                    last = traces.result(between, rest)
+                    if (
+                        last is not None
+                        and (last == end).all()
+                        and traces.events(row, (sooner, rest))
+                        == traces.events(row, (first, second))
+                    ):
+                        return True
+        return False
+
+    def _require_no_change(self, edge: int, node: int) -> None:
+        space = self._space
+        if space.state[self._targets[edge]] != space.state[node]:
+            text = space.model.state_text(space.rows[space.state[node]])
+            raise BadInput(
+                f"--asynchronous: the state {text} changes while all robots idle",
+                remedy="Let an action of some robot do it: without a clock nothing else happens.",
+            )
+
+    # ---- up: what robots say, and when
+
+    def _retract(self, here: _Node, graph: _Graph) -> None:
+        """Find the queues of a node from those that its moves lead to.
+
+        After k steps a robot has said its first k events; of these it has done all but as many as
+        it has idled.
+        """
+        space = self._space
+        state, goal = int(space.state[here.node]), int(space.goal[here.node])
+        layer = int(space.layer[here.node])
+        if not layer:
+            here.queues[((),) * len(self._robots)] = graph.node(state, goal, layer, {})
+            return
+        moves: dict[_Queues, dict[Step, tuple[int, int]]] = {}
+        for numbers, edge, after in here.moves:
+            cost = int(space.cost[edge])
+            for following, target in after.queues.items():
+                said, queues = [], []
+                for number, queue, idles in zip(numbers, following, here.idles, strict=True):
+                    ahead = (number, *queue) if number else queue
+                    said.append(ahead[idles] if idles < len(ahead) else 0)
+                    queues.append(ahead[:idles])
+                own = moves.setdefault(tuple(queues), {})
+                known = own.setdefault(tuple(said), (target, cost))
+                assert known == (target, cost), "what robots will do says what happens next"
+        for own_queues, own in moves.items():
+            here.queues[own_queues] = graph.node(state, goal, layer, own)
+
+    def _texts(self) -> tuple[tuple[str, ...], ...]:
+        model = self._space.model
+        return tuple(
+            (names[0], *(event_text(model, robot, event) for event in self.events[robot]))
+            for robot, names in enumerate(model.labels)
+        )
+
+
+class _Waits:
+    """Counts of events that others wait for.
+
+    Attributes
+    ----------
+    none
+        (columns) no event was met; a column is a pair of robots and what events of the one may
+        wait for.
+    matter
+        (nodes, columns) whether some event after a node may wait for such events.
+    acting
+        By node, for each robot whether it has events to come.
+    """
+
+    def __init__(self, space: PlanSpace, traces: Traces) -> None:
+        robots = range(space.robots)
+        future = [_future(space, robot) for robot in robots]
+        self.acting: list[list[bool]] = np.stack([own.any(axis=1) for own in future], 1).tolist()
+        self._column: list[list[list[int]]] = [[[] for _ in robots] for _ in robots]
+        matter, added = [np.zeros((len(space), 0), np.bool_)], []
+        width = 0
+        for i in robots:
+            for j in robots:
+                if i == j:
+                    continue
+                used = np.unique(space.robot_labels(i))
+                table = traces.interfering[i, j].copy()
+                table[np.setdiff1d(np.arange(len(table)), used)] = False
+                patterns, pattern = np.unique(table, axis=0, return_inverse=True)
+                pattern = pattern.reshape(-1)
+                self._column[i][j] = (width + pattern).tolist()
+                kinds = np.zeros((len(table), len(patterns)), np.bool_)
+                kinds[np.arange(len(table)), pattern] = patterns.any(axis=1)[pattern]
+                matter.append(future[i][:, : len(table)] @ kinds)
+                added.append((j, slice(width, width + len(patterns)), patterns))
+                width += len(patterns)
+        self.matter = np.concatenate(matter, axis=1).astype(np.int16)
+        self.none: Ints = np.zeros(width, np.int16)
+        self._by_label = [np.zeros((len(names), width), np.int16) for names in space.model.labels]
+        for j, columns, patterns in added:
+            self._by_label[j][:, columns] = patterns.T
+        self._added: dict[Step, Ints] = {}
+
+    def added(self, step: Step) -> Ints:
+        """(columns) what the events of a step add."""
+        if step not in self._added:
+            rows = [own[label] for own, label in zip(self._by_label, step, strict=True) if label]
+            self._added[step] = np.sum(rows, axis=0, dtype=np.int16) if rows else self.none
+        return self._added[step]
+
+    def of(self, past: Ints, robot: int, label: int, earlier: Sequence[int]) -> tuple[int, ...]:
+        """What an event waits for, of the past and of robots that are earlier in its step."""
+        return tuple(
+            int(past[own[label]]) + (other in earlier) if other != robot else 0
+            for other, own in enumerate(self._column[robot])
+        )
+
+
+def _future(space: PlanSpace, robot: int) -> Bools:
+    """(nodes, labels) the subactions of a robot on plans from each node."""
+    found = np.zeros((len(space), len(space.model.labels[robot])), np.bool_)
+    for edges in space.edges_by_layer():
+        below = found[edges.target]
+        labels = space.robot_labels(robot, edges.edges)
+        below[np.arange(len(labels)), labels] = True
+        np.logical_or.at(found, edges.source, below)
+    found[:, 0] = False
+    return found
+
+
+class _Graph:
+    """A plan space in the making, from the goals up: nodes with the same edges are one."""
+
+    def __init__(self, robots: int) -> None:
+        self._robots = robots
+        self._nodes: dict[object, int] = {}
+        self._state: list[int] = []
+        self._goal: list[int] = []
+        self._layer: list[int] = []
+        self._edges: list[list[tuple[Step, tuple[int, int]]]] = []
+
+    def node(self, state: int, goal: int, layer: int, moves: Mapping[Step, tuple[int, int]]) -> int:
+        """The number of a node with these edges: labels, then target and cost."""
+        edges = sorted(moves.items())
+        key = state, goal, layer, tuple(edges)
+        if key not in self._nodes:
+            self._nodes[key] = len(self._state)
+            self._state.append(state)
+            self._goal.append(goal)
+            self._layer.append(layer)
+            self._edges.append(edges)
+        return self._nodes[key]
+
+    def space(
+        self, old: PlanSpace, starts: Sequence[int], labels: tuple[tuple[str, ...], ...]
+    ) -> PlanSpace:
+        """The plan space of what paths from the starts pass through."""
+        edges = [edge for own in self._edges for edge in own]
+        degrees = [len(own) for own in self._edges]
+        table = np.array([step for step, _ in edges], np.int32).reshape(len(edges), self._robots)
+        found = replace(
+            old,
+            model=replace(old.model, labels=labels, is_asynchronous=True),
+            state=np.array(self._state, np.int64),
+            goal=np.array(self._goal, np.int64),
+            layer=np.array(self._layer, np.int64),
+            first=np.concatenate(([0], np.cumsum(degrees))).astype(np.int64),
+            target=np.array([target for _, (target, _) in edges], np.int64),
+            labels=table,
+            cost=np.array([cost for _, (_, cost) in edges], np.int64),
+            starts=np.array(starts, np.int64),
+        )
+        return found.reduced()
+
+
+def event_text(model: JointModel, robot: int, event: Event) -> str:
+    """An event for people: ``(move r1 a b) after 2 of r2, with r3``."""
+    text = model.labels[robot][event.label]
+    waits = [
+        f"{number} of {name}"
+        for name, number in zip(model.robots, event.waits, strict=True)
+        if number
+    ]
+    after = f" after {' and '.join(waits)}" if waits else ""
+    others = [f"{model.robots[other]} {model.labels[other][label]}" for other, label in event.meets]
+    return text + after + (f" with {' and '.join(others)}" if others else "")
