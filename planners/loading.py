@@ -140,6 +140,7 @@ def _joint_model(
         is_joint_action=domain.is_joint_action,
         slack=slack,
         slack_facts=tuple(facts.index[atom] for atom in left),
+        is_asynchronous=options.asynchronous,
         impossible=impossible_actions(domain, problem, team, actions, {*chain(*starts)}),
     )
 

@@ -87,6 +87,12 @@ def build_language(
         return _few_words(making, words, worst=worst, seed=options.seed)
     if start is not None:
         return repair_language(making, start, options.seed)
+    if candidates.model.is_asynchronous and method in ("greedy", "separating"):
+        raise UsageError(
+            f"--method {method} parts plans where their states first differ, and without a common "
+            "step they may differ in what robots do next",
+            remedy="Use --method best or minimal.",
+        )
     if candidates.model.hides_slack and method in ("greedy", "separating"):
         raise UsageError(
             f"--method {method} parts plans where their states first differ, and with slack they "

@@ -36,7 +36,9 @@ if TYPE_CHECKING:
 Result = TypeVar("Result")
 
 #: Options that are fixed in a loaded domain.
-_FIXED = frozenset({"cost", "unowned", "remember_actions", "slack", "words_see_slack"})
+_FIXED = frozenset(
+    {"cost", "unowned", "remember_actions", "slack", "words_see_slack", "asynchronous"}
+)
 
 
 def public(

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.records import DEFAULT_MAX, PlansOptions, UnderstandOptions
 from coordlang.commands.terminal import echo, note_single_robot, write
+from planners.search.asynchronous import as_executed
 from planners.search.kept_plans import search
 from planners.search.optimal_plans import search as bounded_search
 from planners.search.plan_file import Texts, texts, to_ipc, to_json, to_plansys2
@@ -121,8 +122,9 @@ def plans(files: Arguments, options: PlansOptions) -> OptimalPlans:
     loaded = files.instance()
     model, task = loaded.model, loaded.tasks[0]
     if options.heuristic == "auto":
-        return OptimalPlans(Plans.of(search(model, task)))
-    return OptimalPlans(Plans.of(bounded_search(model, task, heuristic=options.heuristic)))
+        return OptimalPlans(Plans.of(as_executed(search(model, task))))
+    in_step = bounded_search(model, task, heuristic=options.heuristic)
+    return OptimalPlans(Plans.of(as_executed(in_step)))
 
 
 def show_plans(found: OptimalPlans, options: PlansOptions) -> None:

@@ -22,7 +22,7 @@ from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
 from planners.search.kept_plans import search
 from planners.search.plan_space import PlanSpace, UnfoldingStep
-from planners.system.errors import BadInput, OutOfMemory, Position, Refuted, note
+from planners.system.errors import BadInput, OutOfMemory, Position, Refuted, UsageError, note
 from planners.system.messages import echoed
 
 
@@ -187,6 +187,13 @@ def language_in_task(
     check_source(language, domain, [problem], position)
     listed = recorded_list(language)
     options = options or options_of(language)
+    if options.asynchronous:
+        raise UsageError(
+            "the words are for robots that keep no common step (--asynchronous), and this command "
+            "follows plans step by step",
+            position=position,
+            remedy="`coordlang verify` follows them.",
+        )
     loaded, recorded = model_of_listed(domain, [problem], listed, options, position)
     atoms = set(" ".join(filter(None, language.states)).replace(") (", ")\0(").split("\0"))
     atoms -= {"", *loaded.model.codec.facts.texts}

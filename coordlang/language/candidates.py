@@ -16,6 +16,7 @@ from planners.joint.tables import Bools, Rows, find_rows, unique_rows
 from planners.loading import PlanningInstance, build
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
+from planners.search.asynchronous import as_executed
 from planners.search.goals import searched
 from planners.search.kept_plans import search
 from planners.search.optimal_plans import joined, plan_spaces, solvable
@@ -273,7 +274,7 @@ def _one_by_one(
             if not skip_unsolvable or len(skipped) == len(names) - 1:
                 raise
             skipped.append(name)
-    source = Searched(joined(spaces))
+    source = Searched(as_executed(joined(spaces)))
     return Candidates(kind, loaded, source, listed=tuple(kept), skipped=tuple(skipped))
 
 
@@ -328,7 +329,7 @@ def from_recorded(
     They are searched one by one, without the rest of the space.
     """
     loaded, tasks = model_of_listed(domain, problems, listed, options, position)
-    source = Searched(joined([search(loaded.model, task) for task in tasks]))
+    source = Searched(as_executed(joined([search(loaded.model, task) for task in tasks])))
     return Candidates("problems", loaded, source, listed=tuple(listed))
 
 

@@ -17,7 +17,7 @@ from coordlang.language.candidates import Kind
 from coordlang.language.listed import ListedTask
 from coordlang.language.provenance import Guarantee, Provenance, Tolerance
 from coordlang.language.words import Language
-from planners.pddl.model_options import Cost, Unowned
+from planners.pddl.model_options import Cost, Execution, Unowned
 from planners.system.errors import BadInput, Position
 from planners.system.files import FileFormat, read_bytes, require_seen
 from planners.system.messages import echoed
@@ -63,6 +63,10 @@ class ModelRecord(msgspec.Struct):
             description="Whether states also say how many joint steps of the slack are left: "
             "(slack-left 1)."
         ),
+    ] = UNSET
+    execution: Annotated[
+        Execution | UnsetType,
+        Meta(description="How robots act: in step (where nothing is said), or without one."),
     ] = UNSET
     idle: Annotated[
         list[str] | None,

@@ -180,6 +180,7 @@ def provenance_of(
             "unowned": options.unowned,
             "remember_actions": options.remember_actions,
             **({"words_see_slack": True} if options.words_see_slack else {}),
+            **({"execution": "asynchronous"} if options.asynchronous else {}),
             "problem_sha256": problem.source.sha256,
             "world_sha256": world_sha256(domain, problem),
         },

@@ -43,6 +43,7 @@ def options_of(
         remember_actions=entries.get("remember_actions", False),
         slack=(language.tolerance.slack if language.tolerance else None) or 0,
         words_see_slack=entries.get("words_see_slack", False),
+        asynchronous=entries.get("execution") == "asynchronous",
         recorded=bool(language.provenance.robots),
     )
     for name in sorted(given) if model else ():

@@ -252,6 +252,8 @@ def _reason(space: PlanSpace, node: int, labels: tuple[int, ...]) -> str:
     Not applicable, or it wastes something.
     """
     model = space.model
+    if model.is_asynchronous:
+        return "no optimal plan has these events, with what they wait for"
     row = space.rows[space.state[node]]
     steps = model.successors(row[None, :])
     same = np.flatnonzero((steps.labels == np.array(labels)).all(axis=1))

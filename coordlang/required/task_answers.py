@@ -21,6 +21,7 @@ from planners.loading import PlanningInstance
 from planners.parallel.batch import Batch, Store, Table, digest
 from planners.parallel.workers import Workers
 from planners.pddl.model_options import Cost
+from planners.search.asynchronous import as_executed
 from planners.search.kept_plans import keeping_plans, search, store_in_use
 from planners.search.plan_file import json_count
 from planners.search.plan_space import PlanSpace
@@ -94,7 +95,7 @@ def _answer(shared: tuple[JointModel, Sequence[PlanningTask], Store | None], num
     """One job: a task; its answer as JSON, in which fractions are texts."""
     model, tasks, folder = shared
     with keeping_plans(folder):
-        space = search(model, tasks[number])
+        space = as_executed(search(model, tasks[number]))
     witness = miscoordination(space, 0)
     found = NONE if witness is None else failures([space], [None], _ADDITIONS)
     fewest = None if witness is None else _fewest(space, found)
@@ -124,7 +125,7 @@ def fewest_actions(space: PlanSpace) -> PlanSpace | None:
     O(edges).
     """
     model = space.model
-    if model.cost != "makespan" or model.slack:
+    if model.cost != "makespan" or model.slack or model.is_asynchronous:
         return None
     counts = _actions(model)
     cost = sum(counts[robot][space.robot_labels(robot)] for robot in range(space.robots))

@@ -107,7 +107,7 @@ def inseparable(space: PlanSpace) -> Miscoordination | None:
     if goal is None:
         return None
     part, trail, _ = _violation(space, apart, goal)
-    if not space.model.hides_slack:
+    if space.model.nodes_are_states:
         trail = through_same_states(part, trail)
     return describe_failure(part, trail)
 

@@ -40,14 +40,14 @@ def certify(candidates: Candidates, evidence: Mapping[Clause, Evidence], size: i
     `ValueError` if they do not refute it.
     """
     needed = core(evidence, size) if size else []
-    reasons = [_reason(candidates, clause, evidence[clause]) for clause in needed]
+    reasons = [_reason(clause, evidence[clause]) for clause in needed]
     return Certificate(candidates.loaded.domain.name, list(candidates.model.robots), size, reasons)
 
 
-def _reason(candidates: Candidates, clause: Clause, evidence: Evidence) -> Reason:
+def _reason(clause: Clause, evidence: Evidence) -> Reason:
     """The plans behind a clause, from a candidate task's start on, with their warping paths."""
     space, example, symmetry = evidence.space, evidence.example, evidence.symmetry
-    model = candidates.model
+    model = space.model
     start, prefix = way_to(space, example.start)
     before = space.state[space.nodes_on(start, prefix)[:-1]].tolist()
     init = model.codec.decode(space.rows[space.state[start]])

@@ -108,6 +108,8 @@ def parts(candidates: Candidates, group: SymmetryGroup) -> list[Part]:
     model = candidates.model
     if candidates.kind != "all" or model.remembers or model.slack or len(candidates.spaces) != 1:
         return []
+    if model.is_asynchronous:
+        return []
     space = candidates.spaces[0]
     graph, named = _neighbours(candidates), _named(candidates)
     end = _ends(space)

@@ -66,8 +66,8 @@ def differences(
 ) -> FirstDifferences:
     """Find them for candidate tasks, in jobs of about ``portion`` effort.
 
-    Of plans within a slack that states do not say there are none to speak of: a plan may part from
-    another one by waiting in the state that they share.
+    Where nodes are more than states there are none to speak of: a plan may part from another one in
+    the state that they share, by waiting there, or by what robots say that they do next.
 
     Raises `Inseparable` with the plans of the first portion that has some.
     """
@@ -78,8 +78,8 @@ def differences(
         source, spoken_for = source.only(goals.chosen), goals.spoken_for[goals.chosen]
     portions = cut(source.efforts, portion)
     efforts = [float(source.efforts[own.start : own.stop].sum()) for own in portions]
-    identity = digest(source.identity, spoken_for, model.hides_slack)
-    shared = source, spoken_for, not model.hides_slack
+    identity = digest(source.identity, spoken_for, model.nodes_are_states)
+    shared = source, spoken_for, model.nodes_are_states
     batch = Batch("first differences", _of_goals, shared, portions, identity, efforts)
     found: list[Table] = []
 
@@ -214,7 +214,7 @@ def symmetric_goals(
     """
     model = candidates.model
     states = len(candidates.rows)
-    if candidates.kind != "all" or model.remembers or model.slack:
+    if candidates.kind != "all" or model.remembers or model.slack or model.is_asynchronous:
         return None
     if states**2 * len(model.robots) < least:
         return None

@@ -22,8 +22,8 @@ def greedy(job: Job) -> Outcome:
 
 
 def first_language(job: Job) -> Assignment:
-    """A language to begin with: greedy's, or a word for each state where states hide slack."""
-    if job.candidates.model.hides_slack:
+    """A language to begin with: greedy's, or a word for each state where nodes are more."""
+    if not job.candidates.model.nodes_are_states:
         return {state: word for word, state in enumerate(job.states)}
     return greedy(job).partition
 

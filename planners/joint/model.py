@@ -131,6 +131,8 @@ class JointModel:
     than the least makespan plans may take (`planners.search.slack`); ``slack_facts``, where states
     on plans say how many of them are left, are the numbers of the facts that do: none left, one
     left, and so on.  ``impossible`` says what robots can never do, for messages.
+    ``is_asynchronous``: robots keep no common step, and the labels of plan spaces are events
+    (`planners.search.asynchronous`); ``has_ties`` as in `planners.joint.traces.Traces`.
     """
 
     name: str
@@ -148,6 +150,7 @@ class JointModel:
     slack_facts: tuple[int, ...] = ()
     impossible: tuple[Impossible, ...] = ()
     is_asynchronous: bool = False
+    has_ties: bool = False
 
     @property
     def kept_plan(self) -> str:
@@ -177,6 +180,14 @@ class JointModel:
     def hides_slack(self) -> bool:
         """Whether plans have slack and states do not say how much is left: states may repeat."""
         return bool(self.slack) and not self.slack_facts
+
+    @property
+    def nodes_are_states(self) -> bool:
+        """Whether no two nodes of a plan space have one state, goal and number of steps to go.
+
+        Nodes also say what is left of hidden slack, or what robots without a common step do next.
+        """
+        return not (self.hides_slack or self.is_asynchronous)
 
     @property
     def remembers(self) -> bool:

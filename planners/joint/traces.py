@@ -19,7 +19,7 @@ import numpy as np
 from planners.grounding.actions import GroundAction
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import JointModel, Options
-from planners.joint.tables import Bools, Rows
+from planners.joint.tables import Bools, Ints, Rows
 from planners.pddl.formula_tree import literals
 from planners.pddl.lifted import Atom, StepAtom
 
@@ -55,12 +55,16 @@ class Traces:
     ----------
     interfering
         For robots ``i`` and ``j`` a table (labels of i, labels of j).
+    has_ties
+        Whether blocks of a step that was looked at could be done in another order: then the order
+        of robots decides, which symmetries need not keep.
     """
 
     def __init__(self, model: JointModel) -> None:
         self._model = model
         self._robots = range(len(model.robots))
         self.interfering = _interfering(model)
+        self.has_ties = False
         self._results: dict[tuple[bytes, Step], Rows | None] = {}
         self._blocks: dict[tuple[bytes, Step], tuple[Block, ...]] = {}
 
@@ -150,13 +154,21 @@ class Traces:
         result = self.result(row, alone(together, step))
         assert result is not None, "what it does not interfere with is not needed"
         for number in range(len(together), 0, -1):
-            for blocks in ordered_partitions(together, number):
-                here: Rows | None = row
-                for block in blocks:
-                    here = None if here is None else self.result(here, alone(block, step))
-                if here is not None and (here == result).all():
-                    return blocks
+            every = ordered_partitions(together, number)
+            found = [blocks for blocks in every if self._leads(row, step, blocks, result)]
+            self.has_ties |= len(found) > 1
+            if found:
+                return found[0]
         raise AssertionError("one block is the step itself")
+
+    def _leads(self, row: Rows, step: Step, blocks: Sequence[Block], result: Rows) -> bool:
+        """Whether blocks, one after another, lead to a state."""
+        for block in blocks:
+            after = self.result(row, alone(block, step))
+            if after is None:
+                return False
+            row = after
+        return np.array_equal(row, result)
 
 
 def alone(block: Block, step: Step) -> Step:
@@ -180,7 +192,7 @@ def ordered_partitions(robots: Block, number: int) -> Iterator[tuple[Block, ...]
             yield from ((first, *others) for others in ordered_partitions(rest, number - 1))
 
 
-def _only(options: tuple[np.ndarray, np.ndarray], label: int):  # type: ignore[no-untyped-def,type-arg]
+def _only(options: tuple[Ints, Ints], label: int) -> tuple[Ints, Ints]:
     """Of what a robot may choose in one state one label."""
     _, labels = options
     chosen = labels[labels == label]

@@ -12,6 +12,7 @@ from planners.system.messages import echoed
 from planners.system.options import option
 
 Cost = Literal["makespan", "makespan+actions", "makespan+cost"]
+Execution = Literal["lockstep", "asynchronous"]
 Unowned = Literal["error", "environment", "shared"]
 
 #: The most slack that is taken: plans of so many joint steps fill any memory.
@@ -39,6 +40,9 @@ class ModelOptions:
     )
     words_see_slack: bool = option(
         False, "States also say how many steps of the slack are left, and words may differ in that."
+    )
+    asynchronous: bool = option(
+        False, "Robots keep no common step: what counts is what each waits for, not when."
     )
     recorded: bool = False
 
@@ -68,6 +72,7 @@ class ModelOptions:
             "remember-actions": self.remember_actions,
             "slack": self.slack,
             "words-see-slack": self.words_see_slack,
+            "asynchronous": self.asynchronous,
         }
         if self.unowned != "error":
             options["unowned"] = self.unowned
@@ -84,6 +89,11 @@ class ModelOptions:
             raise UsageError(
                 f"--slack {echoed(str(self.slack))}: more than {MOST_SLACK:,} joint steps",
                 remedy="Say --slack 1.",
+            )
+        if self.asynchronous and self.slack:
+            raise UsageError(
+                "--asynchronous --slack: without a common step no steps are counted",
+                remedy="Leave out one of them.",
             )
         if self.words_see_slack and not self.slack:
             raise UsageError(

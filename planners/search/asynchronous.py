@@ -26,6 +26,11 @@ from planners.system.errors import BadInput
 _Queues = tuple[tuple[int, ...], ...]
 
 
+def as_executed(space: PlanSpace) -> PlanSpace:
+    """A plan space as its model says that robots execute plans: in step, or without one."""
+    return asynchronous(space) if space.model.is_asynchronous else space
+
+
 def asynchronous(space: PlanSpace) -> PlanSpace:
     """The optimal plans of a plan space as plans of robots that keep no common step.
 
@@ -93,7 +98,8 @@ class _Unfolding:
             for node in layer.values():
                 self._retract(node, graph)
         nothing: _Queues = ((),) * len(self._robots)
-        return graph.space(self._space, [s.queues[nothing] for s in starts], self._texts())
+        model = replace(self._space.model, labels=self._texts(), has_ties=self._traces.has_ties)
+        return graph.space(replace(self._space, model=model), [s.queues[nothing] for s in starts])
 
     def _node(self, node: int, past: Ints, idles: Step, allowed: Sequence[int]) -> _Node:
         past = past * self._waits.matter[node]
@@ -238,13 +244,13 @@ class _Waits:
                 if i == j:
                     continue
                 used = np.unique(space.robot_labels(i))
-                table = traces.interfering[i, j].copy()
+                table: Bools = traces.interfering[i, j].copy()
                 table[np.setdiff1d(np.arange(len(table)), used)] = False
                 patterns, pattern = np.unique(table, axis=0, return_inverse=True)
                 pattern = pattern.reshape(-1)
                 self._column[i][j] = (width + pattern).tolist()
                 kinds = np.zeros((len(table), len(patterns)), np.bool_)
-                kinds[np.arange(len(table)), pattern] = patterns.any(axis=1)[pattern]
+                kinds[np.arange(len(table)), pattern] = np.asarray(patterns.any(axis=1))[pattern]
                 matter.append(future[i][:, : len(table)] @ kinds)
                 added.append((j, slice(width, width + len(patterns)), patterns))
                 width += len(patterns)
@@ -305,16 +311,13 @@ class _Graph:
             self._edges.append(edges)
         return self._nodes[key]
 
-    def space(
-        self, old: PlanSpace, starts: Sequence[int], labels: tuple[tuple[str, ...], ...]
-    ) -> PlanSpace:
+    def space(self, old: PlanSpace, starts: Sequence[int]) -> PlanSpace:
         """The plan space of what paths from the starts pass through."""
         edges = [edge for own in self._edges for edge in own]
         degrees = [len(own) for own in self._edges]
         table = np.array([step for step, _ in edges], np.int32).reshape(len(edges), self._robots)
         found = replace(
             old,
-            model=replace(old.model, labels=labels, is_asynchronous=True),
             state=np.array(self._state, np.int64),
             goal=np.array(self._goal, np.int64),
             layer=np.array(self._layer, np.int64),
@@ -328,13 +331,13 @@ class _Graph:
 
 
 def event_text(model: JointModel, robot: int, event: Event) -> str:
-    """An event for people: ``(move r1 a b) after 2 of r2, with r3``."""
-    text = model.labels[robot][event.label]
-    waits = [
-        f"{number} of {name}"
-        for name, number in zip(model.robots, event.waits, strict=True)
-        if number
+    """An event as text: ``(move r1 a b) (after-2 r2) (with r3 (lift r3 t))``.
+
+    Names stand after spaces alone, so that symmetries rename an event like a subaction.
+    """
+    waits = zip(event.waits, model.robots, strict=True)
+    after = [f"(after-{number} {name})" for number, name in waits if number]
+    meets = [
+        f"(with {model.robots[other]} {model.labels[other][its]})" for other, its in event.meets
     ]
-    after = f" after {' and '.join(waits)}" if waits else ""
-    others = [f"{model.robots[other]} {model.labels[other][label]}" for other, label in event.meets]
-    return text + after + (f" with {' and '.join(others)}" if others else "")
+    return " ".join((model.labels[robot][event.label], *after, *meets))

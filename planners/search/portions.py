@@ -18,6 +18,7 @@ import numpy as np
 from planners.joint.model import FullState, Goal, JointModel
 from planners.joint.tables import Bools, Ints, Rows
 from planners.parallel.batch import digest
+from planners.search.asynchronous import as_executed
 from planners.search.graphs import parts_of_graph
 from planners.search.optimal_plans import distances, plan_spaces
 from planners.search.plan_space import PlanSpace
@@ -52,12 +53,12 @@ class Explored:
         """
         tasks = self.goals[goals.start : goals.stop]
         (space,) = plan_spaces(self.space, tasks, PieceSizes(pairs=sys.maxsize))
-        return space
+        return as_executed(space)
 
     @property
     def spaces(self) -> tuple[PlanSpace, ...]:
         """The plan spaces of all tasks, in batches of goals."""
-        return tuple(plan_spaces(self.space, self.goals))
+        return tuple(map(as_executed, plan_spaces(self.space, self.goals)))
 
     def only(self, goals: Ints) -> Explored:
         """The tasks of some of the goals, given by number."""
@@ -256,4 +257,5 @@ def _of_model(model: JointModel) -> Iterator[object]:
     yield model.labels
     yield model.cost
     yield model.slack
+    yield model.is_asynchronous
     yield tuple(model.codec.facts.texts)

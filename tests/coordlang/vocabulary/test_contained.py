@@ -186,7 +186,7 @@ def test_two_labels_must_not_become_one() -> None:
 
 def proves(candidates: Candidates, instance: ContainedInstance, refuted: int) -> Checked:
     """What all clauses of a part show of the whole."""
-    reasons = [_reason(candidates, *known) for known in instance.languages.known.evidence.items()]
+    reasons = [_reason(*known) for known in instance.languages.known.evidence.items()]
     return check(certificate(candidates, refuted, reasons), candidates)
 
 
@@ -232,7 +232,7 @@ def test_a_forged_symmetry_of_a_part_is_refused() -> None:
     for clause, evidence in list(instance.languages.known.evidence.items())[:20]:
         if evidence.symmetry is None:
             image = frozenset(pair(int(to[a]), int(to[b])) for a, b in clause)
-            reason = _reason(candidates, image, replace(evidence, symmetry=Symmetry(forged, to)))
+            reason = _reason(image, replace(evidence, symmetry=Symmetry(forged, to)))
             with pytest.raises(Refuted, match="reason 1 of the certificate is wrong"):
                 check(certificate(candidates, 1, [reason]), candidates)
             refused += 1
