@@ -11,10 +11,11 @@ from typing import Any, ClassVar
 from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.records import DEFAULT_MAX, PlansOptions, UnderstandOptions
 from coordlang.commands.terminal import echo, note_single_robot, write
-from planners.search.asynchronous import as_executed
+from planners.joint.tables import Rows
+from planners.search.asynchronous import Timing, as_executed
 from planners.search.kept_plans import search
 from planners.search.optimal_plans import search as bounded_search
-from planners.search.plan_file import Texts, texts, to_ipc, to_json, to_plansys2
+from planners.search.plan_file import Texts, json_count, texts, to_ipc, to_json, to_plansys2
 from planners.search.plans import Plan, Plans
 from planners.system.notebook import Presented
 
@@ -30,19 +31,25 @@ class OptimalPlans(Presented):
     robot, None where it idles.
     """
 
-    __slots__ = ("_plans",)
+    __slots__ = ("_listed", "_plans", "_timing")
     shown: ClassVar[tuple[str, ...]] = ("count", "makespan", "robots")
 
     def __init__(self, plans: Plans) -> None:
+        """Take plans in step; where the model says so they are listed up to timing."""
+        self._listed, self._timing = plans, None
+        space = as_executed(plans.space)
+        if space is not plans.space:
+            self._listed, self._timing = Plans.of(space), Timing(space)
         self._plans = plans
 
     @property
     def count(self) -> int:
         """The exact number of plans: different sequences of joint actions.
 
-        With slack of those with all steps that are allowed, the last ones at rest.
+        With slack of those with all steps that are allowed, the last ones at rest.  Without a
+        common step plans that differ in timing alone count once.
         """
-        return self._plans.count
+        return self._listed.count
 
     @property
     def makespan(self) -> int:
@@ -66,20 +73,22 @@ class OptimalPlans(Presented):
         return self._plans.space.model.robots
 
     def __iter__(self) -> Iterator[PlanSteps]:
-        return map(self._texts, self._plans)
+        return map(self._texts, self._listed)
 
     def __getitem__(self, rank: int) -> PlanSteps:
         """Return the plan at a position, 0 to ``count - 1``; raises `IndexError` outside."""
-        return self._texts(self._plans.unrank(rank))
+        return self._texts(self._listed.unrank(rank))
 
     def rank(self, plan: Sequence[Texts]) -> int | None:
         """Return the position of a plan, None if it is no optimal plan of the task."""
         numbers = self._numbers(plan)
-        return None if numbers is None else self._plans.rank(numbers)
+        if self._timing and numbers is not None:
+            numbers = self._timing.labels(self._start, numbers)
+        return None if numbers is None else self._listed.rank(numbers)
 
     def sample(self, number: int, seed: int = 0) -> list[PlanSteps]:
         """Draw plans uniformly and independently; the same seed draws the same plans."""
-        return [self._texts(plan) for plan in self._plans.sample(number, seed)]
+        return [self._texts(plan) for plan in self._listed.sample(number, seed)]
 
     def ipc(self, plan: Sequence[Texts]) -> str:
         """Return a plan as an IPC plan file (docs/formats.md).
@@ -94,9 +103,22 @@ class OptimalPlans(Presented):
 
     def data(self, listed: Sequence[Sequence[Texts]]) -> dict[str, Any]:
         """Return the data of a JSON plan file with these plans in it (docs/formats.md)."""
-        return to_json(self._plans, [self._known(plan) for plan in listed])
+        data = to_json(self._plans, [self._known(plan) for plan in listed])
+        if self._timing:
+            complete = len(listed) == self.count
+            count = json_count(self.count)
+            data |= {"execution": "asynchronous", "count": count, "complete": complete}
+        return data
+
+    @property
+    def _start(self) -> Rows:
+        space = self._plans.space
+        start: Rows = space.rows[space.state[self._plans.start]]
+        return start
 
     def _texts(self, plan: Plan) -> PlanSteps:
+        if self._timing:
+            plan = self._timing.steps(plan, self._listed.states(plan))
         return texts(self._plans.space.model, self._plans.without_rest(plan))
 
     def _numbers(self, plan: Sequence[Texts]) -> Plan | None:
@@ -122,9 +144,8 @@ def plans(files: Arguments, options: PlansOptions) -> OptimalPlans:
     loaded = files.instance()
     model, task = loaded.model, loaded.tasks[0]
     if options.heuristic == "auto":
-        return OptimalPlans(Plans.of(as_executed(search(model, task))))
-    in_step = bounded_search(model, task, heuristic=options.heuristic)
-    return OptimalPlans(Plans.of(as_executed(in_step)))
+        return OptimalPlans(Plans.of(search(model, task)))
+    return OptimalPlans(Plans.of(bounded_search(model, task, heuristic=options.heuristic)))
 
 
 def show_plans(found: OptimalPlans, options: PlansOptions) -> None:

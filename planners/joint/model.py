@@ -11,6 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from planners.pddl.lifted import Atom, Formula, StepAtom
 from planners.pddl.model_options import Cost
 from planners.system.errors import Position
 from planners.system.notebook import named
+
+if TYPE_CHECKING:
+    from planners.joint.traces import Event
 
 #: The text of label 0.
 IDLE = "idle"
@@ -132,7 +136,8 @@ class JointModel:
     on plans say how many of them are left, are the numbers of the facts that do: none left, one
     left, and so on.  ``impossible`` says what robots can never do, for messages.
     ``is_asynchronous``: robots keep no common step, and the labels of plan spaces are events
-    (`planners.search.asynchronous`); ``has_ties`` as in `planners.joint.traces.Traces`.
+    (`planners.search.asynchronous`).  The model of such a space has these ``events`` by label, the
+    model ``in_step`` whose subactions they are, and ``has_ties`` (`planners.joint.traces.Traces`).
     """
 
     name: str
@@ -151,6 +156,8 @@ class JointModel:
     impossible: tuple[Impossible, ...] = ()
     is_asynchronous: bool = False
     has_ties: bool = False
+    in_step: JointModel | None = None
+    events: tuple[tuple[Event | None, ...], ...] = ()
 
     @property
     def kept_plan(self) -> str:

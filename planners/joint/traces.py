@@ -113,20 +113,26 @@ class Traces:
         """
         done: list[list[Event]] = [[] for _ in self._robots]
         for step in steps:
-            new = {}
-            for robot, (earlier, block) in enumerate(self.before(row, step)):
-                if block:
-                    waits = tuple(
-                        self._count(robot, step[robot], other, done[other]) + (other in earlier)
-                        for other in self._robots
-                    )
-                    new[robot] = Event(step[robot], waits, meeting(robot, step, block))
-            for robot, event in new.items():
+            for robot, event in self.next_events(row, step, done).items():
                 done[robot].append(event)
             after = self.result(row, step)
             assert after is not None, "it is a joint step"
             row = after
         return done
+
+    def next_events(
+        self, row: Rows, step: Step, done: Sequence[Sequence[Event]]
+    ) -> dict[int, Event]:
+        """The events of a joint step by robot, after those that are ``done``."""
+        found = {}
+        for robot, (earlier, block) in enumerate(self.before(row, step)):
+            if block:
+                waits = tuple(
+                    self._count(robot, step[robot], other, done[other]) + (other in earlier)
+                    for other in self._robots
+                )
+                found[robot] = Event(step[robot], waits, meeting(robot, step, block))
+        return found
 
     def _count(self, robot: int, label: int, other: int, done: Sequence[Event]) -> int:
         if robot == other:

@@ -13,11 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise, product
 
 import numpy as np
 
 from planners.joint.model import JointModel
-from planners.joint.tables import Bools, Ints
+from planners.joint.tables import Bools, Ints, Rows
 from planners.joint.traces import Event, Step, Traces, meeting
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import BadInput
@@ -98,7 +99,19 @@ class _Unfolding:
             for node in layer.values():
                 self._retract(node, graph)
         nothing: _Queues = ((),) * len(self._robots)
-        model = replace(self._space.model, labels=self._texts(), has_ties=self._traces.has_ties)
+        old = self._space.model
+        events = tuple((None, *own) for own in self.events)
+        model = replace(
+            old,
+            labels=tuple(
+                tuple(event_text(old, robot, event) for event in own)
+                for robot, own in enumerate(events)
+            ),
+            is_asynchronous=True,
+            events=events,
+            in_step=old,
+            has_ties=self._traces.has_ties,
+        )
         return graph.space(replace(self._space, model=model), [s.queues[nothing] for s in starts])
 
     def _node(self, node: int, past: Ints, idles: Step, allowed: Sequence[int]) -> _Node:
@@ -210,13 +223,6 @@ class _Unfolding:
         for own_queues, own in moves.items():
             here.queues[own_queues] = graph.node(state, goal, layer, own)
 
-    def _texts(self) -> tuple[tuple[str, ...], ...]:
-        model = self._space.model
-        return tuple(
-            (names[0], *(event_text(model, robot, event) for event in self.events[robot]))
-            for robot, names in enumerate(model.labels)
-        )
-
 
 class _Waits:
     """Counts of events that others wait for.
@@ -288,6 +294,75 @@ def _future(space: PlanSpace, robot: int) -> Bools:
     return found
 
 
+class Timing:
+    """Turns plans of robots that keep no common step into plans in step, and back.
+
+    Parameters
+    ----------
+    space
+        Made by `asynchronous`.
+    """
+
+    def __init__(self, space: PlanSpace) -> None:
+        model = space.model
+        assert model.in_step is not None
+        self._space, self._model, self._traces = space, model, Traces(model.in_step)
+
+    def steps(self, plan: Sequence[Step], states: Sequence[int]) -> tuple[Step, ...]:
+        """The steps of a plan that does everything as soon as possible.
+
+        ``plan`` are labels of the plan space, ``states`` those that it passes.
+        """
+        parts = [
+            [self._model.events[robot][number] for number in own if number]
+            for robot, own in enumerate(zip(*plan, strict=True))
+        ]
+        done: list[list[Event]] = [[] for _ in parts]
+        found: list[Step] = []
+        for here, after in pairwise(states):
+            row, end = self._space.rows[here], self._space.rows[after]
+            next_ones = [
+                own[len(past)] if len(past) < len(own) else None
+                for own, past in zip(parts, done, strict=True)
+            ]
+            found.append(self._step(row, end, next_ones, done))
+            for own, event, label in zip(done, next_ones, found[-1], strict=True):
+                if event and label:
+                    own.append(event)
+        return tuple(found)
+
+    def _step(
+        self, row: Rows, end: Rows, events: Sequence[Event | None], done: Sequence[Sequence[Event]]
+    ) -> Step:
+        """As many of the robots' next events as can be done at once, between two states."""
+        labels = [(event.label, 0) if event else (0,) for event in events]
+        for step in sorted(product(*labels), key=lambda step: step.count(0)):
+            after = self._traces.result(row, step)
+            if after is not None and np.array_equal(after, end):
+                own = self._traces.next_events(row, step, done)
+                if all(not label or own[r] == events[r] for r, label in enumerate(step)):
+                    return step
+        raise AssertionError("some events lead from each state of a plan to the next one")
+
+    def labels(self, row: Rows, steps: Sequence[Step]) -> tuple[Step, ...] | None:
+        """The labels of a plan in step, whatever its timing; None if it is no plan of the space.
+
+        ``row`` is the state where it begins.
+        """
+        here: Rows | None = row
+        for step in steps:
+            if here is None:
+                return None
+            here = self._traces.result(here, step)
+        if here is None:
+            return None
+        columns = []
+        for own, events in zip(self._model.events, self._traces.events(row, steps), strict=True):
+            numbers = [own.index(event) if event in own else -1 for event in events]
+            columns.append(numbers + [0] * (len(steps) - len(numbers)))
+        return tuple(zip(*columns, strict=True))
+
+
 class _Graph:
     """A plan space in the making, from the goals up: nodes with the same edges are one."""
 
@@ -330,11 +405,13 @@ class _Graph:
         return found.reduced()
 
 
-def event_text(model: JointModel, robot: int, event: Event) -> str:
+def event_text(model: JointModel, robot: int, event: Event | None) -> str:
     """An event as text: ``(move r1 a b) (after-2 r2) (with r3 (lift r3 t))``.
 
     Names stand after spaces alone, so that symmetries rename an event like a subaction.
     """
+    if event is None:
+        return model.labels[robot][0]
     waits = zip(event.waits, model.robots, strict=True)
     after = [f"(after-{number} {name})" for number, name in waits if number]
     meets = [

@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Plans of robots without a common step against the definition: parts, timing, interleavings."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+
+from coordlang.language.candidates import all_pairs, from_problems
+from coordlang.language.partition import Partition
+from coordlang.verification.by_definition import verify
+from planners.joint.traces import Event, Traces
+from planners.loading import load
+from planners.pddl.model_options import ModelOptions
+from planners.search.asynchronous import Timing, asynchronous, event_text
+from planners.search.optimal_plans import search
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import Plans as Paths
+from planners.search.plans import counts
+from planners.system.errors import BadInput, CoordlangError
+from tests.support import naive
+from tests.support.asynchronous import ChangesAlone, Plans, World, least_words
+from tests.support.domains import DOMAINS, all_tasks, own_task, read
+from tests.support.random_models import random_model
+
+RUNS = [(2, range(60)), (3, range(12))]
+THOROUGH = [(2, range(60, 1_500)), (3, range(12, 800)), (4, range(100))]
+SEEDS = [*RUNS, *(pytest.param(*run, marks=pytest.mark.thorough) for run in THOROUGH)]
+
+
+def random_tasks(robots: int, seeds: range) -> Iterator[tuple[PlanSpace, World, list[int], Random]]:
+    """Plan spaces in step of random models, and some of their tasks."""
+    for seed in seeds:
+        random = Random(seed)
+        try:
+            domain, problem, options = random_model(seed, robots)
+            candidates = all_pairs(domain, [problem], options)
+        except CoordlangError:
+            continue
+        for space in candidates.spaces:
+            tasks = random.sample(range(len(space.starts)), min(4, len(space.starts)))
+            yield space, World(candidates.model), tasks, random
+
+
+def paths(space: PlanSpace, task: int) -> dict[tuple[tuple[str, ...], ...], tuple[int, ...]]:
+    """The parts of a task's plans, as texts, each with the states that the plan passes."""
+    found = {}
+    listed = Paths(space, int(space.starts[task]), counts(space))
+    for plan in listed:
+        columns = enumerate(zip(*plan, strict=True)) if plan else enumerate([()] * space.robots)
+        parts = tuple(
+            tuple(space.model.labels[robot][number] for number in own if number)
+            for robot, own in columns
+        )
+        assert parts not in found, "plans with equal parts are one"
+        found[parts] = tuple(listed.states(plan))
+    return found
+
+
+@pytest.mark.parametrize(("robots", "seeds"), SEEDS)
+def test_paths_are_the_plans_up_to_timing(robots: int, seeds: range) -> None:
+    """They have the states of those that do everything as soon as possible, and come from them."""
+    seen: Counter[str] = Counter()
+    for space, world, tasks, _ in random_tasks(robots, seeds):
+        try:
+            made = asynchronous(space)
+        except BadInput:
+            seen["refused"] += 1
+            continue
+        timing = Timing(made)
+        for task in tasks:
+            try:
+                plans = Plans(world, space, task, 60)
+            except naive.TooLarge:
+                continue
+            wanted = {}
+            for parts, states in plans.states.items():
+                wanted[
+                    tuple(
+                        tuple(
+                            event_text(
+                                world.model,
+                                robot,
+                                Event(
+                                    e.label, e.waits, tuple(sorted((o, at) for o, _, at in e.meets))
+                                ),
+                            )
+                            for e in part
+                        )
+                        for robot, part in enumerate(parts)
+                    )
+                ] = states
+            assert paths(made, task) == wanted
+            seen["plans"] += len(wanted)
+            listed = Paths(made, int(made.starts[task]), counts(made))
+            for plan in listed:
+                steps = timing.steps(plan, listed.states(plan))
+                assert steps in plans.listed
+                row = space.rows[space.state[space.starts[task]]]
+                assert timing.labels(row, steps) == plan
+    print(f"{robots} robots: {dict(seen)}")
+    assert seen["plans"] >= 30
+
+
+@pytest.mark.parametrize(("robots", "seeds"), SEEDS)
+def test_under_a_language_every_interleaving_ends_in_the_goal(robots: int, seeds: range) -> None:
+    """A language by definition, whatever time events take; and `verify` agrees."""
+    seen: Counter[str] = Counter()
+    for space, world, tasks, random in random_tasks(robots, seeds):
+        for task in tasks:
+            try:
+                plans = Plans(world, space, task, 40)
+            except (naive.TooLarge, ChangesAlone):
+                continue
+            one = space.with_tasks(space.starts[[task]], space.second[[task]])
+            made = asynchronous(one)
+            row = space.rows[space.state[space.starts[task]]]
+            for many in (1, 2, 4):
+                word = {state: random.randrange(many) for state in range(len(space.rows))}
+                mixtures = [mixed for mixed, _ in plans.mixtures(word)]
+                if len(mixtures) > 100:
+                    continue
+                holds = all(mixed in plans.states for mixed in mixtures)
+                partition = Partition.of_states(space.rows, word)
+                assert verify(partition, [made]).holds == holds
+                ends = Counter(end for mixed in mixtures for end in world.ends(row, mixed))
+                assert not holds or set(ends) == {"arrived"}
+                seen["language" if holds else "none"] += 1
+                seen["mixtures"] += len(mixtures)
+                seen["do not arrive"] += any(end != "arrived" for end in ends)
+    print(f"{robots} robots: {dict(seen)}")
+    assert min(seen["language"], seen["none"]) >= 5
+
+
+@pytest.mark.parametrize(
+    ("robots", "seeds"),
+    [(2, range(60)), *(pytest.param(*run, marks=pytest.mark.thorough) for run in THOROUGH)],
+)
+def test_one_plan_is_the_soonest_in_every_event(robots: int, seeds: range) -> None:
+    """Of plans with equal parts one has every event no later than any other one."""
+    compared = 0
+    for space, world, tasks, _ in random_tasks(robots, seeds):
+        for task in tasks:
+            row = space.rows[space.state[space.starts[task]]]
+            by_parts: dict[object, list[tuple[tuple[int, ...], ...]]] = {}
+            try:
+                for plan in naive.listed(space, task, 60):
+                    parts, when = world.parts(row, plan)
+                    by_parts.setdefault(parts, []).append(when)
+            except (naive.TooLarge, ChangesAlone):
+                continue
+            for timings in by_parts.values():
+                times = np.array([[t for own in when for t in own] for when in timings])
+                assert (times == times.min(axis=0)).all(axis=1).any()
+                compared += len(timings) > 1
+    print(f"{robots} robots: {compared} plans have several timings")
+    assert compared > 0
+
+
+@pytest.mark.parametrize(
+    ("folder", "stem", "in_step", "asynchronously"),
+    [
+        ("three-cells", "problem", 3, 3),
+        ("t-map", "problem", 3, 3),
+        ("grid", "gw1-2x2", 3, 5),
+        pytest.param("grid", "gw2-2x3", 5, 9, marks=pytest.mark.thorough),
+    ],
+)
+def test_least_words(folder: str, stem: str, in_step: int, asynchronously: int) -> None:
+    """As an independent brute force found them; every mixture arrives in every interleaving."""
+    (space,) = all_tasks(folder, stem).spaces
+    world = World(space.model)
+    plans = [Plans(world, space, task, 100) for task in range(len(space.starts))]
+    least, word = least_words(plans, range(len(space.rows)))
+    assert least == asynchronously
+    for task, own in enumerate(plans):
+        row = space.rows[space.state[space.starts[task]]]
+        for mixed, _ in own.mixtures(word):
+            assert world.ends(row, mixed) == {"arrived"}
+    if in_step < asynchronously:
+        assert sum(len(own.states) for own in plans) < sum(len(own.listed) for own in plans)
+
+
+def test_who_leaves_a_cell_goes_before_who_follows() -> None:
+    (space,) = all_tasks("three-cells").spaces
+    traces, followed = Traces(space.model), 0
+    for node in range(len(space)):
+        for edge in space.out_edges(node):
+            texts = space.model.texts(space.labels_of(edge))
+            moves = [text.strip("()").split() if text else None for text in texts]
+            blocks = traces.blocks(space.rows[space.state[node]], space.labels_of(edge))
+            one, two = moves
+            if one and two:
+                assert two[2] == one[3] or one[2] == two[3], "of three cells two are left"
+                assert blocks == (((1,), (0,)) if two[2] == one[3] else ((0,), (1,)))
+                followed += 1
+    assert followed > 0
+
+
+def test_robots_that_turn_in_a_ring_meet(tmp_path: Path) -> None:
+    """Three robots on three cells: nobody can go first."""
+    old = (DOMAINS / "three-cells" / "problem.pddl").read_text()
+    (tmp_path / "turn.pddl").write_text(
+        old.replace("r1 r2 - robot", "r1 r2 r3 - robot")
+        .replace("(:init", "(:init (at r3 c)")
+        .replace(old[old.index("(:goal") :], "(:goal (and (at r1 b) (at r2 c) (at r3 a))))")
+    )
+    loaded = load(DOMAINS / "three-cells" / "domain.pddl", [tmp_path / "turn.pddl"])
+    space = search(loaded.model, loaded.tasks[0])
+    assert space.cost_of(0)[0] == 1
+    (edge,) = space.out_edges(int(space.starts[0]))
+    traces = Traces(space.model)
+    assert traces.blocks(loaded.tasks[0].init, space.labels_of(edge)) == ((0, 1, 2),)
+    (made,) = paths(asynchronous(space), 0)
+    assert made[0] == ("(move r1 a b) (with r2 (move r2 b c)) (with r3 (move r3 c a))",)
+
+
+def test_a_shared_action_and_two_that_lift_one_table_meet() -> None:
+    (space,) = own_task("tray", "serve").spaces
+    traces = Traces(space.model)
+    path = space.first_path(int(space.starts[0]))
+    blocks = [
+        traces.blocks(space.rows[space.state[node]], space.labels_of(edge))
+        for node, edge in zip(space.nodes_on(int(space.starts[0]), path), path, strict=False)
+    ]
+    assert any(len(block) == 2 for step in blocks for block in step)
+
+
+def test_in_joint_actions_all_who_act_meet() -> None:
+    (space,) = own_task("grid-joint", "corners-3x3").spaces
+    traces = Traces(space.model)
+    edge = space.first_path(int(space.starts[0]))[0]
+    row = space.rows[space.state[space.starts[0]]]
+    assert traces.blocks(row, space.labels_of(edge)) == ((0, 1),)
+
+
+def test_what_does_not_interfere_is_in_no_order() -> None:
+    """Far from each other robots wait for nothing, and their plans count once."""
+    domain, problem = read("grid", "corners-4x4")
+    candidates = from_problems(domain, [problem], ModelOptions(asynchronous=True))
+    (space,) = candidates.spaces
+    firsts = {
+        space.model.events[robot][label]
+        for edge in space.out_edges(int(space.starts[0]))
+        for robot, label in enumerate(space.labels_of(edge))
+    }
+    assert firsts
+    assert all(event is not None and event.waits == (0, 0) for event in firsts)
+
+
+def test_a_state_that_changes_by_itself_is_refused() -> None:
+    said = []
+    for seed in range(400):
+        domain, problem, options = random_model(seed, 2)
+        try:
+            candidates = all_pairs(domain, [problem], replace(options, asynchronous=True))
+            candidates.spaces  # noqa: B018
+        except CoordlangError as error:
+            said.append(str(error))
+    assert any("--asynchronous: the state" in text and "all robots idle" in text for text in said)
