@@ -89,8 +89,8 @@ def build_language(
         return repair_language(making, start, options.seed)
     if candidates.model.is_asynchronous and method in ("greedy", "separating"):
         raise UsageError(
-            f"--method {method} parts plans where their states first differ, and without a common "
-            "step they may differ in what robots do next",
+            f"--asynchronous: --method {method} parts plans where their states first differ, and "
+            "they may differ in what robots do next",
             remedy="Use --method best or minimal.",
         )
     if candidates.model.hides_slack and method in ("greedy", "separating"):

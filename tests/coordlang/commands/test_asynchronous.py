@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A language for robots without a common step: every command follows its file, or refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import coordlang as library
+from planners.system.errors import UsageError
+from tests.coordlang.commands.conftest import FILES, Shell
+
+SQUARE = FILES["SQUARE"]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Five words for all tasks of the 2x2 grid, of which three are enough in step."""
+    path = tmp_path_factory.mktemp("asynchronous") / "l.json"
+    built = library.build(*SQUARE, tasks="all", asynchronous=True, method="minimal")
+    assert (len(built.language.words), built.language.guarantee.lower_bound) == (5, 5)
+    built.language.save(path)
+    return path
+
+
+def test_the_file_says_so_and_verify_follows_it(made: Path, shell: Shell) -> None:
+    data = json.loads(made.read_text())
+    assert data["model"]["execution"] == "asynchronous"
+    shell(f"verify {made} SQUARE", 0, "asynchronous: all optimal plans of one sentence mix freely")
+    # In step the same words are none: plans that differ in timing alone do not mix step by step.
+    del data["model"]["execution"]
+    Path("in-step.json").write_text(json.dumps(data))
+    shell("verify in-step.json SQUARE", 1)
+    with pytest.raises(UsageError, match="--asynchronous contradicts the language file"):
+        library.verify("in-step.json", *SQUARE, asynchronous=True)
+
+
+def test_words_that_suffice_in_step_are_refuted(shell: Shell) -> None:
+    shell("build SQUARE --tasks all --method minimal -o three.json", 0, "3 words (minimal, proved")
+    data = json.loads(Path("three.json").read_text())
+    data["model"]["execution"] = "asynchronous"
+    Path("three.json").write_text(json.dumps(data))
+    said = shell("verify three.json SQUARE", 1).out
+    assert "(after-" in said
+    assert "no optimal plan has these events" in said
+    data["model"]["execution"] = "whenever"
+    Path("three.json").write_text(json.dumps(data))
+    shell("verify three.json SQUARE", 31)
+
+
+def test_a_proof_is_checked(shell: Shell) -> None:
+    shell(
+        "build SQUARE --tasks all --method minimal --asynchronous -o l.json --certificate p.json", 0
+    )
+    shell("verify l.json SQUARE --certificate p.json", 0, "lower bound 5")
+
+
+def test_plans_that_differ_in_timing_alone_count_once(shell: Shell) -> None:
+    in_step, without = (
+        library.plans(*FILES["CELLS"]),
+        library.plans(*FILES["CELLS"], asynchronous=True),
+    )
+    assert (in_step.count, without.count) == (4, 2)
+    assert set(without) < set(in_step)
+    assert [without.rank(plan) for plan in without] == [0, 1]
+    ranks = [without.rank(plan) for plan in in_step]
+    assert sorted(ranks) == [0, 0, 1, 1]
+    data = json.loads(shell("plans CELLS --asynchronous --format json", 0).out)
+    assert (data["execution"], data["count"], data["complete"]) == ("asynchronous", 2, True)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "say {} SQUARE plan.json",
+        "understand {} SQUARE w0",
+        "plan {} SQUARE w0",
+        "choices {} SQUARE w0",
+        "explain {} SQUARE",
+        "report {} SQUARE -o page.html",
+        "export {} SQUARE w0 --to ltlf -o out",
+        "build SQUARE --asynchronous --slack 1 -o x.json",
+        "build SQUARE --asynchronous --method greedy -o x.json",
+        "build SQUARE --asynchronous --method separating -o x.json",
+        "lift SQUARE --asynchronous -o x.json",
+    ],
+)
+def test_what_does_not_follow_refuses(command: str, made: Path, shell: Shell) -> None:
+    Path("plan.json").write_text("[]")
+    assert "asynchronous" in shell(command.format(made), 2).err
+    assert not Path("x.json").exists()
