@@ -90,11 +90,15 @@ class ModelOptions:
                 f"--slack {echoed(str(self.slack))}: more than {MOST_SLACK:,} joint steps",
                 remedy="Say --slack 1.",
             )
-        if self.asynchronous and self.slack:
-            raise UsageError(
-                "--asynchronous --slack: without a common step no steps are counted",
-                remedy="Leave out one of them.",
-            )
+        for given, name, why in (
+            (self.slack, "slack", "no steps are counted"),
+            (self.remember_actions, "remember-actions", "nobody acts last"),
+        ):
+            if self.asynchronous and given:
+                raise UsageError(
+                    f"--asynchronous --{name}: without a common step {why}",
+                    remedy="Leave out one of them.",
+                )
         if self.words_see_slack and not self.slack:
             raise UsageError(
                 "--words-see-slack belongs to --slack, and there is none",

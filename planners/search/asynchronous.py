@@ -38,7 +38,8 @@ def asynchronous(space: PlanSpace) -> PlanSpace:
     Raises
     ------
     BadInput
-        If a state changes in a joint step in which all robots idle.
+        If a state changes in a joint step in which all robots idle, or no plan is the soonest of
+        those that differ in timing alone.
     """
     return _Unfolding(space).run()
 
@@ -194,6 +195,15 @@ class _Unfolding:
                 remedy="Let an action of some robot do it: without a clock nothing else happens.",
             )
 
+    def _refuse_timing(self, node: int) -> None:
+        """Raise for a plan that can be done in two ways, of which none is sooner in every event."""
+        text = self._space.model.state_text(self._space.rows[self._space.state[node]])
+        raise BadInput(
+            f"--asynchronous: from the state {text} events can be done sooner in two ways, which "
+            "lead through different states",
+            remedy="Let actions that cannot all be done at once interfere in pairs.",
+        )
+
     # ---- up: what robots say, and when
 
     def _retract(self, here: _Node, graph: _Graph) -> None:
@@ -218,8 +228,8 @@ class _Unfolding:
                     said.append(ahead[idles] if idles < len(ahead) else 0)
                     queues.append(ahead[:idles])
                 own = moves.setdefault(tuple(queues), {})
-                known = own.setdefault(tuple(said), (target, cost))
-                assert known == (target, cost), "what robots will do says what happens next"
+                if own.setdefault(tuple(said), (target, cost)) != (target, cost):
+                    self._refuse_timing(here.node)
         for own_queues, own in moves.items():
             here.queues[own_queues] = graph.node(state, goal, layer, own)
 

@@ -19,7 +19,7 @@ from coordlang.language.warping import separation_clause
 from coordlang.vocabulary.sat import PartitionProblem
 from planners.grounding.actions import GroundAction
 from planners.joint.composition import ComposingStepper, JointActionStepper
-from planners.joint.model import JointModel
+from planners.joint.model import Goal, JointModel
 from planners.joint.tables import Rows
 from planners.pddl.formula_tree import literals
 from planners.pddl.lifted import Atom, StepAtom
@@ -143,10 +143,10 @@ class World:
             for other in self.robots
         )
 
-    def ends(self, row: Rows, parts: Parts) -> set[str]:
+    def ends(self, row: Rows, parts: Parts, goal: Goal) -> set[str]:
         """How executions of parts end, over all interleavings of starts and ends.
 
-        Of ``arrived`` (all is done), ``stuck`` (some wait for ever), ``overlap`` (an event would
+        Of ``arrived`` (all is done, and the goal holds), ``elsewhere`` (it does not), ``stuck`` (some wait for ever), ``overlap`` (an event would
         start beside one that interferes with it) and ``impossible`` (it would start where it is
         not applicable).
         """
@@ -164,7 +164,9 @@ class World:
                     following.append(then)
             if not following:
                 done = here.ended == tuple(map(len, parts))
-                found.add("arrived" if done else "stuck")
+                mask = self.model.codec.mask(sorted(here.facts))
+                holds = done and self.model.holds(goal, mask[None, :])[0]
+                found.add("arrived" if holds else "elsewhere" if done else "stuck")
             front += [then for then in following if then not in seen]
             seen.update(following)
         return found

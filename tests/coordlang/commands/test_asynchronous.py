@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -66,7 +67,7 @@ def test_plans_that_differ_in_timing_alone_count_once(shell: Shell) -> None:
     assert set(without) < set(in_step)
     assert [without.rank(plan) for plan in without] == [0, 1]
     ranks = [without.rank(plan) for plan in in_step]
-    assert sorted(ranks) == [0, 0, 1, 1]
+    assert Counter(ranks) == {0: 2, 1: 2}
     data = json.loads(shell("plans CELLS --asynchronous --format json", 0).out)
     assert (data["execution"], data["count"], data["complete"]) == ("asynchronous", 2, True)
 

@@ -16,7 +16,7 @@ from coordlang.language.candidates import all_pairs, from_problems
 from coordlang.language.partition import Partition
 from coordlang.verification.by_definition import verify
 from planners.joint.traces import Event, Traces
-from planners.loading import load
+from planners.loading import build, load
 from planners.pddl.model_options import ModelOptions
 from planners.search.asynchronous import Timing, asynchronous, event_text
 from planners.search.optimal_plans import search
@@ -28,6 +28,7 @@ from tests.support import naive
 from tests.support.asynchronous import ChangesAlone, Plans, World, least_words
 from tests.support.domains import DOMAINS, all_tasks, own_task, read
 from tests.support.random_models import random_model
+from tests.support.texts import parsed
 
 RUNS = [(2, range(60)), (3, range(12))]
 THOROUGH = [(2, range(60, 1_500)), (3, range(12, 800)), (4, range(100))]
@@ -121,6 +122,7 @@ def test_under_a_language_every_interleaving_ends_in_the_goal(robots: int, seeds
             one = space.with_tasks(space.starts[[task]], space.second[[task]])
             made = asynchronous(one)
             row = space.rows[space.state[space.starts[task]]]
+            goal = space.goals[space.goal[space.starts[task]]]
             for many in (1, 2, 4):
                 word = {state: random.randrange(many) for state in range(len(space.rows))}
                 mixtures = [mixed for mixed, _ in plans.mixtures(word)]
@@ -129,7 +131,7 @@ def test_under_a_language_every_interleaving_ends_in_the_goal(robots: int, seeds
                 holds = all(mixed in plans.states for mixed in mixtures)
                 partition = Partition.of_states(space.rows, word)
                 assert verify(partition, [made]).holds == holds
-                ends = Counter(end for mixed in mixtures for end in world.ends(row, mixed))
+                ends = Counter(end for mixed in mixtures for end in world.ends(row, mixed, goal))
                 assert not holds or set(ends) == {"arrived"}
                 seen["language" if holds else "none"] += 1
                 seen["mixtures"] += len(mixtures)
@@ -181,8 +183,9 @@ def test_least_words(folder: str, stem: str, in_step: int, asynchronously: int) 
     assert least == asynchronously
     for task, own in enumerate(plans):
         row = space.rows[space.state[space.starts[task]]]
+        goal = space.goals[space.goal[space.starts[task]]]
         for mixed, _ in own.mixtures(word):
-            assert world.ends(row, mixed) == {"arrived"}
+            assert world.ends(row, mixed, goal) == {"arrived"}
     if in_step < asynchronously:
         assert sum(len(own.states) for own in plans) < sum(len(own.listed) for own in plans)
 
@@ -252,6 +255,34 @@ def test_what_does_not_interfere_is_in_no_order() -> None:
     }
     assert firsts
     assert all(event is not None and event.waits == (0, 0) for event in firsts)
+
+
+NOT_ALL_AT_ONCE = """
+(define (domain three) (:requirements :typing :negative-preconditions :multi-agent)
+  (:types robot)
+  (:predicates (done ?r - robot) (twice ?r - robot) (first ?r - robot))
+  (:action e :agent ?r - robot :parameters ()
+    :precondition (and (first ?r) (not (done ?r))
+      (not (exists (?a ?b - robot) (and (not (= ?a ?b)) (f ?a) (f ?b)))))
+    :effect (done ?r))
+  (:action again :agent ?r - robot :parameters ()
+    :precondition (and (first ?r) (done ?r) (not (twice ?r))) :effect (twice ?r))
+  (:action f :agent ?r - robot :parameters ()
+    :precondition (and (not (first ?r)) (not (done ?r))) :effect (done ?r)))
+"""
+
+
+def test_plans_of_which_none_is_the_soonest_are_refused() -> None:
+    """r1 may begin beside each of two robots, not beside both: some robot is late, either one."""
+    problem = """
+(define (problem p) (:domain three) (:objects r1 r2 r3 - robot) (:init (first r1))
+  (:goal (and (twice r1) (done r2) (done r3))))
+"""
+    domain, read_problem = parsed(NOT_ALL_AT_ONCE, problem)
+    loaded = build(domain, [read_problem])
+    space = search(loaded.model, loaded.tasks[0])
+    with pytest.raises(BadInput, match="sooner in two ways"):
+        asynchronous(space)
 
 
 def test_a_state_that_changes_by_itself_is_refused() -> None:
