@@ -40,8 +40,8 @@ CoordinatesSource = File | Mapping[str, tuple[float, float]]
 #: A sentence: ``"w1 w0"``, its words ``("w1", "w0")``, or one of `explain`.
 SentenceSource = str | Iterable[str]
 
-#: What the command line has not where plans take no slack, or a language file says how much.
-NO_SLACK = "slack words_see_slack"
+#: What the command line has not where plans are optimal and in step, or a language file says it.
+NO_SLACK = "slack words_see_slack asynchronous"
 #: Plans that are listed where no number is given.
 DEFAULT_MAX = 10
 
