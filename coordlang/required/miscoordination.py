@@ -15,7 +15,7 @@ import numpy as np
 
 from coordlang.language.candidates import describe
 from coordlang.required.choices import Choices
-from planners.joint.model import PlanningTask
+from planners.joint.model import JointModel, PlanningTask
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import ProvedImpossible
@@ -182,11 +182,15 @@ def miscoordination(space: PlanSpace, task: int) -> Miscoordination | None:
 class Inseparable(ProvedImpossible):
     """Two plans introduce RC but pass through the same states.
 
-    No state-based language can tell them apart.  ``hides_slack``: they differ in where they wait.
+    No state-based language can tell them apart.  With slack that the states of the ``model`` hide
+    they differ in where they wait, without a common step in who waits for whom.
     """
 
-    def __init__(self, witness: Miscoordination, *, hides_slack: bool = False) -> None:
-        if hides_slack:
+    def __init__(self, witness: Miscoordination, model: JointModel) -> None:
+        if model.is_asynchronous:
+            what = "optimal plans", ""
+            remedy = "Robots with a common step may have a language: leave out --asynchronous."
+        elif model.hides_slack:
             what = "plans within slack", ", though they may wait in different ones"
             remedy = (
                 "Build with --words-see-slack: states then also say how much of the slack is left; "

@@ -91,7 +91,7 @@ def differences(
             if not table:
                 witness = inseparable(source.portion(portions[len(found)]))
                 assert witness is not None
-                raise Inseparable(witness, hides_slack=model.hides_slack)
+                raise Inseparable(witness, model)
             found.append(table)
             progress(f"looking where coordination is required: {so_far()}")
     return _together(found, goals)

@@ -5,13 +5,18 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import coordlang as library
-from planners.system.errors import UsageError
+from coordlang.commands.building import build_language
+from coordlang.language.candidates import all_pairs
+from coordlang.required.miscoordination import Inseparable
+from planners.system.errors import CoordlangError, UsageError
 from tests.coordlang.commands.conftest import FILES, Shell
+from tests.support.random_models import random_model
 
 SQUARE = FILES["SQUARE"]
 
@@ -92,3 +97,19 @@ def test_what_does_not_follow_refuses(command: str, made: Path, shell: Shell) ->
     Path("plan.json").write_text("[]")
     assert "asynchronous" in shell(command.format(made), 2).err
     assert not Path("x.json").exists()
+
+
+def test_plans_that_no_words_tell_apart_are_shown() -> None:
+    """They differ in who waits for whom, in some random models."""
+    found = []
+    for seed in range(120):
+        domain, problem, options = random_model(seed, 2)
+        try:
+            candidates = all_pairs(domain, [problem], replace(options, asynchronous=True))
+            build_language(candidates, "minimal")
+        except Inseparable as error:
+            found.append(error)
+        except CoordlangError:
+            continue
+    assert found
+    assert all("leave out --asynchronous" in str(error) for error in found)
