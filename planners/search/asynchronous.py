@@ -22,6 +22,7 @@ from planners.joint.tables import Bools, Ints, Rows
 from planners.joint.traces import Event, Step, Traces, meeting
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import BadInput
+from planners.system.limits import reaching
 
 #: The events that robots have said they will do and have not done: for each robot some, in order.
 _Queues = tuple[tuple[int, ...], ...]
@@ -41,7 +42,9 @@ def asynchronous(space: PlanSpace) -> PlanSpace:
         If a state changes in a joint step in which all robots idle, or no plan is the soonest of
         those that differ in timing alone.
     """
-    return _Unfolding(space).run()
+    unfolding = _Unfolding(space)
+    with reaching(unfolding.so_far, space.model.smaller("smaller or fewer tasks")):
+        return unfolding.run()
 
 
 @dataclass(slots=True)
@@ -85,8 +88,15 @@ class _Unfolding:
         self._allowed: dict[int, Sequence[int]] = {}
         self.events: list[dict[Event, int]] = [{} for _ in self._robots]
         self._layers: list[dict[object, _Node]] = [{} for _ in space.layers]
+        self._graph = _Graph(space.robots)
+
+    def so_far(self) -> str:
+        """How far it got, for messages."""
+        pasts = sum(map(len, self._layers))
+        return f"{pasts:,} states with their pasts, {len(self._graph):,} nodes of the graph"
 
     def run(self) -> PlanSpace:
+        """The graph."""
         idle = (0,) * len(self._robots)
         starts = []
         for node in self._space.starts.tolist():
@@ -95,10 +105,9 @@ class _Unfolding:
         for layer in self._layers[:0:-1]:
             for node in layer.values():
                 self._extend(node)
-        graph = _Graph(self._space.robots)
         for layer in self._layers:
             for node in layer.values():
-                self._retract(node, graph)
+                self._retract(node)
         nothing: _Queues = ((),) * len(self._robots)
         old = self._space.model
         events = tuple((None, *own) for own in self.events)
@@ -113,7 +122,9 @@ class _Unfolding:
             in_step=old,
             has_ties=self._traces.has_ties,
         )
-        return graph.space(replace(self._space, model=model), [s.queues[nothing] for s in starts])
+        return self._graph.space(
+            replace(self._space, model=model), [s.queues[nothing] for s in starts]
+        )
 
     def _node(self, node: int, past: Ints, idles: Step, allowed: Sequence[int]) -> _Node:
         past = past * self._waits.matter[node]
@@ -206,7 +217,7 @@ class _Unfolding:
 
     # ---- up: what robots say, and when
 
-    def _retract(self, here: _Node, graph: _Graph) -> None:
+    def _retract(self, here: _Node) -> None:
         """Find the queues of a node from those that its moves lead to.
 
         After k steps a robot has said its first k events; of these it has done all but as many as
@@ -216,7 +227,7 @@ class _Unfolding:
         state, goal = int(space.state[here.node]), int(space.goal[here.node])
         layer = int(space.layer[here.node])
         if not layer:
-            here.queues[((),) * len(self._robots)] = graph.node(state, goal, layer, {})
+            here.queues[((),) * len(self._robots)] = self._graph.node(state, goal, layer, {})
             return
         moves: dict[_Queues, dict[Step, tuple[int, int]]] = {}
         for numbers, edge, after in here.moves:
@@ -231,7 +242,7 @@ class _Unfolding:
                 if own.setdefault(tuple(said), (target, cost)) != (target, cost):
                     self._refuse_timing(here.node)
         for own_queues, own in moves.items():
-            here.queues[own_queues] = graph.node(state, goal, layer, own)
+            here.queues[own_queues] = self._graph.node(state, goal, layer, own)
 
 
 class _Waits:
@@ -383,6 +394,10 @@ class _Graph:
         self._goal: list[int] = []
         self._layer: list[int] = []
         self._edges: list[list[tuple[Step, tuple[int, int]]]] = []
+
+    def __len__(self) -> int:
+        """Count the nodes."""
+        return len(self._state)
 
     def node(self, state: int, goal: int, layer: int, moves: Mapping[Step, tuple[int, int]]) -> int:
         """The number of a node with these edges: labels, then target and cost."""
