@@ -42,7 +42,9 @@ def keeps_its_promises(of: Mission, settings: Settings, number: int) -> None:
         assert found.arrived
         assert found.mixes
         assert found.nearest is not None
-        assert 2 * settings.radius - 0.001 < found.nearest <= nearest(found) + 0.001
+        # Places are recorded to a millimetre, so that two of them may be 1.4 mm farther apart, and
+        # so is the distance.
+        assert 2 * settings.radius - 0.001 < found.nearest <= nearest(found) + 0.002
 
 
 @pytest.fixture(scope="module")
