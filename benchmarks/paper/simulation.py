@@ -195,7 +195,7 @@ def section(records: Sequence[Record]) -> Section:
     warehouses = [record for record in found if "warehouse" in record.parameters]
     blocks = [_DEFINITION]
     if floors:
-        blocks += [_FLOORS, _sums(floors), _WORDS, _floor_table(floors), _computed(floors)]
+        blocks += [_FLOORS, _sums(floors), _floor_table(floors), _computed(floors)]
     if warehouses:
         blocks += [_HUMAN, _human_table(warehouses), _compared(warehouses)]
     blocks += [_detour_text(record) for record in found if "detour" in record.parameters]
@@ -270,7 +270,6 @@ def _sums(floors: Sequence[Record]) -> str:
 
 #: What is told of a run on average.
 _MEANS = ("messages", "seconds")
-_WORDS = "Within a word robots are not in step, and a sentence promises nothing of such mixtures."
 
 
 def _human_table(warehouses: Sequence[Record]) -> str:
@@ -301,7 +300,6 @@ def _compared(warehouses: Sequence[Record]) -> str:
 
 def _detour_text(record: Record) -> str:
     result = record.result
-    known = result["known"]
     counts = ("runs", "by_chance", "granted", "passed", "other_same", "well", "collisions")
     rows = [
         [
@@ -319,9 +317,7 @@ def _detour_text(record: Record) -> str:
         f"The motivating scenario. When r1 has done {_LEARNED} of {result['steps']} steps, it "
         f"learns that {PLACE} is of interest, and asks its choices for a way through it. *Without "
         "the wish*: runs with the same seed in which nothing becomes interesting. *r2 does the "
-        f"same*: its subactions are equal in both. In joint steps {known['ways']} of the "
-        f"{known['parts']} parts of r1 through {PLACE} are open, whatever r2 does.\n\n"
-        + markdown(head, rows)
+        "same*: its subactions are equal in both.\n\n" + markdown(head, rows)
     )
 
 
