@@ -12,6 +12,7 @@ import msgspec
 from msgspec import Meta
 
 from planners.joint.model import JointModel
+from planners.pddl.model_options import Execution
 from planners.search.plans import Plan, Plans
 from planners.system.errors import BadInput, Position
 from planners.system.files import FileFormat, read_text
@@ -51,6 +52,10 @@ class PlansFile(msgspec.Struct, frozen=True):
     ] = None
     complete: Annotated[bool | None, Meta(description="Whether all of them are listed.")] = None
     optimal_cost: Annotated[int | None, Meta(description="The least makespan.")] = None
+    execution: Annotated[
+        Execution | None,
+        Meta(description="Without a common step plans that differ in timing alone count once."),
+    ] = None
     optimal_second_cost: Annotated[
         int | None, Meta(description="The least second cost, where the cost has two parts.")
     ] = None
