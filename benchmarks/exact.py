@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The exact method at its limits: bounds, rounds, clauses and seconds, by seed.
 
-    python -m benchmarks.exact [ROW ..] [--cost COST] [--seeds N] [--jobs N] [--limit SECONDS]
-                               [--kept FILE]
+    python -m benchmarks.exact [ROW ..] [--cost COST] [--asynchronous] [--seeds N] [--jobs N]
+                               [--limit SECONDS] [--kept FILE]
 
 Rows are those of Table 1, ``open-RxC`` and ``ring-RxC`` (two robots, all pairs of states),
 ``open-RxC-N`` (N robots), and the problems of the CoDMAP domains by their names in
@@ -62,6 +62,7 @@ def main() -> None:
     """Print the table."""
     parser = frame.arguments(__doc__, 600)
     parser.add_argument("--cost", default="makespan+actions")
+    parser.add_argument("--asynchronous", action="store_true", help="robots keep no common step")
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1, help="processes of each search")
     given = parser.parse_args()
@@ -69,6 +70,7 @@ def main() -> None:
     for name in rows(given.rows):
         for seed in range(given.seeds):
             key = f"{name}/{given.cost}/{seed}/{given.limit:g}/{given.jobs}"
+            key += "/asynchronous" if given.asynchronous else ""
             row = done.get(key, partial(measured, key, name, seed, given))
             if row["cells"]:
                 table.print(name, seed, *row["cells"])
@@ -81,20 +83,21 @@ def rows(asked: Sequence[str]) -> list[str]:
     return [name for given in asked for name in (codmap(10) if given == "codmap" else (given,))]
 
 
-def candidates_of(name: str, cost: str) -> Candidates:
-    """The candidate tasks of a row."""
+def candidates_of(name: str, cost: str, *, asynchronous: bool = False) -> Candidates:
+    """The candidate tasks of a row; those of Table 1 are always in step."""
     for row in ROWS:
         if row.name == name:
             return row.candidates()
     if "/" in name:
         loaded = load(name, cost)
-        return from_problems(loaded.domain, loaded.problems, ModelOptions(cost=loaded.model.cost))
+        options = ModelOptions(cost=loaded.model.cost, asynchronous=asynchronous)
+        return from_problems(loaded.domain, loaded.problems, options)
     match = re.fullmatch(r"(open|ring)-(\d+)x(\d+)(?:-(\d))?", name)
     if match is None:
         raise SystemExit(f"there is no row {name}")
     make = {"open": open_grid, "ring": ring}[match[1]]
     domain, problem = on_grid(name, make(int(match[2]), int(match[3])), int(match[4] or 2))
-    return all_pairs(domain, [problem])
+    return all_pairs(domain, [problem], ModelOptions(asynchronous=asynchronous))
 
 
 class Bounds:
@@ -127,7 +130,8 @@ def measured(key: str, name: str, seed: int, given: Namespace) -> Figures:
     bounds = Bounds()
     try:
         with time_limit(given.limit):
-            candidates, workers = candidates_of(name, given.cost), Workers(given.jobs)
+            candidates = candidates_of(name, given.cost, asynchronous=given.asynchronous)
+            workers = Workers(given.jobs)
             built = build_language(
                 candidates, "minimal", seed=seed, workers=workers, progress=bounds
             )
