@@ -163,6 +163,7 @@ def _instance(
     """A problem; that of a factored folder where none is given."""
     given = {"DOMAIN": arguments.values.get("DOMAIN"), "PROBLEM": problem}
     files = Arguments(options.source, (*given,), given).read()
+    options.require(files.source.model)
     say(f"finding all optimal plans of {files.problems[0].name}")
     points = read_coordinates_of(options.coordinates, files.problems[0])
     try:

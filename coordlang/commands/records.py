@@ -384,12 +384,17 @@ class LiftOptions(AnswerOptions, takes="DOMAIN PROBLEMS..."):
     seed: int = option(0, "Seed of all random choices.", least=0)
 
     def __post_init__(self) -> None:
-        if self.source.model.asynchronous:
+        self.require(self.source.model)
+
+    @staticmethod
+    def require(model: ModelOptions) -> None:
+        """Raise `UsageError` for a model whose plans teach nothing: those of `load`, too."""
+        if model.asynchronous:
             raise UsageError(
                 "--asynchronous: words over features are learned from plans in step",
                 remedy="Build a language of this problem: `coordlang build --asynchronous`.",
             )
-        if self.source.model.slack:
+        if model.slack:
             raise UsageError(
                 "--slack: words over features are learned from optimal plans",
                 remedy="Build a language of this problem: `coordlang build --slack`.",

@@ -7,6 +7,7 @@ import json
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -97,6 +98,14 @@ def test_what_does_not_follow_refuses(command: str, made: Path, shell: Shell) ->
     Path("plan.json").write_text("[]")
     assert "asynchronous" in shell(command.format(made), 2).err
     assert not Path("x.json").exists()
+
+
+@pytest.mark.parametrize("options", [{"asynchronous": True}, {"slack": 1}])
+def test_words_over_features_are_not_learned_from_a_loaded_domain(options: dict[str, Any]) -> None:
+    """Its options are not those of `lift`, and a lifted file would not say them."""
+    loaded = library.load(*FILES["CELLS"], **options)
+    with pytest.raises(UsageError, match="words over features are learned from"):
+        library.lift(loaded)
 
 
 def test_plans_that_no_words_tell_apart_are_shown() -> None:
