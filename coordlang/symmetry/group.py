@@ -63,12 +63,28 @@ class Symmetry:
         """The image of a joint action, given and returned as each robot's text."""
         image: list[str | None] = [None] * len(robots)
         for number, text in enumerate(texts):
-            image[self.robot(robots, number)] = self.text(text) if text is not None else None
+            if text is not None:
+                image[self.robot(robots, number)] = _in_order(self.text(text), robots)
         return tuple(image)
 
 
 def _renamed(renaming: Renaming, text: str) -> str:
     return re.sub(r"(?<= )[^ ()]+", lambda match: renaming.get(match[0], match[0]), text)
+
+
+def _in_order(text: str, robots: Sequence[str]) -> str:
+    """An event with those that it waits for and those that it meets in the order of robots.
+
+    As `planners.search.asynchronous.event_text` writes it; a subaction alone is as it is.
+    """
+    if ") (" not in text:
+        return text
+    subaction, *others = re.findall(r"\((?:[^()]|\([^()]*\))*\)", text)
+
+    def place(other: str) -> tuple[bool, int]:
+        return other.startswith("(with "), robots.index(other.split()[1].rstrip(")"))
+
+    return " ".join((subaction, *sorted(others, key=place)))
 
 
 def _images(renaming: Renaming, codec: StateCodec, rows: Rows) -> Rows | None:

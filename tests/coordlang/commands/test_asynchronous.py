@@ -64,6 +64,27 @@ def test_a_proof_is_checked(shell: Shell) -> None:
     shell("verify l.json SQUARE --certificate p.json", 0, "lower bound 5")
 
 
+DOOR = """(define (domain door) (:types robot)
+ (:predicates (free) (in ?r - robot) (done ?r - robot))
+ (:action enter :agent ?r - robot :parameters ()
+  :precondition (and (free) (not (done ?r))) :effect (and (not (free)) (in ?r)))
+ (:action leave :agent ?r - robot :parameters ()
+  :precondition (in ?r) :effect (and (free) (not (in ?r)) (done ?r))))
+"""
+
+
+def test_a_proof_by_symmetries_of_three_robots_is_checked(shell: Shell) -> None:
+    """The last one waits for two: the image of its event names them in the order of robots."""
+    Path("door.pddl").write_text(DOOR)
+    Path("three.pddl").write_text(
+        "(define (problem three) (:domain door) (:objects r1 r2 r3 - robot) (:init (free))\n"
+        " (:goal (and (done r1) (done r2) (done r3))))"
+    )
+    files = "door.pddl three.pddl"
+    shell(f"build {files} --method minimal --asynchronous -o l.json --certificate p.json", 0)
+    shell(f"verify l.json {files} --certificate p.json", 0, "lower bound 3")
+
+
 def test_plans_that_differ_in_timing_alone_count_once(shell: Shell) -> None:
     in_step, without = (
         library.plans(*FILES["CELLS"]),
