@@ -105,7 +105,7 @@ class OptimalPlans(Presented):
         """Return the data of a JSON plan file with these plans in it (docs/formats.md)."""
         data = to_json(self._plans, [self._known(plan) for plan in listed])
         if self._timing:
-            complete = len(listed) == self.count
+            complete = len({self.rank(plan) for plan in listed}) == self.count
             count = json_count(self.count)
             data |= {"execution": "asynchronous", "count": count, "complete": complete}
         return data
