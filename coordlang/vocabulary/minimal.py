@@ -41,7 +41,9 @@ _BEGINNING = 10
 #: What may be spent on each number at first.
 _SOON = Budget(rounds=10, conflicts=2_000)
 #: Rounds that partitions of a kind are given for one task at first, one time after another ..
-_FOR_KINDS = 1, 2, 5, 10
+_FOR_KINDS, _WHERE_DEAR = (1, 2, 5, 10), (5, 10)
+#: (rounds are dear where a node has many pairs of edges, all nodes together)
+_DEAR = 30_000
 #: .. with fewer words than the best language by this part at least.
 _FEWER_WORDS = 5
 #: Merges in a row that fail before something else is tried.
@@ -145,7 +147,7 @@ class MinimalSearch:
         if self._pairs // _FIRST_PAIRS > _BEGINNING * self._most:
             return
         if self._is_one_task:
-            for rounds in _FOR_KINDS:
+            for rounds in _WHERE_DEAR if self._pairs > _DEAR else _FOR_KINDS:
                 self._find_fewer_tied(rounds)
         while self.lower < self.upper and not self._is_spent and self.decide(self.lower, _SOON):
             pass
@@ -172,13 +174,18 @@ class MinimalSearch:
         """Look for a language of some kind with fewer words than the best one.
 
         From below, where partitions are refuted soonest and most is learnt of the others, too; then
-        nearer and nearer to the number that suffices.
+        between the number that was tried last and the one that suffices.  Where rounds are dear
+        only that.
         """
-        size = self.lower
-        while size <= self.upper - max(1, self.upper // _FEWER_WORDS) and not self._is_spent:
-            if self._finds_tied(size, rounds):
+        least = self.lower
+        if self._pairs <= _DEAR and least < self.upper:
+            if self._finds_tied(least, rounds):
                 return
-            size = max(size + 1, between(size, self.upper))
+            least += 1
+        while least <= self.upper - max(1, self.upper // _FEWER_WORDS) and not self._is_spent:
+            size = between(least, self.upper)
+            if not self._finds_tied(size, rounds):
+                least = size + 1
 
     @cached_property
     def _pairs(self) -> int:
