@@ -15,7 +15,6 @@ from coordlang.language.candidates import from_problems
 from coordlang.required.choices import Choices
 from coordlang.vocabulary.counterexample_walk import CounterexampleWalk
 from coordlang.vocabulary.counterexamples import Counterexample, Mixtures, many_counterexamples
-from coordlang.vocabulary.stutter_free import StutterFree
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import BadInput, ProvedImpossible, UsageError
 from tests.support import naive
@@ -83,48 +82,6 @@ def test_what_sets_refute_is_what_listing_refutes(robots: int | None, seeds: ran
     answers = compared(spaces, Random(seeds.start))
     print(f"{robots or 'any'} robots: {dict(answers)}")
     assert min(answers[True], answers[False]) >= 5
-
-
-@pytest.mark.parametrize(("robots", "seeds"), runs(120, 60, 40))
-def test_stutter_free_words_are_refuted_where_listing_refutes_them(
-    robots: int | None, seeds: range
-) -> None:
-    random = Random(seeds.start)
-    answers: Counter[bool] = Counter()
-    for _, space in random_spaces(seeds, robots, 3_000):
-        mixtures = Mixtures(Choices(space))
-        for words in (2, 3, 4):
-            word = stutter_free(space, words, random)
-            if word is None:
-                continue
-            try:
-                holds = naive.is_language(space, dict(enumerate(word)), MOST[space.robots])
-            except naive.TooLarge:
-                break
-            nodes = np.array(word)[space.state]
-            found = many_counterexamples(mixtures, nodes, 20)
-            assert bool(found) != holds
-            for table in found:
-                for row in range(len(table)):
-                    check(space, table.one(row), word)
-            answers[holds] += 1
-    print(f"{robots or 'any'} robots: {dict(answers)}")
-    assert min(answers[True], answers[False]) >= 5
-
-
-def stutter_free(space: PlanSpace, words: int, random: Random) -> list[int] | None:
-    """Random words that change at every step; None where these were not found."""
-    word = [-1] * len(space.rows)
-    joined: dict[int, list[int]] = {}
-    for a, b in StutterFree(space).pairs:
-        joined.setdefault(a, []).append(b)
-        joined.setdefault(b, []).append(a)
-    for state in random.sample(range(len(word)), len(word)):
-        taken = {word[other] for other in joined.get(state, ())}
-        if taken >= set(range(words)):
-            return None
-        word[state] = random.choice([w for w in range(words) if w not in taken])
-    return word
 
 
 def test_plans_within_slack_are_refuted_like_optimal_ones() -> None:

@@ -17,15 +17,8 @@ import pytest
 from planners.pddl.sexpr import Source, parse
 from planners.system.errors import BadInput
 from tests.support.command import Command
+from tests.support.hall import DOMAIN
 
-DOMAIN = """(define (domain hall)
-  (:requirements :typing)
-  (:types robot room)
-  (:predicates (at ?r - robot ?x - room) (door ?x ?y - room))
-  (:action go :agent ?r - robot :parameters (?x ?y - room)
-    :precondition (and (at ?r ?x) (door ?x ?y))
-    :effect (and (at ?r ?y) (not (at ?r ?x)))))
-"""
 PROBLEM = """(define (problem two) (:domain hall)
   (:objects r1 r2 - robot a b c - room)
   (:init (at r1 a) (at r2 b) (door a b) (door b a) (door b c) (door c b))
