@@ -258,7 +258,7 @@ LEFT = re.compile(r"[a-z0-9_]{8}|\.[^/]{1,16}\.[a-z0-9_]{8}|coordlang-[a-z0-9_]{
 
 
 #: They write as others do.
-ALIKE = ("ground", "understand", "choices", "inspect")
+ALIKE = ("ground", "understand", "choices", "inspect", "report")
 
 
 @pytest.mark.parametrize(

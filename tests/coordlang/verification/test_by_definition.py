@@ -26,8 +26,8 @@ from tests.support.texts import parsed
 
 #: (robots, plans of one task that the twin lists at most, models)
 SIZES = [
-    (2, 60, 50),
-    (3, 14, 50),
+    (2, 60, 40),
+    (3, 14, 40),
     (4, 7, 10),
     pytest.param(2, 60, 600, marks=pytest.mark.slow),
     pytest.param(3, 14, 600, marks=pytest.mark.slow),

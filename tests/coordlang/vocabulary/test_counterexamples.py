@@ -76,7 +76,7 @@ def check(space: PlanSpace, example: Counterexample, word: list[int]) -> None:
     assert space.path_with(example.start, mixed) is None
 
 
-@pytest.mark.parametrize(("robots", "seeds"), runs(120, 60, 40))
+@pytest.mark.parametrize(("robots", "seeds"), runs(80, 30, 40))
 def test_what_sets_refute_is_what_listing_refutes(robots: int | None, seeds: range) -> None:
     spaces = (space for _, space in random_spaces(seeds, robots, 3_000))
     answers = compared(spaces, Random(seeds.start))

@@ -23,7 +23,7 @@ from planners.system.errors import BadInput, CoordlangError, OutOfTime, UsageErr
 from planners.system.limits import time_limit
 from tests.support import jobs
 from tests.support.cluster import ENVIRONMENT, Cluster, needs_distributed, running_cluster
-from tests.support.domains import ROOT
+from tests.support.domains import DOMAINS
 from tests.support.jobs import batch, until, workers
 
 pytestmark = needs_distributed
@@ -86,7 +86,7 @@ def test_work_that_is_stopped_leaves_nothing(how: str, connected: Workers, tmp_p
             with pytest.raises(KeyboardInterrupt):
                 list(connected.tables(waiting))
         else:
-            with pytest.raises(OutOfTime), time_limit(4):
+            with pytest.raises(OutOfTime), time_limit(2):
                 list(connected.tables(waiting))
     finally:
         signal.signal(signal.SIGINT, before)
@@ -135,7 +135,7 @@ def test_there_is_no_cluster(
     silence: str,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr("planners.parallel.dask_cluster._CONNECTING", 1.0)
+    monkeypatch.setattr("planners.parallel.dask_cluster._CONNECTING", 0.4)
     (tmp_path / "not.json").write_text("nothing")
     (tmp_path / "nested.json").write_text("[" * 100_000)
     (tmp_path / "other.json").write_text('{"address": "ucx://127.0.0.1:9"}')
@@ -158,15 +158,10 @@ def test_there_is_no_cluster(
 
 
 def test_the_command_says_it_within_its_limit(silence: str) -> None:
-    world = ROOT / "domains" / "grid"
-    arguments: list[str | Path] = [
-        "coordination",
-        world / "domain.pddl",
-        world / "corners-3x3.pddl",
-    ]
-    limits = ["--scheduler", silence, "--time-limit", "6"]
+    files = [DOMAINS / "grid" / f"{stem}.pddl" for stem in ("domain", "corners-3x3")]
+    limits = ["--scheduler", silence, "--time-limit", "4"]
     done = subprocess.run(
-        [sys.executable, "-m", "coordlang", *arguments, *limits],
+        [sys.executable, "-m", "coordlang", "coordination", *files, *limits],
         capture_output=True,
         text=True,
         env=ENVIRONMENT,
