@@ -17,6 +17,8 @@ from tests.support.domains import DOMAINS
 # Some 150 processes are started, each of which would compile the packages again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+# No test reads what another one, or this machine's user, has found: not in processes either.
+os.environ["COORDLANG_CACHE"] = "off"
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -29,12 +31,6 @@ def pytest_collection_modifyitems() -> None:
 
     if hasattr(providers, "_get_local_constants"):
         providers._get_local_constants = lambda: providers._local_constants
-
-
-@pytest.fixture(autouse=True)
-def _no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No test reads what another one, or this machine's user, has found: not in processes either."""
-    monkeypatch.setenv("COORDLANG_CACHE", "off")
 
 
 @pytest.fixture

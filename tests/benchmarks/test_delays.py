@@ -77,9 +77,7 @@ class Script(Random):
 
 
 def test_a_delay_by_hand() -> None:
-    """r1 goes a c b and r2 goes b a.  If r2 is late by a step, all is well; if r1 is, r2 runs into
-    it, unless it yields.
-    """
+    """r1 goes a c b, r2 b a. r2 may be late by a step; if r1 is, r2 hits it, unless it yields."""
     execution, task, r1, r2 = swap()
 
     def steps(part: tuple[int, ...], yields: bool, *draws: float) -> int | None:

@@ -68,9 +68,7 @@ def test_against_listed_plans(folder: str, stem: str) -> None:
 
 
 def test_three_cells_by_hand() -> None:
-    """Whoever does not wait passes c: a human in c stops every plan.  r1 goes from a to b in two of
-    the four plans.
-    """
+    """All pass c, or wait: a human there stops every plan. r1 goes a b in two of the four."""
     one = three_cells()
     labels = one.model.labels[0]
     forbidden = frozenset([labels.index("(move r1 a b)")])

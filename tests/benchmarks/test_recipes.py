@@ -9,9 +9,7 @@ from benchmarks.paper import planning_cost, scenario
 from benchmarks.paper.__main__ import RECIPES
 from benchmarks.paper.grid import entered_cells, task_cells
 from benchmarks.paper.recipe import Settings
-from benchmarks.paper.reported import (
-    TABLE_1,
-)
+from benchmarks.paper.reported import TABLE_1
 from benchmarks.paper.suite import CORRIDOR, OTHERS, ROWS, WORLDS, language_for
 from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.execution.guided_search import ExpandedStates

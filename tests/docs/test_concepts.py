@@ -17,9 +17,7 @@ from tests.support.texts import model_of
 
 
 def joint_space(actions: list[tuple[str, str, str]], robots: int, goal: str) -> PlanSpace:
-    """Joint-action PDDL from (subactions, precondition, effect); ``-`` is idling, facts are p0 ..
-    p9.
-    """
+    """Joint-action PDDL of (subactions, precondition, effect); ``-`` idles, facts are p0 .. p9."""
     text = []
     for number, (parts, before, after) in enumerate(actions):
         comments = "\n".join(

@@ -22,6 +22,7 @@ from coordlang.language.listed import ListedTask
 from coordlang.verification.certificate_file import write_certificate
 from planners.pddl.model_options import ModelOptions
 from planners.search.plan_space import PlanSpace
+from tests.fuzz.mutations import places
 from tests.support import naive
 from tests.support.command import Command, Outcome
 from tests.support.domains import DOMAINS, read
@@ -69,14 +70,6 @@ def edits(data: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[str | int, A
             del at[key]
             yield key, deepcopy(data)
             at[key] = value
-
-
-def places(data: Any) -> Iterator[tuple[Any, Any]]:
-    """Every (container, key) inside."""
-    if isinstance(data, dict | list):
-        for key in [*data] if isinstance(data, dict) else range(len(data)):
-            yield data, key
-            yield from places(data[key])
 
 
 def others(key: object, value: Any, words: tuple[str, ...]) -> list[Any]:

@@ -11,7 +11,7 @@ import pickle
 import subprocess
 import sys
 import tracemalloc
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from hypothesis import strategies as st
 
 from coordlang.execution import monitor as monitor_module
 from coordlang.execution.monitor import Monitor, MonitorError, NotAllowed, NotPossible
+from tests.fuzz.mutations import places
 
 
 def choices_file(length: int = 3, cells: int = 4) -> dict[str, Any]:
@@ -309,14 +310,6 @@ NASTY = st.one_of(
     st.recursive(st.integers(-1, 8), lambda inner: st.lists(inner, max_size=3), max_leaves=5),
     st.dictionaries(st.sampled_from(["idle", "(x)", "step", "next"]), st.integers(-1, 8)),
 )
-
-
-def places(data: Any) -> Iterator[tuple[Any, Any]]:
-    """Every (container, key) inside."""
-    for key in list(data) if isinstance(data, dict) else range(len(data)):
-        yield data, key
-        if isinstance(data[key], dict | list):
-            yield from places(data[key])
 
 
 def refused_or_sound(make: Callable[[], Monitor]) -> None:

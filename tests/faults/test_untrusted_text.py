@@ -265,9 +265,7 @@ def test_names_with_such_characters_are_refused(bare: Make, bad: str) -> None:
         assert name in ("r1", "a") or re.search(rf"{place}\.pddl:\d+:\d+: ", done.err)
 
 
-def test_a_comment_is_no_name_but_one_about_subactions_is(
-    bare: Make,
-) -> None:
+def test_a_comment_is_no_name_but_one_about_subactions_is(bare: Make) -> None:
     world = bare({})
     world.write(DOMAIN="; a title \x1b[1m \u202e\n" + CORRIDOR)
     assert world.run("plans PDDL --count").code == 0

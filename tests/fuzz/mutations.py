@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ways to break a PDDL text: its tokens, groups, literals, names and bytes."""
+"""Ways to break a PDDL text: its tokens, groups, literals, names, bytes; places in JSON data."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from random import Random
+from typing import Any
 
 Mutation = Callable[[str, Random], str]
 _TOKEN = re.compile(r";[^\n\r]*|[()]|[^\s();]+|\s+")
@@ -19,6 +20,14 @@ ODD = (
     *("#", "_", "@", "é", "\u0130", "\u00b2", "\u0663", "\u200b", "\x00", "\x1b[31m"),
     *("x" * 5_000, "9" * 5_000),
 )
+
+
+def places(data: Any) -> Iterator[tuple[Any, Any]]:
+    """Every (container, key) inside of JSON data."""
+    if isinstance(data, dict | list):
+        for key in [*data] if isinstance(data, dict) else range(len(data)):
+            yield data, key
+            yield from places(data[key])
 
 
 def tokens_of(text: str) -> list[str]:

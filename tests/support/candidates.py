@@ -28,9 +28,7 @@ MOST = 40
 
 @cache
 def on_graph(seed: int, robots: int) -> Candidates | None:
-    """Robots on a random graph: all pairs of states, or one task with a partial goal.  None for a
-    useless draw.
-    """
+    """Robots on a random graph: all pairs of states, or one partial goal. None if useless."""
     text, problem = graph_text(Random(seed), robots)
     domain, goal = parsed(text, problem)
     try:

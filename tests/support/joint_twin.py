@@ -82,9 +82,7 @@ def check_model(text: RandomModel, note: Callable[[str], None]) -> None:
 
 
 def _far(twin: Twin, state: State) -> Problem:
-    """The same problem with the last state that the twin reached as its goal, as far as it differs
-    from the first.
-    """
+    """The problem whose goal is how the twin's last state differs from the first one."""
     goals: list[Formula] = [*sorted(state - twin.init, key=str)]
     goals += [Not(atom) for atom in sorted(twin.init - state, key=str)]
     return replace(twin.rules.problem, goal=And(tuple(goals)))

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The paper's definitions, read literally: plans are listed and every mixture is made.  Tiny inputs
-only.
-"""
+"""The paper's definitions, read literally: all plans, and all their mixtures. Tiny inputs only."""
 
 from __future__ import annotations
 
@@ -80,9 +78,7 @@ def states(space: PlanSpace, task: int, plan: Plan) -> tuple[int, ...]:
 
 
 def divergence(sequences: list[tuple[int, ...]]) -> tuple[int, frozenset[int]] | None:
-    """alpha*: the last state before the sequences first differ, and the different next ones; None
-    if they never do.
-    """
+    """alpha*: the last state before sequences first differ, and the next ones; None if never."""
     for step, here in enumerate(zip(*sequences, strict=True)):
         if len(set(here)) > 1:
             return sequences[0][step - 1], frozenset(here)

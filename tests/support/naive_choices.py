@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Choices by definition: plans are listed, projected and mixed; what a robot knows is read off all
-mixtures.
-"""
+"""Choices by definition: plans listed, projected, mixed; knowledge is read off all mixtures."""
 
 from __future__ import annotations
 
@@ -100,9 +98,7 @@ class Listed:
         return {own[:step] for own in self.own[robot] for step in range(len(own) + 1)}
 
     def least(self, robot: int, known: dict[Own, Known] | None = None) -> int:
-        """How many states the least automaton has: histories with different futures (Myhill and
-        Nerode).
-        """
+        """The size of the least automaton: histories by their futures (Myhill and Nerode)."""
         return len({self._future(robot, history, known) for history in self.histories(robot)})
 
     def _future(

@@ -36,9 +36,7 @@ def literals(random: Random, facts: list[str], positive: float = 0.5) -> str:
 
 
 def joint_text(random: Random, robots: int) -> tuple[str, list[str]]:
-    """Joint-action PDDL, each robot has two subactions or idles: mixtures that drift away and come
-    back, dead ends.
-    """
+    """Joint-action PDDL, two subactions a robot: mixtures that drift and come back, dead ends."""
     facts = [f"f{n}" for n in range(random.randint(2, 4))]
     names = [f"r{n + 1}" for n in range(robots)]
     actions = []
@@ -83,9 +81,7 @@ def ma_text(random: Random, robots: int) -> tuple[str, list[str]]:
 
 
 def graph_text(random: Random, robots: int) -> tuple[str, str]:
-    """Robots on a small random directed graph, each with edges of its own; random rules of the
-    road.  Much RC.
-    """
+    """Robots on a small random digraph with edges of their own, and random rules. Much RC."""
     places = [f"c{n}" for n in range(max(robots, random.choice([3, 3, 4])))]
     names = [f"r{n + 1}" for n in range(robots)]
     rules = ["(forall (?o - robot ?z - place) (not (go ?o ?z ?y)))"]
@@ -173,9 +169,7 @@ def random_chores(seed: int, robots: int) -> tuple[Domain, Problem, ModelOptions
 
 
 def random_threes(seed: int) -> RandomModel:
-    """Three robots with effects that depend on what two others do: a third one decides what
-    happens between two.
-    """
+    """Three robots; effects depend on two others, so a third decides what happens between two."""
     pick = Random(f"threes {seed}")
     names = [
         (f"a{n}{k}", robot) for n, robot in enumerate(_ROBOTS) for k in range(1 + (n == seed % 3))

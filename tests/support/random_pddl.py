@@ -129,9 +129,7 @@ class _Writer:
     # -- schemas
 
     def _schema(self, scope: Scope) -> tuple[str, str]:
-        """Precondition and the effects (not yet joined) of an action; one in six has no effect at
-        all.
-        """
+        """Precondition and effects (not yet joined) of an action; one in six has no effect."""
         pick = self.random
         if pick.random() < 0.12 and self.kind != "joint":
             return self._wait(scope)
@@ -186,9 +184,7 @@ class _Writer:
         return "\n".join([*lines, f"    :precondition {precondition}", f"    :effect {effect})"])
 
     def _comments(self, scope: Scope) -> list[str]:
-        """The robots' parts.  Mostly all parameters are named, so that the parts determine the
-        action.
-        """
+        """The robots' parts; most name all parameters, so that they determine the action."""
         pick = self.random
         lines = []
         for robot in self.robots:
@@ -263,9 +259,7 @@ class _Writer:
         return self._literal(scope)
 
     def _about_the_step(self, scope: Scope) -> str:
-        """The forms that domains use: nobody does .., somebody else does .., nobody does .. unless
-        ..
-        """
+        """As domains write: nobody does .., somebody else does .., nobody does .. unless .."""
         pick = self.random
         inner = {**scope, "?o": "robot"}
         name = pick.choice(list(self.actions))

@@ -14,12 +14,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from coordlang.language.candidates import (
-    Candidates,
-    all_pairs,
-    explored_if_small,
-    from_problems,
-)
+from coordlang.language.candidates import Candidates, all_pairs, explored_if_small, from_problems
 from coordlang.verification.by_definition import inseparable
 from planners.joint.model import JointModel, PlanningTask
 from planners.loading import PlanningInstance, build

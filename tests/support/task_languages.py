@@ -79,9 +79,7 @@ def random_language(random: Random, candidates: Candidates) -> Language:
 
 @cache
 def shipped(name: str) -> tuple[Candidates, TaskLanguage]:
-    """The task of a shipped problem with the greedy language for it; actions remembered where plans
-    are inseparable.
-    """
+    """A shipped task and its greedy language; remembers actions if plans are inseparable."""
     folder, _, stem = name.partition("/")
     for remember in (False, True):
         candidates = own_task(folder, stem, ModelOptions(remember_actions=remember))
@@ -104,9 +102,7 @@ def where_r2_is(candidates: Candidates) -> Language:
 
 @cache
 def three_cells() -> TaskLanguage:
-    """r1 and r2 trade a and b on three adjacent cells, a joint step being three states: four
-    optimal plans.
-    """
+    """r1 and r2 trade a and b of three cells; three states a joint step: four optimal plans."""
     candidates = own_task("three-cells")
     return next(languages_in_tasks(where_r2_is(candidates), candidates))
 
@@ -167,9 +163,7 @@ def random_task_language(seed: int, robots: int) -> tuple[Candidates, TaskLangua
 
 @lru_cache(500)
 def candidates_of(seed: int, robots: int) -> Candidates | None:
-    """A random model with all pairs of its states, or with one task and a partial goal; half of
-    them chores.
-    """
+    """A random model with all pairs of states, or one partial goal; half of them chores."""
     chores = seed % 2 == 0
     domain, problem, options = (random_chores if chores else random_model)(seed, robots)
     if seed % 5 == 0:
@@ -193,9 +187,7 @@ def tasks_of(candidates: Candidates, seed: int) -> list[tuple[PlanSpace, int]]:
 
 @lru_cache(100)
 def in_built_languages(seed: int, robots: int) -> list[TaskLanguage]:
-    """A built and verified language in some of its candidate tasks; most of them with as few words
-    as merging gives.
-    """
+    """A verified language in some of its tasks; most have as few words as merging gives."""
     candidates = candidates_of(seed, robots)
     if candidates is None:
         return []
@@ -212,9 +204,7 @@ def in_built_languages(seed: int, robots: int) -> list[TaskLanguage]:
 
 
 def merged(table: Partition, candidates: Candidates, seed: int) -> Partition:
-    """Words merged at random as long as it stays a language: sentences then leave more open, and
-    mix more.
-    """
+    """Words merged at random while it stays a language: sentences leave more open, and mix."""
     words = list(range(len(table.words)))
     pairs = list(combinations(words, 2))
     Random(seed).shuffle(pairs)

@@ -88,9 +88,7 @@ def test_long_lines_are_broken() -> None:
     assert fitted(text, 100) == text
 
 
-def test_inspect_keeps_its_columns_apart_and_to_the_page(
-    coordlang: Command, tmp_path: Path
-) -> None:
+def test_inspect_keeps_columns_apart_and_to_the_page(coordlang: Command, tmp_path: Path) -> None:
     """Users met names of robots that run into the next column, and lines of any length."""
     domain, problem = tmp_path / "d.pddl", tmp_path / "p.pddl"
     domain.write_text(

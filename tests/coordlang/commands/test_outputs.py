@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Output files: refused before the work where they cannot be written, overwrite an input file or
-each other.
-"""
+"""Output files: refused before the work if not writable, an input, or one written twice."""
 
 from __future__ import annotations
 
@@ -23,9 +21,7 @@ from tests.support.domains import DOMAINS
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a file of each kind; `in/` holds the PDDL files by the names that `export`
-    writes.
-    """
+    """A file of each kind; `in/` holds the PDDL files by the names that `export` writes."""
     folder = tmp_path_factory.mktemp("outputs")
     (folder / "in").mkdir()
     sources = [DOMAINS / "t-map" / name for name in ("domain.pddl", "problem.pddl")]

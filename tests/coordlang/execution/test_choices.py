@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A robot's choices against the definition: every combination is optimal, and no subplan is left
-out.
-"""
+"""A robot's choices by definition: all combinations are optimal, no subplan is left out."""
 
 from __future__ import annotations
 
@@ -38,9 +36,7 @@ def moves(automaton: Automaton) -> list[dict[int, int]]:
 
 
 def check_automata(found: SentenceChoices, twin: Listed) -> None:
-    """Each automaton accepts exactly the robot's own parts, is deterministic, and the least that
-    knows what it knows.
-    """
+    """Each accepts just the robot's own parts, and is the least that knows what it knows."""
     facts = found.task_language.model.codec.facts.texts
     for own, parts in zip(found.robots, twin.own, strict=True):
         automaton = own.automaton
@@ -71,9 +67,7 @@ def check_automata(found: SentenceChoices, twin: Listed) -> None:
 
 
 def check_combinations(found: SentenceChoices, twin: Listed) -> None:
-    """Every combination of choices, stepped through all robots' monitors, is an optimal plan; they
-    allow no others.
-    """
+    """Every combination, stepped through all monitors, is an optimal plan; no others go through."""
     labels = found.task_language.model.labels
     for chosen in product(*(accepted(moves(own.automaton)) for own in found.robots)):
         monitors = [monitor(found.task_language.model, own, "") for own in found.robots]
@@ -117,9 +111,7 @@ def test_every_combination_is_optimal(robots: int, models: int) -> None:
 
 @pytest.mark.parametrize(("robots", "models"), RUNS)
 def test_a_broken_language_is_found_out(robots: int, models: int) -> None:
-    """Under any partition the walk agrees with the list; where that says no, the property above
-    fails.
-    """
+    """Under any partition the walk agrees with the list; if it says no, the above fails."""
     seen: Counter[bool] = Counter()
     for _, task_language, words, twin in with_twins(in_random_words, robots, models):
         found = choices(task_language, words)
@@ -136,9 +128,7 @@ def test_a_broken_language_is_found_out(robots: int, models: int) -> None:
 
 
 def check_violation(found: SentenceChoices, twin: Listed) -> None:
-    """What is shown: plans with the sentence, whose mixture is no optimal plan, and breaks where it
-    says.
-    """
+    """The plans shown have the sentence, and their mixture breaks where it says."""
     assert found.mixtures is not None
     shown = found.mixtures.witness
     assert shown is not None
@@ -157,9 +147,7 @@ def check_violation(found: SentenceChoices, twin: Listed) -> None:
 
 @pytest.mark.parametrize(("robots", "models"), RUNS)
 def test_own_atoms_are_known(robots: int, models: int) -> None:
-    """Without all combinations: what the own subactions say is true in every mixture, and nothing
-    else is said.
-    """
+    """What the own subactions say is true in every mixture, and nothing else is said."""
     seen: Counter[str] = Counter()
     for _, task_language, words, twin in with_twins(in_random_words, robots, models):
         if not twin.mixes:

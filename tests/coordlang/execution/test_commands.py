@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``say``, ``understand``, ``plan`` and ``choices`` at the terminal: what they print and write, and
-what they say when something is wrong.
-"""
+"""``say``, ``understand``, ``plan``, ``choices``: what they print, write, and say of mistakes."""
 
 from __future__ import annotations
 
 import json
 import re
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
@@ -38,11 +37,8 @@ def pddl(world: str) -> tuple[Path, Path]:
 @pytest.fixture(scope="module")
 def languages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("languages")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("COORDLANG_CACHE", "off")
-        for world, (_, tasks) in WORLDS.items():
-            built = door.build(*pddl(world), tasks=tasks, method="greedy")
-            built.language.save(folder / world)
+    for world, (_, tasks) in WORLDS.items():
+        door.build(*pddl(world), tasks=tasks, method="greedy").language.save(folder / world)
     return {world: folder / world for world in WORLDS}
 
 
@@ -68,58 +64,38 @@ def changed(path: Path, file: Path, old: str, new: str) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("commands", "world", "arguments", "code", "message"),
+    ("commands", "line", "code", "message"),
     [
-        ("understand plan", "t", [""], 31, "the sentence is empty"),
-        ("understand plan", "t", ["w0 w9"], 31, "word 2 of the sentence, 'w9', is no word of this"),
-        ("understand plan", "t", ["w0 w0"], 31, "twice in a row"),
-        ("understand plan", "t", ["w1 w0"], 1, "at the beginning no plan says 'w1'"),
-        ("understand plan", "t", ["w0 w1 w0"], 1, "after \"w0 w1\" no plan says 'w0'"),
-        ("understand plan", "t", ["w0 w1 w3"], 1, '"w0 w1 w3" no plan ends\n  There plans say'),
-        ("plan", "t", ["w0 w1 w3 w2 w0 w1"], 1, "no plan says 'w1'\n  There plans end."),
-        ("understand", "t", ["w0", "--count", "--max", 3], 2, ""),
-        ("understand", "t", ["w0", "--format", "dot", "--sample", 2], 2, ""),
-        ("understand", "t", ["w0", "--format", "dot", "--count"], 2, ""),
-        ("plan", "t", [], 2, ""),
-        ("plan", "t", ["w0", "--prefer", "shortest"], 2, ""),
-        ("plan", "t", ["w0", "--heuristic", "best"], 2, ""),
+        ("understand plan", "t ''", 31, "the sentence is empty"),
+        ("understand plan", "t 'w0 w9'", 31, "word 2 of the sentence, 'w9', is no word of this"),
+        ("understand plan", "t 'w0 w0'", 31, "twice in a row"),
+        ("understand plan", "t 'w1 w0'", 1, "at the beginning no plan says 'w1'"),
+        ("understand plan", "t 'w0 w1 w0'", 1, "after \"w0 w1\" no plan says 'w0'"),
+        ("understand plan", "t 'w0 w1 w3'", 1, '"w0 w1 w3" no plan ends\n  There plans say'),
+        ("plan", "t 'w0 w1 w3 w2 w0 w1'", 1, "no plan says 'w1'\n  There plans end."),
+        ("understand", "t w0 --count --max 3", 2, ""),
+        ("understand", "t w0 --format dot --sample 2", 2, ""),
+        ("understand", "t w0 --format dot --count", 2, ""),
+        ("plan", "t", 2, ""),
+        ("plan", "t w0 --prefer shortest", 2, ""),
+        ("plan", "t w0 --heuristic best", 2, ""),
+        ("plan", "cells w0 --heuristic manhattan", 2, "needs a goal with places such as"),
+        ("choices", "cells 'w0 w1'", 1, "no optimal plan has the sentence"),
+        ("choices", "cells 'w1 w9'", 31, "'w9', is no word of this language"),
+        ("choices", "cells ''", 31, "the sentence is empty"),
+        ("choices", "cells 'w1 w0' --robot r3", 2, "no such robot\n  The robots are r1, r2."),
+        ("choices", "cells 'w1 w0' --history idle", 2, "ask about one --robot"),
         (
-            "plan",
-            "cells",
-            ["w0", "--heuristic", "manhattan"],
-            2,
-            "needs a goal with places such as",
-        ),
-        ("choices", "cells", ["w0 w1"], 1, "no optimal plan has the sentence"),
-        ("choices", "cells", ["w1 w9"], 31, "'w9', is no word of this language"),
-        ("choices", "cells", [""], 31, "the sentence is empty"),
-        (
-            "choices",
-            "cells",
-            ["w1 w0", "--robot", "r3"],
-            2,
-            "no such robot\n  The robots are r1, r2.",
-        ),
-        ("choices", "cells", ["w1 w0", "--history", "idle"], 2, "ask about one --robot"),
-        (
-            *("choices", "cells", ["w1 w0", "--robot", "r1", "--visit", "(at r1 z)"], 2),
+            *("choices", "cells 'w1 w0' --robot r1 --visit '(at r1 z)'", 2),
             "(at r1 z) is no atom that can change",
         ),
-        (
-            *("choices", "cells", ["w1 w0", "--robot", "r1", "--history", "jump"], 2),
-            "'jump' is no PDDL text",
-        ),
-        (
-            *("choices", "cells", ["w1 w0", "--robot=r1", "--history=idle", "--format=dot"], 2),
-            "as text or JSON",
-        ),
+        ("choices", "cells 'w1 w0' --robot r1 --history jump", 2, "'jump' is no PDDL text"),
+        ("choices", "cells 'w1 w0' --robot=r1 --history=idle --format=dot", 2, "as text or JSON"),
     ],
 )
-def test_wrong_arguments(
-    commands: str, world: str, arguments: list[str], code: int, message: str, ask: Ask
-) -> None:
+def test_wrong_arguments(commands: str, line: str, code: int, message: str, ask: Ask) -> None:
     for command in commands.split():
-        outcome = ask(command, world, *arguments)
+        outcome = ask(command, *shlex.split(line))
         assert (outcome.code, outcome.out) == (code, "")
         assert message in outcome.err
 

@@ -111,9 +111,7 @@ def detour(task_language: TaskLanguage, random: Random) -> Plan:
 def judged(
     candidates: Candidates, task_language: TaskLanguage, plan: Plan, optimal: set[Plan]
 ) -> str:
-    """What `say` does with a sequence of steps, compared with the plan checker and the list of
-    optimal plans.
-    """
+    """What `say` says of steps; the plan checker and the list of optimal plans agree."""
     loaded, model = candidates.loaded, candidates.model
     said: tuple[Texts, ...] = texts(model, plan)
     problem = loaded.problems[0]

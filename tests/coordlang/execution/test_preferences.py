@@ -146,9 +146,7 @@ DECIDED_BY_COUNTS = (11772, 14101, 15357)
 
 @pytest.mark.thorough
 def test_random_graphs() -> None:
-    """Larger ones than small models have; the counts decide between beginnings that come to the
-    same nodes.
-    """
+    """Larger than in small models: counts decide between beginnings that reach the same nodes."""
     seen: Counter[int] = Counter()
     for seed in [*range(200), *DECIDED_BY_COUNTS]:
         random = Random(seed)

@@ -118,9 +118,7 @@ def test_against_listed_plans(robots: int, monkeypatch: pytest.MonkeyPatch) -> N
     ("folder", "stem", "every"), [("t-map", "problem", 3), ("grid", "gw2-2x3", 100)]
 )
 def test_who_decides_a_change(folder: str, stem: str, every: int) -> None:
-    """In every state before the change: these robots' subactions settle it, and no smaller set of
-    robots does.
-    """
+    """Before the change these robots' subactions always settle it; no smaller set of robots does."""
     candidates = all_tasks(folder, stem)
     language = build_language(candidates, "greedy").language
     formulas = all_covers(mapped_states(language, candidates.model))
@@ -146,9 +144,7 @@ def test_who_decides_a_change(folder: str, stem: str, every: int) -> None:
 
 
 def states_before(fits: object, task_language: TaskLanguage, number: int) -> set[int]:
-    """The states in which a plan is just before its change of word ``number``, by following all
-    plans.
-    """
+    """The states just before a plan's change of word ``number``, by following all plans."""
     found = set()
     word = task_language.partition.word_of(task_language.space.rows)
     plans = Plans.of(fits)  # type: ignore[arg-type]

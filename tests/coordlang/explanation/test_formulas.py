@@ -14,13 +14,7 @@ from coordlang.commands.building import build_language
 from coordlang.explanation.minimise import Points, expand, minimise
 from coordlang.explanation.text import literal_text, pddl_condition, shown
 from coordlang.explanation.variables import Variable, truth, valuation
-from coordlang.explanation.words import (
-    Cover,
-    Literal,
-    all_covers,
-    describe_words,
-    mapped_states,
-)
+from coordlang.explanation.words import Cover, Literal, all_covers, describe_words, mapped_states
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.language.words import Language
 from planners.joint.model import show
@@ -128,9 +122,7 @@ def test_where_a_robot_is() -> None:
 
 
 def test_text_and_pddl() -> None:
-    """One robot's place out of three, and everything else: as text, and as PDDL where a set of
-    values needs negations.
-    """
+    """One robot's place out of three, and the rest: as text, and as PDDL, with negations."""
     candidates = all_tasks("three-cells")
     keys = [candidates.model.codec.key(row) for row in candidates.rows]
     language = language_of(
@@ -286,9 +278,7 @@ def test_a_single_term_limits_as_few_variables_as_possible() -> None:
     ],
 )
 def test_variables_are_invariants(folder: str, stem: str, names: set[str]) -> None:
-    """At most one atom of a variable is true in every reachable state; "none" is a value only where
-    it can happen.
-    """
+    """At most one atom of a variable is true at a time; "none" is a value if it can happen."""
     domain = read_domain(DOMAINS / folder / "domain.pddl")
     candidates = from_problems(domain, [read_problem(DOMAINS / folder / f"{stem}.pddl", domain)])
     space = explore(candidates.model, np.stack([task.init for task in candidates.loaded.tasks]))

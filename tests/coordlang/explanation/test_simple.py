@@ -34,9 +34,7 @@ def boxes(sizes: Sequence[int]) -> list[Box]:
 
 
 def shortest_formulas(values: list[tuple[int, ...]], sizes: Sequence[int]) -> dict[int, Lengths]:
-    """For every set of the states (bits): the fewest terms that hold just these, and then the
-    fewest limits; all terms are tried.
-    """
+    """For each set of states (bits) the fewest terms, then limits, that hold in just these."""
     of_set: dict[int, int] = {}
     for box in boxes(sizes):
         held = sum(

@@ -43,10 +43,8 @@ T_MAP, CELLS = pddl("t-map"), pddl("three-cells")
 @pytest.fixture(scope="module")
 def languages(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     folder = tmp_path_factory.mktemp("languages")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("COORDLANG_CACHE", "off")
-        door.build(*T_MAP, tasks="all", method="minimal").language.save(folder / "t-map")
-        door.build(*CELLS, method="greedy").language.save(folder / "cells")
+    door.build(*T_MAP, tasks="all", method="minimal").language.save(folder / "t-map")
+    door.build(*CELLS, method="greedy").language.save(folder / "cells")
     return folder / "t-map", folder / "cells"
 
 

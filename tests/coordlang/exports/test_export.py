@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is exported against the definition: the plans that fit, listed; the formula, evaluated on
-plans.
-"""
+"""Exports by definition: the plans that fit, listed; the formula, evaluated on plans."""
 
 from __future__ import annotations
 
@@ -177,9 +175,7 @@ def true_at(formula: Any, states: Sequence[frozenset[str]], place: int) -> bool:
 def asked(
     tasks: Iterable[TaskLanguage], sentences: int, plans: int
 ) -> Iterator[tuple[str, list[dict[str, bool]], bool]]:
-    """The formulas of some sentences, some plans as the symbols that hold in their states, and
-    whether a plan has the sentence.
-    """
+    """Formulas of sentences; plans as symbols that hold in their states; which plan has which."""
     for used in tasks:
         codec, every, listed = used.model.codec, Plans.of(used.space, used.task), by_sentence(used)
         for words in islice(listed, sentences):

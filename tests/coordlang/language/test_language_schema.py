@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The JSON Schema of language files: the packaged copy, what is written, what is not allowed, and
-what is written by hand.
-"""
+"""The JSON Schema of language files: packaged, written, not allowed, written by hand."""
 
 from __future__ import annotations
 

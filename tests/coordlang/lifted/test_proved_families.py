@@ -48,14 +48,7 @@ def holds(candidates: Candidates, words: Ints) -> bool:
 
 
 @pytest.mark.parametrize(
-    "size",
-    [
-        3,
-        4,
-        5,
-        pytest.param(6, marks=pytest.mark.thorough),
-        pytest.param(7, marks=pytest.mark.thorough),
-    ],
+    "size", [3, 4, 5, *(pytest.param(n, marks=pytest.mark.thorough) for n in (6, 7))]
 )
 def test_three_arcs_of_a_ring_are_words(size: int) -> None:
     """Every partition by arcs of r1, three or more of them; two are not enough."""

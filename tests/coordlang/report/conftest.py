@@ -165,9 +165,7 @@ class Opener:
 
 @pytest.fixture
 def open_page(browser: Browser, tmp_path: Path) -> Iterator[Opener]:
-    """Opens pages from files; in the end none may have logged anything or asked for anything but
-    its own file.
-    """
+    """Opens pages from files; none may log anything or ask for anything but its own file."""
     opener = Opener(browser, tmp_path)
     yield opener
     for opened in opener.pages:

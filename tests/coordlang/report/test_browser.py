@@ -88,9 +88,7 @@ def test_every_page_plays(open_page: Opener, domain: str, problem: str, tasks: s
 
 @pytest.mark.thorough
 def test_all_plans_through_the_interface_of_the_page(open_page: Opener) -> None:
-    """The page's own counting and ranking, over all sentences of all tasks: nothing is missing,
-    nothing twice.
-    """
+    """The page's own counts and ranks, over all sentences of all tasks: none missing or twice."""
     for domain, problem, tasks in WORLDS:
         opened = open_page(make_world(domain, problem, tasks).report.html)
         found = opened.page.evaluate(
@@ -116,9 +114,7 @@ def test_all_plans_through_the_interface_of_the_page(open_page: Opener) -> None:
 
 @pytest.mark.thorough
 def test_a_robots_options_are_its_own_subplans(open_page: Opener) -> None:
-    """What the page lets a robot do, step by step, is what its part is in some plan with the
-    sentence; no more, no less.
-    """
+    """What the page lets a robot do at a step: its part in each plan with the sentence."""
     world = make_world("grid", "three-robots-3x3", None)
     spoken = language_in_task(world.language, world.domain, world.problem)
     opened = open_page(world.report.html)
@@ -234,9 +230,7 @@ def remaining(world: World, number: int) -> set[int]:
 
 @pytest.mark.thorough
 def test_the_picture_of_the_words(open_page: Opener) -> None:
-    """Every state of the language is there once, with its word; a word alone, on demand; and the
-    map's tint agrees.
-    """
+    """Every state of the language once, with its word; one word on demand; and the map's tint."""
     world = make_world("t-map", "problem")
     opened = open_page(world.report.html)
     page = opened.page

@@ -67,9 +67,7 @@ def test_plans_and_sentences(domain: str, problem: str, tasks: str | None) -> No
 
 
 def test_ranks_are_those_of_the_planner() -> None:
-    """Plan number k of the page (edges in order) is plan number k of the planner: same labels, same
-    states.
-    """
+    """Plan number k of the page (edges in order) is that of the planner: labels and states."""
     for domain, problem, tasks in WORLDS:
         world = make_world(domain, problem, tasks)
         data, task = world.data, world.data["tasks"][0]

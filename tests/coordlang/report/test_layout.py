@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Coordinates: from names, from files, by graph layout; nodes of layers in an order with few
-crossings.
-"""
+"""Coordinates from names, files, and graph layout; orders of layers with few crossings."""
 
 from __future__ import annotations
 

@@ -13,11 +13,7 @@ from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.required.miscoordination import Inseparable
 from coordlang.verification.by_definition import inseparable
 from coordlang.vocabulary import first_differences
-from coordlang.vocabulary.first_differences import (
-    FirstDifferences,
-    differences,
-    symmetric_goals,
-)
+from coordlang.vocabulary.first_differences import FirstDifferences, differences, symmetric_goals
 from planners.parallel.workers import Workers
 from planners.pddl import parse_problem, read_domain, read_problem
 from planners.pddl.model_options import ModelOptions

@@ -11,11 +11,7 @@ import pytest
 
 from coordlang.language.candidates import Candidates
 from coordlang.required.choices import Choices
-from coordlang.required.miscoordination import (
-    Miscoordination,
-    Step,
-    miscoordination,
-)
+from coordlang.required.miscoordination import Miscoordination, Step, miscoordination
 from coordlang.verification.by_definition import inseparable
 from planners.check.validate import Verdict, validate
 from planners.joint.model import JointModel

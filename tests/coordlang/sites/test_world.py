@@ -78,9 +78,7 @@ def test_links_are_ways_and_what_statics_relate() -> None:
     ("domain", "problem"), [("t-map", "problem"), ("grid-joint", "t-map"), ("push-box", "around")]
 )
 def test_moves_are_what_happens(domain: str, problem: str) -> None:
-    """Where a subaction is said to bring a thing, there it is after every joint step with this
-    subaction.
-    """
+    """Where a subaction is said to bring a thing, there it is after every such joint step."""
     world, loaded = world_of(domain, problem)
     model = loaded.model
     space = explore(model, loaded.tasks[0].init[None, :])

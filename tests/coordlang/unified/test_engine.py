@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The engine inside unified-planning: its plans against ours and against unified-planning's own
-simulator and validator.
-"""
+"""The engine inside unified-planning: its plans against ours, and by its own validator."""
 
 from __future__ import annotations
 
@@ -89,9 +87,7 @@ CROSSING = """(define (domain crossing) (:requirements :typing) (:types cell KIN
 
 
 def crossing(cells: int = 4, kind: str = "robot", more: str = "") -> Any:
-    """Two robots on a star of cells (the T-map with four) trade places, one cell each; entering
-    asks for a free cell.
-    """
+    """Two robots trade places on a star of cells (the T-map with four); a cell must be free."""
     names, others = [f"c{n}" for n in range(cells)], [n for n in range(cells) if n != 1]
     ways = " ".join(f"(near c{n} c1) (near c1 c{n})" for n in others)
     free = " ".join(f"(free c{n})" for n in (1, *range(3, cells)))
@@ -183,9 +179,7 @@ def test_an_optimal_plan(capfd: pytest.CaptureFixture[str]) -> None:
 
 
 def agents() -> Any:
-    """The same as `crossing` with two agents: where each of them is is an object fluent of its own,
-    and the goal of one is private.
-    """
+    """`crossing` with two agents, whose places are object fluents; one goal is private."""
     same, problem, cell = crossing(), MultiAgentProblem("crossing"), up.UserType("cell")
     near, free = same.fluent("near"), same.fluent("free")
     for fluent in (near, free):
@@ -226,9 +220,7 @@ def test_a_multi_agent_problem() -> None:
 
 
 def test_agents_of_different_kinds() -> None:
-    """One action name with different meanings, fluents of others (Dot), a private fluent; the guard
-    opens, the guest enters.
-    """
+    """One action name with two meanings, others' fluents (Dot), a private one: guard, guest."""
     problem = MultiAgentProblem("door")
     open_ = up.Fluent("open", up.BoolType())
     problem.ma_environment.add_fluent(open_, default_initial_value=False)
@@ -341,9 +333,7 @@ def random_problem(seed: int) -> Any:
 
 
 def shortest(problem: Any) -> tuple[int, int] | None:
-    """The length and number of the shortest plans, by breadth-first search with unified-planning's
-    simulator.
-    """
+    """Length and number of shortest plans, breadth first with unified-planning's simulator."""
     with up.SequentialSimulator(problem) as simulator:
         start = simulator.get_initial_state()
         atoms = [*problem.initial_values]

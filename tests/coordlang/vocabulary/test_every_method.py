@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What every way to a language must do, whatever it is: a new one in `METHODS` is tested here
-without being named.
-"""
+"""What every way to a language must do; a new one in `METHODS` is tested by being there."""
 
 from __future__ import annotations
 

@@ -112,9 +112,7 @@ def blocks(partition: Assignment) -> set[frozenset[int]]:
 
 
 def test_flexible_is_best_by_trying_all() -> None:
-    """On models small enough for it the search goes from the worst language to the best; no bound
-    is exceeded.
-    """
+    """The search goes from the worst language to the best; no bound is exceeded."""
     better = 0
     random = Random(2)
     for _ in range(30):

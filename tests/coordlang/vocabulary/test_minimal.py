@@ -98,9 +98,7 @@ def test_one_of_symmetric_partitions(
     drawn: list[set[tuple[int, int]]],
     pairs: list[tuple[int, int]],
 ) -> None:
-    """Where all images of a clause are clauses, a partition is left if there was one, and it is the
-    first of its images.
-    """
+    """If all images of a clause are clauses, a partition is left, the first of its images."""
     clauses = {
         frozenset(pair(s[a], s[b]) for a, b in clause if a != b)
         for clause in drawn

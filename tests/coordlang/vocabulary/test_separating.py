@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Theorem 3 against its definition: plans listed, all failing tuples separated, all partitions
-tried.
-"""
+"""Theorem 3 by definition: all failing tuples of plans separated, all partitions tried."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rules of joint steps (docs/pddl.md), each by hand-worked plans that keep it and that break
-it.
-"""
+"""The rules of joint steps (docs/pddl.md), each kept and broken by plans made by hand."""
 
 from __future__ import annotations
 

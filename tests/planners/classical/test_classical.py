@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The optimal plans of both plain forms stand one to one for the optimal joint plans, and cost as
-much.
-"""
+"""Optimal plans of both plain forms: one for each optimal joint plan, at the same cost."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Concurrency networks: each kind of constraint by hand, and random networks against the naive
-twin.
-"""
+"""Concurrency networks: each constraint by hand, random networks against the naive twin."""
 
 from __future__ import annotations
 
@@ -136,9 +134,7 @@ def test_a_wrong_network(network: str, message: str) -> None:
 
 
 def random_network(random: Random, domain: Domain) -> str:
-    """One to three constraints over the arguments of a random type, and maybe a dependence between
-    two of them.
-    """
+    """Up to three constraints over arguments of a random type; maybe two of them depend."""
     kinds = sorted({p.types for s in domain.schemas for p in s.parameters})
     kind = random.choice(kinds)
     places = [

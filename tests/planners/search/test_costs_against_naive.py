@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``--cost makespan+cost`` against brute force: least makespan, then least PDDL action cost, on
-random models.
-"""
+"""``--cost makespan+cost`` against brute force on random models: makespan, then action cost."""
 
 from __future__ import annotations
 
@@ -30,9 +28,7 @@ Price = Callable[[str], int]
 
 
 def priced(seed: int, kind: Kind) -> tuple[PlanningInstance, Price]:
-    """A random model in which every action costs a constant, or what its first argument costs, or
-    nothing.
-    """
+    """A random model; an action costs a constant, what its first argument costs, or nothing."""
     text = random_model(seed, kind)
     random = Random(seed)
     names = re.findall(r"\(:action (\S+)", text.domain)

@@ -36,9 +36,7 @@ def check(name: str, loaded: PlanningInstance, space: Space) -> Counter[int]:
 
 
 def distances(space: Space, goals: list[bool]) -> Ints:
-    """The least joint steps from every state to a goal, -1 where there is no way: layer by layer,
-    backward.
-    """
+    """The least joint steps from every state to a goal, -1 if there is no way, backward."""
     before: dict[int, set[int]] = {}
     for source, target in zip(space.sources.tolist(), space.target.tolist(), strict=True):
         before.setdefault(target, set()).add(source)
@@ -143,9 +141,7 @@ AROUND = """(define (problem p) (:domain jumps) (:objects r1 r2 - robot c0-0 c0-
 
 
 def test_manhattan_is_admissible_where_robots_jump() -> None:
-    """Three cells a step: seven cells are three steps; and nothing is known of a robot that turns
-    up anywhere.
-    """
+    """At three cells a step seven are three steps; robots that turn up anywhere tell nothing."""
     loaded = model_of(JUMPS.format(more=""), AROUND)
     check("manhattan", loaded, explore(loaded.model, loaded.tasks[0].init[None, :]))
     assert manhattan(loaded) == 3
