@@ -177,6 +177,7 @@ def test_bounds_are_the_largest_sets_that_mix(robots: int) -> None:
     assert coordinated >= 10
 
 
+@pytest.mark.thorough
 def test_flexible_reaches_its_bound_on_the_ring() -> None:
     """GWB5: the language leaves as many plans open as any language could."""
     domain, problem = read("grid", "gwb5-3x3")
