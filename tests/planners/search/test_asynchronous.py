@@ -142,7 +142,7 @@ def test_under_a_language_every_interleaving_ends_in_the_goal(robots: int, seeds
 
 @pytest.mark.parametrize(
     ("robots", "seeds"),
-    [(2, range(60)), *(pytest.param(*run, marks=pytest.mark.thorough) for run in THOROUGH)],
+    [(2, range(60)), *(pytest.param(*run, marks=pytest.mark.thorough) for run in THOROUGH[:2])],
 )
 def test_one_plan_is_the_soonest_in_every_event(robots: int, seeds: range) -> None:
     """Of plans with equal parts one has every event no later than any other one."""
