@@ -135,7 +135,7 @@ def symmetry_group(
     if candidates.model.remembers or candidates.model.slack_facts:
         return SymmetryGroup(())
     generators, dropped = checked_generators(candidates, largest_graph)
-    if any(space.model.has_ties for space in candidates.spaces):
+    if candidates.model.is_asynchronous and any(s.model.has_ties for s in candidates.spaces):
         # Robots whose events could be done in either order do them in the order of robots.
         robots = candidates.model.robots
         fixing = [s for s in generators if all(s.renaming.get(r, r) == r for r in robots)]
