@@ -106,9 +106,9 @@ def parts(candidates: Candidates, group: SymmetryGroup) -> list[Part]:
     symmetry of a part takes its steps to such steps, but need not keep the slack that is left.
     """
     model = candidates.model
-    if candidates.kind != "all" or model.remembers or model.slack or len(candidates.spaces) != 1:
+    if candidates.kind != "all" or model.remembers or model.slack or model.is_asynchronous:
         return []
-    if model.is_asynchronous:
+    if len(candidates.spaces) != 1:
         return []
     space = candidates.spaces[0]
     graph, named = _neighbours(candidates), _named(candidates)

@@ -40,10 +40,11 @@ _PAIRS, _FIRST_PAIRS = 1_000, 30
 _BEGINNING = 10
 #: What may be spent on each number at first.
 _SOON = Budget(rounds=10, conflicts=2_000)
-#: Rounds that partitions of a kind are given for one task at first, one time after another ..
-_FOR_KINDS, _WHERE_DEAR = (1, 2, 5, 10), (5, 10)
-#: (rounds are dear where a node has many pairs of edges, all nodes together)
+#: Rounds are dear where there are more pairs of edges that leave one node.
 _DEAR = 30_000
+#: Rounds that partitions of a kind are given for one task at first, one time after another, and
+#: where they are dear ..
+_FOR_KINDS, _WHERE_DEAR = (1, 2, 5, 10), (5, 10)
 #: .. with fewer words than the best language by this part at least.
 _FEWER_WORDS = 5
 #: Merges in a row that fail before something else is tried.
@@ -147,7 +148,7 @@ class MinimalSearch:
         if self._pairs // _FIRST_PAIRS > _BEGINNING * self._most:
             return
         if self._is_one_task:
-            for rounds in _WHERE_DEAR if self._pairs > _DEAR else _FOR_KINDS:
+            for rounds in _WHERE_DEAR if self._is_dear else _FOR_KINDS:
                 self._find_fewer_tied(rounds)
         while self.lower < self.upper and not self._is_spent and self.decide(self.lower, _SOON):
             pass
@@ -178,7 +179,7 @@ class MinimalSearch:
         only that.
         """
         least = self.lower
-        if self._pairs <= _DEAR and least < self.upper:
+        if not self._is_dear and least < self.upper:
             if self._finds_tied(least, rounds):
                 return
             least += 1
@@ -192,6 +193,10 @@ class MinimalSearch:
         """Pairs of edges that leave one node: what a walk through all tasks goes over."""
         degrees = (space.out_degrees.astype(float) for space in self._job.candidates.spaces)
         return sum(int((degree**2).sum()) for degree in degrees)
+
+    @property
+    def _is_dear(self) -> bool:
+        return self._pairs > _DEAR
 
     @property
     def work(self) -> int:
