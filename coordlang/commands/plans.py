@@ -11,7 +11,6 @@ from typing import Any, ClassVar
 from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.records import DEFAULT_MAX, PlansOptions, UnderstandOptions
 from coordlang.commands.terminal import echo, note_single_robot, write
-from planners.joint.tables import Rows
 from planners.search.asynchronous import Timing, as_executed
 from planners.search.kept_plans import search
 from planners.search.optimal_plans import search as bounded_search
@@ -83,7 +82,7 @@ class OptimalPlans(Presented):
         """Return the position of a plan, None if it is no optimal plan of the task."""
         numbers = self._numbers(plan)
         if self._timing and numbers is not None:
-            numbers = self._timing.labels(self._start, numbers)
+            numbers = self._timing.labels(self._listed.start, numbers)
         return None if numbers is None else self._listed.rank(numbers)
 
     def sample(self, number: int, seed: int = 0) -> list[PlanSteps]:
@@ -109,12 +108,6 @@ class OptimalPlans(Presented):
             count = json_count(self.count)
             data |= {"execution": "asynchronous", "count": count, "complete": complete}
         return data
-
-    @property
-    def _start(self) -> Rows:
-        space = self._plans.space
-        start: Rows = space.rows[space.state[self._plans.start]]
-        return start
 
     def _texts(self, plan: Plan) -> PlanSteps:
         if self._timing:

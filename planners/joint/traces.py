@@ -10,7 +10,7 @@ together: it is a *meeting*.  See docs/asynchronous.md.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -81,6 +81,18 @@ class Traces:
             self._results[key] = found.result[mine[0]] if len(mine) else None
         return self._results[key]
 
+    def follow(self, row: Rows, steps: Sequence[Step]) -> Rows | None:
+        """Where joint steps one after another lead; None if one cannot be taken."""
+        here: Rows | None = row
+        for step in steps:
+            here = None if here is None else self.result(here, step)
+        return here
+
+    def leads(self, row: Rows, steps: Sequence[Step], end: Rows) -> bool:
+        """Whether joint steps one after another lead to a state."""
+        last = self.follow(row, steps)
+        return last is not None and np.array_equal(last, end)
+
     def blocks(self, row: Rows, step: Step) -> tuple[Block, ...]:
         """The events of a joint step in blocks: those that interfere in their order."""
         key = row.tobytes(), step
@@ -91,21 +103,6 @@ class Traces:
             self._blocks[key] = tuple(found)
         return self._blocks[key]
 
-    def before(self, row: Rows, step: Step) -> list[tuple[tuple[int, ...], Block]]:
-        """For each robot the others whose events of a step come before its own, and its block.
-
-        Those alone that interfere.  Nothing for robots that idle.
-        """
-        found: list[tuple[tuple[int, ...], Block]] = [((), ()) for _ in self._robots]
-        done: list[int] = []
-        for block in self.blocks(row, step):
-            for robot in block:
-                tables = self.interfering
-                earlier = [o for o in done if tables[robot, o][step[robot], step[o]]]
-                found[robot] = tuple(sorted(earlier)), block
-            done += block
-        return found
-
     def events(self, row: Rows, steps: Sequence[Step]) -> list[list[Event]]:
         """Each robot's events in joint steps one after another, with what they wait for.
 
@@ -113,32 +110,44 @@ class Traces:
         """
         done: list[list[Event]] = [[] for _ in self._robots]
         for step in steps:
-            for robot, event in self.next_events(row, step, done).items():
+            for robot, event in self.events_after(done, row, step).items():
                 done[robot].append(event)
             after = self.result(row, step)
             assert after is not None, "it is a joint step"
             row = after
         return done
 
-    def next_events(
-        self, row: Rows, step: Step, done: Sequence[Sequence[Event]]
+    def events_after(
+        self, done: Sequence[Sequence[Event]], row: Rows, step: Step
     ) -> dict[int, Event]:
-        """The events of a joint step by robot, after those that are ``done``."""
-        found = {}
-        for robot, (earlier, block) in enumerate(self.before(row, step)):
-            if block:
-                waits = tuple(
-                    self._count(robot, step[robot], other, done[other]) + (other in earlier)
-                    for other in self._robots
-                )
-                found[robot] = Event(step[robot], waits, meeting(robot, step, block))
-        return found
+        """The events of a joint step by robot, after those that are ``done`` by each."""
 
-    def _count(self, robot: int, label: int, other: int, done: Sequence[Event]) -> int:
-        if robot == other:
-            return 0
-        row = self.interfering[robot, other][label]
-        return sum(bool(row[event.label]) for event in done)
+        def waits(robot: int, other: int) -> int:
+            if robot == other:
+                return 0
+            interferes = self.interfering[robot, other][step[robot]]
+            return sum(bool(interferes[event.label]) for event in done[other])
+
+        return self.events_of(row, step, waits)
+
+    def events_of(
+        self, row: Rows, step: Step, waits: Callable[[int, int], int]
+    ) -> dict[int, Event]:
+        """The events of a joint step by robot.
+
+        ``waits (robot, other)`` says how many events of another robot before the step interfere
+        with the robot's.
+        """
+        found: dict[int, Event] = {}
+        for block in self.blocks(row, step):
+            earlier = list(found)
+            for robot in block:
+                counts = [waits(robot, other) for other in self._robots]
+                for other in earlier:
+                    counts[other] += bool(self.interfering[robot, other][step[robot], step[other]])
+                meets = tuple((other, step[other]) for other in block if other != robot)
+                found[robot] = Event(step[robot], tuple(counts), meets)
+        return found
 
     def _joined(self, step: Step) -> list[Block]:
         """Robots whose events interfere, by way of others too, together."""
@@ -161,30 +170,20 @@ class Traces:
         assert result is not None, "what it does not interfere with is not needed"
         for number in range(len(together), 0, -1):
             every = ordered_partitions(together, number)
-            found = [blocks for blocks in every if self._leads(row, step, blocks, result)]
+            found = [
+                blocks
+                for blocks in every
+                if self.leads(row, [alone(block, step) for block in blocks], result)
+            ]
             self.has_ties |= len(found) > 1
             if found:
                 return found[0]
         raise AssertionError("one block is the step itself")
 
-    def _leads(self, row: Rows, step: Step, blocks: Sequence[Block], result: Rows) -> bool:
-        """Whether blocks, one after another, lead to a state."""
-        for block in blocks:
-            after = self.result(row, alone(block, step))
-            if after is None:
-                return False
-            row = after
-        return np.array_equal(row, result)
-
 
 def alone(block: Block, step: Step) -> Step:
     """What some robots do in a step, while all others idle."""
     return tuple(label if robot in block else 0 for robot, label in enumerate(step))
-
-
-def meeting(robot: int, step: Step, block: Block) -> tuple[tuple[int, int], ...]:
-    """The other robots of a block with the numbers of their subactions."""
-    return tuple((other, step[other]) for other in block if other != robot)
 
 
 def ordered_partitions(robots: Block, number: int) -> Iterator[tuple[Block, ...]]:

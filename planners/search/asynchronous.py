@@ -5,13 +5,13 @@ A robot's *part* of a plan is its events in order, each with what it waits for
 (`planners.joint.traces`).  Plans with equal parts differ in timing alone: they are one plan, whose
 states are those of the one that does everything as soon as possible.  In the graph made here a
 path is such a plan: edge k has the k-th event of each robot, 0 where it has no more, and leads to
-the state after step k.  So what is asked of label sequences is asked of parts, and all that builds,
-verifies and explains languages in step does so without one (docs/asynchronous.md).
+the state after step k.  So what is asked of label sequences is asked of parts, and all that builds
+and verifies languages in step does so without one (docs/asynchronous.md).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise, product
 
@@ -19,7 +19,7 @@ import numpy as np
 
 from planners.joint.model import JointModel
 from planners.joint.tables import Bools, Ints, Rows
-from planners.joint.traces import Event, Step, Traces, meeting
+from planners.joint.traces import Event, Step, Traces, alone
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import BadInput
 from planners.system.limits import reaching
@@ -71,7 +71,7 @@ class _Node:
     node: int
     past: Ints
     idles: tuple[int, ...]
-    allowed: Sequence[int]
+    allowed: tuple[int, ...]
     moves: list[tuple[Step, int, _Node]] = field(default_factory=list)
     queues: dict[_Queues, int] = field(default_factory=dict)
 
@@ -85,10 +85,11 @@ class _Unfolding:
         self._waits = _Waits(space, self._traces)
         self._labels: list[Step] = [tuple(row) for row in space.labels.tolist()]
         self._targets: list[int] = space.targets().tolist()
-        self._allowed: dict[int, Sequence[int]] = {}
+        self._allowed: dict[int, tuple[int, ...]] = {}
         self.events: list[dict[Event, int]] = [{} for _ in self._robots]
         self._layers: list[dict[object, _Node]] = [{} for _ in space.layers]
         self._graph = _Graph(space.robots)
+        self._nothing: _Queues = ((),) * space.robots
 
     def so_far(self) -> str:
         """How far it got, for messages."""
@@ -100,7 +101,7 @@ class _Unfolding:
         idle = (0,) * len(self._robots)
         starts = []
         for node in self._space.starts.tolist():
-            out = self._space.out_edges(node)
+            out = tuple(self._space.out_edges(node))
             starts.append(self._node(node, self._waits.none, idle, out))
         for layer in self._layers[:0:-1]:
             for node in layer.values():
@@ -108,7 +109,6 @@ class _Unfolding:
         for layer in self._layers:
             for node in layer.values():
                 self._retract(node)
-        nothing: _Queues = ((),) * len(self._robots)
         old = self._space.model
         events = tuple((None, *own) for own in self.events)
         model = replace(
@@ -123,16 +123,16 @@ class _Unfolding:
             has_ties=self._traces.has_ties,
         )
         return self._graph.space(
-            replace(self._space, model=model), [s.queues[nothing] for s in starts]
+            replace(self._space, model=model), [s.queues[self._nothing] for s in starts]
         )
 
-    def _node(self, node: int, past: Ints, idles: Step, allowed: Sequence[int]) -> _Node:
+    def _node(self, node: int, past: Ints, idles: Step, allowed: tuple[int, ...]) -> _Node:
         past = past * self._waits.matter[node]
         idles = tuple(
             number if acts else 0
             for number, acts in zip(idles, self._waits.acting[node], strict=True)
         )
-        key = node, past.tobytes(), idles, tuple(allowed)
+        key = node, past.tobytes(), idles, allowed
         layer = self._layers[int(self._space.layer[node])]
         if key not in layer:
             layer[key] = _Node(node, past, idles, allowed)
@@ -146,32 +146,27 @@ class _Unfolding:
             step = self._labels[edge]
             if not any(step):
                 self._require_no_change(edge, here.node)
-            numbers = []
-            for robot, (earlier, block) in enumerate(self._traces.before(row, step)):
-                if block:
-                    waits = self._waits.of(here.past, robot, step[robot], earlier)
-                    event = Event(step[robot], waits, meeting(robot, step, block))
-                    numbers.append(
-                        self.events[robot].setdefault(event, len(self.events[robot]) + 1)
-                    )
-                else:
-                    numbers.append(0)
+            numbers = [0] * len(self._robots)
+            waits = self._waits.of(here.past, step)
+            for robot, event in self._traces.events_of(row, step, waits).items():
+                known = self.events[robot]
+                numbers[robot] = known.setdefault(event, len(known) + 1)
             past = here.past + self._waits.added(step)
             idles = tuple(n + (not own) for n, own in zip(here.idles, step, strict=True))
             after = self._node(self._targets[edge], past, idles, self._next(edge, here.node))
             here.moves.append((tuple(numbers), edge, after))
 
-    def _next(self, edge: int, source: int) -> Sequence[int]:
+    def _next(self, edge: int, source: int) -> tuple[int, ...]:
         """The edges after one of which no event could be done in its step already."""
         if edge not in self._allowed:
             out = self._space.out_edges(self._targets[edge])
-            self._allowed[edge] = [after for after in out if not self._is_late(source, edge, after)]
+            self._allowed[edge] = tuple(e for e in out if not self._is_late(source, edge, e))
         return self._allowed[edge]
 
     def _is_late(self, source: int, edge: int, after: int) -> bool:
         """Whether some events of a step may be done in the step before, and it is the same plan."""
         first, second = self._labels[edge], self._labels[after]
-        idle = [robot for robot in self._robots if second[robot] and not first[robot]]
+        idle = {robot for robot in self._robots if second[robot] and not first[robot]}
         if not idle:
             return False
         space, traces = self._space, self._traces
@@ -180,21 +175,16 @@ class _Unfolding:
             for node in (source, self._targets[edge], self._targets[after])
         )
         for block in traces.blocks(middle, second):
-            if set(block) <= set(idle):
-                sooner = tuple(
-                    second[robot] if robot in block else first[robot] for robot in self._robots
-                )
-                rest = tuple(0 if robot in block else second[robot] for robot in self._robots)
-                between = traces.result(row, sooner)
-                if between is not None and any(rest):
-                    last = traces.result(between, rest)
-                    if (
-                        last is not None
-                        and (last == end).all()
-                        and traces.events(row, (sooner, rest))
-                        == traces.events(row, (first, second))
-                    ):
-                        return True
+            others = tuple(robot for robot in self._robots if robot not in block)
+            sooner = tuple(second[r] if r in block else first[r] for r in self._robots)
+            steps = sooner, alone(others, second)
+            if (
+                idle.issuperset(block)
+                and any(steps[1])
+                and traces.leads(row, steps, end)
+                and traces.events(row, steps) == traces.events(row, (first, second))
+            ):
+                return True
         return False
 
     def _require_no_change(self, edge: int, node: int) -> None:
@@ -227,7 +217,7 @@ class _Unfolding:
         state, goal = int(space.state[here.node]), int(space.goal[here.node])
         layer = int(space.layer[here.node])
         if not layer:
-            here.queues[((),) * len(self._robots)] = self._graph.node(state, goal, layer, {})
+            here.queues[self._nothing] = self._graph.node(state, goal, layer, {})
             return
         moves: dict[_Queues, dict[Step, tuple[int, int]]] = {}
         for numbers, edge, after in here.moves:
@@ -276,9 +266,8 @@ class _Waits:
                 patterns, pattern = np.unique(table, axis=0, return_inverse=True)
                 pattern = pattern.reshape(-1)
                 self._column[i][j] = (width + pattern).tolist()
-                kinds = np.zeros((len(table), len(patterns)), np.bool_)
-                kinds[np.arange(len(table)), pattern] = np.asarray(patterns.any(axis=1))[pattern]
-                matter.append(future[i][:, : len(table)] @ kinds)
+                of_label = pattern[:, None] == np.arange(len(patterns))
+                matter.append(future[i] @ (of_label & patterns.any(axis=1)))
                 added.append((j, slice(width, width + len(patterns)), patterns))
                 width += len(patterns)
         self.matter = np.concatenate(matter, axis=1).astype(np.int16)
@@ -295,12 +284,15 @@ class _Waits:
             self._added[step] = np.sum(rows, axis=0, dtype=np.int16) if rows else self.none
         return self._added[step]
 
-    def of(self, past: Ints, robot: int, label: int, earlier: Sequence[int]) -> tuple[int, ...]:
-        """What an event waits for, of the past and of robots that are earlier in its step."""
-        return tuple(
-            int(past[own[label]]) + (other in earlier) if other != robot else 0
-            for other, own in enumerate(self._column[robot])
-        )
+    def of(self, past: Ints, step: Step) -> Callable[[int, int], int]:
+        """How many events of another robot a robot's event of a step waits for, of the past."""
+
+        def waits(robot: int, other: int) -> int:
+            if robot == other:
+                return 0
+            return int(past[self._column[robot][other][step[robot]]])
+
+        return waits
 
 
 def _future(space: PlanSpace, robot: int) -> Bools:
@@ -358,24 +350,19 @@ class Timing:
         """As many of the robots' next events as can be done at once, between two states."""
         labels = [(event.label, 0) if event else (0,) for event in events]
         for step in sorted(product(*labels), key=lambda step: step.count(0)):
-            after = self._traces.result(row, step)
-            if after is not None and np.array_equal(after, end):
-                own = self._traces.next_events(row, step, done)
+            if self._traces.leads(row, [step], end):
+                own = self._traces.events_after(done, row, step)
                 if all(not label or own[r] == events[r] for r, label in enumerate(step)):
                     return step
         raise AssertionError("some events lead from each state of a plan to the next one")
 
-    def labels(self, row: Rows, steps: Sequence[Step]) -> tuple[Step, ...] | None:
-        """The labels of a plan in step, whatever its timing; None if it is no plan of the space.
+    def labels(self, start: int, steps: Sequence[Step]) -> tuple[Step, ...] | None:
+        """The labels of a plan in step, whatever its timing; None if it cannot be carried out.
 
-        ``row`` is the state where it begins.
+        ``start`` is the node of the plan space where it begins; what is no event of it is -1.
         """
-        here: Rows | None = row
-        for step in steps:
-            if here is None:
-                return None
-            here = self._traces.result(here, step)
-        if here is None:
+        row = self._space.rows[self._space.state[start]]
+        if self._traces.follow(row, steps) is None:
             return None
         columns = []
         for own, events in zip(self._model.events, self._traces.events(row, steps), strict=True):

@@ -103,8 +103,7 @@ def test_paths_are_the_plans_up_to_timing(robots: int, seeds: range) -> None:
             for plan in listed:
                 steps = timing.steps(plan, listed.states(plan))
                 assert steps in plans.listed
-                row = space.rows[space.state[space.starts[task]]]
-                assert timing.labels(row, steps) == plan
+                assert timing.labels(int(made.starts[task]), steps) == plan
     print(f"{robots} robots: {dict(seen)}")
     assert seen["plans"] >= 30
 
