@@ -11,10 +11,10 @@ from typing import Any, ClassVar
 from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.records import DEFAULT_MAX, PlansOptions, UnderstandOptions
 from coordlang.commands.terminal import echo, note_single_robot, write
-from planners.search.asynchronous import Timing, as_executed
+from planners.search.asynchronous import as_executed
 from planners.search.kept_plans import search
 from planners.search.optimal_plans import search as bounded_search
-from planners.search.plan_file import Texts, json_count, texts, to_ipc, to_json, to_plansys2
+from planners.search.plan_file import Texts, texts, to_ipc, to_json, to_plansys2
 from planners.search.plans import Plan, Plans
 from planners.system.notebook import Presented
 
@@ -30,16 +30,13 @@ class OptimalPlans(Presented):
     robot, None where it idles.
     """
 
-    __slots__ = ("_listed", "_plans", "_timing")
+    __slots__ = ("_plans",)
     shown: ClassVar[tuple[str, ...]] = ("count", "makespan", "robots")
 
     def __init__(self, plans: Plans) -> None:
-        """Take plans in step; where the model says so they are listed up to timing."""
-        self._listed, self._timing = plans, None
+        """Take the plans of one task; where its model says so they are listed up to timing."""
         space = as_executed(plans.space)
-        if space is not plans.space:
-            self._listed, self._timing = Plans.of(space), Timing(space)
-        self._plans = plans
+        self._plans = plans if space is plans.space else Plans.of(space)
 
     @property
     def count(self) -> int:
@@ -48,7 +45,7 @@ class OptimalPlans(Presented):
         With slack of those with all steps that are allowed, the last ones at rest.  Without a
         common step plans that differ in timing alone count once.
         """
-        return self._listed.count
+        return self._plans.count
 
     @property
     def makespan(self) -> int:
@@ -72,22 +69,20 @@ class OptimalPlans(Presented):
         return self._plans.space.model.robots
 
     def __iter__(self) -> Iterator[PlanSteps]:
-        return map(self._texts, self._listed)
+        return map(self._texts, self._plans)
 
     def __getitem__(self, rank: int) -> PlanSteps:
         """Return the plan at a position, 0 to ``count - 1``; raises `IndexError` outside."""
-        return self._texts(self._listed.unrank(rank))
+        return self._texts(self._plans.unrank(rank))
 
     def rank(self, plan: Sequence[Texts]) -> int | None:
         """Return the position of a plan, None if it is no optimal plan of the task."""
         numbers = self._numbers(plan)
-        if self._timing and numbers is not None:
-            numbers = self._timing.labels(self._listed.start, numbers)
-        return None if numbers is None else self._listed.rank(numbers)
+        return None if numbers is None else self._plans.rank(numbers)
 
     def sample(self, number: int, seed: int = 0) -> list[PlanSteps]:
         """Draw plans uniformly and independently; the same seed draws the same plans."""
-        return [self._texts(plan) for plan in self._listed.sample(number, seed)]
+        return [self._texts(plan) for plan in self._plans.sample(number, seed)]
 
     def ipc(self, plan: Sequence[Texts]) -> str:
         """Return a plan as an IPC plan file (docs/formats.md).
@@ -102,22 +97,15 @@ class OptimalPlans(Presented):
 
     def data(self, listed: Sequence[Sequence[Texts]]) -> dict[str, Any]:
         """Return the data of a JSON plan file with these plans in it (docs/formats.md)."""
-        data = to_json(self._plans, [self._known(plan) for plan in listed])
-        if self._timing:
-            complete = len({self.rank(plan) for plan in listed}) == self.count
-            count = json_count(self.count)
-            data |= {"execution": "asynchronous", "count": count, "complete": complete}
-        return data
+        return to_json(self._plans, [self._known(plan) for plan in listed])
 
     def _texts(self, plan: Plan) -> PlanSteps:
-        if self._timing:
-            plan = self._timing.steps(plan, self._listed.states(plan))
-        return texts(self._plans.space.model, self._plans.without_rest(plan))
+        return texts(self._plans.model, self._plans.steps(plan))
 
     def _numbers(self, plan: Sequence[Texts]) -> Plan | None:
-        steps = [self._plans.space.model.numbers(step) for step in plan]
+        steps = [self._plans.model.numbers(step) for step in plan]
         known = tuple(step for step in steps if step is not None)
-        return self._plans.padded(known) if len(known) == len(steps) else None
+        return self._plans.of_steps(known) if len(known) == len(steps) else None
 
     def _known(self, plan: Sequence[Texts]) -> Plan:
         numbers = self._numbers(plan)

@@ -78,7 +78,7 @@ def say(files: Arguments, options: SayOptions) -> Said:
             remedy="A step has one text for each robot, None where it idles.",
         )
     is_file = isinstance(plan, str | PathLike)
-    plans = read_plan_file(fspath(plan), used.model) if is_file else [plan]
+    plans = read_plan_file(fspath(plan), used.in_step) if is_file else [plan]
     sentences = []
     for number, steps in enumerate(plans, 1):
         try:
@@ -252,7 +252,7 @@ def plan(files: Arguments, options: PlanOptions) -> PlanUnderSentence:
     return PlanUnderSentence(
         used,
         used.text(words),
-        tuple(used.model.texts(step) for step in found.plan),
+        tuple(used.in_step.texts(step) for step in found.plan),
         options.heuristic,
         found,
         plan_under_sentence(used, None, options.heuristic, expanded),
@@ -284,6 +284,8 @@ def show_plan(found: PlanUnderSentence, options: PlanOptions) -> int:
     echo(text, nl=False)
     for entry in found.fulfilled:
         echo(entry.text(), err=True)
+    if not found.search.generated:
+        return covered_code(found)  # it is read off the plans
     expanded = counted(found.expanded, "node")
     without = f"without the sentence {found.without_sentence.expanded:,}"
     echo(f"A* ({found.heuristic}) expanded {expanded}; {without}", err=True)

@@ -17,7 +17,7 @@ from planners.joint.model import Goal, JointModel
 from planners.joint.tables import Rows
 from planners.search.goals import FAR, Values
 from planners.search.heuristics import heuristic
-from planners.search.plans import Plan
+from planners.search.plans import Plan, Plans
 from planners.search.slack import rests
 
 #: (joint steps, second component of the cost).
@@ -90,11 +90,14 @@ def plan_under_sentence(
 
     ``name`` is one of `planners.search.heuristics.HEURISTICS`; ``states`` are what earlier searches
     with the same language and model have expanded; for ``count_words`` see `_a_star`.  Of plans
-    within slack the earliest is read off the plan space, without a search.  Raises `NoPlanFits`.
+    within slack the earliest is read off the plan space, without a search, and of plans without a
+    common step the first one.  Raises `NoPlanFits`.
     """
     space, start = task_language.space, task_language.start
     if space.model.slack:
         return _earliest(task_language, words)
+    if space.model.is_asynchronous:
+        return _first(task_language, words)
     states = states or ExpandedStates(task_language.model, task_language.partition)
     goal, init = space.goals[space.goal[start]], space.rows[space.state[start]]
     bound = heuristic(name, task_language.model, goal, init)
@@ -103,6 +106,20 @@ def plan_under_sentence(
     found = _a_star(states, init, goal, bound, words, count_words)
     assert found.cost == space.cost_of(task_language.task), "A* is optimal"
     return found
+
+
+def _first(task_language: TaskLanguage, words: Sequence[int] | None) -> GuidedPlan:
+    """The steps of the first plan, as soon as possible."""
+    space = task_language.space
+    if words is not None:
+        space = task_language.plans_with(words)
+    plans = Plans(space, int(space.starts[0]), [])
+    path = space.first_path(plans.start)
+    passed = task_language.partition.word_of(space.rows)[
+        space.state[space.nodes_on(plans.start, path)]
+    ]
+    steps = plans.steps(tuple(map(space.labels_of, path)))
+    return GuidedPlan(steps, sentence(passed.tolist()), space.cost_of(0), 0, 0, 0)
 
 
 def _earliest(task_language: TaskLanguage, words: Sequence[int] | None) -> GuidedPlan:

@@ -59,8 +59,7 @@ def sentence_of_plan(task_language: TaskLanguage, plan: Sequence[Texts]) -> tupl
     numbers, rows, second = _executed(task_language, plan)
     space, node = task_language.space, task_language.start
     words = [int(task_language.word[node])]
-    with_rest = Plans(space, node, []).padded(numbers) if space.model.slack else None
-    for step, labels in enumerate(with_rest or numbers):
+    for step, labels in enumerate(Plans(space, node, []).of_steps(numbers) or numbers):
         edge = space.edge_with(node, labels)
         if edge is None:
             raise _not_optimal(task_language, plan, rows, second, step)
@@ -95,7 +94,7 @@ def _executed(task_language: TaskLanguage, plan: Sequence[Texts]) -> tuple[Plan,
     cost.  Raises `NotAPlan` for a step that cannot be taken, or if the goal does not hold at the
     end.
     """
-    model, space = task_language.model, task_language.space
+    model, space = task_language.in_step, task_language.space
     init = model.forgetting_slack(space.rows[space.state[task_language.start]])
     numbers: list[tuple[int, ...]] = []
 
@@ -178,7 +177,7 @@ def _not_optimal(
     task_language: TaskLanguage, plan: Sequence[Texts], rows: Sequence[Rows], cost: int, step: int
 ) -> NotOptimal:
     """The error that says how much too expensive a plan is, and where it leaves optimal ones."""
-    model, space = task_language.model, task_language.space
+    model, space = task_language.in_step, task_language.space
     makespan, second = space.cost_of(task_language.task)
     excess = max(0, len(plan) - makespan), cost - second
     if excess[0]:
@@ -192,7 +191,9 @@ def _not_optimal(
         few = "are as few as can be" if not model.slack else "are within the slack"
         steps = counted(len(plan), "step")
         wrong = f"its {steps} {few}, but with {cost} {what} where {second} are enough"
-    if step == makespan:
+    if model.is_asynchronous:
+        reason = wrong
+    elif step == makespan:
         reason = f"{wrong}: the goal holds before step {step + 1} already"
     else:
         state = model.state_text(rows[step])

@@ -20,9 +20,10 @@ from planners.joint.tables import Ints
 from planners.pddl.formula_tree import conjuncts
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
+from planners.search.asynchronous import as_executed
 from planners.search.kept_plans import search
 from planners.search.plan_space import PlanSpace, UnfoldingStep
-from planners.system.errors import BadInput, OutOfMemory, Position, Refuted, UsageError, note
+from planners.system.errors import BadInput, OutOfMemory, Position, Refuted, note
 from planners.system.messages import echoed
 
 
@@ -94,6 +95,11 @@ class TaskLanguage:
     def model(self) -> JointModel:
         """The joint model of the task."""
         return self.space.model
+
+    @property
+    def in_step(self) -> JointModel:
+        """The model of joint steps, of which plans are made also without a common step."""
+        return self.model.in_step or self.model
 
     def words_of(self, text: str | Iterable[str]) -> tuple[int, ...]:
         """Word numbers of a sentence, ``"w2 w0"`` or ``("w2", "w0")``.
@@ -187,13 +193,6 @@ def language_in_task(
     check_source(language, domain, [problem], position)
     listed = recorded_list(language)
     options = options or options_of(language)
-    if options.asynchronous:
-        raise UsageError(
-            "the words are for robots that keep no common step (--asynchronous), and this command "
-            "follows plans step by step",
-            position=position,
-            remedy="`coordlang verify` follows them.",
-        )
     loaded, recorded = model_of_listed(domain, [problem], listed, options, position)
     atoms = set(" ".join(filter(None, language.states)).replace(") (", ")\0(").split("\0"))
     atoms -= {"", *loaded.model.codec.facts.texts}
@@ -205,7 +204,7 @@ def language_in_task(
         loaded, (*recorded, _) = model_of_listed(
             domain, [problem], [*listed, all_true], options, position
         )
-    space = search(loaded.model, loaded.tasks[0])
+    space = as_executed(search(loaded.model, loaded.tasks[0]))
     partition = language.partition(loaded.model)
     covered = _covers(language, space, recorded)
     verdict = _verdict(partition, space) if covered else None

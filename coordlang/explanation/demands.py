@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 import numpy as np
@@ -74,13 +74,18 @@ class WordChange(
 
 @dataclass(frozen=True, slots=True)
 class SentenceDemands:
-    """What one sentence of one task demands: ``steps`` is the makespan of its ``plans``."""
+    """What one sentence of one task demands: ``steps`` is the makespan of its ``plans``.
+
+    ``unit``: what subplans are sequences of, steps, or events where there is no common step: then
+    None stands for no more of them, and no changes of words are told.
+    """
 
     sentence: tuple[str, ...]
     plans: int
     steps: int
     parts: list[RobotPart]
     changes: list[WordChange]
+    unit: Literal["step", "event"] = "step"
 
     def data(self) -> dict[str, Any]:
         """What it demands, for JSON; steps count from 1, null is idling."""
@@ -106,7 +111,8 @@ def sentence_demands(
     sentence = word[first].tolist()
     choices = Choices(space)
     changes = []
-    for number, pair in enumerate(pairwise(sentence), 1):
+    is_asynchronous = space.model.is_asynchronous
+    for number, pair in enumerate(pairwise(sentence) if not is_asynchronous else (), 1):
         order = _named_first(space.model.robots, formulas[partition.words[pair[1]]])
         changes.append(_change(space, partition, passed == number, pair, order))
     return SentenceDemands(
@@ -115,6 +121,7 @@ def sentence_demands(
         steps=space.cost_of(0)[0],
         parts=[_part(choices, robot) for robot in range(space.robots)],
         changes=changes,
+        unit="event" if is_asynchronous else "step",
     )
 
 

@@ -125,7 +125,8 @@ def _term_lines(formula: Cover) -> list[str]:
 def demands_text(demands: SentenceDemands) -> str:
     """What a sentence demands, in plain sentences."""
     lines = [f'"{" ".join(demands.sentence)}" leaves {counted(demands.plans, "plan")} open.']
-    lines += [line for part in demands.parts for line in _part_lines(part, demands.steps)]
+    for part in demands.parts:
+        lines += _part_lines(part, demands.unit) or [f"  {part.robot} has nothing to do."]
     lines += [
         f"  {change.before} -> {change.after} {_when(change)}: {_cause(change)}."
         for change in demands.changes
@@ -133,43 +134,46 @@ def demands_text(demands: SentenceDemands) -> str:
     return "\n".join(lines)
 
 
-def _part_lines(part: RobotPart, steps: int) -> list[str]:
-    """What one robot may do."""
-    if not steps:
-        return [f"  {part.robot} has nothing to do."]
+def _part_lines(part: RobotPart, unit: str) -> list[str]:
+    """What one robot may do; no line for nothing."""
     if part.subplans == 1:
-        return [f"  {part.robot}: {_sequence([own[0] for own in part.by_step])}."]
+        only = _sequence([own[0] for own in part.by_step], unit)
+        return [f"  {part.robot}: {only}."] if only else []
     if part.listed:
         by_step = zip(*part.listed, strict=True)
         first = len(list(takewhile(lambda own: len(set(own)) == 1, by_step)))
-        head = f": {_sequence(part.listed[0][:first])}, then one of" if first else " may choose:"
+        begin = _sequence(part.listed[0][:first], unit)
+        head = f": {begin}, then one of" if first else " may choose:"
         return [
             f"  {part.robot}{head}",
-            *(f"    {_sequence(subplan[first:])}" for subplan in part.listed),
+            *(f"    {_sequence(own[first:], unit) or 'nothing more'}" for own in part.listed),
         ]
     # The table of steps shows combinations of which some may be no subplans.
     ways = "ways, not every combination of these (choices lists them)"
     if part.subplans == prod(map(len, part.by_step)):
         ways = "ways, any combination of"
-    return [f"  {part.robot} has {part.subplans:,} {ways}:", *_step_lines(part)]
+    return [f"  {part.robot} has {part.subplans:,} {ways}:", *_step_lines(part, unit)]
 
 
-def _step_lines(part: RobotPart) -> list[str]:
+def _step_lines(part: RobotPart, unit: str) -> list[str]:
     """What a robot may do in each step, equal steps together."""
+    idling = "wait" if unit == "step" else "nothing more"
     lines = []
     last = 0
     for subactions, run in groupby(part.by_step):
         first, last = last + 1, last + len(list(run))
-        name = f"step {first}" if first == last else f"steps {first} to {last}"
-        lines.append(f"    {name}: {_alternatives([own or 'wait' for own in subactions])}")
+        name = f"{unit} {first}" if first == last else f"{unit}s {first} to {last}"
+        lines.append(f"    {name}: {_alternatives([own or idling for own in subactions])}")
     return lines
 
 
-def _sequence(subplan: Sequence[str | None]) -> str:
-    """``waits 2 steps, move a b, move b c``."""
+def _sequence(subplan: Sequence[str | None], unit: str) -> str:
+    """``wait 2 steps, move a b, move b c``."""
     parts = []
     for own, run in groupby(subplan):
         number = len(list(run))
+        if own is None and unit == "event":
+            continue  # there are no more
         if own is None:
             parts.append("wait" if number == 1 else f"wait {number} steps")
         else:

@@ -19,6 +19,7 @@ from coordlang.required.miscoordination import Miscoordination, miscoordination
 from planners.joint.model import PlanningTask
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
+from planners.search.asynchronous import as_executed
 from planners.search.kept_plans import search
 from planners.system.errors import OutOfMemory, Position, ProvedImpossible, UsageError
 
@@ -122,7 +123,7 @@ def _candidates(
         tasks = (planning_task(first.model, domain, problem, one, position) for one in listed)
     for task in tasks:
         try:
-            space = search(first.model, task)
+            space = as_executed(search(first.in_step, task))
         except ProvedImpossible:
             continue  # of two states one need not be reachable from the other
         word = first.partition.word_of(space.rows)[space.state]

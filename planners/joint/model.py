@@ -289,9 +289,10 @@ def own_text(text: str, robot: str) -> str:
     ``(pass r1 r2 ball)`` of r1 is ``pass r2 ball``.
 
     Without the parentheses and the first of its arguments that is the robot's name; a further one
-    is what it acts on.
+    is what it acts on.  What an event waits for follows as it is.
     """
-    name, *args = text.strip("()").split()
+    subaction, more, waits = text.partition(") (")
+    name, *args = subaction.strip("()").split()
     if robot in args:
         args.remove(robot)
-    return " ".join((name, *args))
+    return " ".join((name, *args)) + more[1:] + waits

@@ -30,7 +30,8 @@ _Queues = tuple[tuple[int, ...], ...]
 
 def as_executed(space: PlanSpace) -> PlanSpace:
     """A plan space as its model says that robots execute plans: in step, or without one."""
-    return asynchronous(space) if space.model.is_asynchronous else space
+    is_in_step = space.model.in_step is None
+    return asynchronous(space) if space.model.is_asynchronous and is_in_step else space
 
 
 def asynchronous(space: PlanSpace) -> PlanSpace:
@@ -364,10 +365,12 @@ class Timing:
         row = self._space.rows[self._space.state[start]]
         if self._traces.follow(row, steps) is None:
             return None
+        parts = self._traces.events(row, steps)
+        length = max(int(self._space.layer[start]), *map(len, parts))
         columns = []
-        for own, events in zip(self._model.events, self._traces.events(row, steps), strict=True):
+        for own, events in zip(self._model.events, parts, strict=True):
             numbers = [own.index(event) if event in own else -1 for event in events]
-            columns.append(numbers + [0] * (len(steps) - len(numbers)))
+            columns.append(numbers + [0] * (length - len(numbers)))
         return tuple(zip(*columns, strict=True))
 
 

@@ -103,17 +103,16 @@ def texts(model: JointModel, plan: Plan) -> tuple[Texts, ...]:
 
 
 def to_ipc(plans: Plans, plan: Plan) -> str:
-    """An IPC plan file; of a plan within slack without its rest at the end.
+    """An IPC plan file of a plan's steps (`Plans.steps`).
 
     Joint-action PDDL: one ``(action args)`` a line.  Otherwise one subaction a line with its step,
     ``0: (move r1 a b)``, idling left out, a shared subaction once.  Then ``; makespan = 3``.
     """
-    plan = plans.without_rest(plan)
     lines = [
-        text if plans.space.model.is_joint_action else f"{number}: {text}"
+        text if plans.model.is_joint_action else f"{number}: {text}"
         for number, text in numbered_actions(plans, plan)
     ]
-    return "\n".join([*lines, f"; makespan = {len(plan)}"]) + "\n"
+    return "\n".join([*lines, f"; makespan = {len(plans.steps(plan))}"]) + "\n"
 
 
 def to_plansys2(plans: Plans, plan: Plan) -> str:
@@ -122,15 +121,15 @@ def to_plansys2(plans: Plans, plan: Plan) -> str:
     The time is the joint step, and each action lasts one step.  Lines before one with "Solution
     Found" are skipped by its readers.
     """
-    plan = plans.without_rest(plan)
     lines = [f"{number}.000: {text}  [1.000]" for number, text in numbered_actions(plans, plan)]
     return "\n".join([";;;; Solution Found", *lines]) + "\n"
 
 
 def numbered_actions(plans: Plans, plan: Plan) -> Iterator[tuple[int, str]]:
     """The actions of a plan, each with its joint step: joint actions, or robots' subactions."""
-    model, rows = plans.space.model, plans.space.rows
-    for number, (state, labels) in enumerate(zip(plans.states(plan), plan, strict=False)):
+    model, rows = plans.model, plans.space.rows
+    steps = zip(plans.states(plan), plans.steps(plan), strict=False)
+    for number, (state, labels) in enumerate(steps):
         whole = model.joint_action(rows[state], labels)
         own = model.texts(labels) if whole is None else (whole,)
         yield from ((number, text) for text in dict.fromkeys(own) if text is not None)
@@ -138,12 +137,12 @@ def numbered_actions(plans: Plans, plan: Plan) -> Iterator[tuple[int, str]]:
 
 def to_json(plans: Plans, listed: Sequence[Plan], task: int = 0) -> dict[str, Any]:
     """The data of a JSON plan file: the listed plans, the exact number of all, the optimal cost."""
-    model = plans.space.model
+    model = plans.model
     _, second = plans.space.cost_of(task)
     data: dict[str, Any] = {
         "plans": [
-            {"cost": len(plan), "actions": [list(step) for step in texts(model, plan)]}
-            for plan in map(plans.without_rest, listed)
+            {"cost": len(steps), "actions": [list(step) for step in texts(model, steps)]}
+            for steps in map(plans.steps, listed)
         ],
         "count": json_count(plans.count),
         "complete": len(listed) == plans.count,
@@ -152,6 +151,8 @@ def to_json(plans: Plans, listed: Sequence[Plan], task: int = 0) -> dict[str, An
     }
     if model.slack:
         data["slack"] = model.slack
+    if model.is_asynchronous:
+        data["execution"] = "asynchronous"
     if model.cost != "makespan":
         data["optimal_second_cost"] = second
     return data

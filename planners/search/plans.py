@@ -6,11 +6,14 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import accumulate
 from random import Random
 
 import numpy as np
 
+from planners.joint.model import JointModel
+from planners.search.asynchronous import Timing
 from planners.search.plan_space import PlanSpace
 from planners.search.slack import rests
 
@@ -35,7 +38,7 @@ def counts(space: PlanSpace) -> list[int]:
     return [int(v) for v in values]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Plans:
     """The optimal plans of one task as a sequence in a stable order.
 
@@ -57,6 +60,32 @@ class Plans:
     def count(self) -> int:
         """How many plans there are, exactly."""
         return self.counted[self.start]
+
+    @property
+    def model(self) -> JointModel:
+        """The model whose subactions the joint `steps` are made of."""
+        return self.space.model.in_step or self.space.model
+
+    @cached_property
+    def _timing(self) -> Timing | None:
+        return Timing(self.space) if self.space.model.in_step else None
+
+    def steps(self, plan: Plan) -> Plan:
+        """The joint steps of a plan.
+
+        With slack without the rest at the end; without a common step all is done as soon as
+        possible.
+        """
+        if self._timing:
+            return self._timing.steps(plan, self.states(plan))
+        return self.without_rest(plan)
+
+    def of_steps(self, steps: Plan) -> Plan | None:
+        """The plan with these joint steps, None if they begin no plan.
+
+        Without a common step whatever their timing; what is no event of a plan here is -1.
+        """
+        return self._timing.labels(self.start, steps) if self._timing else self.padded(steps)
 
     def __iter__(self) -> Iterator[Plan]:
         """All plans, lazily: memory is one plan."""
