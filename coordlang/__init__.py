@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from coordlang.commands.sentences import understand as understand
     from coordlang.commands.simulate import simulate as simulate
     from coordlang.commands.verify import verify as verify
+    from coordlang.execution.monitor import EventMonitor as EventMonitor
     from coordlang.execution.monitor import Monitor as Monitor
     from coordlang.execution.monitor import MonitorError as MonitorError
     from coordlang.execution.monitor import NotAllowed as NotAllowed
@@ -75,7 +76,13 @@ _DEFINED_IN = {
     "coordlang.commands.sentences": ("say", "understand", "plan"),
     "coordlang.commands.inputs": ("load", "load_language"),
     "coordlang.language.words": ("Language",),
-    "coordlang.execution.monitor": ("Monitor", "MonitorError", "NotAllowed", "NotPossible"),
+    "coordlang.execution.monitor": (
+        "EventMonitor",
+        "Monitor",
+        "MonitorError",
+        "NotAllowed",
+        "NotPossible",
+    ),
     "coordlang.execution.task_language": ("NoPlanFits",),
     "coordlang.execution.plan_sentence": ("NotAPlan", "NotOptimal"),
     "coordlang.required.miscoordination": ("Inseparable",),

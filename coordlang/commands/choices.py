@@ -22,7 +22,7 @@ from coordlang.commands.witness import witness_text
 from coordlang.execution import choices as execution
 from coordlang.execution.choices import RobotChoices, SentenceChoices, to_bytes
 from coordlang.execution.drawing import choices_dot, distinguishing
-from coordlang.execution.monitor import Answer, Monitor, MonitorError, NotAllowed
+from coordlang.execution.monitor import Answer, EventMonitor, Monitor, MonitorError, NotAllowed
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import describe
 from coordlang.language.provenance import percent
@@ -98,7 +98,7 @@ class RobotsChoices(InTask):
     def monitor(self, robot: str) -> Monitor:
         """A run-time monitor of one robot; `UsageError` if there is no such robot."""
         (number,) = _numbers(self.used.model.robots, robot)
-        return execution.monitor(self.used.model, self.found.robots[number], self.sentence)
+        return execution.monitor(self.found.fits, self.found.robots[number], self.sentence)
 
     def data(self) -> dict[str, Any]:
         """The data of a choices file (docs/formats.md)."""
@@ -188,7 +188,7 @@ def _followed(
     try:
         at = found.monitor(found.robots[0])
         for subaction in history:
-            at.did(subaction)
+            Monitor.did(at, subaction)  # whatever else it would have to wait for
         return at, at.can(**detours) if any(detours.values()) else None
     except NotAllowed as error:
         raise Refuted(str(error), remedy="After that nothing is guaranteed any more.") from None
@@ -199,20 +199,26 @@ def _followed(
 
 
 def _monitor_text(at: Monitor, answer: Answer | None) -> str:
-    may = " or ".join(text or "idle" for text in at.allowed())
+    unit, nothing = _unit_and_idling(isinstance(at, EventMonitor))
+    may = " or ".join(text or nothing for text in at.allowed())
     lines = [
-        f"step {at.step + 1}: {at.robot} may do {may}; {counted(at.remaining, 'subplan')} left"
+        f"{unit} {at.step + 1}: {at.robot} may do {may}; {counted(at.remaining, 'subplan')} left"
     ]
     if at.finished:
-        lines = [f"{at.robot} has done all its {counted(at.step, 'step')}"]
+        lines = [f"{at.robot} has done all its {counted(at.step, unit)}"]
     if answer is not None and not answer:
         lines.append("the detour is not possible any more, whatever it does")
     elif answer is not None:
         subplans = counted(answer.subplans, "subplan")
         lines.append(f"the detour is possible in {subplans}, the first of them:")
         steps = enumerate(answer.subplan or (), at.step + 1)
-        lines += [f"  {step:>4}  {text or 'idle'}" for step, text in steps]
+        lines += [f"  {step:>4}  {text or nothing}" for step, text in steps]
     return "\n".join(lines) + "\n"
+
+
+def _unit_and_idling(is_asynchronous: bool) -> tuple[str, str]:
+    """What a subplan is made of, and what a robot does that idles, or has no more to do."""
+    return ("event", "nothing more") if is_asynchronous else ("step", "idle")
 
 
 def _monitor_json(at: Monitor, answer: Answer | None) -> str:
@@ -260,13 +266,14 @@ def _table(found: RobotsChoices, own: RobotChoices, width: int) -> list[str]:
     model, automaton = found.used.model, own.automaton
     subplans, states = counted(automaton.count, "subplan"), counted(len(automaton), "state")
     lines = [f"follow {subplans} ({states}):"]
+    unit, nothing = _unit_and_idling(model.is_asynchronous)
     rows: list[tuple[str, str, str, list[str], str]] = []
     for step, layer in enumerate(automaton.layers[:-1], 1):
         if layer.start >= STATES_SHOWN:
             break
         for state, atoms in zip(layer, distinguishing(found.found, own, layer), strict=True):
             moves = [
-                f"{model.label_text(own.robot, label) or 'idle'} -> {to}"
+                f"{model.label_text(own.robot, label) or nothing} -> {to}"
                 for label, to in automaton.moves[state].items()
             ]
             left = f"{automaton.left[state]:,}"
@@ -274,7 +281,7 @@ def _table(found: RobotsChoices, own: RobotChoices, width: int) -> list[str]:
     if rows := rows[:STATES_SHOWN]:
         widest = max(len(" | ".join(moves)) for *_, moves, _ in rows)
         mark = " | " if widest <= width // 2 else "\n| "
-        head = ("step", "state", "left", "may do", "knows")
+        head = (unit, "state", "left", "may do", "knows")
         cells = [(*row[:3], mark.join(row[3]), row[4]) for row in rows]
         lines += columns([head, *cells], width, numbers=3)
     rest = automaton.layers[-1].start - len(rows)

@@ -8,7 +8,7 @@ no more and no fewer.  Choices files have them as JSON (docs/formats.md), which
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import reduce
@@ -16,15 +16,17 @@ from operator import or_
 from typing import Annotated, Any, Literal
 
 import msgspec
+import numpy as np
 from msgspec import UNSET, Meta, UnsetType
 
 from coordlang.execution.automaton import Automaton, Knowledge, determinise
 from coordlang.execution.mixtures import Mixtures, walk_mixtures
-from coordlang.execution.monitor import FORMAT, IDLE, VERSION, Monitor
+from coordlang.execution.monitor import FORMAT, IDLE, VERSION, EventMonitor, Monitor
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import describe
 from coordlang.language.provenance import tolerance_data
 from planners.joint.model import JointModel
+from planners.joint.traces import Traces
 from planners.pddl.lifted import TRUE
 from planners.search.plan_file import Count, json_count
 from planners.search.plan_space import PlanSpace
@@ -83,9 +85,9 @@ def choices(
 
     What is known in a state is exact (`coordlang.execution.automaton.determinise`) where all
     combinations of choices can be walked with at most ``most`` joint moves (None: as many as the
-    memory holds) and all of them are optimal.  Elsewhere only the atoms are known that the robot's
-    own subactions alone change.  Raises `NoPlanFits`, and `OutOfMemory` if the automata, or with
-    ``most=None`` the combinations, do not fit into the memory.
+    memory holds) and all of them are optimal.  Elsewhere, and without a common step, only the atoms
+    are known that the robot's own subactions alone change.  Raises `NoPlanFits`, and `OutOfMemory`
+    if the automata, or with ``most=None`` the combinations, do not fit into the memory.
     """
     fits, model = task_language.plans_with(words), task_language.model
     subplans = [determinise(fits, robot) for robot in range(len(model.robots))]
@@ -95,7 +97,9 @@ def choices(
         if most is None:
             raise
         mixtures = None
-    space = mixtures.space if mixtures is not None else None
+    # Without a common step a node is no state in which a robot is when it has done its events.
+    is_known = mixtures is not None and not model.is_asynchronous
+    space = mixtures.space if mixtures is not None and is_known else None
     truth = [] if space is None else facts_at_nodes(space)
     robots = []
     for robot in range(len(model.robots)):
@@ -105,7 +109,7 @@ def choices(
         robots.append(
             RobotChoices(robot, exact, "exact")
             if exact
-            else knowing(fits, robot, own_facts(model, robot))
+            else _knowing_own(fits, subplans[robot], robot)
         )
     return SentenceChoices(task_language, tuple(words), fits, tuple(robots), mixtures)
 
@@ -121,6 +125,38 @@ def knowing(fits: PlanSpace, robot: int, facts: int) -> RobotChoices:
     return RobotChoices(robot, replace(found, known=known), "own")
 
 
+def _knowing_own(fits: PlanSpace, subplans: Automaton, robot: int) -> RobotChoices:
+    """A robot's subplans; of what its own subactions alone change it knows the values."""
+    model = fits.model.in_step or fits.model
+    facts, changes = own_changes(model, robot)
+    others = ((1 << len(model.codec.facts)) - 1) & ~facts
+    start = model.codec.fact_bits(fits.rows[fits.state[fits.starts[0]]])
+    # States of the automaton with the true facts there, numbered in the order of a walk.
+    found = {(0, start & facts): 0}
+    layers: list[range] = []
+    moves: list[dict[int, int]] = []
+    for _ in subplans.layers:
+        here = list(found)[len(moves) :]
+        layers.append(range(len(moves), len(moves) + len(here)))
+        for state, true in here:
+            moves.append({})
+            for label, to in subplans.moves[state].items():
+                adds, deletes = changes.get(_part(fits.model, robot, label), (0, 0))
+                after = to, (true & ~deletes) | adds
+                moves[-1][label] = found.setdefault(after, len(found))
+    left = tuple(subplans.left[state] for state, _ in found)
+    known = tuple(Knowledge(true, true | others) for _, true in found)
+    return RobotChoices(robot, Automaton(tuple(layers), tuple(moves), left, known), "own")
+
+
+def _part(model: JointModel, robot: int, label: int) -> str | None:
+    """The text of the subaction of a label, be it an event; None for idling."""
+    if model.in_step is None:
+        return model.label_text(robot, label)
+    event = model.events[robot][label]
+    return model.in_step.label_text(robot, event.label) if event else None
+
+
 def facts_at_nodes(space: PlanSpace) -> list[int]:
     """The true facts at each node, as bits."""
     codec, states = space.model.codec, space.state.tolist()
@@ -128,8 +164,10 @@ def facts_at_nodes(space: PlanSpace) -> list[int]:
     return [bits[state] for state in states]
 
 
-def own_facts(model: JointModel, robot: int) -> int:
+def own_changes(model: JointModel, robot: int) -> tuple[int, dict[str | None, tuple[int, int]]]:
     """The facts of which every change is certain from the robot's own label, as bits.
+
+    And by own subaction those of them that it adds, and that it deletes.
 
     Found from the ground actions, without regard to what is reachable: no action without this robot
     changes the fact, no conditional effect does, and two (joint) actions with the same own part
@@ -150,7 +188,14 @@ def own_facts(model: JointModel, robot: int) -> int:
         if robot in action.owners:
             first = of_part.setdefault(action.part_of(robot), certain)
             others |= {f for f in first.keys() | certain.keys() if first.get(f) != certain.get(f)}
-    return sum(1 << fact for fact in range(len(model.codec.facts)) if fact not in others)
+    facts = sum(1 << fact for fact in range(len(model.codec.facts)) if fact not in others)
+
+    def changed(certain: Mapping[int, bool], adds: bool) -> int:
+        return facts & sum(1 << fact for fact, added in certain.items() if added is adds)
+
+    return facts, {
+        part: (changed(certain, True), changed(certain, False)) for part, certain in of_part.items()
+    }
 
 
 # ---- the file
@@ -172,6 +217,38 @@ class StateRecord(msgspec.Struct, frozen=True):
     ]
 
 
+class OwnEvent(msgspec.Struct, frozen=True, rename={"meets": "with"}):
+    """An event of a robot that keeps no common step with the others."""
+
+    subaction: Annotated[str, Meta(description="What is done.")]
+    after: Annotated[
+        dict[str, int],
+        Meta(description="Robot -> how many of its events that interfere must have ended before."),
+    ]
+    meets: Annotated[
+        dict[str, str], Meta(description="Robot that starts together with it -> its subaction.")
+    ]
+
+
+class Passings(msgspec.Struct, frozen=True):
+    """What a robot waits for that keeps no common step with the others."""
+
+    events: Annotated[
+        dict[str, OwnEvent], Meta(description="What the keys of 'next' mean, but for 'idle'.")
+    ]
+    interferes: Annotated[
+        dict[str, dict[str, list[str]]],
+        Meta(description="Own subaction -> other robot -> its subactions that interfere with it."),
+    ]
+    others: Annotated[
+        dict[str, list[dict[str, int]]],
+        Meta(
+            description="Other robot -> for its first event, its second one and so on what it may "
+            "be -> how many own events that interfere with it must have ended before."
+        ),
+    ]
+
+
 class RobotRecord(msgspec.Struct, frozen=True):
     """The choices of one robot."""
 
@@ -190,6 +267,10 @@ class RobotRecord(msgspec.Struct, frozen=True):
     ]
     others: Annotated[list[str], Meta(description="The other atoms that can change.")]
     states: Annotated[list[StateRecord], Meta(description="The states of the automaton.")]
+    passings: Annotated[
+        Passings | UnsetType,
+        Meta(description="What it waits for; missing where robots step together."),
+    ] = UNSET
 
 
 class ChoicesFile(msgspec.Struct, frozen=True):
@@ -239,7 +320,7 @@ def to_record(choices: SentenceChoices, robots: Sequence[int] | None = None) -> 
         guaranteed=choices.guaranteed,
         tolerance=tolerance_data(task_language.tolerance).get("tolerance", UNSET),
         combinations_walked=choices.mixtures.nodes if choices.mixtures is not None else None,
-        choices=[_robot(task_language.model, own) for own in choices.of(robots)],
+        choices=[_robot(choices.fits, own) for own in choices.of(robots)],
     )
 
 
@@ -248,13 +329,15 @@ def to_bytes(choices: SentenceChoices, robots: Sequence[int] | None = None) -> b
     return msgspec.json.encode(to_record(choices, robots)) + b"\n"
 
 
-def monitor(model: JointModel, own: RobotChoices, sentence: str) -> Monitor:
-    """A run-time monitor of a robot's subplans under a sentence."""
-    entry = msgspec.to_builtins(_robot(model, own))
-    return Monitor({"format": FORMAT, "version": VERSION, "sentence": sentence, "choices": [entry]})
+def monitor(fits: PlanSpace, own: RobotChoices, sentence: str) -> Monitor:
+    """A run-time monitor of a robot's subplans in some plans, those with a sentence."""
+    entry = msgspec.to_builtins(_robot(fits, own))
+    data = {"format": FORMAT, "version": VERSION, "sentence": sentence, "choices": [entry]}
+    return EventMonitor(data) if fits.model.is_asynchronous else Monitor(data)
 
 
-def _robot(model: JointModel, own: RobotChoices) -> RobotRecord:
+def _robot(fits: PlanSpace, own: RobotChoices) -> RobotRecord:
+    model = fits.model
     automaton, texts = own.automaton, model.codec.facts.texts
     sometimes_known = reduce(or_, (known.true | ~known.possible for known in automaton.known))
     facts = [fact for fact in range(len(texts)) if sometimes_known >> fact & 1]
@@ -284,4 +367,57 @@ def _robot(model: JointModel, own: RobotChoices) -> RobotRecord:
             for step, states in enumerate(automaton.layers)
             for state in states
         ],
+        passings=_passings(fits, own) if model.is_asynchronous else UNSET,
+    )
+
+
+def _passings(fits: PlanSpace, own: RobotChoices) -> Passings:
+    """What a robot waits for in its subplans, and what it may hear of the others."""
+    model, robot = fits.model, own.robot
+    in_step, robots = model.in_step, model.robots
+    assert in_step is not None, "there is a common step"
+    texts = in_step.labels
+    others = [other for other in range(len(robots)) if other != robot]
+    #: For each robot and number of its events what it may be, with the least that it waits for.
+    may_be: dict[int, list[dict[int, int]]] = {other: [] for other in others}
+    for layer in range(len(fits.layers) - 1, 0, -1):
+        edges = fits.layer_edges(layer).edges
+        for other, found in may_be.items():
+            found.append({})
+            for number in np.unique(fits.robot_labels(other, edges)).tolist():
+                if event := model.events[other][number]:
+                    least = found[-1].get(event.label, event.waits[robot])
+                    found[-1][event.label] = min(least, event.waits[robot])
+    tables = Traces(in_step).interfering
+    events = [
+        (model.labels[robot][label], event)
+        for label in sorted(own.automaton.labels)
+        if (event := model.events[robot][label])
+    ]
+    return Passings(
+        events={
+            text: OwnEvent(
+                texts[robot][event.label],
+                {robots[other]: event.waits[other] for other in others if event.waits[other]},
+                {robots[other]: texts[other][its] for other, its in event.meets},
+            )
+            for text, event in events
+        },
+        interferes={
+            texts[robot][label]: {
+                robots[other]: [
+                    texts[other][its]
+                    for its in sorted({its for found in may_be[other] for its in found})
+                    if tables[robot, other][label, its]
+                ]
+                for other in others
+            }
+            for label in sorted({event.label for _, event in events})
+        },
+        others={
+            robots[other]: [
+                {texts[other][its]: least for its, least in sorted(one.items())} for one in found
+            ]
+            for other, found in may_be.items()
+        },
     )

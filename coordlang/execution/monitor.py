@@ -22,7 +22,7 @@ from decimal import Decimal
 from fnmatch import fnmatchcase
 from functools import cache, partial
 from io import BytesIO
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, Self, TypeVar
 
 FORMAT = "coordlang/choices"
 VERSION = 1
@@ -67,7 +67,7 @@ class NotAllowed(MonitorError):
 
 
 class NotPossible(MonitorError):
-    """A promise that can no longer be kept."""
+    """A promise that can no longer be kept, or a report of what cannot have happened."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +131,9 @@ class Monitor:
                 f"choices file version {_shown(version)}; this program reads version {VERSION}"
             )
         entry = _entry(data, robot)
+        if ("passings" in entry) != isinstance(self, EventMonitor):
+            kind = "an EventMonitor" if "passings" in entry else "a Monitor"
+            raise MonitorError(f"the choices in this file are for {kind}")
         self.robot = _text(entry, "robot", "a robot's choices")
         self.sentence = _text(data, "sentence", "the file")
         where = f"the choices of {self.robot}"
@@ -144,13 +147,17 @@ class Monitor:
         self._atoms = {**dict.fromkeys(facts, False), **dict.fromkeys(sorted(others))}
         if len(self._atoms) < len(facts) + len(others):
             raise _broken(f"{where}: an atom occurs twice in 'facts' and 'others'")
-        states = _read_states(entry, facts, where)
+        states = _read_states(entry, facts, where, self._own_texts(entry, where))
         self._most = max(MAX_NODES, _NODES_OF_STATE * len(states))
         self._start = self._here = states[0]  # both, so that no step has states to give back
         self._has_promised = False
 
+    def _own_texts(self, entry: Mapping[str, Any], where: str) -> set[str]:
+        """Keys of 'next' that are known to be well written."""
+        return {IDLE}
+
     @classmethod
-    def read(cls, path: str, robot: str | None = None, *, max_bytes: int = MAX_BYTES) -> Monitor:
+    def read(cls, path: str, robot: str | None = None, *, max_bytes: int = MAX_BYTES) -> Self:
         """The monitor of a choices file, compressed or not, of at most ``max_bytes`` bytes.
 
         Raises `MonitorError` for a larger one and for a file that is no choices file, whatever it
@@ -162,7 +169,7 @@ class Monitor:
             pass  # raised below, where the memory of what was read is free again
         raise MonitorError(f"{path}: it does not fit into the memory")
 
-    def copy(self) -> Monitor:
+    def copy(self) -> Self:
         """A monitor of its own in the same place, for trying things out; constant time."""
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
@@ -338,8 +345,189 @@ class Monitor:
         raise MonitorError(f"{_shown(atom)} is no atom that can change: {similar}")
 
 
+class _OwnEvent(NamedTuple):
+    """What an event does, how many events of each other robot it waits for, and whom it meets."""
+
+    subaction: str
+    after: Mapping[str, int]
+    meets: Mapping[str, str]
+
+
+class _Count(NamedTuple):
+    """How many events have ended that interfere with a subaction.
+
+    Those of ``robot`` with the ``own`` one, or own ones with ``its``.
+    """
+
+    robot: str
+    own: str = ""
+    its: str = ""
+
+
+class EventMonitor(Monitor):
+    """Follows a robot that keeps no common step with the others.
+
+    What it may do are events, subactions with what they wait for: ``(move r1 a b) (after-1 r2)``.
+    The robot chooses one of those that are `allowed`, says `start` when nothing is `missing`, and
+    `did` when it has ended.  It says what it observes of the others: what has `ended`, and who is
+    `ready` for a meeting.
+
+    Parameters and errors are those of `Monitor`.
+    """
+
+    def __init__(self, data: Mapping[str, Any], robot: str | None = None) -> None:
+        super().__init__(data, robot)
+        # Replaced and not changed, so that copies stay as they are: how many events were observed
+        # of each robot, the `_Count` s so far, and who waits for its partners in what.
+        self._observed: dict[str, int] = dict.fromkeys(self._others, 0)
+        self._counts: dict[_Count, int] = {}
+        self._ready: dict[str, str] = {}
+        self._underway: str | None = None
+
+    def _own_texts(self, entry: Mapping[str, Any], where: str) -> set[str]:
+        record = _get(entry, "passings", dict, where)
+        self._events = {
+            text: _own_event(event, f"event {_shown(text)}")
+            for text, event in _get(record, "events", dict, where).items()
+        }
+        self._others = _others(record, where)
+        #: What the end of an event counts for: (robot, subaction), "" for the own robot.
+        self._counted: dict[tuple[str, str], list[_Count]] = {}
+        for own, by_robot in _get(record, "interferes", dict, where).items():
+            for robot in by_robot:
+                for text in _get(by_robot, robot, list, f"{where}: 'interferes'"):
+                    self._counted.setdefault((robot, text), []).append(_Count(robot, own=own))
+                    self._counted.setdefault(("", own), []).append(_Count(robot, its=text))
+        return {IDLE, *self._events}
+
+    @property
+    def finished(self) -> bool:
+        """Whether there is no event that the robot may do."""
+        return not any(self._here.moves)
+
+    def allowed(self) -> tuple[str | None, ...]:
+        """What the robot may do next (None: no more), sorted; while one is under way that one."""
+        return (self._underway,) if self._underway else super().allowed()
+
+    def missing(self, event: str | None) -> dict[str, int | str]:
+        """What an allowed event still waits for; nothing: it may start.
+
+        By robot the number of its events that must end, or the subaction that it must be ready to
+        start together with this one.
+        """
+        if event not in self.allowed():
+            raise NotAllowed(self.robot, event, self.step, self.allowed())
+        if event is None or event == self._underway:
+            return {}
+        own = self._events[event]
+        found: dict[str, int | str] = {
+            robot: its for robot, its in own.meets.items() if self._ready.get(robot) != its
+        }
+        for robot, number in own.after.items():
+            if (left := number - self._counts.get(_Count(robot, own=own.subaction), 0)) > 0:
+                found[robot] = left
+        return found
+
+    def may_start(self) -> tuple[str | None, ...]:
+        """The allowed events that may start now; None: the robot may do no more."""
+        return tuple(event for event in self.allowed() if not self.missing(event))
+
+    def late(self) -> tuple[str, ...]:
+        """The robots that every allowed event waits for."""
+        waits = [self.missing(event).keys() for event in self.allowed()]
+        return tuple(sorted(set.intersection(*map(set, waits)))) if waits else ()
+
+    def start(self, event: str) -> None:
+        """Tell that an own event starts.  Raises `NotAllowed`, and `NotPossible` while it waits."""
+        if missing := self.missing(event):
+            waits = " and ".join(
+                f"{its} of {robot}" if isinstance(its, str) else f"{its} more of {robot}"
+                for robot, its in missing.items()
+            )
+            raise NotPossible(f"{self.robot} cannot start {event}: it waits for {waits}")
+        self._underway = event
+
+    def did(self, subaction: str | None) -> None:
+        """Tell that the event under way has ended; None: the robot does no more.
+
+        Raises `NotAllowed`, and `NotPossible` for an event that was not started.
+        """
+        if subaction in self.allowed() and subaction != self._underway:
+            raise NotPossible(f"{self.robot} cannot have done {subaction}: it has not started it")
+        super().did(subaction)
+        while self.finished and self._here.moves:
+            super().did(None)
+        if self._underway:
+            self._count(("", self._events[self._underway].subaction))
+        self._underway = None
+
+    def ended(self, robot: str, subaction: str, number: int) -> None:
+        """Tell that an event of another robot was observed to end: its ``number``, from 1.
+
+        Events that interfere with none of the robot's own need not be told.  Raises `MonitorError`
+        for a robot that there is not, and `NotPossible` for what cannot have happened: an event
+        that was told before or has another number, or waits for own events.
+        """
+        may_be = self._events_of(robot)
+        text = _plain(subaction)
+        what = f"{robot} cannot have done {text} as its event {number}"
+        if not self._observed[robot] < number <= len(may_be):
+            told = f"{self._observed[robot]} of {len(may_be)} were told before"
+            raise NotPossible(f"{what}: {told}")
+        if text not in may_be[number - 1]:
+            could = " or ".join([*may_be[number - 1]][:_SHOWN]) or "nothing"
+            raise NotPossible(f"{what}: that is {could}")
+        if may_be[number - 1][text] > self._counts.get(_Count(robot, its=text), 0):
+            raise NotPossible(f"{what}: it waits for {self.robot}")
+        self._observed = {**self._observed, robot: number}
+        self._ready = {name: its for name, its in self._ready.items() if name != robot}
+        self._count((robot, text))
+
+    def ready(self, robot: str, subaction: str) -> None:
+        """Tell that another robot is ready to start this together with an own event."""
+        self._events_of(robot)
+        self._ready = {**self._ready, robot: _plain(subaction)}
+
+    def _events_of(self, robot: str) -> Sequence[Mapping[str, int]]:
+        if robot not in self._others:
+            names = ", ".join(self._others) or "none"
+            raise MonitorError(f"there is no robot {_shown(robot)} beside {self.robot}: {names}")
+        return self._others[robot]
+
+    def _count(self, ended: tuple[str, str]) -> None:
+        counted = self._counted.get(ended, ())
+        self._counts = self._counts | {key: self._counts.get(key, 0) + 1 for key in counted}
+
+
+def _own_event(record: Any, where: str) -> _OwnEvent:
+    after, meets = _get(record, "after", dict, where), _get(record, "with", dict, where)
+    for robot in after:
+        _get(after, robot, int, f"{where}: 'after'")
+    for robot in meets:
+        _check_plain(meets[robot], f"{where}: 'with'")
+    subaction = _text(record, "subaction", where)
+    _check_plain(subaction, where)
+    return _OwnEvent(subaction, after, meets)
+
+
+def _others(record: Mapping[str, Any], where: str) -> dict[str, list[dict[str, int]]]:
+    """For each other robot what its events may be, and how many own ones they wait for at least."""
+    others: dict[str, list[dict[str, int]]] = _get(record, "others", dict, where)
+    for robot in others:
+        for event in _get(others, robot, list, f"{where}: 'others'"):
+            if not isinstance(event, Mapping):
+                raise _broken(f"{where}: an event of {_shown(robot)} is {_shown(event)}")
+            for text in event:
+                _check_plain(text, f"{where}: 'others'")
+                _get(event, text, int, f"{where}: 'others'")
+    return others
+
+
 def _made_by(do: Sequence[str], never: Sequence[str], shift: int, text: str | None) -> int | None:
     """The dos that a subaction makes, as bits from ``shift`` on; None if it is never done."""
+    if text is not None:
+        subaction, waits, _ = text.partition(") (")  # of an event only what is done counts
+        text = subaction + waits[:1]
     if any(_matches(pattern, text) for pattern in never):
         return None
     return sum(1 << bit for bit, pattern in enumerate(do, shift) if _matches(pattern, text))
@@ -445,19 +633,22 @@ def _entry(data: Any, robot: str | None) -> Mapping[str, Any]:
     raise MonitorError(f"the file has no choices of {_shown(robot)}; it has those of {names}")
 
 
-def _read_states(entry: Mapping[str, Any], facts: Sequence[str], where: str) -> dict[int, _State]:
+def _read_states(
+    entry: Mapping[str, Any], facts: Sequence[str], where: str, texts: set[str]
+) -> dict[int, _State]:
     """The states of a file by number, read backwards; 0 is the start.
 
-    Raises `MonitorError` unless every state can be reached from state 0 in step 0 and leads to
-    later states of the next step, so that there are no cycles, all subplans have one length, and
-    the counts of subplans agree: these never take much more memory than those in the file.
+    ``texts`` are known to be well written.  Raises `MonitorError` unless every state can be reached
+    from state 0 in step 0 and leads to later states of the next step, so that there are no cycles,
+    all subplans have one length, and the counts of subplans agree: these never take much more
+    memory than those in the file.
     """
     records = _get(entry, "states", list, where)
     steps = [_get(record, "step", int, f"state {n}") for n, record in enumerate(records)]
     if not records or steps[0] != 0:
         raise MonitorError("the automaton has no state 0 in step 0")
     states: dict[int, _State] = {}
-    texts, reached, last = {IDLE}, set[_State](), max(steps)
+    reached, last = set[_State](), max(steps)
     for number, record in zip(reversed(range(len(records))), reversed(records), strict=True):
         moves = _moves(record, number, steps[number] + 1, states, texts)
         reached.update(moves.values())

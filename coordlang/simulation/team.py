@@ -73,7 +73,7 @@ class Mission:
             found = choices(task_language, sentence)
             for name, own in zip(model.robots, found.robots, strict=True):
                 words = own_words(found.fits, task_language, own.robot)
-                self._given[name] = monitor(model, own, ""), words
+                self._given[name] = monitor(found.fits, own, ""), words
 
     def team(self, seed: int) -> Team:
         """Return what each robot is given in the run with this seed."""
@@ -87,7 +87,7 @@ class Mission:
             )
             own = knowing(fits, robot, self._places_of(name))
             words = own_words(fits, self.task_language, robot) if agreed else None
-            team[name] = monitor(self.task_language.model, own, ""), words
+            team[name] = monitor(fits, own, ""), words
         return team
 
     def agreed_plan(self, seed: int) -> Plan:

@@ -18,11 +18,13 @@ from itertools import combinations, product
 from coordlang.language.warping import separation_clause
 from coordlang.vocabulary.sat import PartitionProblem
 from planners.grounding.actions import GroundAction
+from planners.joint import traces as joint
 from planners.joint.composition import ComposingStepper, JointActionStepper
 from planners.joint.model import Goal, JointModel
 from planners.joint.tables import Rows
 from planners.pddl.formula_tree import literals
 from planners.pddl.lifted import Atom, StepAtom
+from planners.search.asynchronous import event_text
 from planners.search.plan_space import PlanSpace
 from tests.support import naive
 
@@ -300,10 +302,30 @@ class Plans:
     def mixtures(self, word: Mapping[int, int]) -> Iterator[tuple[Parts, tuple[Parts, ...]]]:
         """The mixtures of plans with one sentence, each with plans that it is made of."""
         for group in self.by_sentence(word).values():
-            made: dict[Parts, tuple[Parts, ...]] = {}
-            for chosen in product(group, repeat=len(group[0])):
-                made.setdefault(tuple(own[robot] for robot, own in enumerate(chosen)), chosen)
-            yield from made.items()
+            yield from self.mixtures_of(group)
+
+    @staticmethod
+    def mixtures_of(group: Sequence[Parts]) -> Iterator[tuple[Parts, tuple[Parts, ...]]]:
+        """The mixtures of some plans."""
+        made: dict[Parts, tuple[Parts, ...]] = {}
+        for chosen in product(group, repeat=len(group[0])):
+            made.setdefault(tuple(own[robot] for robot, own in enumerate(chosen)), chosen)
+        yield from made.items()
+
+
+def texts(model: JointModel, parts: Parts) -> tuple[tuple[str, ...], ...]:
+    """Parts as the product writes them."""
+    return tuple(
+        tuple(
+            event_text(
+                model,
+                robot,
+                joint.Event(e.label, e.waits, tuple(sorted((o, at) for o, _, at in e.meets))),
+            )
+            for e in part
+        )
+        for robot, part in enumerate(parts)
+    )
 
 
 def _hurry(when: tuple[tuple[int, ...], ...]) -> tuple[int, tuple[tuple[int, ...], ...]]:

@@ -12,7 +12,7 @@ import pytest
 from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.commands.building import build_language
 from coordlang.execution.automaton import Automaton, determinise
-from coordlang.execution.choices import RobotChoices, SentenceChoices, choices, monitor, own_facts
+from coordlang.execution.choices import RobotChoices, SentenceChoices, choices, monitor, own_changes
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import from_problems
 from planners.pddl.lifted import TRUE
@@ -70,7 +70,7 @@ def check_combinations(found: SentenceChoices, twin: Listed) -> None:
     """Every combination, stepped through all monitors, is an optimal plan; no others go through."""
     labels = found.task_language.model.labels
     for chosen in product(*(accepted(moves(own.automaton)) for own in found.robots)):
-        monitors = [monitor(found.task_language.model, own, "") for own in found.robots]
+        monitors = [monitor(found.fits, own, "") for own in found.robots]
         for step in zip(*chosen, strict=True):
             for number, (at, label) in enumerate(zip(monitors, step, strict=True)):
                 text = labels[number][label] if label else None
@@ -166,7 +166,7 @@ def check_own_atoms(
 ) -> None:
     assert own.atoms == "own"
     known = twin.knows(own.robot)
-    mask = own_facts(task_language.model, own.robot)
+    mask, _ = own_changes(task_language.model, own.robot)
     facts = task_language.model.codec.facts.texts
     for part in twin.own[own.robot]:
         state = 0
@@ -249,7 +249,7 @@ def test_a_task_that_starts_at_its_goal() -> None:
     found = choices(task_language, (int(task_language.word[task_language.start]),))
     for own in found.robots:
         assert len(own.automaton) == own.automaton.count == 1
-        at = monitor(task_language.model, own, "")
+        at = monitor(found.fits, own, "")
         assert at.finished
         assert (at.step, at.remaining, at.allowed()) == (0, 1, ())
         assert at.can(never="(move *)")

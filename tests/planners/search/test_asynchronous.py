@@ -15,17 +15,17 @@ import pytest
 from coordlang.language.candidates import all_pairs, from_problems
 from coordlang.language.partition import Partition
 from coordlang.verification.by_definition import verify
-from planners.joint.traces import Event, Traces
+from planners.joint.traces import Traces
 from planners.loading import build, load
 from planners.pddl.model_options import ModelOptions
-from planners.search.asynchronous import Timing, asynchronous, event_text
+from planners.search.asynchronous import Timing, asynchronous
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans as Paths
 from planners.search.plans import counts
 from planners.system.errors import BadInput, CoordlangError
 from tests.support import naive
-from tests.support.asynchronous import ChangesAlone, Plans, World, least_words
+from tests.support.asynchronous import ChangesAlone, Plans, World, least_words, texts
 from tests.support.domains import DOMAINS, all_tasks, own_task, read
 from tests.support.random_models import random_model
 from tests.support.texts import parsed
@@ -80,23 +80,7 @@ def test_paths_are_the_plans_up_to_timing(robots: int, seeds: range) -> None:
                 plans = Plans(world, space, task, 60)
             except naive.TooLarge:
                 continue
-            wanted = {}
-            for parts, states in plans.states.items():
-                wanted[
-                    tuple(
-                        tuple(
-                            event_text(
-                                world.model,
-                                robot,
-                                Event(
-                                    e.label, e.waits, tuple(sorted((o, at) for o, _, at in e.meets))
-                                ),
-                            )
-                            for e in part
-                        )
-                        for robot, part in enumerate(parts)
-                    )
-                ] = states
+            wanted = {texts(world.model, parts): states for parts, states in plans.states.items()}
             assert paths(made, task) == wanted
             seen["plans"] += len(wanted)
             listed = Paths(made, int(made.starts[task]), counts(made))

@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Monitors of robots that keep no common step: each chooses and starts by its own, at any times."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Callable, Iterator
+from functools import partial
+from random import Random
+
+import pytest
+
+from benchmarks.paper.task_choices import languages_in_tasks
+from coordlang.commands.building import build_language
+from coordlang.execution.choices import SentenceChoices, choices, to_bytes
+from coordlang.execution.monitor import (
+    EventMonitor,
+    MonitorError,
+    NotAllowed,
+    NotPossible,
+)
+from coordlang.language.partition import Partition
+from planners.pddl.model_options import ModelOptions
+from planners.search.asynchronous import asynchronous
+from tests.planners.search.test_asynchronous import random_tasks
+from tests.support import naive
+from tests.support.asynchronous import ChangesAlone, World, texts
+from tests.support.asynchronous import Plans as Listed
+from tests.support.domains import own_task
+from tests.support.task_languages import in_words, sentence_of, shipped
+
+SEEDS = [
+    *((2, range(40)), (3, range(10))),
+    *(
+        pytest.param(*run, marks=pytest.mark.thorough)
+        for run in ((2, range(40, 900)), (3, range(10, 500)), (4, range(60)))
+    ),
+]
+
+
+def monitors_of(found: SentenceChoices) -> list[EventMonitor]:
+    """As robots read them."""
+    data = json.loads(to_bytes(found))
+    return [EventMonitor(data, name) for name in data["robots"]]
+
+
+class Robots:
+    """Robots that start and end their events at random times, by their monitors alone.
+
+    ``running`` are the subactions under way, by robot; a robot that waits for a partner has chosen.
+    """
+
+    def __init__(self, found: SentenceChoices, world: World, random: Random) -> None:
+        self.at, self.world, self.random = monitors_of(found), world, random
+        self.names = world.model.robots
+        self.running: dict[int, str] = {}
+        self.chosen: dict[int, str] = {}
+        self.did: list[list[str]] = [[] for _ in self.at]
+        self.seen: Counter[str] = Counter()
+
+    def label(self, robot: int, event: str) -> int:
+        own = self.at[robot]._events[event]
+        return self.world.model.labels[robot].index(own.subaction)
+
+    def run(self) -> tuple[tuple[str, ...], ...]:
+        """Until nothing can be done any more: what each robot did."""
+        while moves := [*self.moves()]:
+            self.random.choice(moves)()
+        assert not self.chosen, "somebody waits for ever"
+        assert all(own.finished for own in self.at), "somebody waits for ever"
+        return tuple(map(tuple, self.did))
+
+    def moves(self) -> Iterator[Callable[[], None]]:
+        for robot, own in enumerate(self.at):
+            if robot in self.running:
+                yield partial(self.end, robot)
+            elif robot in self.chosen:
+                if not own.missing(self.chosen[robot]):
+                    meets = self.at[robot]._events[self.chosen[robot]].meets
+                    block = [robot, *(self.names.index(name) for name in meets)]
+                    if all(not self.at[r].missing(self.chosen.get(r)) for r in block):
+                        yield partial(self.start, tuple(block))
+            else:
+                for event in own.allowed():
+                    if event is None:
+                        if own.may_start() == (None,):
+                            continue  # it has finished
+                        yield partial(own.did, None)
+                        continue
+                    waits = own.missing(event)
+                    assert (event in own.may_start()) == (not waits)
+                    if waits and all(isinstance(its, int) for its in waits.values()):
+                        assert self.refuses(robot, event)
+                        self.seen["waits"] += 1
+                    elif not any(isinstance(its, int) for its in waits.values()):
+                        yield partial(self.choose, robot, event)
+
+    def refuses(self, robot: int, event: str) -> bool:
+        with pytest.raises(NotPossible, match="it waits for"):
+            self.at[robot].start(event)
+        with pytest.raises(NotPossible, match="not started"):
+            self.at[robot].did(event)
+        return True
+
+    def choose(self, robot: int, event: str) -> None:
+        """Start at once, or tell the partners of the meeting."""
+        self.chosen[robot] = event
+        own = self.at[robot]._events[event]
+        for name in own.meets:
+            self.seen["meets"] += 1
+            self.at[self.names.index(name)].ready(self.names[robot], own.subaction)
+
+    def start(self, block: tuple[int, ...]) -> None:
+        for robot in block:
+            event = self.chosen.pop(robot)
+            for other, its in self.running.items():
+                if other not in block:
+                    assert not self.world.interfere(
+                        robot, self.label(robot, event), other, self.label(other, its)
+                    ), "they overlap"
+            self.at[robot].start(event)
+            assert self.at[robot].allowed() == self.at[robot].may_start() == (event,)
+            self.running[robot] = event
+
+    def end(self, robot: int) -> None:
+        event = self.running.pop(robot)
+        self.at[robot].did(event)
+        self.did[robot].append(event)
+        subaction = self.at[robot]._events[event].subaction
+        for other, at in enumerate(self.at):
+            if other != robot:
+                before = at.copy()
+                at.ended(self.names[robot], subaction, len(self.did[robot]))
+                with pytest.raises(NotPossible, match="told before"):
+                    at.ended(self.names[robot], subaction, len(self.did[robot]))
+                assert before._counts is not at._counts or before._counts == at._counts
+
+
+@pytest.mark.parametrize(("robots", "seeds"), SEEDS)
+def test_robots_arrive_whatever_they_choose_and_whenever_they_start(
+    robots: int, seeds: range
+) -> None:
+    """What all did together is an optimal plan, and what each may do are its parts of plans."""
+    seen: Counter[str] = Counter()
+    for space, world, tasks, random in random_tasks(robots, seeds):
+        for task in tasks:
+            try:
+                plans = Listed(world, space, task, 40)
+                made = asynchronous(space.with_tasks(space.starts[[task]], space.second[[task]]))
+            except (naive.TooLarge, ChangesAlone):
+                continue
+            word = {state: random.randrange(2) for state in range(len(space.rows))}
+            table = Partition.of_states(space.rows, word)
+            word = dict(enumerate(table.word_of(space.rows).tolist()))
+            own = in_words(None, table, made, 0)
+            for words, group in plans.by_sentence(word).items():
+                found = choices(own, words)
+                parts = [
+                    {*own} for own in zip(*(texts(world.model, p) for p in group), strict=True)
+                ]
+                for at, mine in zip(monitors_of(found), parts, strict=True):
+                    assert at.remaining == len(mine)
+                mixed = {mix for mix, _ in Listed.mixtures_of(group)}
+                assert found.guaranteed == (mixed <= plans.states.keys())
+                if not found.guaranteed:
+                    seen["no language"] += 1
+                    continue
+                optimal = {texts(world.model, p) for p in plans.states}
+                for _ in range(min(len(mixed), 4)):
+                    team = Robots(found, world, random)
+                    did = team.run()
+                    assert did in optimal
+                    assert all(own in mine for own, mine in zip(did, parts, strict=True))
+                    seen += team.seen
+                    seen["runs"] += 1
+                    seen["several parts"] += max(map(len, parts)) > 1
+    print(f"{robots} robots: {dict(seen)}")
+    assert min(seen["runs"], seen["no language"], seen["waits"], seen["several parts"]) >= 5
+
+
+@pytest.fixture
+def pair() -> list[EventMonitor]:
+    """r1 and r2 turn round on the 2x2 grid, each in two moves."""
+    made = own_task("grid", "gw1-2x2", ModelOptions(asynchronous=True))
+    used = next(languages_in_tasks(build_language(made, "minimal").language, made))
+    return monitors_of(choices(used, used.words_of(sentence_of(used))))
+
+
+def test_what_cannot_have_happened_is_refused(pair: list[EventMonitor]) -> None:
+    r1, r2 = pair
+    (first,), (second,) = r1.allowed(), r2.allowed()
+    assert first is not None
+    assert second is not None
+    r1.start(first)
+    r1.did(first)
+    (further,) = r1.allowed()
+    assert further is not None
+    assert r1.missing(further) == {"r2": 1}
+    assert (r1.may_start(), r1.late()) == ((), ("r2",))
+    with pytest.raises(NotPossible, match="it waits for 1 more of r2"):
+        r1.start(further)
+    with pytest.raises(MonitorError, match="no robot r3"):
+        r1.ended("r3", second, 1)
+    with pytest.raises(NotPossible, match=r"that is \(move r2"):
+        r1.ended("r2", "(move r2 c0-0 c0-0)", 1)
+    with pytest.raises(NotPossible, match="0 of 2 were told before"):
+        r1.ended("r2", second, 3)
+    with pytest.raises(NotAllowed, match=r"may not do \(move r1 c0-0 c0-0\)"):
+        r1.did("(move r1 c0-0 c0-0)")
+    r1.ended("r2", second, 1)
+    assert (r1.may_start(), r1.late()) == ((further,), ())
+    # r2 hears that r1 has come to where it still is: r1 would have waited for it.
+    own = further.split(") (")[0] + ")"
+    with pytest.raises(NotPossible, match="it waits for r2"):
+        r2.ended("r1", own, 2)
+    r1.start(further)
+    r1.did(further)
+    assert r1.finished
+    assert r1.late() == ()
+
+
+def test_each_file_has_its_kind_of_monitor() -> None:
+    _, in_step = shipped("three-cells/problem")
+    data = to_bytes(choices(in_step, in_step.words_of("w1 w0")))
+    with pytest.raises(MonitorError, match="are for a Monitor"):
+        EventMonitor(json.loads(data), "r1")
