@@ -22,7 +22,7 @@ from coordlang.exports.ltlf import SentenceFormula, export_ltlf
 from coordlang.exports.pddl import PddlExport, plan_names
 from coordlang.language.provenance import tolerance_data
 from planners.search.plan_file import json_count, only_one_plan
-from planners.system.errors import BadInput, Position, Refuted
+from planners.system.errors import BadInput, Position, Refuted, UsageError
 from planners.system.files import read_text
 from planners.system.messages import visible
 from planners.system.notebook import counted
@@ -153,6 +153,12 @@ def export(files: Arguments, options: ExportOptions) -> Any:
     said = files.needed("SENTENCE")
     used = files.task().used
     words = used.words_of(said)
+    if used.model.is_asynchronous and options.to != "bt":
+        raise UsageError(
+            f"--to {options.to}: states of a plan in step say nothing about robots that keep no "
+            "common step",
+            remedy="Use --to bt: trees in which robots wait for each other's events.",
+        )
     if options.to == "pddl":
         strips_only = options.for_planner == "pyperplan"
         return ExportedTask(used, words, options.max_actions, strips_only=strips_only)

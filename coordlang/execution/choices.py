@@ -141,20 +141,12 @@ def _knowing_own(fits: PlanSpace, subplans: Automaton, robot: int) -> RobotChoic
         for state, true in here:
             moves.append({})
             for label, to in subplans.moves[state].items():
-                adds, deletes = changes.get(_part(fits.model, robot, label), (0, 0))
+                adds, deletes = changes.get(fits.model.subaction_text(robot, label), (0, 0))
                 after = to, (true & ~deletes) | adds
                 moves[-1][label] = found.setdefault(after, len(found))
     left = tuple(subplans.left[state] for state, _ in found)
     known = tuple(Knowledge(true, true | others) for _, true in found)
     return RobotChoices(robot, Automaton(tuple(layers), tuple(moves), left, known), "own")
-
-
-def _part(model: JointModel, robot: int, label: int) -> str | None:
-    """The text of the subaction of a label, be it an event; None for idling."""
-    if model.in_step is None:
-        return model.label_text(robot, label)
-    event = model.events[robot][label]
-    return model.in_step.label_text(robot, event.label) if event else None
 
 
 def facts_at_nodes(space: PlanSpace) -> list[int]:

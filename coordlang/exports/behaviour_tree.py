@@ -6,11 +6,15 @@ the step to begin (``AwaitStep``), chooses one of the subactions that its automa
 (``Chooses``), checks that what it knows and the subaction needs does hold (``Holds``), and does it.
 The automaton's state is an entry of the tree's blackboard, so that the tree is as large as the
 automaton and no larger, although a behaviour tree has no way back.
+
+Robots that keep no common step await no steps: having chosen an event, a robot waits until the
+events of others that it waits for have ended (``AwaitEnded``), and those that start together with
+it are ready (``AwaitPartner``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
@@ -19,11 +23,39 @@ from planners.grounding.actions import GroundAction
 from planners.joint.model import IDLE, JointModel
 from planners.pddl.formula_tree import required_atoms
 
-#: The leaves that a robot has to bring besides its actions: name -> (kind, port, what it does).
+
+class _Leaf(NamedTuple):
+    """A leaf that a robot has to bring besides its actions."""
+
+    kind: str
+    ports: tuple[str, ...]
+    does: str
+
+
+_LEAVES = {
+    "Chooses": _Leaf("Condition", ("subaction",), "succeeds if the robot wants to do this now"),
+    "Holds": _Leaf("Condition", ("fact",), "succeeds if this fact is true now"),
+}
+#: By name, where robots step together, and where they do not.
 LEAVES = {
-    "AwaitStep": ("Action", "step", "is running until this joint step begins; steps count from 0"),
-    "Chooses": ("Condition", "subaction", "succeeds if the robot wants to do this now"),
-    "Holds": ("Condition", "fact", "succeeds if this fact is true now"),
+    "AwaitStep": _Leaf(
+        "Action", ("step",), "is running until this joint step begins; steps count from 0"
+    ),
+    **_LEAVES,
+}
+EVENT_LEAVES = {
+    "AwaitEnded": _Leaf(
+        "Action",
+        ("robot", "count", "subaction"),
+        "is running until so many events of the robot have ended that interfere with the subaction",
+    ),
+    "AwaitPartner": _Leaf(
+        "Action",
+        ("robot", "does", "subaction"),
+        "says that the own robot is ready for the subaction, and is running until the other one is "
+        "for what it does",
+    ),
+    **_LEAVES,
 }
 
 
@@ -62,10 +94,15 @@ def _comment(choices: SentenceChoices) -> str:
     else:
         promise = "The language does not cover this task: choices of different robots need not mix."
     leaves = "".join(
-        f"\n    {name} ({kind}, {port}): {does}." for name, (kind, port, does) in LEAVES.items()
+        f"\n    {name} ({leaf.kind}, {', '.join(leaf.ports)}): {leaf.does}."
+        for name, leaf in _leaves(choices.task_language.model).items()
     )
     text = f' Sentence "{sentence}". {promise}\n  Leaves besides the actions:{leaves}\n  '
     return text.replace("--", "- -")  # two hyphens end a comment
+
+
+def _leaves(model: JointModel) -> Mapping[str, _Leaf]:
+    return EVENT_LEAVES if model.is_asynchronous else LEAVES
 
 
 def _tree(model: JointModel, own: RobotChoices) -> ET.Element:
@@ -76,15 +113,17 @@ def _tree(model: JointModel, own: RobotChoices) -> ET.Element:
     ET.SubElement(steps, "Script", code="state := 0")
     actions = {
         action.label: action
-        for action in model.actions
+        for action in (model.in_step or model).actions
         if own.robot in action.owners and not action.parts
     }
     for step, states in enumerate(own.automaton.layers[:-1]):
         moves = [
             _Move(state, *move) for state in states for move in own.automaton.moves[state].items()
         ]
-        here = ET.SubElement(steps, "Sequence", name=f"step {step}")
-        ET.SubElement(here, "Action", ID="AwaitStep", step=str(step))
+        unit = "event" if model.is_asynchronous else "step"
+        here = ET.SubElement(steps, "Sequence", name=f"{unit} {step}")
+        if not model.is_asynchronous:
+            here.append(_leaf("AwaitStep", step=str(step)))
         here.append(_choosing(model, own, moves))
         here.append(_acting(model, own, moves, actions))
     return tree
@@ -119,8 +158,9 @@ def _acting(
     for number, move in enumerate(moves):
         branch = ET.SubElement(act, "Sequence")
         ET.SubElement(branch, "ScriptCondition", code=f"move == {number}")
-        text = model.label_text(own.robot, move.label)
+        text = model.subaction_text(own.robot, move.label)
         if text is not None:
+            branch.extend(_awaiting(model, own.robot, move.label, text))
             known = own.automaton.known[move.state].true
             needed = required_atoms(actions[text].precondition) if text in actions else ()
             numbers = {index[atom] for atom in needed if atom in index}
@@ -131,22 +171,39 @@ def _acting(
     return act
 
 
+def _awaiting(model: JointModel, robot: int, label: int, text: str) -> Iterator[ET.Element]:
+    """What an event waits for."""
+    event = model.events[robot][label] if model.in_step else None
+    if event is None or model.in_step is None:
+        return
+    for name, count in zip(model.robots, event.waits, strict=True):
+        if count:
+            yield _leaf("AwaitEnded", robot=name, count=str(count), subaction=text)
+    for other, its in event.meets:
+        does = model.in_step.labels[other][its]
+        yield _leaf("AwaitPartner", robot=model.robots[other], does=does, subaction=text)
+
+
+def _leaf(name: str, **ports: str) -> ET.Element:
+    return ET.Element("Action", {"ID": name, **ports})
+
+
 def _action(text: str) -> ET.Element:
     """``(move r1 a b)`` as a leaf ``move`` with the ports ``arg0`` (r1), ``arg1`` and ``arg2``."""
     name, *arguments = text.strip("()").split()
     ports = {f"arg{number}": argument for number, argument in enumerate(arguments)}
-    return ET.Element("Action", {"ID": name, "subaction": text, **ports})
+    return _leaf(name, subaction=text, **ports)
 
 
 def _models(model: JointModel, choices: SentenceChoices) -> ET.Element:
     """The ports of all leaves, which editors of trees ask for."""
     found = ET.Element("TreeNodesModel")
-    for name, (kind, port, _) in LEAVES.items():
-        found.append(_leaf_model(kind, name, [port]))
+    for name, leaf in _leaves(model).items():
+        found.append(_leaf_model(leaf.kind, name, leaf.ports))
     ports: dict[str, int] = {}
     for own in choices.robots:
         for label in sorted(own.automaton.labels):
-            if (text := model.label_text(own.robot, label)) is not None:
+            if (text := model.subaction_text(own.robot, label)) is not None:
                 name, *arguments = text.strip("()").split()
                 ports[name] = max(ports.get(name, 0), len(arguments))
     for name, number in sorted(ports.items()):

@@ -260,6 +260,13 @@ class JointModel:
         """The text of a robot's label; None is idling."""
         return self.labels[robot][label] if label else None
 
+    def subaction_text(self, robot: int, label: int) -> str | None:
+        """The text of the subaction of a robot's label, be that an event; None is idling."""
+        if self.in_step is None:
+            return self.label_text(robot, label)
+        event = self.events[robot][label]
+        return self.in_step.label_text(robot, event.label) if event else None
+
     def label_number(self, robot: int, text: str | None) -> int | None:
         """The number of a robot's label with this text (None: idling), None if there is none."""
         if text is None:

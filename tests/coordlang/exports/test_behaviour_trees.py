@@ -7,9 +7,10 @@ The XML of BehaviorTree.CPP 4 is read as its documentation describes the nodes t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from itertools import islice
+from random import Random
 from xml.etree import ElementTree as ET
 
 import py_trees
@@ -19,11 +20,15 @@ from py_trees.common import Status
 from coordlang.execution.choices import choices
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.exports.behaviour_tree import behaviour_trees
+from coordlang.language.partition import Partition
 from planners.joint.model import IDLE, JointModel
+from planners.search.asynchronous import asynchronous
 from planners.search.plans import Plan
+from tests.planners.search.test_asynchronous import random_tasks
 from tests.support import naive
+from tests.support.asynchronous import ChangesAlone, Event, Plans, World, texts
 from tests.support.naive_choices import listed
-from tests.support.task_languages import random_task_languages, shipped
+from tests.support.task_languages import in_words, random_task_languages, shipped
 
 #: Shipped problems: two and three robots, shared actions, conditional choices, joint-action PDDL.
 WORLDS = [
@@ -199,3 +204,87 @@ def test_a_robot_that_cannot_act_does_nothing_else(fails: bool) -> None:
     tree.tick()
     assert tree.root.status == Status.FAILURE
     assert not team.done
+
+
+class FreeTeam:
+    """Robots without a common step: their trees are ticked in any order; an action takes two ticks."""
+
+    def __init__(self, xml: str, world: World, wanted: Sequence[Sequence[Event]]) -> None:
+        self.xml, self.world, self.wanted = xml, world, wanted
+        self.model = world.model
+        self.texts = texts(self.model, tuple(map(tuple, wanted)))
+        self.done: list[list[str]] = [[] for _ in wanted]
+        self.begun: set[int] = set()
+        self.ready: dict[int, tuple[int, str]] = {}
+
+    def label(self, robot: int, text: str) -> int:
+        return self.model.labels[robot].index(text)
+
+    def tree(self, robot: int) -> py_trees.trees.BehaviourTree:
+        names = self.model.robots
+
+        def chooses(ports: Mapping[str, str]) -> Status:
+            own, k = self.texts[robot], len(self.done[robot])
+            return status(ports["subaction"] == (own[k] if k < len(own) else IDLE))
+
+        def ended(ports: Mapping[str, str]) -> Status:
+            other, own = names.index(ports["robot"]), self.label(robot, ports["subaction"])
+            met = sum(
+                self.world.interfere(robot, own, other, self.label(other, text))
+                for text in self.done[other]
+            )
+            return Status.SUCCESS if met >= int(ports["count"]) else Status.RUNNING
+
+        def partner(ports: Mapping[str, str]) -> Status:
+            other = names.index(ports["robot"])
+            self.ready[robot] = len(self.done[robot]), ports["subaction"]
+            number, does = self.ready.get(other, (-1, ""))
+            is_ready = does == ports["does"] and number >= len(self.done[other]) - 1
+            return Status.SUCCESS if is_ready else Status.RUNNING
+
+        def acts(ports: Mapping[str, str]) -> Status:
+            if robot not in self.begun:
+                self.begun.add(robot)
+                return Status.RUNNING
+            self.begun.remove(robot)
+            self.done[robot].append(ports["subaction"])
+            return Status.SUCCESS
+
+        actions = {text.strip("()").split()[0] for text in self.model.labels[robot][1:]}
+        leaves: dict[str, Leaf] = dict.fromkeys(actions, acts)
+        leaves |= {"AwaitEnded": ended, "AwaitPartner": partner, "Chooses": chooses}
+        return read_tree(self.xml, names[robot], {**leaves, "Holds": lambda ports: Status.SUCCESS})
+
+    def run(self, random: Random) -> None:
+        trees = [self.tree(robot) for robot in self.world.robots]
+        for _ in range(200 * len(trees)):
+            tree = random.choice(trees)
+            if tree.root.status != Status.SUCCESS:
+                tree.tick()
+            assert tree.root.status != Status.FAILURE
+        assert all(tree.root.status == Status.SUCCESS for tree in trees), "somebody waits for ever"
+        assert self.done == [
+            [self.model.labels[robot][event.label] for event in own]
+            for robot, own in enumerate(self.wanted)
+        ]
+
+
+@pytest.mark.parametrize(("robots", "seeds"), [(2, range(40)), (3, range(8))])
+def test_trees_without_a_common_step_do_every_mixture(robots: int, seeds: range) -> None:
+    several = 0
+    for space, world, tasks, random in random_tasks(robots, seeds):
+        for task in tasks:
+            try:
+                plans = Plans(world, space, task, 30)
+                made = asynchronous(space.with_tasks(space.starts[[task]], space.second[[task]]))
+            except (naive.TooLarge, ChangesAlone):
+                continue
+            table = Partition.of_states(space.rows, dict.fromkeys(range(len(space.rows)), 0))
+            found = choices(in_words(None, table, made, 0), (0,))
+            if not found.guaranteed:
+                continue
+            xml = behaviour_trees(found)
+            for parts, _ in islice(plans.mixtures_of([*plans.states]), 3):
+                FreeTeam(xml, world, parts).run(random)
+                several += len(plans.states) > 1
+    assert several >= 3
