@@ -53,6 +53,12 @@ def read_preference(task_language: TaskLanguage, text: str) -> Preference:
     Raises `UsageError` for anything else.
     """
     kind, _, argument = text.strip().partition(":")
+    if task_language.model.is_asynchronous and (kind == "first" or argument.count("(") > 1):
+        raise UsageError(
+            f"--prefer {echoed(text)}: without a common step nobody goes first, and states are not "
+            "passed at once",
+            remedy="Use shortest, most-plans, or avoid with one atom.",
+        )
     if text.strip() in ("shortest", "most-plans"):
         return text.strip()
     if kind == "first":

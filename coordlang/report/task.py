@@ -161,12 +161,18 @@ def _witness_data(
     if witness is None:
         return None
     space, model = language.space, language.model
-    mixed = (
-        [own[robot] for robot, own in enumerate(step)] for step in zip(*witness.plans, strict=True)
-    )
-    init = space.rows[space.state[language.start]]
-    rows, _, why = carried_out(model, init, filter(None, map(model.numbers, mixed)))
-    goal = space.goals[space.goal[language.start]]
+    why: str | None = witness.reason
+    together, reaches = list(witness.mixed_states), False
+    if not model.is_asynchronous:  # else nobody does them step by step
+        mixed = (
+            [own[robot] for robot, own in enumerate(step)]
+            for step in zip(*witness.plans, strict=True)
+        )
+        init = space.rows[space.state[language.start]]
+        rows, _, why = carried_out(model, init, filter(None, map(model.numbers, mixed)))
+        together = [model.codec.key(row) for row in rows]
+        goal = space.goals[space.goal[language.start]]
+        reaches = why is None and bool(model.holds(goal, rows[-1][None, :])[0])
     return {
         "plans": [
             [[tables.label(robot, text) for robot, text in enumerate(step)] for step in plan]
@@ -175,10 +181,10 @@ def _witness_data(
         "states": [[tables.state(key) for key in states] for states in witness.states],
         "breaks": witness.step,
         "reason": witness.reason,
-        "together": [tables.state(model.codec.key(row)) for row in rows],
-        "stops": None if why is None else len(rows) - 1,
+        "together": [tables.state(key) for key in together],
+        "stops": None if why is None else len(together) - 1,
         "why": why,
-        "reaches": why is None and bool(model.holds(goal, rows[-1][None, :])[0]),
+        "reaches": reaches,
     }
 
 

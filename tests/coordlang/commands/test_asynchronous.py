@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -102,13 +103,10 @@ def test_plans_that_differ_in_timing_alone_count_once(shell: Shell) -> None:
 @pytest.mark.parametrize(
     "command",
     [
-        "say {} SQUARE plan.json",
-        "understand {} SQUARE w0",
-        "plan {} SQUARE w0",
-        "choices {} SQUARE w0",
-        "explain {} SQUARE",
-        "report {} SQUARE -o page.html",
-        "export {} SQUARE w0 --to ltlf -o out",
+        "export {} SQUARE 'w1 w2' --to ltlf -o out",
+        "export {} SQUARE 'w1 w2' --to pddl -o out",
+        "plan {} SQUARE --prefer first:r1",
+        "plan {} SQUARE --prefer avoid:(at\\ r1\\ c0-0)(at\\ r2\\ c0-1)",
         "build SQUARE --asynchronous --slack 1 -o x.json",
         "build SQUARE --asynchronous --method greedy -o x.json",
         "build SQUARE --asynchronous --method separating -o x.json",
@@ -116,9 +114,65 @@ def test_plans_that_differ_in_timing_alone_count_once(shell: Shell) -> None:
     ],
 )
 def test_what_does_not_follow_refuses(command: str, made: Path, shell: Shell) -> None:
-    Path("plan.json").write_text("[]")
-    assert "asynchronous" in shell(command.format(made), 2).err
+    assert re.search("asynchronous|common step", shell(command.format(made), 2).err)
     assert not Path("x.json").exists()
+
+
+#: The second plan of the square, with a step in which r2 waits.
+LATE = """0: (move r1 c0-0 c1-0)
+1: (move r2 c1-1 c0-1)
+1: (move r1 c1-0 c1-1)
+2: (move r2 c0-1 c0-0)
+"""
+
+
+def test_plans_have_sentences_whatever_their_timing(made: Path, shell: Shell) -> None:
+    said = [library.say(made, *SQUARE, plan).sentence for plan in library.plans(*SQUARE)]
+    assert said == ["w1 w2", "w1 w3 w2"]
+    shell("plans SQUARE --max 1", 0)
+    Path("late.ipc").write_text(LATE)
+    assert shell(f"say {made} SQUARE late.ipc", 0).out.strip() == said[1]
+    Path("late.ipc").write_text(
+        LATE.replace("1: (move r2 c1-1 c0-1)\n", "0: (move r2 c1-1 c1-0)\n")
+    )
+    shell(f"say {made} SQUARE late.ipc", 1, "this is no plan")
+    detour = "0: (move r1 c0-0 c0-1)\n1: (move r1 c0-1 c0-0)\n"
+    moved = [f"{int(line[0]) + 2}{line[1:]}" for line in LATE.splitlines()]
+    Path("late.ipc").write_text(detour + "\n".join(moved) + "\n")
+    shell(f"say {made} SQUARE late.ipc", 1, "it takes 5 steps, and 2 are enough")
+
+
+def test_a_sentence_is_understood_planned_and_explained(made: Path, shell: Shell) -> None:
+    first, second = library.plans(*SQUARE)
+    assert list(library.understand(made, *SQUARE, "w1 w2")) == [first]
+    assert tuple(library.plan(made, *SQUARE, "w1 w3 w2")) == second
+    assert library.plan(made, *SQUARE, prefer="shortest").sentence == "w1 w2"
+    data = json.loads(shell(f"understand {made} SQUARE 'w1 w2' --format json", 0).out)
+    assert data["execution"] == "asynchronous"
+    assert data["edges"][-1]["actions"] == [
+        ["(move r1 c0-1 c1-1) (after-1 r2)", "(move r2 c1-0 c0-0) (after-1 r1)"]
+    ]
+    said = shell(f"explain {made} SQUARE --task", 0).out
+    assert "r1: move c0-0 c0-1, move c0-1 c1-1 (after-1 r2)." in said
+    assert "in step" not in said
+    shell(f"report {made} SQUARE -o page.html", 0)
+    assert "no optimal plan has these events" in Path("page.html").read_text()
+
+
+def test_choices_are_events(made: Path, shell: Shell) -> None:
+    said = shell(f"choices {made} SQUARE 'w1 w2'", 0).out
+    assert "event  state" in said
+    after = "--robot r1 --history '(move r1 c0-0 c0-1)'"
+    said = shell(f"choices {made} SQUARE 'w1 w2' {after}", 0).out
+    assert said == "event 2: r1 may do (move r1 c0-1 c1-1) (after-1 r2); 1 subplan left\n"
+    shell(f"choices {made} SQUARE 'w1 w2' {after} --do '(move * c1-1)' --visit '(at r1 c1-1)'", 0)
+    shell(f"choices {made} SQUARE 'w1 w2' --format json -o c.json", 0)
+    assert library.EventMonitor.read("c.json", "r1").remaining == 1
+    with pytest.raises(library.MonitorError, match="are for an EventMonitor"):
+        library.Monitor.read("c.json", "r1")
+    trees = shell(f"export {made} SQUARE 'w1 w2' --to bt", 0).out
+    assert '<Action ID="AwaitEnded" robot="r2" count="1"' in trees
+    assert "AwaitStep" not in trees
 
 
 @pytest.mark.parametrize("options", [{"asynchronous": True}, {"slack": 1}])
