@@ -14,7 +14,9 @@ from contextlib import closing
 from dataclasses import dataclass
 from functools import cache
 from itertools import combinations, product
+from random import Random
 
+from coordlang.language.candidates import all_pairs
 from coordlang.language.warping import separation_clause
 from coordlang.vocabulary.sat import PartitionProblem
 from planners.grounding.actions import GroundAction
@@ -26,7 +28,9 @@ from planners.pddl.formula_tree import literals
 from planners.pddl.lifted import Atom, StepAtom
 from planners.search.asynchronous import event_text
 from planners.search.plan_space import PlanSpace
+from planners.system.errors import CoordlangError
 from tests.support import naive
+from tests.support.random_models import random_model
 
 #: A joint step: the label number of each robot.
 Step = tuple[int, ...]
@@ -273,6 +277,20 @@ def ordered_partitions(robots: Block, number: int) -> Iterator[tuple[Block, ...]
                 yield from ((first, *others) for others in ordered_partitions(rest, number - 1))
         if number == 1:
             return
+
+
+def random_tasks(robots: int, seeds: range) -> Iterator[tuple[PlanSpace, World, list[int], Random]]:
+    """Plan spaces in step of random models, and some of their tasks."""
+    for seed in seeds:
+        random = Random(seed)
+        try:
+            domain, problem, options = random_model(seed, robots)
+            candidates = all_pairs(domain, [problem], options)
+        except CoordlangError:
+            continue
+        for space in candidates.spaces:
+            tasks = random.sample(range(len(space.starts)), min(4, len(space.starts)))
+            yield space, World(candidates.model), tasks, random
 
 
 class Plans:

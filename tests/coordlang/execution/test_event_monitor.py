@@ -23,9 +23,8 @@ from coordlang.execution.monitor import (
 from coordlang.language.partition import Partition
 from planners.pddl.model_options import ModelOptions
 from planners.search.asynchronous import asynchronous
-from tests.planners.search.test_asynchronous import random_tasks
 from tests.support import naive
-from tests.support.asynchronous import ChangesAlone, World, texts
+from tests.support.asynchronous import ChangesAlone, World, random_tasks, texts
 from tests.support.asynchronous import Plans as Listed
 from tests.support.domains import own_task
 from tests.support.task_languages import in_words, sentence_of, shipped

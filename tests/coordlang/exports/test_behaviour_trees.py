@@ -24,9 +24,8 @@ from coordlang.language.partition import Partition
 from planners.joint.model import IDLE, JointModel
 from planners.search.asynchronous import asynchronous
 from planners.search.plans import Plan
-from tests.planners.search.test_asynchronous import random_tasks
 from tests.support import naive
-from tests.support.asynchronous import ChangesAlone, Event, Plans, World, texts
+from tests.support.asynchronous import ChangesAlone, Event, Plans, World, random_tasks, texts
 from tests.support.naive_choices import listed
 from tests.support.task_languages import in_words, random_task_languages, shipped
 

@@ -4,10 +4,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from random import Random
 
 import numpy as np
 import pytest
@@ -23,9 +21,9 @@ from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans as Paths
 from planners.search.plans import counts
-from planners.system.errors import BadInput, CoordlangError
+from planners.system.errors import BadInput
 from tests.support import naive
-from tests.support.asynchronous import ChangesAlone, Plans, World, least_words, texts
+from tests.support.asynchronous import ChangesAlone, Plans, World, least_words, random_tasks, texts
 from tests.support.domains import DOMAINS, all_tasks, own_task, read
 from tests.support.random_models import random_model
 from tests.support.texts import parsed
@@ -33,20 +31,6 @@ from tests.support.texts import parsed
 RUNS = [(2, range(60)), (3, range(12))]
 THOROUGH = [(2, range(60, 1_500)), (3, range(12, 800)), (4, range(100))]
 SEEDS = [*RUNS, *(pytest.param(*run, marks=pytest.mark.thorough) for run in THOROUGH)]
-
-
-def random_tasks(robots: int, seeds: range) -> Iterator[tuple[PlanSpace, World, list[int], Random]]:
-    """Plan spaces in step of random models, and some of their tasks."""
-    for seed in seeds:
-        random = Random(seed)
-        try:
-            domain, problem, options = random_model(seed, robots)
-            candidates = all_pairs(domain, [problem], options)
-        except CoordlangError:
-            continue
-        for space in candidates.spaces:
-            tasks = random.sample(range(len(space.starts)), min(4, len(space.starts)))
-            yield space, World(candidates.model), tasks, random
 
 
 def paths(space: PlanSpace, task: int) -> dict[tuple[tuple[str, ...], ...], tuple[int, ...]]:
