@@ -4,12 +4,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from benchmarks.paper.task_choices import sentence_of
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.language.sentences import Sentence
 from coordlang.simulation.floor import Floor
 from coordlang.simulation.record import RunRecord, WishRecord
 from coordlang.simulation.run import runs_of
@@ -19,22 +17,9 @@ from coordlang.sites.coordinates import Point
 from planners.search.plans import Plan
 
 
-@dataclass(frozen=True, slots=True)
-class Said:
-    """A task, an optimal plan of it, drawn uniformly, and its sentence."""
-
-    used: TaskLanguage
-    plan: Plan
-    words: Sentence
-
-    def mission(self, agreement: Agreement) -> Mission:
-        """Return the mission of robots that have agreed on the sentence, a plan, or nothing."""
-        return Mission(self.used, agreement, self.words if agreement == "sentence" else ())
-
-
-def said_of(used: TaskLanguage, plan: Plan) -> Said:
-    """Return what is said to agree on the sentence of a plan."""
-    return Said(used, plan, sentence_of(used, plan))
+def mission_of(used: TaskLanguage, plan: Plan, agreement: Agreement) -> Mission:
+    """Return the mission of robots that agree on a plan's sentence, on any plan, or on nothing."""
+    return Mission(used, agreement, sentence_of(used, plan) if agreement == "sentence" else ())
 
 
 def drive(

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Robots with wheels in a simulator: what is promised of joint steps, looked at on a floor.
 
-Three experiments: tasks that require coordination, with a language and without, robots keeping step
-in three ways; deliveries with a human in the way, whom only lidars see; and the detour of the
-motivating scenario.  Each run stands beside what the joint model says of the same choices.
+Two experiments: tasks that require coordination, with a language and without, robots keeping step
+in three ways; and the detour of the motivating scenario.  Each run stands beside what the joint
+model says of the same choices.
 """
 
 from __future__ import annotations
@@ -13,14 +13,12 @@ from random import Random
 from typing import Any
 
 from benchmarks.frame import markdown
-from benchmarks.paper.driving import Said, counted, drive, is_well, said_of
+from benchmarks.paper.driving import counted, drive, is_well, mission_of
 from benchmarks.paper.floors import FLOORS, foreign_map, tasks_of
-from benchmarks.paper.grid import task_cells
 from benchmarks.paper.recipe import Recipe, Record, Result, Section, Settings, Unit
 from benchmarks.paper.scenario import PLACE, detour, drawn_task, trading_rooms
-from benchmarks.paper.suite import CORRIDOR, language_for, method_of
-from benchmarks.paper.task_choices import TaskChoices, languages_in_tasks
-from benchmarks.paper.warehouse import WAREHOUSES, deliveries, human_in, listed_tasks
+from benchmarks.paper.suite import CORRIDOR, language_for
+from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.simulation.pace import PACES
 from coordlang.simulation.record import RunRecord, WishRecord
 from coordlang.simulation.simulator import Settings as How
@@ -37,26 +35,16 @@ _DRIVEN: Mapping[Agreement, Sequence[str]] = {
     "sentence": tuple(_WAYS),
     "nothing": tuple(way for way in _WAYS if way != "word"),
 }
-#: Warehouses, with the layout and the method of the language.
-_WAREHOUSES = (
-    ("open 3x3", "across", "minimal"),
-    ("open 3x3", "along", "minimal"),
-    ("open 4x4", "along", "greedy"),
-    ("ring 3x4", "across", "minimal"),
-)
 #: Steps that r1 has done when the place becomes interesting.
 _LEARNED = 3
 
 
 def units(settings: Settings) -> list[Unit]:
-    """List a unit for each floor and agreement, for each warehouse, and for the detour."""
+    """List a unit for each floor, and for the detour."""
     floors = ("T-map, 2 robots", "handover, 2 robots") if settings.quick else tuple(FLOORS)
     found: dict[str, dict[str, Any]] = {
         name: {"world": FLOORS[name].world.name, "floor": name} for name in floors
     }
-    for name, layout, method in _WAREHOUSES[: 1 if settings.quick else None]:
-        parameters = {"warehouse": name, "layout": layout, "method": method}
-        found[f"{name}/{layout}/{method}"] = parameters
     if not settings.quick:
         found["detour"] = {"detour": PLACE}
     runs = {"runs": settings.samples}
@@ -71,8 +59,6 @@ def run(unit: Unit, settings: Settings) -> Result:
         return {"absent": "the package ir-sim"}
     if "floor" in unit.parameters:
         return _run_floor(unit, settings)
-    if "warehouse" in unit.parameters:
-        return _run_warehouse(unit, settings)
     return _run_detour(unit, settings)
 
 
@@ -89,9 +75,9 @@ def _run_floor(unit: Unit, settings: Settings) -> Result:
         random = Random(f"{settings.seed} {floor.key} {number}")
         used = tasks[random.randrange(len(tasks))]
         plans = Plans.of(used.space, used.task)
-        one = said_of(used, plans.unrank(random.randrange(plans.count)))
+        plan = plans.unrank(random.randrange(plans.count))
         for agreement, by_way in found.items():
-            prepared = one.mission(agreement)
+            prepared = mission_of(used, plan, agreement)
             for way, runs in by_way.items():
                 runs.append(drive(prepared, _WAYS[way], number, dict(floor.known)))
     return {
@@ -105,56 +91,12 @@ def _run_floor(unit: Unit, settings: Settings) -> Result:
     }
 
 
-def _run_warehouse(unit: Unit, settings: Settings) -> Result:
-    """Draw tasks and where a human stands; run each with the plan, and with its sentence."""
-    parameters = unit.parameters
-    world, rows, columns = WAREHOUSES[parameters["warehouse"]]
-    listed = listed_tasks(deliveries(rows, columns, parameters["layout"]))
-    candidates, language = language_for(world, parameters["method"], settings.seed, listed)
-    tasks = list(languages_in_tasks(language, candidates))
-    choices = TaskChoices(tasks[0])
-    corners = {cell for used in tasks for cell in task_cells(used.space, used.task)[0]}
-    cells = sorted({atom.args[1] for atom in candidates.model.codec.facts.atoms} - corners)
-    found: dict[str, list[list[bool]]] = {"plan": [], "sentence": []}
-    touched = dict.fromkeys(found, 0)
-    for number in range(parameters["runs"]):
-        random = Random(f"{settings.seed} {unit.key} {number}")
-        used = tasks[random.randrange(len(tasks))]
-        human = random.choice(cells)
-        together = Said(used, (), ()).mission("plan")
-        one = said_of(used, together.agreed_plan(number))
-        forbidden = human_in(candidates.model, human)
-        model_says = {
-            "plan": not forbidden.breaks(one.plan),
-            "sentence": choices.succeeds(used.task, one.words, forbidden),
-        }
-        for agreement, prepared in (("plan", together), ("sentence", one.mission("sentence"))):
-            record = drive(prepared, How(human=human), number)
-            found[agreement].append([is_well(record), model_says[agreement]])
-            touched[agreement] += record.collisions > 0
-    return {
-        "words": len(language.words),
-        "tasks": len(tasks),
-        **{
-            agreement: {
-                "runs": len(pairs),
-                "well": sum(well for well, _ in pairs),
-                "collisions": touched[agreement],
-                "model": sum(says for _, says in pairs),
-                "model_only": sum(says and not well for well, says in pairs),
-                "floor_only": sum(well and not says for well, says in pairs),
-            }
-            for agreement, pairs in found.items()
-        },
-    }
-
-
 def _run_detour(unit: Unit, settings: Settings) -> Result:
     """Let the place become interesting when r1 has done some steps; r2 is not informed."""
     candidates, language = language_for(CORRIDOR, "minimal", settings.seed, trading_rooms())
     used = drawn_task(list(languages_in_tasks(language, candidates)))
     first = next(iter(Plans.of(used.space, used.task)))
-    prepared = said_of(used, first).mission("sentence")
+    prepared = mission_of(used, first, "sentence")
     wish = WishRecord("r1", _LEARNED, prepared.atom_at("r1", PLACE))
     found: Result = {"words": len(language.words), "known": detour(used), "steps": prepared.steps}
     for pace in PACES:
@@ -192,12 +134,9 @@ def section(records: Sequence[Record]) -> Section:
     """Render the tables, and where robots with wheels and joint steps disagree."""
     found = [record for record in records if "absent" not in record.result]
     floors = [record for record in found if "floor" in record.parameters]
-    warehouses = [record for record in found if "warehouse" in record.parameters]
     blocks = [_DEFINITION]
     if floors:
         blocks += [_FLOORS, _sums(floors), _floor_table(floors), _computed(floors)]
-    if warehouses:
-        blocks += [_HUMAN, _human_table(warehouses), _compared(warehouses)]
     blocks += [_detour_text(record) for record in found if "detour" in record.parameters]
     blocks += [
         f"Not run: {record.key}, for want of {record.result['absent']}."
@@ -221,12 +160,6 @@ uniformly. *Nothing*: each robot follows an optimal plan of its own. *Messages* 
 at 0.4 m. *Joint model*: runs in which the robots' subplans, done in step, are an optimal plan.
 *Agree*: runs that end well exactly if they are. The simulator does not see the doors of *handover*:
 its runs with nothing agreed are no evidence."""
-
-_HUMAN = """\
-A human stands in a random cell that is no corner; only lidars see the human, up to two cells away.
-Deliveries as above, by the clock. Runs that end well on the floor, where robots ask their monitor
-for a way that avoids the cell, and in the *joint model*, where all know of the human at the
-start."""
 
 
 def _floor_table(floors: Sequence[Record]) -> str:
@@ -270,32 +203,6 @@ def _sums(floors: Sequence[Record]) -> str:
 
 #: What is told of a run on average.
 _MEANS = ("messages", "seconds")
-
-
-def _human_table(warehouses: Sequence[Record]) -> str:
-    rows = []
-    for record in warehouses:
-        name = f"{record.parameters['warehouse']}, {record.parameters['layout']}"
-        ends = (record.result[agreed][what] for agreed in _AGREED for what in ("well", "model"))
-        rows.append([f"{name}, {method_of(record)}", record.result["words"], *ends])
-    runs = warehouses[0].result["plan"]["runs"]
-    heads = (f"{agreed}{where}" for agreed in _AGREED for where in ("", ", joint model"))
-    return markdown((f"well of {runs}: map, layout, language", "words", *heads), rows)
-
-
-#: What robots in a warehouse have agreed on.
-_AGREED = ("plan", "sentence")
-
-
-def _compared(warehouses: Sequence[Record]) -> str:
-    """How often floor and joint model say different things, and how often somebody collided."""
-    results = [record.result[agreed] for record in warehouses for agreed in _AGREED]
-    runs, touched = (sum(r[what] for r in results) for what in ("runs", "collisions"))
-    other = sum(r["model_only"] + r["floor_only"] for r in results)
-    return (
-        f"Floor and joint model differ in {other} of {runs} runs, and in {touched} somebody "
-        "touched something."
-    )
 
 
 def _detour_text(record: Record) -> str:

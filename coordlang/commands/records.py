@@ -493,7 +493,6 @@ class SimulateOptions(
     radius: float | None = option(None, "Of a robot (default: a fifth of --cell).", "METRES")
     noise: float = option(0.1, "The standard deviation of what wheels do.", "SHARE")
     lidar: bool = option(True, "Robots do not look ahead.", names="--no-lidar")
-    human: str | None = option(None, "Somebody whom only lidars see.", "PLACE|random|walking")
     visit: Sequence[str] = option((), "After STEP it wants to visit PLACE.", "ROBOT:STEP:PLACE")
     coordinates: CoordinatesSource | None = coordinates_option()
     output: tuple[str, ...] = output_option(

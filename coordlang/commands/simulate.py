@@ -121,7 +121,7 @@ def simulate(files: Arguments, options: SimulateOptions) -> Simulated:
     if options.replay is not None:
         return Simulated(read_simulation(options.replay))
     files.needed("LANGUAGE")
-    given = {name: getattr(options, name) for name in ("step", "cell", "noise", "lidar", "human")}
+    given = {name: getattr(options, name) for name in ("step", "cell", "noise", "lidar")}
     radius = options.cell / 5 if options.radius is None else options.radius
     settings, runs = Settings(radius=radius, **given), options.runs
     require_simulator()

@@ -55,7 +55,6 @@ def _run(found: RunRecord, robots: Sequence[str]) -> dict[str, Any]:
             [[round(x, 2), round(y, 2), round(heading, 2)] for x, y, heading in found.poses[robot]]
             for robot in robots
         ],
-        "human": [[round(x, 2), round(y, 2)] for x, y in found.human],
         "steps": [
             [[step.begin, step.end, _does(step)] for step in found.steps if step.robot == robot]
             for robot in robots

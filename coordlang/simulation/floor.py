@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The floor: where places lie in metres, the walls between cells, and a human who walks there.
+"""The floor: where places lie in metres, and the walls between cells.
 
 x to the right, y up; the place drawn lowest and furthest left has the coordinates 0.  Where places
 are the cells of a grid, there is a wall along every side of a cell that no link crosses.  Elsewhere
@@ -10,13 +10,11 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from random import Random
+from collections.abc import Mapping, Sequence
 
 from coordlang.sites.coordinates import Point, from_names
 from coordlang.sites.world import World
 from planners.system.errors import BadInput, UsageError
-from planners.system.messages import echoed
 
 #: A wall: (x, y) of one end, (x, y) of the other, in metres.
 Wall = tuple[float, float, float, float]
@@ -26,22 +24,15 @@ Wall = tuple[float, float, float, float]
 #: comes, which has the other one's flank before it meanwhile, and must neither touch it nor stop.
 _MOST_RADIUS = 0.25
 
-#: What stands for a place in ``Settings.human``: a place drawn for each run, or one to walk from.
-_STANDING_SOMEWHERE, _WALKING = "random", "walking"
-#: Metres a second that a human walks, for places one metre apart.
-_SPEED = 0.5
-#: The share of a cell within which a human has reached a place.
-_REACHED = 0.05
-
 
 class Floor:
-    """Where the places and walls of a world are, and the pairs of places that moves link.
+    """Where the places and walls of a world are.
 
-    ``longest`` and ``shortest`` are the lengths of such links, in metres; 0 and infinite without.
-    ``known`` are coordinates of places, x to the right and y down, as a file of coordinates has
-    them; where they are not all known, the names of the places have to say them (``c2-3``).
-    ``cell`` is the length of one unit of them in metres.  Raises `BadInput` if the coordinates are
-    not known.
+    ``longest`` and ``shortest`` are the lengths of the links that moves use, in metres; 0 and
+    infinite without.  ``known`` are coordinates of places, x to the right and y down, as a file of
+    coordinates has them; where they are not all known, the names of the places have to say them
+    (``c2-3``).  ``cell`` is the length of one unit of them in metres.  Raises `BadInput` if the
+    coordinates are not known.
     """
 
     def __init__(self, world: World, known: Mapping[str, Point], cell: float) -> None:
@@ -53,8 +44,8 @@ class Floor:
             name: ((x - left) * cell, (top - y) * cell) for name, (x, y) in points.items()
         }
         self.walls = _walls(points, links, cell)
-        self.links = tuple(link.ends for link in world.links if link.moves)
-        lengths = [math.dist(self.points[a], self.points[b]) for a, b in self.links]
+        moves = (link.ends for link in world.links if link.moves)
+        lengths = [math.dist(self.points[a], self.points[b]) for a, b in moves]
         self.longest, self.shortest = max(lengths, default=0.0), min(lengths, default=math.inf)
 
 
@@ -140,74 +131,3 @@ def _closed_sides(
                 side, begin = ((True, x + dx), y - 1) if dx else ((False, y + dy), x - 1)
                 sides[side].add(begin)
     return sides
-
-
-class Human:
-    """A human in a place, or walking from ``before`` to ``place``, and then on.
-
-    ``wanted`` is a place, ``random`` or ``walking``; where no robot starts or ends, unless it is
-    named.  Raises `UsageError` if there is no such place, a robot starts there, or none is left.
-    """
-
-    def __init__(
-        self,
-        wanted: str,
-        floor: Floor,
-        starts: Collection[str],
-        goals: Collection[str],
-        cell: float,
-        random: Random,
-    ) -> None:
-        free = sorted(set(floor.points) - {*starts, *goals})
-        named = wanted not in (_STANDING_SOMEWHERE, _WALKING)
-        if named and (wanted in starts or wanted not in floor.points):
-            why = "a robot starts in this place" if wanted in starts else "there is no such place"
-            raise UsageError(
-                f"--human {echoed(wanted)}: {why}",
-                remedy=f"Say a place such as {min(floor.points)}, or {_STANDING_SOMEWHERE}, or "
-                f"{_WALKING}.",
-            )
-        if not named and not free:
-            raise UsageError(
-                "there is no place for a human: robots start or end in all of them",
-                remedy="Leave out --human.",
-            )
-        self.place = self.before = wanted if named else random.choice(free)
-        self.walks = wanted == _WALKING
-        self._floor, self._cell, self._random = floor, cell, random
-        self._ways: dict[str, list[str]] = {name: [] for name in floor.points}
-        for one, other in floor.links:
-            self._ways[one].append(other)
-            self._ways[other].append(one)
-
-    def velocity(self, at: Point, robots: Sequence[Point], clearance: float) -> tuple[float, float]:
-        """Return how the human walks, in metres a second to the right and up.
-
-        The human turns back where a robot ahead is nearer than ``clearance``, from middle to
-        middle, and stands still where that leads to another one.
-        """
-        if not self.walks:
-            return 0.0, 0.0
-        if self._meets(at, robots, clearance):
-            self.place, self.before = self.before, self.place
-            if self._meets(at, robots, clearance):
-                return 0.0, 0.0
-        target = self._floor.points[self.place]
-        if math.dist(at, target) < _REACHED * self._cell and self._ways[self.place]:
-            self.before = self.place
-            self.place = self._random.choice(self._ways[self.place])
-            target = self._floor.points[self.place]
-        way = target[0] - at[0], target[1] - at[1]
-        length = math.hypot(*way)
-        speed = min(_SPEED * self._cell, 4 * length) / length if length else 0.0
-        return way[0] * speed, way[1] * speed
-
-    def _meets(self, at: Point, robots: Iterable[Point], clearance: float) -> bool:
-        """Say whether a robot is near on the way ahead."""
-        target = self._floor.points[self.place]
-        way = target[0] - at[0], target[1] - at[1]
-        return any(
-            math.dist(at, robot) < clearance
-            and (robot[0] - at[0]) * way[0] + (robot[1] - at[1]) * way[1] > 0
-            for robot in robots
-        )

@@ -52,19 +52,18 @@ class EventRecord(msgspec.Struct, frozen=True, omit_defaults=True):
     kind: Annotated[
         Literal["collision", "stopped", "missed", "word", "detour", "deadlock", "arrived"],
         Meta(
-            description="collision: robots touch each other, a wall or the human; stopped: a robot "
+            description="collision: robots touch each other or a wall; stopped: a robot "
             "stands before what its lidar sees, told once in a step; missed: a robot was not there "
             "when a step began by the clock; word: a robot told that it may have come to a word; "
-            "detour: a robot asked its choices whether it can visit an atom or keep out of a "
-            "place; deadlock: nobody moves any more; arrived: all steps of all robots are done."
+            "detour: a robot asked its choices whether it can visit an atom; deadlock: "
+            "nobody moves any more; arrived: all steps of all robots are done."
         ),
     ]
     robots: Annotated[list[str], Meta(description="The robots that it concerns.")]
     touched: Annotated[
-        str | None, Meta(description="What a robot collided with that is no robot: wall, human.")
+        str | None, Meta(description="What a robot collided with that is no robot: wall.")
     ] = None
     visit: Annotated[str | None, Meta(description="The atom that a detour visits.")] = None
-    avoid: Annotated[str | None, Meta(description="The place that a detour avoids.")] = None
     granted: Annotated[
         bool | None, Meta(description="Whether the detour can be had; then the robot makes it.")
     ] = None
@@ -94,7 +93,7 @@ class RunRecord(msgspec.Struct, frozen=True):
 
     seed: Annotated[int, Meta(description="It draws all that is random in this run.")]
     collisions: Annotated[
-        _Count, Meta(description="How often a robot came to touch a robot, a wall or the human.")
+        _Count, Meta(description="How often a robot came to touch a robot or a wall.")
     ]
     deadlock: Annotated[
         bool, Meta(description="Nobody moved any more before all were there, without a collision.")
@@ -132,9 +131,6 @@ class RunRecord(msgspec.Struct, frozen=True):
         float | None,
         Meta(description="The least distance of two robots' middles in metres; null: no two."),
     ] = None
-    human: Annotated[
-        list[tuple[float, float]], Meta(description="Where the human was; empty without one.")
-    ] = []
 
 
 class SimulationRecord(msgspec.Struct, frozen=True):
@@ -163,10 +159,6 @@ class SimulationRecord(msgspec.Struct, frozen=True):
     radius: Annotated[float, Meta(description="The radius of a robot in metres.", gt=0)]
     noise: Annotated[float, Meta(description="The noise of wheels, as a share.", ge=0)]
     lidar: Annotated[bool, Meta(description="Whether robots stop before what they see ahead.")]
-    human: Annotated[
-        str | None,
-        Meta(description="The place of a human, random or walking; null: there was none."),
-    ]
     wishes: Annotated[list[WishRecord], Meta(description="What robots came to want on the way.")]
     places: Annotated[
         dict[str, tuple[float, float]],
@@ -218,9 +210,8 @@ def event_text(event: EventRecord) -> str:
         case "word":
             return f"{who} may have come to word {event.words[who] + 1} of the sentence"
         case "detour":
-            what = f"visit {event.visit}" if event.visit else f"keep out of {event.avoid}"
             allowed = "its choices allow it" if event.granted else "impossible"
-            return f"{who} wants to {what}: {allowed}"
+            return f"{who} wants to visit {event.visit}: {allowed}"
         case "deadlock":
             return "nobody moves any more"
     return "all have arrived"
@@ -229,14 +220,12 @@ def event_text(event: EventRecord) -> str:
 def _wrong(record: SimulationRecord, run: RunRecord) -> str | None:
     """Say why a run cannot be played, None if it can."""
     lengths = {len(run.poses.get(name, ())) for name in record.robots}
-    if run.human:
-        lengths.add(len(run.human))
     if len(lengths) != 1 or 0 in lengths:
         return "there is not one pose of each robot at each time"
     named = {step.robot for step in run.steps}.union(*(event.robots for event in run.events))
     if not named <= {*record.robots}:
         return "it speaks of robots that are not listed"
-    points = [(x, y) for poses in run.poses.values() for x, y, _ in poses] + run.human
+    points = [(x, y) for poses in run.poses.values() for x, y, _ in poses]
     if not all(abs(x) < _LARGEST and abs(y) < _LARGEST for x, y in points):
         return f"poses lie between {-_LARGEST:g} and {_LARGEST:g}"
     return None

@@ -25,7 +25,7 @@ Image = NDArray[np.uint8]
 
 #: Okabe and Ito's colours (2008), distinguishable with every kind of colour vision.
 ROBOTS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-_PLACE, _GRID, _WALL, _HUMAN, _ALARM = "#f4f4f4", "#d9d9d9", "#444444", "#555555", "#c1121f"
+_PLACE, _GRID, _WALL, _ALARM = "#f4f4f4", "#d9d9d9", "#444444", "#c1121f"
 #: Seconds for which an event is written below the floor.
 _SHOWN = 3.0
 #: Frames a second, seconds of the run in a frame, and pixels an inch.
@@ -58,9 +58,8 @@ class Scene:
         axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         axes.set_axis_off()
         self._draw_floor()
-        #: Of each robot its disc, name, front and way; the human's disc and name.
+        #: Of each robot its disc, name, front and way.
         self._robots = [self._draw_robot(k, name) for k, name in enumerate(record.robots)]
-        self._human = self._disc(_HUMAN, "human", 0.45) if run.human else None
 
     def show(self, index: int) -> None:
         """Draw the pose of this number of each robot, and the way so far."""
@@ -83,10 +82,6 @@ class Scene:
                 [y + end * math.sin(heading) for end in ends],
             )
             way.set_data([pose[0] for pose in poses], [pose[1] for pose in poses])
-        if self._human is not None:
-            disc, text = self._human
-            disc.set_center(self.run.human[index])
-            text.set_position(self.run.human[index])
 
     def _draw_floor(self) -> None:
         from matplotlib.patches import Rectangle
@@ -113,10 +108,10 @@ class Scene:
             self.axes.add_patch(ring)
         (way,) = self.axes.plot([], [], color=hue, linewidth=1.4, alpha=0.55, zorder=3)
         (front,) = self.axes.plot([], [], color=hue, linewidth=2.5, zorder=4)
-        return *self._disc(hue, name, 0.8), front, way
+        return *self._disc(hue, name), front, way
 
-    def _disc(self, colour: str, name: str, share: float) -> tuple[Any, Any]:
-        """A disc with a text in it, as high as this share of its radius."""
+    def _disc(self, colour: str, name: str) -> tuple[Any, Any]:
+        """A disc with a name in it, as high as most of its radius."""
         from matplotlib.patches import Circle
 
         disc = self.axes.add_patch(Circle((0, 0), self.record.radius, facecolor=colour, zorder=5))
@@ -124,7 +119,7 @@ class Scene:
         figure = self.axes.get_figure(root=True)
         assert figure is not None, "axes are made in a figure"
         inches = self.axes.get_position().height * figure.get_figheight()
-        points = max(2.0, share * 72 * inches / (high[1] - low[1]) * self.record.radius)
+        points = max(2.0, 0.8 * 72 * inches / (high[1] - low[1]) * self.record.radius)
         look: dict[str, Any] = {"color": "white", "ha": "center", "va": "center", "zorder": 7}
         return disc, self.axes.text(0, 0, name, fontsize=points, **look)
 

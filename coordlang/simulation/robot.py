@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from itertools import accumulate
 from random import Random
 
-from coordlang.execution.monitor import IDLE, Monitor, Texts
+from coordlang.execution.monitor import IDLE, Monitor
 from coordlang.simulation.pace import Message, OwnWords, Pace
 
 #: Metres x, metres y, heading in radians (0: to the right, counterclockwise).
@@ -26,8 +26,8 @@ Velocity = tuple[float, float]
 
 #: What is worth recording, its kind and further fields.  ``stopped``: something is in its way,
 #: told once in a step; ``missed``: it was late for a beginning by the clock; ``word``: it may have
-#: come to a word; ``detour``: it asked its choices, to ``visit`` an atom or ``avoid`` a place, and
-#: has committed to it if that is ``granted``.
+#: come to a word; ``detour``: it asked its choices to ``visit`` an atom, and has committed to it
+#: if that is ``granted``.
 Event = tuple[str, Mapping[str, object]]
 
 STANDING: Velocity = (0.0, 0.0)
@@ -71,16 +71,14 @@ class Sensed:
 
     ``time`` are seconds since the start, ``pose`` is where it believes to be.  ``ahead`` is how far
     from its middle the lidar sees the first thing in its way, in metres: infinite where there is
-    none, None where it did not look.  ``heard`` are the messages of the tick before, ``strangers``
-    what the lidar sees that is neither on the map nor a robot: (metres, radians from straight
-    ahead).  ``wanted`` are atoms that it is to visit from now on, if it can.
+    none, None where it did not look.  ``heard`` are the messages of the tick before, ``wanted``
+    atoms that it is to visit from now on, if it can.
     """
 
     time: float
     pose: Pose
     ahead: float | None
     heard: tuple[Message, ...] = ()
-    strangers: tuple[tuple[float, float], ...] = ()
     wanted: tuple[str, ...] = ()
 
 
@@ -132,8 +130,7 @@ class Robot:
         self._is_turning = False
         self._messages: list[Message] = []
         self._events: list[Event] = []
-        #: Places that it asked to avoid, beginnings missed, the step in which it was stopped.
-        self._met: set[str] = set()
+        #: Beginnings missed, the step in which it was stopped.
         self._missed, self._stopped_in = 0, -1
 
     @property
@@ -142,8 +139,8 @@ class Robot:
         return self._monitor.finished and not self._is_underway
 
     @property
-    def looks_around(self) -> bool:
-        """Whether it is about to choose a step, and has to be told what it sees."""
+    def chooses_next(self) -> bool:
+        """Whether it is about to choose a step, and has to be told what it is to visit."""
         return not self._is_underway and not self._monitor.finished
 
     @property
@@ -165,7 +162,7 @@ class Robot:
         """Take a tick: hear, go on with the step under way or begin the next one, and drive."""
         self._pace.hears(sensed.heard)
         if not self._is_underway:
-            self._look_around(sensed)
+            self._heed_wishes(sensed)
             begun = self.steps[-1].begin if self.steps else -1.0
             if self._monitor.finished or not self._pace.may_begin(
                 self.done, self.words, begun, sensed.time
@@ -189,29 +186,13 @@ class Robot:
         self._messages, self._events = [], []
         return told
 
-    def _look_around(self, sensed: Sensed) -> None:
-        """Commit to what is wanted, and to keep out of places that somebody stands in."""
+    def _heed_wishes(self, sensed: Sensed) -> None:
+        """Commit to what is wanted, where its choices allow it."""
         for atom in sensed.wanted:
-            self._ask({"visit": atom}, visit=atom)
-        met = {self._place_of(stranger, sensed.pose) for stranger in sensed.strangers}
-        for place in sorted(met - self._met):
-            if ways := [text for text, led in sorted(self._leads.items()) if led == place]:
-                self._met.add(place)
-                self._ask({"avoid": place}, never=ways)
-
-    def _ask(self, told: Mapping[str, object], **detour: Texts) -> None:
-        granted = bool(self._monitor.can(**detour))
-        if granted:
-            self._monitor.commit(**detour)
-        self._events.append(("detour", {**told, "granted": granted}))
-
-    def _place_of(self, stranger: tuple[float, float], pose: Pose) -> str:
-        """The place nearest to what the lidar sees, behind the surface that it sees."""
-        length = stranger[0] + self._cell / 10
-        angle = pose[2] + stranger[1]
-        at = pose[0] + length * math.cos(angle), pose[1] + length * math.sin(angle)
-        away = {name: math.dist(at, point) for name, point in self._points.items()}
-        return min(sorted(away), key=away.__getitem__)
+            granted = bool(self._monitor.can(visit=atom))
+            if granted:
+                self._monitor.commit(visit=atom)
+            self._events.append(("detour", {"visit": atom, "granted": granted}))
 
     @property
     def _is_underway(self) -> bool:

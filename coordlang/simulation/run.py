@@ -11,7 +11,7 @@ from random import Random
 from typing import Any
 
 from coordlang.language.candidates import describe
-from coordlang.simulation.floor import Floor, Human, require_room
+from coordlang.simulation.floor import Floor, require_room
 from coordlang.simulation.pace import Message, Pace
 from coordlang.simulation.record import (
     FORMAT,
@@ -23,14 +23,12 @@ from coordlang.simulation.record import (
     WishRecord,
 )
 from coordlang.simulation.robot import TICK, Pose, Robot, Sensed, period
-from coordlang.simulation.simulator import POSITION_NOISE, Settings, Simulator
+from coordlang.simulation.simulator import POSITION_NOISE, WALL, Settings, Simulator
 from coordlang.simulation.team import Mission
 from coordlang.sites.coordinates import Point
 
 #: A run ends when no step has begun or ended for so many periods: nobody will move any more.
 _PATIENCE = 4
-#: And with somebody walking about for so many.
-_WITH_WALKER = 12
 #: Ticks from one pose of the record to the next.
 _INTERVAL = 2
 
@@ -115,11 +113,6 @@ class _Going:
         }
         self.sensing = {name: Random(f"{seed} sensors {name}") for name in self.robots}
         self.wishes = list(wishes)
-        self.human: Human | None = None
-        if settings.human is not None:
-            ends = list(mission.starts.values()), list(mission.goals.values())
-            drawn = Random(f"{seed} human")
-            self.human = Human(settings.human, floor, *ends, settings.cell, drawn)
         poses = {
             name: (
                 *floor.points[place],
@@ -127,8 +120,7 @@ class _Going:
             )
             for name, place in mission.starts.items()
         }
-        standing = floor.points[self.human.place] if self.human is not None else None
-        self.simulator = Simulator(floor, poses, settings, seed, standing)
+        self.simulator = Simulator(floor, poses, settings, seed)
         self.ticks = self.messages = self.collisions = self.changes = 0
         self.last_change, self.nearest = 0.0, math.inf
         self.heard: tuple[Message, ...] = ()
@@ -136,7 +128,6 @@ class _Going:
         self.collided: set[str] = set()
         self.events: list[EventRecord] = []
         self.poses: dict[str, list[Pose]] = {name: [] for name in self.robots}
-        self.human_at: list[Point] = []
 
     @property
     def time(self) -> float:
@@ -151,9 +142,7 @@ class _Going:
     @property
     def has_ended(self) -> bool:
         """Whether all are there, or nobody will move any more."""
-        walks = self.human is not None and self.human.walks
-        patience = (_WITH_WALKER if walks else _PATIENCE) * self.period
-        return self.has_arrived or self.time - self.last_change > patience
+        return self.has_arrived or self.time - self.last_change > _PATIENCE * self.period
 
     def tick(self) -> None:
         """Let a tick pass: sense, choose, tell, move."""
@@ -170,11 +159,7 @@ class _Going:
         changes = sum(len(robot.steps) + robot.done for robot in self.robots.values())
         if changes > self.changes:
             self.changes, self.last_change = changes, self.time
-        walk = 0.0, 0.0
-        if self.human is not None:
-            clearance = 2 * self.settings.radius + 0.3 * self.settings.cell
-            walk = self.human.velocity(self.simulator.human(), self._middles(), clearance)
-        self.simulator.tick(velocities, walk)
+        self.simulator.tick(velocities)
         self.ticks += 1
         self._see_collisions()
         apart = (math.dist(one, other) for one, other in combinations(self._middles(), 2))
@@ -209,7 +194,6 @@ class _Going:
             subplans=subplans,
             steps=sorted(steps, key=lambda step: step.begin),
             events=self.events,
-            human=self.human_at,
             poses=self.poses,
         )
 
@@ -220,14 +204,12 @@ class _Going:
         ahead: float | None = math.inf
         if self.settings.lidar:
             ahead = self.simulator.ahead(name) if robot.looks_ahead else None
-        strangers: tuple[tuple[float, float], ...] = ()
         wanted: list[WishRecord] = []
-        if robot.looks_around:
-            strangers = self.simulator.strangers(name) if self.human is not None else ()
+        if robot.chooses_next:
             wanted = [one for one in self.wishes if one.robot == name and one.step <= robot.done]
             self.wishes = [one for one in self.wishes if one not in wanted]
         visits = tuple(wish.visit for wish in wanted)
-        return Sensed(self.time, (x, y, heading), ahead, heard, strangers, visits)
+        return Sensed(self.time, (x, y, heading), ahead, heard, visits)
 
     def _middles(self) -> list[Point]:
         """Where the robots are."""
@@ -238,9 +220,8 @@ class _Going:
         for pair in sorted(touching - self.touching):
             self.collisions += 1
             robots = [name for name in pair if name in self.robots]
-            others = [name.removeprefix("the ") for name in pair if name not in self.robots]
             self.collided.update(robots)
-            self._event("collision", robots, touched=others[0] if others else None)
+            self._event("collision", robots, touched="wall" if WALL in pair else None)
         self.touching = touching
 
     def _keep_poses(self) -> None:
@@ -248,9 +229,6 @@ class _Going:
             for name, poses in self.poses.items():
                 x, y, heading = self.simulator.pose(name)
                 poses.append((round(x, 3), round(y, 3), round(heading, 3)))
-            if self.human is not None:
-                x, y = self.simulator.human()
-                self.human_at.append((round(x, 3), round(y, 3)))
 
     def _event(self, kind: Any, robots: list[str], **further: Any) -> None:
         knows_words = self.mission.agreement != "nothing"

@@ -19,22 +19,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coordlang.simulation.floor import Floor, outlines
 from coordlang.simulation.robot import SPEED, TICK, TURN, Pose, Velocity
-from coordlang.sites.coordinates import Point
 from planners.system.errors import UsageError
 from planners.system.signals import postponed_signals
 
-Floats = NDArray[np.float64]
-
-#: The names of the human and of walls: with a space, as no robot is called.
-HUMAN, WALL = "the human", "the wall"
+#: The name of walls: with a space, as no robot is called.
+WALL = "the wall"
 #: Beams of a lidar, and the angle that they cover, in radians.
 _BEAMS, _ANGLE = 61, 2 * math.pi
-#: What a lidar sees within this many metres of the human's surface is the human.
-_SURFACE = 0.05
 #: What a lidar sees beside its robot's way within this many metres counts as in its way.
 _BESIDE = 0.02
 #: Noise of the position that a robot believes in, in metres for each unit of ``Settings.noise``.
@@ -49,9 +43,7 @@ class Settings:
     ``step`` is one of `coordlang.simulation.pace.PACES`.  ``noise`` is the standard deviation of
     what wheels do, as a share of what they are told, drawn anew in each tick; a tenth of it, in
     metres and in radians, is that of where a robot believes to be.  ``lidar``: robots stop before
-    what a lidar sees straight ahead.  ``human`` is the place of a human that nobody but a lidar
-    knows of, ``random`` for a place drawn for each run, ``walking`` for one who walks about; None
-    for nobody.
+    what a lidar sees straight ahead.
     """
 
     cell: float = 1.0
@@ -59,7 +51,6 @@ class Settings:
     step: str = "clock"
     noise: float = 0.1
     lidar: bool = True
-    human: str | None = None
 
     def __post_init__(self) -> None:
         """Raise `UsageError` for what no robot can be built with."""
@@ -80,10 +71,6 @@ class Settings:
             raise UsageError(
                 f"--noise {self.noise:g}: expected a share from 0 to 1",
                 remedy="Say 0 for wheels that do what they are told.",
-            )
-        if self.human is not None and not self.lidar:
-            raise UsageError(
-                "--human: without a lidar no robot sees a human", remedy="Leave out --no-lidar."
             )
 
 
@@ -107,38 +94,21 @@ def require_simulator() -> Any:
 class Simulator:
     """A world with robots, which time passes in tick by tick.
 
-    ``poses`` are those at the start, ``seed`` is that of the noise on the wheels; a human stands at
-    ``human``, if there is one.
+    ``poses`` are those at the start, ``seed`` is that of the noise on the wheels.
     """
 
     def __init__(
-        self,
-        floor: Floor,
-        poses: Mapping[str, Pose],
-        settings: Settings,
-        seed: int,
-        human: Point | None = None,
+        self, floor: Floor, poses: Mapping[str, Pose], settings: Settings, seed: int
     ) -> None:
         self._settings = settings
-        self._environment = _environment(_world(floor, poses, settings, human), seed)
+        self._environment = _environment(_world(floor, poses, settings), seed)
         self._robots = {robot.name: robot for robot in self._environment.robot_list}
-        others = self._environment.obstacle_list
-        self._human = next((other for other in others if other.name == HUMAN), None)
         for robot in self._robots.values():
             robot.sensors = []  # lidars are asked for, not cast in every tick
 
-    def tick(self, velocities: Mapping[str, Velocity], walk: tuple[float, float]) -> None:
-        """Let a tick pass in which the wheels are told these velocities, and the human walks."""
-        told = {name: list(velocity) for name, velocity in velocities.items()}
-        if self._human is not None:
-            told[HUMAN] = list(walk)
-        self._environment.step(told)
-
-    def human(self) -> Point:
-        """Where the human is."""
-        assert self._human is not None, "nobody is there"
-        x, y = self._human.state[:2, 0].tolist()
-        return x, y
+    def tick(self, velocities: Mapping[str, Velocity]) -> None:
+        """Let a tick pass in which the wheels are told these velocities."""
+        self._environment.step({name: list(velocity) for name, velocity in velocities.items()})
 
     def pose(self, robot: str) -> Pose:
         """Where a robot is, exactly."""
@@ -147,32 +117,17 @@ class Simulator:
 
     def ahead(self, robot: str) -> float:
         """How far ahead of a robot's middle its lidar sees something in its way."""
-        length, angle = self._scan(robot)
-        ahead, beside = length * np.cos(angle), np.abs(length * np.sin(angle))
-        in_way = (beside < self._settings.radius + _BESIDE) & (ahead > 0)
-        return float(ahead[in_way].min(initial=math.inf))
-
-    def strangers(self, robot: str) -> tuple[tuple[float, float], ...]:
-        """What a robot's lidar sees of the human: (metres, radians from straight ahead).
-
-        The map tells walls from it, and robots carry a mark.
-        """
-        (x, y, heading), (length, angle) = self.pose(robot), self._scan(robot)
-        at = x + length * np.cos(heading + angle), y + length * np.sin(heading + angle)
-        away = np.hypot(*(own - human for own, human in zip(at, self.human(), strict=True)))
-        seen = away < self._settings.radius + _SURFACE
-        return tuple(zip(length[seen].tolist(), angle[seen].tolist(), strict=True))
-
-    def _scan(self, robot: str) -> tuple[Floats, Floats]:
-        """The hits of a robot's lidar: metres, and radians from straight ahead."""
         own = self._robots[robot]
         own.lidar.step(own.state[0:3])
         scan = own.lidar.get_scan()
         hits = np.asarray(scan["valid"], np.bool_)
-        return scan["ranges"][hits], own.lidar.angle_list[hits]
+        length, angle = scan["ranges"][hits], own.lidar.angle_list[hits]
+        ahead, beside = length * np.cos(angle), np.abs(length * np.sin(angle))
+        in_way = (beside < self._settings.radius + _BESIDE) & (ahead > 0)
+        return float(ahead[in_way].min(initial=math.inf))
 
     def touching(self) -> set[tuple[str, str]]:
-        """The pairs that touch, in order: robots by name, `HUMAN` and ``the wall``."""
+        """The pairs that touch, in order: robots by name, and ``the wall``."""
         found = set()
         for name, robot in self._robots.items():
             for other in robot.collision_obj:
@@ -195,12 +150,9 @@ def _environment(world: dict[str, Any], seed: int) -> Any:
     return environment
 
 
-def _world(
-    floor: Floor, poses: Mapping[str, Pose], settings: Settings, human: Point | None
-) -> dict[str, Any]:
+def _world(floor: Floor, poses: Mapping[str, Pose], settings: Settings) -> dict[str, Any]:
     """The world as ir-sim reads it."""
     spread = settings.noise**2
-    disc = {"name": "circle", "radius": settings.radius}
     lidar = {
         "type": "lidar2d",
         "range_max": 2 * settings.cell,
@@ -215,7 +167,7 @@ def _world(
                 "noise": settings.noise > 0,
                 "alpha": [spread, 0, spread, spread],
             },
-            "shape": disc,
+            "shape": {"name": "circle", "radius": settings.radius},
             "state": list(pose),
             "vel_max": [SPEED, TURN],
             "vel_min": [-SPEED, -TURN],
@@ -223,7 +175,7 @@ def _world(
         }
         for name, pose in poses.items()
     ]
-    others: list[dict[str, Any]] = [
+    walls = [
         {
             "name": f"{WALL} {number}",
             "shape": {"name": "linestring", "vertices": [list(point) for point in outline]},
@@ -231,8 +183,5 @@ def _world(
         }
         for number, outline in enumerate(outlines(floor.walls))
     ]
-    if human is not None:
-        walker = {"name": HUMAN, "kinematics": {"name": "omni"}, "shape": disc}
-        others.append({**walker, "state": [*human, 0]})
     world = {"step_time": TICK, "collision_mode": "stop"}
-    return {"world": world, "robot": robots, "obstacle": others}
+    return {"world": world, "robot": robots, "obstacle": walls}

@@ -52,10 +52,9 @@ def runs(
     settings: Settings,
     number: int,
     *wishes: WishRecord,
-    stem: str = "problem",
     first: int = 0,
 ) -> list[RunRecord]:
-    """Runs in a shipped problem, of seeds one after the other."""
-    of = mission_of(folder, stem, agreement)
+    """Runs in a shipped problem's own task, of seeds one after the other."""
+    of = mission_of(folder, agreement=agreement)
     floor = floor_for(of, settings)
     return list(runs_of(of, floor, settings, number, first, wishes))

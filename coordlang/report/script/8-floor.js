@@ -52,10 +52,8 @@ class FloorView {
       svg.append(draw('circle', { cx, cy, r: this.size + 7, class: `goal ${robotClass(r)}` }, draw('title', {}, `goal of ${robot}`)));
     });
     this.trails = robots.map((_, r) => svg.appendChild(draw('path', { class: `trail done ${robotClass(r)}` })));
-    const disc = (name, colour, text) => svg.appendChild(draw('g', { class: `wheeled ${colour}`, 'data-thing': name }, draw('title', {}, name),
-      draw('circle', { r: this.size }), draw('line', { x1: 0, y1: 0, x2: this.size, y2: 0 }), draw('text', { y: 5, 'font-size': 15 }, text)));
-    this.human = disc('human', 'human', 'H');
-    this.discs = robots.map((robot, r) => disc(robot, robotClass(r), cut(robot, 4)));
+    this.discs = robots.map((robot, r) => svg.appendChild(draw('g', { class: `wheeled ${robotClass(r)}`, 'data-thing': robot }, draw('title', {}, robot),
+      draw('circle', { r: this.size }), draw('line', { x1: 0, y1: 0, x2: this.size, y2: 0 }), draw('text', { y: 5, 'font-size': 15 }, cut(robot, 4)))));
     this.svg = svg;
     this.byId('floor-stage').replaceChildren(svg);
   }
@@ -65,7 +63,6 @@ class FloorView {
     this.byId('run-select').value = number;
     this.run = this.all.runs[number];
     this.frames = Math.max(...this.run.poses.map(own => own.length));
-    this.human.style.display = this.run.human.length ? '' : 'none';
     this.byId('floor-events').replaceChildren(...this.run.events.map(([time, text, bad]) => make('li', {},
       make('button', { type: 'button', class: bad ? 'bad' : null, 'data-time': time, onclick: () => { this.transport.pause(); this.transport.go(Math.round(time / this.all.interval)); } },
         make('b', {}, `${time.toFixed(1)} s`), ` ${text}`))));
@@ -75,7 +72,7 @@ class FloorView {
   place(group, [x, y, heading], name) {
     const [left, top] = this.at([x, y]);
     group.setAttribute('transform', `translate(${left.toFixed(1)} ${top.toFixed(1)})`);
-    if (heading !== undefined) group.querySelector('line').setAttribute('transform', `rotate(${(-heading * 180 / Math.PI).toFixed(1)})`);
+    group.querySelector('line').setAttribute('transform', `rotate(${(-heading * 180 / Math.PI).toFixed(1)})`);
     return `${name} at ${x.toFixed(2)}, ${y.toFixed(2)} m`;
   }
 
@@ -85,7 +82,6 @@ class FloorView {
       this.trails[r].setAttribute('d', poses.slice(0, frame + 1).map((pose, k) => `${k ? 'L' : 'M'}${this.at(pose).map(v => v.toFixed(1)).join(' ')}`).join(''));
       return this.place(this.discs[r], own(poses), this.all.robots[r]);
     });
-    if (run.human.length) where.push(this.place(this.human, own(run.human), 'human'));
     this.svg.setAttribute('aria-label', where.join('; '));
     this.byId('floor-does').replaceChildren(...this.all.robots.map((robot, r) => {
       const steps = run.steps[r].filter(step => step[0] <= now), last = steps.at(-1);

@@ -60,8 +60,6 @@ def test_json_has_what_is_promised(simulate: Shell) -> None:
         ("--radius 0.05", 2, "pass through each other unseen"),
         ("--cell 0.3", 2, "too small"),
         ("--cell -1", 2, "above 0"),
-        ("--human nowhere", 2, "there is no such place"),
-        ("--human random --no-lidar", 2, "no robot sees"),
         ("--visit r1", 2, "expected ROBOT:STEP:PLACE"),
         ("--visit r1:0:nowhere", 2, "no atom says"),
         ("--noise nan", 2, "expected a share"),

@@ -48,17 +48,15 @@ def test_a_plane_is_in_a_city_and_not_in_its_fuel(tmp_path: Path) -> None:
     assert found.runs[0].arrived
 
 
-def test_a_robot_may_be_called_human(tmp_path: Path) -> None:
+def test_a_robot_may_be_called_wall(tmp_path: Path) -> None:
     problem, words = tmp_path / "problem.pddl", tmp_path / "words.json"
     domain = DOMAINS / "corridor" / "domain.pddl"
     text = (DOMAINS / "corridor" / "problem.pddl").read_text()
-    problem.write_text(text.replace("r1", "human").replace("r2", "wall"))
+    problem.write_text(text.replace("r2", "wall"))
     coordlang.build(domain, problem, method="greedy").language.save(words)
-    found = coordlang.simulate(words, domain, problem, human="random", seed=1)
+    found = coordlang.simulate(words, domain, problem, seed=1)
     run = found.runs[0]
-    assert set(run.poses) == {"human", "wall"}
-    assert len(run.human) == len(run.poses["human"])
-    assert len({(x, y) for x, y, _ in run.poses["human"]}) > len(set(run.human)) == 1
+    assert set(run.poses) == {"r1", "wall"}
     assert recorded(found.record, run, ".png").startswith(b"\x89PNG")
 
 

@@ -23,9 +23,9 @@ from tests.support.simulation import floor_for, mission_of
 
 @cache
 def record() -> SimulationRecord:
-    mission, settings = mission_of("t-map", agreement="nothing"), Settings(human="c1-1")
+    mission, settings = mission_of("t-map", agreement="nothing"), Settings()
     floor = floor_for(mission)
-    return record_of(mission, floor, settings, list(runs_of(mission, floor, settings, 1)))
+    return record_of(mission, floor, settings, list(runs_of(mission, floor, settings, 1, 1)))
 
 
 def pixels(image: np.ndarray[tuple[int, ...], np.dtype[np.uint8]], colour: str) -> int:
@@ -59,8 +59,8 @@ def test_films_have_the_frames_that_are_drawn() -> None:
     found = record()
     (run,) = found.runs
     assert "nobody moves any more" in {event_text(event) for event in run.events}
-    poses, human = {name: own[:5] for name, own in run.poses.items()}, run.human[:5]
-    run = msgspec.structs.replace(run, poses=poses, human=human)
+    poses = {name: own[:5] for name, own in run.poses.items()}
+    run = msgspec.structs.replace(run, poses=poses)
     drawn = list(frames(found, run))
     assert len({image.shape for image in drawn}) == 1
     gif, film, sheet = (
@@ -97,7 +97,7 @@ def test_a_record_that_cannot_be_played_is_refused(tmp_path: Path) -> None:
         data["robots"] = ["r1"]
 
     for change, said in (
-        (shortened, "seed 0: there is not one pose of each robot"),
+        (shortened, "seed 1: there is not one pose of each robot"),
         (far_away, "poses lie between"),
         (unknown, "robots that are not listed"),
     ):

@@ -57,7 +57,6 @@ def test_numbers_and_texts_are_all_that_a_robot_is_told() -> None:
         "pose": tuple[float, float, float],
         "ahead": float | None,
         "heard": tuple[Message, ...],
-        "strangers": tuple[tuple[float, float], ...],
         "wanted": tuple[str, ...],
     }
     assert get_type_hints(Message) == {"sender": str, "kind": Kind, "number": int}
