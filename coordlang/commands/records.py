@@ -11,7 +11,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from os import PathLike, fspath
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Union, dataclass_transform
 
 import click
@@ -558,7 +557,6 @@ class ReportOptions(PlanningOptions, takes="LANGUAGE DOMAIN PROBLEMS...", doing=
     tasks_shown: int = option(30, "Show at most this many tasks.", "N", least=1)
     coordinates: str | None = coordinates_option()
     run: str | None = option(None, "Also play these runs of simulate.", "RUN.json")
-    planviz: bool = option(False, "Also write a plan for PlanViz.", without="output=-")
     seed: int = option(0, "Draws the tasks.")
 
     def __post_init__(self) -> None:
@@ -567,13 +565,6 @@ class ReportOptions(PlanningOptions, takes="LANGUAGE DOMAIN PROBLEMS...", doing=
                 f"--tasks-shown {self.tasks_shown}: a page shows at most 500 tasks",
                 remedy="Make a page for each of several problems.",
             )
-
-    @property
-    def beside(self) -> list[OutputFile]:
-        """Beside the page and under its name: a plan for PlanViz, and its map."""
-        kinds = ("json", "map") if self.planviz else ()
-        paths = (str(Path(self.output).with_suffix(f".planviz.{kind}")) for kind in kinds)
-        return [OutputFile("--planviz", path) for path in paths]
 
 
 class DomainsOptions(CommandOptions, doing="copying", keeps_plans=False):

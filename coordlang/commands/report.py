@@ -3,28 +3,25 @@
 
 from __future__ import annotations
 
-from coordlang.commands.command import check_outputs
 from coordlang.commands.inputs import Arguments, language_for, public, read_coordinates_of
 from coordlang.commands.records import ReportOptions
 from coordlang.commands.terminal import warn_of_failures, write
 from coordlang.language.provenance import Tolerance
 from coordlang.language.recorded import check_source
 from coordlang.report.page import Report, make_report
-from coordlang.report.planviz import planviz
 from coordlang.report.simulated import require_of
 from coordlang.simulation.record import read_simulation
 from planners.system.errors import Position
 from planners.system.messages import visible
 from planners.system.notebook import counted
 
-#: A page, what the language tolerates, and the texts of what is written beside the page.
-Page = tuple[Report, Tolerance | None, tuple[str, ...]]
+#: A page, and what the language tolerates.
+Page = tuple[Report, Tolerance | None]
 
 
 @public(ReportOptions)
 def report(arguments: Arguments, options: ReportOptions) -> Page:
     """Make the page of a language: its words, and sentences and plans of tasks."""
-    check_outputs(options.beside, ())
     files = arguments.read()
     points = read_coordinates_of(options.coordinates, files.problems[0])
     read, position = language_for(arguments.needed("LANGUAGE"), files, coordinates=points)
@@ -44,18 +41,13 @@ def report(arguments: Arguments, options: ReportOptions) -> Page:
         position=position,
         simulated=simulated,
     )
-    if not options.planviz:
-        return page, read.tolerance, ()
-    shown = planviz(page.first, points)
-    return page, read.tolerance, (shown.plan, shown.map)
+    return page, read.tolerance
 
 
 def show_report(found: Page, options: ReportOptions) -> None:
     """Write the page."""
-    (page, tolerance, beside), output = found, options.output
+    (page, tolerance), output = found, options.output
     shown = f"{counted(page.tasks, 'task')} of {page.candidates:,}"
     place = "stdout" if output == "-" else visible(output)
     write(page.html, output, f"{shown}, {len(page.html):,} bytes, written to {place}")
-    for file, text in zip(options.beside, beside, strict=True):
-        write(text, file.path)
     warn_of_failures(tolerance)

@@ -10,7 +10,6 @@ from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
 
-from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.words import lifted_words
 from coordlang.language.provenance import domain_sha256, percent
 from coordlang.language.words import Language
@@ -34,12 +33,11 @@ _FEW_WORDS = 8
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A page, and how many tasks are shown in it of how many candidate tasks; the first of them."""
+    """A page, and how many tasks are shown in it of how many candidate tasks."""
 
     html: bytes
     tasks: int
     candidates: int
-    first: TaskLanguage
 
 
 def make_report(
@@ -89,7 +87,7 @@ def make_report(
         html = _render(shown, data)
         if len(html) <= largest:
             candidates = int(language.provenance.tasks.get("count", 0))
-            return Report(html, len(selection.tasks), candidates, selection.tasks[0].language)
+            return Report(html, len(selection.tasks), candidates)
         if len(selection.tasks) == 1:
             raise OutOfMemory(
                 f"the page of one task would have {len(html):,} bytes, more than {largest:,}",
