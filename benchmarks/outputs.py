@@ -151,7 +151,7 @@ COMMANDS = {
         explain @minimal.json D problem.pddl --task
         explain @greedy.json D problem.pddl --json
         plan @minimal.json D problem.pddl --prefer most-plans --json
-        plan @minimal.json D problem.pddl --prefer most-plans --heuristic manhattan
+        plan @minimal.json D problem.pddl --prefer most-plans --heuristic projections
         report @minimal.json D problem.pddl -o @minimal.html
         """,
     "elevator": """

@@ -27,6 +27,7 @@ from coordlang.execution.plan_sentence import read_plan_file, sentence_of_plan
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.provenance import tolerance_data
 from planners.search import HeuristicName
+from planners.search.heuristics import HEURISTICS
 from planners.search.plan_file import Texts, json_count
 from planners.search.plans import Plans
 from planners.system.errors import CoordlangError, UsageError, note
@@ -248,14 +249,15 @@ def plan(files: Arguments, options: PlanOptions) -> PlanUnderSentence:
     best = best_sentence(used, preferences) if preferences else None
     words = best.words if best else used.words_of(sentence or ())
     expanded = ExpandedStates(used.model, used.partition)
-    found = plan_under_sentence(used, words, options.heuristic, expanded)
+    bound = HEURISTICS[options.heuristic]
+    found = plan_under_sentence(used, words, bound, expanded)
     return PlanUnderSentence(
         used,
         used.text(words),
         tuple(used.in_step.texts(step) for step in found.plan),
         options.heuristic,
         found,
-        plan_under_sentence(used, None, options.heuristic, expanded),
+        plan_under_sentence(used, None, bound, expanded),
         tuple(_fulfilled(preferences, best)) if best else (),
         SentencePlans(used, words),
     )

@@ -16,7 +16,7 @@ from coordlang.language.sentences import sentence
 from planners.joint.model import Goal, JointModel
 from planners.joint.tables import Rows
 from planners.search.goals import FAR, Values
-from planners.search.heuristics import heuristic
+from planners.search.heuristics import HEURISTICS, Bound, heuristic
 from planners.search.plans import Plan, Plans
 from planners.search.slack import rests
 
@@ -81,14 +81,14 @@ class ExpandedStates:
 def plan_under_sentence(
     task_language: TaskLanguage,
     words: Sequence[int] | None,
-    name: str = "relaxed",
+    bound: Bound = HEURISTICS["relaxed"],
     states: ExpandedStates | None = None,
     *,
     count_words: bool = True,
 ) -> GuidedPlan:
     """Find an optimal plan of the task with a sentence (word numbers); any optimal plan for None.
 
-    ``name`` is one of `planners.search.heuristics.HEURISTICS`; ``states`` are what earlier searches
+    ``bound`` is admissible and consistent; ``states`` are what earlier searches
     with the same language and model have expanded; for ``count_words`` see `_a_star`.  Of plans
     within slack the earliest is read off the plan space, without a search, and of plans without a
     common step the first one.  Raises `NoPlanFits`.
@@ -100,10 +100,10 @@ def plan_under_sentence(
         return _first(task_language, words)
     states = states or ExpandedStates(task_language.model, task_language.partition)
     goal, init = space.goals[space.goal[start]], space.rows[space.state[start]]
-    bound = heuristic(name, task_language.model, goal, init)
+    least = heuristic(bound, task_language.model, goal, init)
     if words is not None:
         task_language.plans_with(words)  # raises if there is none
-    found = _a_star(states, init, goal, bound, words, count_words)
+    found = _a_star(states, init, goal, least, words, count_words)
     assert found.cost == space.cost_of(task_language.task), "A* is optimal"
     return found
 

@@ -4,5 +4,5 @@
 from typing import Literal
 
 #: The heuristics of A*, and what a search for all optimal plans takes: ``auto`` chooses one.
-HeuristicName = Literal["relaxed", "manhattan", "projections", "blind"]
-SearchHeuristic = Literal["auto", "relaxed", "manhattan", "projections", "blind"]
+HeuristicName = Literal["relaxed", "projections", "blind"]
+SearchHeuristic = Literal["auto", "relaxed", "projections", "blind"]

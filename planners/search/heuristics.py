@@ -6,7 +6,6 @@ Every one is admissible and consistent, is 0 in goal states and counts joint ste
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import get_args
@@ -15,9 +14,7 @@ import numpy as np
 
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import Goal, JointModel, Options, PlanningTask
-from planners.joint.states import TrueFacts
 from planners.joint.tables import Bools, Ints, Rows
-from planners.pddl.lifted import Atom
 from planners.search import SearchHeuristic
 from planners.search.goals import FAR, Values, goal_facts, ways_to_facts
 from planners.search.projections import Projections
@@ -31,22 +28,21 @@ _STEPS = 200_000
 #: Truth values held at a time.
 _BITS = 1 << 24
 
-
 #: Model, goal and state variables -> lower bounds on the joint steps left.
-HEURISTICS: dict[str, Callable[[JointModel, Goal, Sequence[StateVariable]], Values]] = {
+Bound = Callable[[JointModel, Goal, Sequence[StateVariable]], Values]
+HEURISTICS: dict[str, Bound] = {
     "relaxed": lambda model, goal, _: relaxed(model, goal),
-    "manhattan": lambda *all_of: manhattan(*all_of),
     "projections": lambda *all_of: Projections(*all_of).value,
     "blind": lambda *_: lambda rows: np.zeros(len(rows), np.int64),
 }
 
 
-def heuristic(name: str, model: JointModel, goal: Goal, init: Rows) -> Values:
-    """``HEURISTICS[name]`` for the states reachable from one; 0 exactly in goal states."""
-    bound = HEURISTICS[name](model, goal, state_variables(model, init))
+def heuristic(bound: Bound, model: JointModel, goal: Goal, init: Rows) -> Values:
+    """The bound for the states reachable from one; 0 exactly in goal states."""
+    least = bound(model, goal, state_variables(model, init))
 
     def value(rows: Rows) -> Ints:
-        return np.maximum(bound(rows), ~model.holds(goal, rows))
+        return np.maximum(least(rows), ~model.holds(goal, rows))
 
     return value
 
@@ -208,59 +204,3 @@ def _transposed(true: Bools) -> Rows:
     bits = np.zeros((true.shape[1], -(-true.shape[0] // 64) * 8), np.uint8)
     bits[:, : packed.shape[1]] = packed
     return bits.view("<u8").astype(np.uint64, copy=False)
-
-
-def manhattan(model: JointModel, goal: Goal, variables: Sequence[StateVariable]) -> Values:
-    """The largest Manhattan distance of a state variable's value from where the goal wants it.
-
-    Places are objects whose names end in two numbers, such as ``c2-3``.  A variable is where one
-    thing is, as ``(at r1 c2-3)``.  The distance is divided by the farthest that any action moves
-    the thing; a thing that some action puts somewhere from no place is left out.  So the bound is
-    admissible in every domain.
-
-    Raises `UsageError` if the goal wants nothing at a place.
-    """
-    wanted, places = goal_facts(model, goal), list(map(_place, model.codec.facts))
-    bounds: dict[int, int] = {}
-    for variable in variables:
-        goals = [place for fact in variable.facts if fact in wanted and (place := places[fact])]
-        speed = _speed(variable, places)
-        if len(goals) == 1 and speed is not None:
-            for fact in variable.facts:
-                place = places[fact]
-                bounds[fact] = -(-_distance(place, goals[0]) // speed) if place else FAR
-    if not bounds:
-        raise UsageError(
-            "the Manhattan heuristic needs a goal with places such as c2-3",
-            remedy="Use --heuristic relaxed: it needs no names.",
-        )
-    of_fact = np.array([bounds.get(fact, 0) for fact in range(len(places))])
-
-    def value(rows: Rows) -> Ints:
-        true = TrueFacts.of(model.codec.facts_part(rows))
-        found: Ints = true.reduced(np.maximum, of_fact, 0)
-        return found
-
-    return value
-
-
-def _place(atom: Atom) -> tuple[int, int] | None:
-    """The place that an atom speaks of, if there is exactly one."""
-    found = [m for arg in atom.args if (m := re.search(r"(?<!\d)(\d{1,9})\D+(\d{1,9})$", arg))]
-    return (int(found[0][1]), int(found[0][2])) if len(found) == 1 else None
-
-
-def _speed(variable: StateVariable, places: Sequence[tuple[int, int] | None]) -> int | None:
-    """How far one joint step moves a thing at most; None if it may turn up anywhere."""
-    speed = 1
-    for needs, value in variable.changes.values():
-        before, after = places[needs[0]], places[value]
-        if after is not None and before is None:
-            return None
-        if after is not None and before is not None:
-            speed = max(speed, _distance(before, after))
-    return speed
-
-
-def _distance(one: tuple[int, int], other: tuple[int, int]) -> int:
-    return abs(one[0] - other[0]) + abs(one[1] - other[1])

@@ -7,13 +7,19 @@ import pytest
 
 from benchmarks.paper import planning_cost, scenario
 from benchmarks.paper.__main__ import RECIPES
-from benchmarks.paper.grid import entered_cells, task_cells
+from benchmarks.paper.grid import cell_position, entered_cells, task_cells
+from benchmarks.paper.planning_cost import manhattan
 from benchmarks.paper.recipe import Settings
 from benchmarks.paper.reported import TABLE_1
 from benchmarks.paper.suite import CORRIDOR, OTHERS, ROWS, WORLDS, language_for
 from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.execution.guided_search import ExpandedStates
+from planners.joint.tables import Rows
+from planners.loading import load
+from planners.search.heuristics import HEURISTICS
 from planners.search.plans import Plans
+from planners.search.reachable import explore
+from tests.support.domains import DOMAINS
 from tests.support.task_languages import three_cells
 
 THOROUGH = pytest.mark.thorough
@@ -51,8 +57,23 @@ def test_expansions_on_three_cells() -> None:
     """
     one = three_cells()
     terrain = ExpandedStates(one.model, one.partition)
-    assert planning_cost.expansions(one, "blind", terrain) == (2, 2, 2)
-    assert planning_cost.expansions(one, "relaxed", terrain) == (2, 2, 2)
+    assert planning_cost.expansions(one, HEURISTICS["blind"], terrain) == (2, 2, 2)
+    assert planning_cost.expansions(one, HEURISTICS["relaxed"], terrain) == (2, 2, 2)
+
+
+def test_the_papers_bound_is_the_farthest_robots_distance() -> None:
+    loaded = load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "gwb5-3x3.pddl"])
+    goal = loaded.tasks[0].goal
+    space = explore(loaded.model, loaded.tasks[0].init[None, :])
+
+    def cells(row: Rows) -> dict[str, tuple[int, int]]:
+        atoms = (loaded.model.codec.facts.atoms[f] for f in loaded.model.codec.true_facts(row))
+        return {atom.args[0]: cell_position(atom.args[1]) for atom in atoms}
+
+    (ends,) = (cells(row) for row in space.rows if loaded.model.holds(goal, row[None, :])[0])
+    for row, bound in zip(space.rows, manhattan(loaded.model, goal, ())(space.rows), strict=True):
+        away = [abs(x - ends[r][0]) + abs(y - ends[r][1]) for r, (x, y) in cells(row).items()]
+        assert bound == max(away)
 
 
 def test_the_detour_is_optimal_and_nobody_else_moves_otherwise() -> None:

@@ -38,8 +38,6 @@ PIECE_SIZES = (
     replace(PIECES, probe=0, effort=300, question=0),
 )
 ASKING = [pieces for pieces in PIECE_SIZES if pieces.probe == 0]
-#: What needs no places: manhattan is compared on a grid.
-GENERAL = [name for name in CHOICES if name != "manhattan"]
 COSTS: tuple[Cost, ...] = ("makespan", "makespan+actions", "makespan+cost")
 
 
@@ -122,7 +120,7 @@ def compared(models: Iterable[PlanningInstance | None]) -> Counter[str]:
             continue
         model, task = loaded.model, loaded.tasks[0]
         pieces = PIECE_SIZES[number % len(PIECE_SIZES)]
-        searches = [(pieces, heuristic) for heuristic in GENERAL]
+        searches = [(pieces, heuristic) for heuristic in CHOICES]
         if loaded.domain.name == "rooms":  # made for what the solver is asked
             searches = [(asking, "auto") for asking in ASKING[number % 2 :: 2]]
         try:

@@ -13,26 +13,24 @@ import pytest
 from planners.joint.tables import Ints
 from planners.loading import PlanningInstance, load
 from planners.search.goals import FAR
-from planners.search.heuristics import HEURISTICS, heuristic
+from planners.search.heuristics import HEURISTICS, Bound, heuristic
 from planners.search.mutexes import mutexes
 from planners.search.reachable import Space, explore
 from planners.search.state_variables import StateVariable, state_variables
-from planners.system.errors import UsageError
 from tests.support.domains import DOMAINS
 from tests.support.random_spaces import explored, random_instance
-from tests.support.texts import model_of
 
 
-def check(name: str, loaded: PlanningInstance, space: Space) -> Counter[int]:
+def check(bound: Bound, loaded: PlanningInstance, space: Space) -> Counter[int]:
     """How far below the true distance the bounds are; -1: it is said that there is no way."""
     model, task = loaded.model, loaded.tasks[0]
     true = distances(space, model.holds(task.goal, space.rows).tolist())
-    bound = heuristic(name, model, task.goal, task.init)(space.rows)
-    assert (bound[true >= 0] <= true[true >= 0]).all()
-    assert ((bound == 0) == (true == 0)).all()
-    assert (bound[space.sources] <= bound[space.target] + 1).all()
-    gaps = Counter((true - bound)[(true >= 0) & (bound < FAR)].tolist())
-    return gaps + Counter({-1: int((bound >= FAR).sum())})
+    least = heuristic(bound, model, task.goal, task.init)(space.rows)
+    assert (least[true >= 0] <= true[true >= 0]).all()
+    assert ((least == 0) == (true == 0)).all()
+    assert (least[space.sources] <= least[space.target] + 1).all()
+    gaps = Counter((true - least)[(true >= 0) & (least < FAR)].tolist())
+    return gaps + Counter({-1: int((least >= FAR).sum())})
 
 
 def distances(space: Space, goals: list[bool]) -> Ints:
@@ -74,7 +72,9 @@ def test_random_models() -> None:
         if loaded is None or (space := explored(loaded)) is None or len(space) > 3_000:
             continue
         for name in ("blind", "projections", "relaxed"):
-            seen += Counter({(name, gap): n for gap, n in check(name, loaded, space).items()})
+            seen += Counter(
+                {(name, gap): n for gap, n in check(HEURISTICS[name], loaded, space).items()}
+            )
         variables = variables_of(loaded, space)
         seen["with variables" if variables else "without"] += 1
         if not loaded.model.is_joint_action:
@@ -102,11 +102,7 @@ def test_shipped_domains(problem: str) -> None:
     loaded = load(folder / "domain.pddl", [DOMAINS / f"{problem}.pddl"])
     space = explore(loaded.model, loaded.tasks[0].init[None, :])
     for name in HEURISTICS:
-        if name == "manhattan" and folder.name not in ("grid", "grid-joint", "corridor"):
-            with pytest.raises(UsageError):
-                check(name, loaded, space)
-            continue
-        gaps = check(name, loaded, space)
+        gaps = check(HEURISTICS[name], loaded, space)
         if name == "relaxed" and problem.startswith("grid"):
             # On an open map robots are seldom in each other's way.
             assert gaps[0] > sum(gaps.values()) / 2
@@ -124,28 +120,3 @@ def test_variables_of_domains(folder: str, problem: str, variables: int, facts: 
     loaded = load(DOMAINS / folder / "domain.pddl", [DOMAINS / folder / f"{problem}.pddl"])
     found = variables_of(loaded, explore(loaded.model, loaded.tasks[0].init[None, :]))
     assert (len(found), sum(len(variable.facts) for variable in found)) == (variables, facts)
-
-
-def manhattan(loaded: PlanningInstance) -> int:
-    """At the start."""
-    task = loaded.tasks[0]
-    return int(heuristic("manhattan", loaded.model, task.goal, task.init)(task.init[None, :])[0])
-
-
-JUMPS = """(define (domain jumps) (:types robot place) (:predicates (at ?r - robot ?x - place) (way ?x ?y - place))
-(:action go :agent ?r - robot :parameters (?x ?y - place) :precondition (and (at ?r ?x) (way ?x ?y))
-  :effect (and (at ?r ?y) (not (at ?r ?x))))
-{more})"""
-AROUND = """(define (problem p) (:domain jumps) (:objects r1 r2 - robot c0-0 c0-3 c0-6 c0-7 - place)
-(:init (at r1 c0-0) (at r2 c0-0) (way c0-0 c0-3) (way c0-3 c0-6) (way c0-6 c0-7)) (:goal (and (at r1 c0-7) (at r2 c0-3))))"""
-
-
-def test_manhattan_is_admissible_where_robots_jump() -> None:
-    """At three cells a step seven are three steps; robots that turn up anywhere tell nothing."""
-    loaded = model_of(JUMPS.format(more=""), AROUND)
-    check("manhattan", loaded, explore(loaded.model, loaded.tasks[0].init[None, :]))
-    assert manhattan(loaded) == 3
-    beam = "(:action beam :agent ?r - robot :parameters (?x - place) :effect (at ?r ?x))"
-    anywhere = model_of(JUMPS.format(more=beam), AROUND)
-    with pytest.raises(UsageError, match="Manhattan"):
-        manhattan(anywhere)
