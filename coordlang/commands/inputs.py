@@ -19,7 +19,6 @@ from planners.pddl import read_domain, read_problem
 from planners.pddl.factored import read_factored
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
-from planners.search.state_variables import note_doubled
 from planners.system.errors import Position, UsageError, note
 from planners.system.files import names_format, read_bytes
 from planners.system.notebook import Presented
@@ -191,9 +190,7 @@ class PlanningInput:
 
     def instance(self) -> PlanningInstance:
         """Return the joint model and the tasks of the problems."""
-        loaded = build(self.domain, self.problems, self.source.model)
-        note_doubled(self.domain, self.problems, loaded.model)
-        return loaded
+        return build(self.domain, self.problems, self.source.model)
 
     def candidates(
         self, tasks: TasksSource | None, options: ModelOptions, *, skip_unsolvable: bool = False
@@ -203,14 +200,11 @@ class PlanningInput:
 
         files = self.domain, self.problems
         if tasks is None:
-            found = from_problems(*files, options, skip_unsolvable=skip_unsolvable)
-        elif tasks == "all":
-            found = all_pairs(*files, options)
-        else:
-            listed, position = read_tasks(tasks)
-            found = from_listed(*files, listed, options, position, skip_unsolvable=skip_unsolvable)
-        note_doubled(*files, found.model)
-        return found
+            return from_problems(*files, options, skip_unsolvable=skip_unsolvable)
+        if tasks == "all":
+            return all_pairs(*files, options)
+        listed, position = read_tasks(tasks)
+        return from_listed(*files, listed, options, position, skip_unsolvable=skip_unsolvable)
 
 
 class ReadTask(NamedTuple):

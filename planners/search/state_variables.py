@@ -11,17 +11,16 @@ same fact interfere, so a joint step changes a variable at most once.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations, product
+from itertools import combinations
 
 from planners.grounding.actions import GroundAction
-from planners.joint.model import JointModel, show
+from planners.joint.model import JointModel
 from planners.joint.tables import Rows
 from planners.pddl.formula_tree import literals
-from planners.pddl.lifted import Atom, Domain, Problem, StepAtom
+from planners.pddl.lifted import Atom, StepAtom
 from planners.search.goals import FactsOf
-from planners.system.errors import note
 
 #: Predicates, each with a position of the object, that facts of one variable may have.
 _SHAPES = 3
@@ -42,7 +41,7 @@ class StateVariable:
 
 def state_variables(model: JointModel, init: Rows) -> list[StateVariable]:
     """Disjoint variables for the states that are reachable from ``init``, large ones first."""
-    found = counted_groups(model, init, lambda count: count == 1)
+    found = _groups(model, init)
     found.sort(key=lambda variable: (-len(variable.facts), variable.facts))
     taken: set[int] = set()
     chosen = []
@@ -53,13 +52,8 @@ def state_variables(model: JointModel, init: Rows) -> list[StateVariable]:
     return chosen
 
 
-def counted_groups(
-    model: JointModel, init: Rows, wanted: Callable[[int], bool]
-) -> list[StateVariable]:
-    """Groups with a common object whose number of true facts no action increases.
-
-    ``wanted`` says how many of their facts may be true at the start: 1 is a state variable.
-    """
+def _groups(model: JointModel, init: Rows) -> list[StateVariable]:
+    """Groups with a common object of whose facts exactly one is true, whatever actions do."""
     true = set(model.codec.true_facts(model.codec.facts_part(init)))
     read: dict[int, FactsOf] = {}
     touching: dict[Atom, list[int]] = defaultdict(list)
@@ -67,7 +61,7 @@ def counted_groups(
         for atom in {effect.atom for effect in action.effects}:
             touching[atom].append(number)
     found = []
-    for facts in _candidates(model, true, wanted):
+    for facts in _candidates(model, true):
         atoms = [model.codec.facts.atoms[fact] for fact in facts]
         own = sorted({number for atom in atoms for number in touching.get(atom, ())})
         for number in own:
@@ -88,10 +82,8 @@ def _is_linked(action: GroundAction) -> bool:
     )
 
 
-def _candidates(
-    model: JointModel, true: set[int], wanted: Callable[[int], bool]
-) -> Iterator[frozenset[int]]:
-    """Groups with a common object and a number of true facts that is wanted; no group twice."""
+def _candidates(model: JointModel, true: set[int]) -> Iterator[frozenset[int]]:
+    """Groups with a common object and one true fact; no group twice."""
     shapes: dict[str, dict[tuple[str, int], list[int]]] = defaultdict(lambda: defaultdict(list))
     for number, atom in enumerate(model.codec.facts.atoms):
         for position, name in enumerate(atom.args):
@@ -100,11 +92,11 @@ def _candidates(
     for name in sorted(shapes):
         own = shapes[name]
         count = {shape: sum(fact in true for fact in facts) for shape, facts in own.items()}
-        usable = sorted(shape for shape in own if not count[shape] or wanted(count[shape]))
+        usable = sorted(shape for shape in own if count[shape] <= 1)
         for size in range(min(_SHAPES, len(usable)), 0, -1):
             for chosen in combinations(usable, size):
                 facts = frozenset(fact for shape in chosen for fact in own[shape])
-                if wanted(sum(count[shape] for shape in chosen)) and facts not in met:
+                if sum(count[shape] for shape in chosen) == 1 and facts not in met:
                     met.add(facts)
                     if len(facts) > 1:
                         yield facts
@@ -139,57 +131,3 @@ def _one_at_a_time(actions: Sequence[GroundAction]) -> bool:
     """
     same_robot = actions and frozenset.intersection(*(frozenset(a.owners) for a in actions))
     return bool(same_robot) or not any(map(_is_linked, actions))
-
-
-# ---- a robot in two places
-
-
-def note_doubled(domain: Domain, problems: Sequence[Problem], model: JointModel) -> None:
-    """Note where two values of what actions only exchange are true at the start of a problem.
-
-    As (at r1 a) and (at r1 b), if robots leave a place where they enter another one.  Values of a
-    predicate only that some action exchanges: two free hands are no mistake.
-    """
-    exchanged = _exchanged(domain)
-    for problem in problems:
-        found = _doubled(problem, model, exchanged)
-        if found:
-            name, atoms = found
-            note(
-                f"{' and '.join(sorted(map(show, atoms)))} are true at the start, and actions only "
-                f"ever put one such fact about {name} in the place of another",
-                position=problem.source.section(":init"),
-                remedy="If one of them is a mistake, remove it from (:init ..).",
-            )
-
-
-def _exchanged(domain: Domain) -> set[tuple[str, int]]:
-    """Predicates with the position of an argument that stays while some action changes others."""
-    return {
-        (new.atom.predicate, position)
-        for schema in domain.schemas
-        for new, old in product(schema.effects, repeat=2)
-        if new.adds > old.adds and new.atom.predicate == old.atom.predicate
-        for position, (a, b) in enumerate(zip(new.atom.args, old.atom.args, strict=False))
-        if a == b and new.atom != old.atom
-    }
-
-
-def _doubled(
-    problem: Problem, model: JointModel, exchanged: set[tuple[str, int]]
-) -> tuple[str, list[Atom]] | None:
-    """An object and facts about it, of which only one should be true."""
-    facts: dict[tuple[str, int, str], list[Atom]] = defaultdict(list)
-    for atom in problem.init:
-        for position, name in enumerate(atom.args):
-            if (atom.predicate, position) in exchanged:
-                facts[atom.predicate, position, name].append(atom)
-    suspect = {key: atoms for key, atoms in sorted(facts.items()) if len(atoms) > 1}
-    if not suspect:
-        return None
-    groups = counted_groups(model, model.state(problem.init), lambda count: count > 1)
-    for (_, _, name), atoms in suspect.items():
-        numbers = {model.codec.facts.index[atom] for atom in atoms}
-        if any(numbers <= set(group.facts) for group in groups):
-            return name, atoms
-    return None
