@@ -487,7 +487,9 @@ class SimulateOptions(
     plan: bool = option(False, "All follow one whole plan.")
     runs: int = option(1, "How many runs.", "N", least=1)
     seed: int = option(0, "Of the first run; the next ones follow.", least=0)
-    step: Literal["clock", "barrier", "word"] = option("clock", "How robots keep step.")
+    step: Literal["clock", "barrier", "word", "passings"] | None = option(
+        None, "How robots keep step (default: a clock; passings, if the language is asynchronous)."
+    )
     cell: float = option(1.0, "How far apart neighbouring cells are.", "METRES")
     radius: float | None = option(None, "Of a robot (default: a fifth of --cell).", "METRES")
     noise: float = option(0.1, "The standard deviation of what wheels do.", "SHARE")

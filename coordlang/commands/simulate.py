@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from os import fspath
 from pathlib import Path
@@ -121,11 +121,12 @@ def simulate(files: Arguments, options: SimulateOptions) -> Simulated:
     if options.replay is not None:
         return Simulated(read_simulation(options.replay))
     files.needed("LANGUAGE")
-    given = {name: getattr(options, name) for name in ("step", "cell", "noise", "lidar")}
+    given = {name: getattr(options, name) for name in ("cell", "noise", "lidar")}
     radius = options.cell / 5 if options.radius is None else options.radius
     settings, runs = Settings(radius=radius, **given), options.runs
     require_simulator()
     task = files.task(options.coordinates)
+    settings = replace(settings, step=_step(task.used, options.step))
     prepared = _prepared(task.used, options)
     points = read_coordinates_of(options.coordinates, task.files.problems[0])
     floor = Floor(prepared.world, points, options.cell)
@@ -142,6 +143,20 @@ def simulate(files: Arguments, options: SimulateOptions) -> Simulated:
         raise stopped
     record = record_of(prepared, floor, settings, done, wishes)
     return Simulated(record, task.used.tolerance, stopped)
+
+
+def _step(used: TaskLanguage, step: str | None) -> str:
+    """The way to keep step; raises `UsageError` for one that is not that of the language."""
+    is_asynchronous = used.model.is_asynchronous
+    if step is None:
+        return "passings" if is_asynchronous else "clock"
+    if (step == "passings") != is_asynchronous:
+        execution = "for robots that keep no common step" if is_asynchronous else "for joint steps"
+        raise UsageError(
+            f"--step {step}: the words are {execution}",
+            remedy="Leave out --step." if is_asynchronous else "Build with --asynchronous.",
+        )
+    return step
 
 
 def _wish(prepared: Mission, text: str) -> WishRecord:

@@ -109,7 +109,7 @@ def choices(
         robots.append(
             RobotChoices(robot, exact, "exact")
             if exact
-            else _knowing_own(fits, subplans[robot], robot)
+            else knowing_own(fits, subplans[robot], robot)
         )
     return SentenceChoices(task_language, tuple(words), fits, tuple(robots), mixtures)
 
@@ -125,7 +125,7 @@ def knowing(fits: PlanSpace, robot: int, facts: int) -> RobotChoices:
     return RobotChoices(robot, replace(found, known=known), "own")
 
 
-def _knowing_own(fits: PlanSpace, subplans: Automaton, robot: int) -> RobotChoices:
+def knowing_own(fits: PlanSpace, subplans: Automaton, robot: int) -> RobotChoices:
     """A robot's subplans; of what its own subactions alone change it knows the values."""
     model = fits.model.in_step or fits.model
     facts, changes = own_changes(model, robot)

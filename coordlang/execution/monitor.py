@@ -409,6 +409,19 @@ class EventMonitor(Monitor):
         """What the robot may do next (None: no more), sorted; while one is under way that one."""
         return (self._underway,) if self._underway else super().allowed()
 
+    def subaction(self, event: str) -> str:
+        """What is done in an event."""
+        return self._events[event].subaction
+
+    def partners(self, event: str) -> tuple[str, ...]:
+        """The robots that an event meets."""
+        return tuple(self._events[event].meets)
+
+    def concerns(self, event: str) -> tuple[str, ...]:
+        """The robots that may wait for an own event, and so should be told when it has ended."""
+        counted = self._counted.get(("", self.subaction(event)), ())
+        return tuple(sorted({count.robot for count in counted}))
+
     def missing(self, event: str | None) -> dict[str, int | str]:
         """What an allowed event still waits for; nothing: it may start.
 

@@ -5,9 +5,10 @@
 - ``barrier``: step k begins when every robot has told that it has done k steps.
 - ``word``: a robot goes on as soon as it has done a step.  Only where the next word may have begun
   it tells so, and waits until every robot has.
+- ``passings``: there are no steps.  A robot starts an event when those of others that it waits for
+  have ended, which they tell if it matters to somebody, and so that they are ready for a meeting.
 
-Robots tell each other `Message` s and nothing else: how far they are, never what they do.  Standard
-library only: a robot carries it.
+Robots tell each other `Message` s and nothing else.  Standard library only: a robot carries it.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-Kind = Literal["step", "word"]
+Kind = Literal["step", "word", "ended", "ready"]
 #: By name, as ``--step`` has them.
-PACES = ("clock", "barrier", "word")
+PACES = ("clock", "barrier", "word", "passings")
 
 #: Seconds by which times may differ that are the same: sums of ticks.
 _SAME = 1e-6
@@ -30,11 +31,14 @@ class Message:
     """What a robot tells all others: that it has done so many steps, or come to this word.
 
     ``number`` counts steps from 1 (``step``), or is the index of a word in the sentence (``word``).
+    Without steps that its event with this number has ended, or is ready for its partners, and which
+    ``subaction`` it is.
     """
 
     sender: str
     kind: Kind
     number: int
+    subaction: str = ""
 
 
 class Pace:
@@ -47,11 +51,11 @@ class Pace:
     @property
     def is_common(self) -> bool:
         """Whether all robots turn in the same time before they drive, and idle without time."""
-        return self._way != "word"
+        return self._way in ("clock", "barrier")
 
     def hears(self, messages: Iterable[Message]) -> None:
         """Take in how far the others are."""
-        for message in messages:
+        for message in messages if self._way != "passings" else ():
             self._heard[message.sender] = max(self._heard[message.sender], message.number)
 
     def told(self, steps: int, words: int, is_further: bool) -> Sequence[tuple[Kind, int]]:
@@ -69,7 +73,7 @@ class Pace:
         """
         if self._way == "clock":
             return abs(math.remainder(time, self.period)) < _SAME and begun < time
-        own = steps if self._way == "barrier" else words
+        own = {"barrier": steps, "word": words, "passings": 0}[self._way]
         return all(heard >= own for heard in self._heard.values())
 
     def missed(self, steps: int, time: float) -> int:

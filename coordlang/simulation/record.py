@@ -50,13 +50,23 @@ class EventRecord(msgspec.Struct, frozen=True, omit_defaults=True):
 
     time: _Seconds
     kind: Annotated[
-        Literal["collision", "stopped", "missed", "word", "detour", "deadlock", "arrived"],
+        Literal[
+            "collision",
+            "stopped",
+            "missed",
+            "word",
+            "detour",
+            "contradicted",
+            "deadlock",
+            "arrived",
+        ],
         Meta(
             description="collision: robots touch each other or a wall; stopped: a robot "
             "stands before what its lidar sees, told once in a step; missed: a robot was not there "
             "when a step began by the clock; word: a robot told that it may have come to a word; "
-            "detour: a robot asked its choices whether it can visit an atom; deadlock: "
-            "nobody moves any more; arrived: all steps of all robots are done."
+            "contradicted: a robot heard of an event that its choices exclude; detour: a robot "
+            "asked its choices whether it can visit an atom; deadlock: nobody moves any more; "
+            "arrived: all steps of all robots are done."
         ),
     ]
     robots: Annotated[list[str], Meta(description="The robots that it concerns.")]
@@ -149,7 +159,10 @@ class SimulationRecord(msgspec.Struct, frozen=True):
     ]
     sentence: Annotated[str | None, Meta(description="The sentence; null for another agreement.")]
     covered: Annotated[bool, Meta(description="Whether it is a candidate task of the language.")]
-    step: Annotated[Literal["clock", "barrier", "word"], Meta(description="The way to keep step.")]
+    step: Annotated[
+        Literal["clock", "barrier", "word", "passings"],
+        Meta(description="The way to keep step; passings: there are no steps, but events."),
+    ]
     makespan: Annotated[_Count, Meta(description="The joint steps of each plan.")]
     period: Annotated[
         float, Meta(description="Seconds for a joint step where nothing comes in between.", gt=0)
@@ -209,6 +222,8 @@ def event_text(event: EventRecord) -> str:
             return f"{who} is not there when a step begins"
         case "word":
             return f"{who} may have come to word {event.words[who] + 1} of the sentence"
+        case "contradicted":
+            return f"{who} heard of an event that its plan excludes"
         case "detour":
             allowed = "its choices allow it" if event.granted else "impossible"
             return f"{who} wants to visit {event.visit}: {allowed}"

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
 from random import Random
 
-from coordlang.execution.monitor import IDLE, Monitor
-from coordlang.simulation.pace import Message, OwnWords, Pace
+from coordlang.execution.monitor import IDLE, EventMonitor, Monitor, NotPossible
+from coordlang.simulation.pace import Kind, Message, OwnWords, Pace
 
 #: Metres x, metres y, heading in radians (0: to the right, counterclockwise).
 Pose = tuple[float, float, float]
@@ -26,8 +26,8 @@ Velocity = tuple[float, float]
 
 #: What is worth recording, its kind and further fields.  ``stopped``: something is in its way,
 #: told once in a step; ``missed``: it was late for a beginning by the clock; ``word``: it may have
-#: come to a word; ``detour``: it asked its choices to ``visit`` an atom, and has committed to it
-#: if that is ``granted``.
+#: come to a word; ``contradicted``: it heard of an event that its choices exclude; ``detour``: it
+#: asked its choices to ``visit`` an atom, and has committed to it if that is ``granted``.
 Event = tuple[str, Mapping[str, object]]
 
 STANDING: Velocity = (0.0, 0.0)
@@ -130,6 +130,8 @@ class Robot:
         self._is_turning = False
         self._messages: list[Message] = []
         self._events: list[Event] = []
+        #: The event that it has chosen and not started, where there are no steps.
+        self._chosen: str | None = None
         #: Beginnings missed, the step in which it was stopped.
         self._missed, self._stopped_in = 0, -1
 
@@ -153,14 +155,18 @@ class Robot:
         ahead, random = self._monitor.copy(), Random()
         random.setstate(self._random.getstate())
         chosen = [step.subaction for step in self.steps]
-        while not ahead.finished:
-            chosen.append(drawn(ahead, random))
+        if isinstance(ahead, EventMonitor) and self._is_underway:
             ahead.did(chosen[-1])
+        while not ahead.finished:
+            chosen.append(drawn(ahead, random, ahead.allowed()))
+            Monitor.did(ahead, chosen[-1])  # whatever it would have to wait for
         return chosen
 
     def act(self, sensed: Sensed) -> Velocity:
         """Take a tick: hear, go on with the step under way or begin the next one, and drive."""
         self._pace.hears(sensed.heard)
+        if isinstance(self._monitor, EventMonitor):
+            self._hear_of_events(self._monitor, sensed.heard)
         if not self._is_underway:
             self._heed_wishes(sensed)
             begun = self.steps[-1].begin if self.steps else -1.0
@@ -168,7 +174,14 @@ class Robot:
                 self.done, self.words, begun, sensed.time
             ):
                 return STANDING
-            self._begin(sensed.time)
+            if isinstance(self._monitor, EventMonitor):
+                if not self._may_start(self._monitor):
+                    return STANDING
+                self._begin(self._start(self._monitor), sensed.time)
+            else:
+                drew = drawn(self._monitor, self._random, self._monitor.allowed())
+                self._monitor.did(drew)
+                self._begin(drew, sensed.time)
         step = self.steps[-1]
         if step.place is None:
             has_ended = self._pace.is_common or sensed.time >= step.begin + self._pace.period
@@ -198,10 +211,51 @@ class Robot:
     def _is_underway(self) -> bool:
         return bool(self.steps) and self.steps[-1].end is None
 
-    def _begin(self, time: float) -> None:
-        subaction = drawn(self._monitor, self._random)
+    def _hear_of_events(self, monitor: EventMonitor, heard: Sequence[Message]) -> None:
+        for message in heard:
+            if message.sender == self.name:
+                continue
+            try:
+                if message.kind == "ended":
+                    monitor.ended(message.sender, message.subaction, message.number)
+                else:
+                    monitor.ready(message.sender, message.subaction)
+            except NotPossible:  # they have agreed on nothing
+                self._events.append(("contradicted", {}))
+
+    def _may_start(self, monitor: EventMonitor) -> bool:
+        """Choose among the events that wait for no other one; whether the chosen one may start.
+
+        It may not where partners are not ready: it tells them that it is.
+        """
+        if self._chosen is None:
+            free = [
+                event
+                for event in monitor.allowed()
+                if all(isinstance(its, str) for its in monitor.missing(event).values())
+            ]
+            if not free:
+                return False
+            self._chosen = drawn(monitor, self._random, free)
+            if self._chosen is None:
+                monitor.did(None)
+                return False
+            if monitor.partners(self._chosen):
+                self._tell("ready", self.done + 1, monitor.subaction(self._chosen))
+        return not monitor.missing(self._chosen)
+
+    def _start(self, monitor: EventMonitor) -> str:
+        event = self._chosen
+        assert event is not None, "an event is chosen"
+        monitor.start(event)
+        self._chosen = None
+        return event
+
+    def _tell(self, kind: Kind, number: int, subaction: str = "") -> None:
+        self._messages.append(Message(self.name, kind, number, subaction))
+
+    def _begin(self, subaction: str | None, time: float) -> None:
         place = self._leads.get(subaction) if subaction is not None else None
-        self._monitor.did(subaction)
         self.steps.append(OwnStep(self.done, subaction, place, time))
         self._is_turning = place is not None
         missed = self._pace.missed(self.done, time)
@@ -216,8 +270,12 @@ class Robot:
             words = self.words = max(before, self._own_words.words[self._word_state])
         self.steps[-1] = replace(step, end=time, words=words)
         self.done += 1
+        if isinstance(self._monitor, EventMonitor):
+            self._monitor.did(step.subaction)
+            if step.subaction and self._monitor.concerns(step.subaction):
+                self._tell("ended", self.done, self._monitor.subaction(step.subaction))
         for kind, number in self._pace.told(self.done, self.words, self.words > before):
-            self._messages.append(Message(self.name, kind, number))
+            self._tell(kind, number)
             if kind == "word":
                 self._events.append(("word", {}))
 
@@ -243,12 +301,11 @@ class Robot:
         return max(0.0, min(_bounded(ahead, SPEED), room)), turn
 
 
-def drawn(monitor: Monitor, random: Random) -> str | None:
+def drawn(monitor: Monitor, random: Random, allowed: Sequence[str | None]) -> str | None:
     """Draw what to do next: each own subplan that is left has the same probability."""
-    allowed = monitor.allowed()
     left = []
     for subaction in allowed:
         after = monitor.copy()
-        after.did(subaction)
+        Monitor.did(after, subaction)  # whatever it would have to wait for
         left.append(after.remaining)
     return allowed[bisect_right([*accumulate(left)], random.randrange(sum(left)))]

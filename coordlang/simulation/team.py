@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from itertools import zip_longest
 from random import Random
 from typing import Literal
 
 import numpy as np
 
 from coordlang.execution.automaton import determinise
-from coordlang.execution.choices import choices, knowing, monitor
+from coordlang.execution.choices import choices, knowing, knowing_own, monitor
 from coordlang.execution.monitor import IDLE, Monitor
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import words_passed
@@ -72,7 +73,9 @@ class Mission:
         if agreement == "sentence":
             found = choices(task_language, sentence)
             for name, own in zip(model.robots, found.robots, strict=True):
-                words = own_words(found.fits, task_language, own.robot)
+                words = None
+                if not model.is_asynchronous:
+                    words = own_words(found.fits, task_language, own.robot)
                 self._given[name] = monitor(found.fits, own, ""), words
 
     def team(self, seed: int) -> Team:
@@ -85,8 +88,12 @@ class Mission:
             fits = self._only(
                 self.agreed_plan(seed) if agreed else self._drawn(f"{seed} plan {name}")
             )
-            own = knowing(fits, robot, self._places_of(name))
-            words = own_words(fits, self.task_language, robot) if agreed else None
+            words = None
+            if fits.model.is_asynchronous:
+                own = knowing_own(fits, determinise(fits, robot), robot)
+            else:
+                own = knowing(fits, robot, self._places_of(name))
+                words = own_words(fits, self.task_language, robot) if agreed else None
             team[name] = monitor(fits, own, ""), words
         return team
 
@@ -106,9 +113,15 @@ class Mission:
         )
 
     def mixes(self, subplans: Mapping[str, Sequence[str | None]]) -> bool:
-        """Say whether subplans of all robots, done in step, are an optimal plan of the task."""
-        own = [subplans[name] for name in self.robots]
-        steps = [self.task_language.model.numbers(step) for step in zip(*own, strict=True)]
+        """Say whether subplans of all robots are an optimal plan of the task.
+
+        Done in step; or without a common step, with what their events wait for.
+        """
+        own = [list(subplans[name]) for name in self.robots]
+        if self.task_language.model.is_asynchronous:
+            own = [[event for event in parts if event] for parts in own]
+            own = [parts + [None] * (self.steps - len(parts)) for parts in own]
+        steps = [self.task_language.model.numbers(step) for step in zip_longest(*own)]
         found = [step for step in steps if step is not None]
         return len(found) == self.steps and (
             self._plans.space.path_with(self._plans.start, found) is not None

@@ -54,7 +54,7 @@ class World:
 
     def moves(self, model: JointModel, robot: int, label: int) -> tuple[tuple[str, str], ...]:
         """Return where a robot's subaction always brings things: pairs (thing, place)."""
-        text = model.label_text(robot, label)
+        text = model.subaction_text(robot, label)
         if text is None:
             return ()
         found = []

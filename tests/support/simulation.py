@@ -13,22 +13,30 @@ from coordlang.simulation.record import RunRecord, SimulationRecord, WishRecord
 from coordlang.simulation.run import record_of, runs_of
 from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Agreement, Mission
+from planners.pddl.model_options import ModelOptions
 from tests.support.domains import own_task, read
 
 
 @cache
-def language_of_task(folder: str, stem: str = "problem", method: str = "greedy") -> TaskLanguage:
+def language_of_task(
+    folder: str, stem: str = "problem", method: str = "greedy", asynchronous: bool = False
+) -> TaskLanguage:
     """A language of a shipped problem's own task, in that task."""
-    built = build_language(own_task(folder, stem), method)
+    options = ModelOptions(asynchronous=asynchronous)
+    built = build_language(own_task(folder, stem, options), method)
     return language_in_task(built.language, *read(folder, stem))
 
 
 @cache
 def mission_of(
-    folder: str, stem: str = "problem", agreement: Agreement = "sentence", method: str = "greedy"
+    folder: str,
+    stem: str = "problem",
+    agreement: Agreement = "sentence",
+    method: str = "greedy",
+    asynchronous: bool = False,
 ) -> Mission:
     """A mission in a shipped problem; a sentence is the one that leaves most plans open."""
-    used = language_of_task(folder, stem, method)
+    used = language_of_task(folder, stem, method, asynchronous)
     words = best_sentence(used, ["most-plans"]).words if agreement == "sentence" else ()
     return Mission(used, agreement, words)
 

@@ -106,6 +106,7 @@ def test_plans_that_differ_in_timing_alone_count_once(shell: Shell) -> None:
         "export {} SQUARE 'w1 w2' --to ltlf -o out",
         "export {} SQUARE 'w1 w2' --to pddl -o out",
         "plan {} SQUARE --prefer first:r1",
+        "simulate {} SQUARE --step clock",
         "plan {} SQUARE --prefer avoid:(at\\ r1\\ c0-0)(at\\ r2\\ c0-1)",
         "build SQUARE --asynchronous --slack 1 -o x.json",
         "build SQUARE --asynchronous --method greedy -o x.json",

@@ -59,8 +59,13 @@ def test_numbers_and_texts_are_all_that_a_robot_is_told() -> None:
         "heard": tuple[Message, ...],
         "wanted": tuple[str, ...],
     }
-    assert get_type_hints(Message) == {"sender": str, "kind": Kind, "number": int}
-    assert get_args(Kind) == ("step", "word")
+    assert get_type_hints(Message) == {
+        "sender": str,
+        "kind": Kind,
+        "number": int,
+        "subaction": str,
+    }
+    assert get_args(Kind) == ("step", "word", "ended", "ready")
     assert all(dataclasses.fields(kind) for kind in (Sensed, Message))
 
 
@@ -72,7 +77,7 @@ def test_each_own_subplan_is_drawn_equally_often() -> None:
     for _ in range(100 * subplans):
         monitor, subplan = given.copy(), list[str | None]()
         while not monitor.finished:
-            subplan.append(drawn(monitor, random))
+            subplan.append(drawn(monitor, random, monitor.allowed()))
             monitor.did(subplan[-1])
         found[tuple(subplan)] += 1
     assert len(found) == subplans

@@ -34,10 +34,10 @@ def nearest(found: RunRecord) -> float:
     )
 
 
-def keeps_its_promises(of: Mission, settings: Settings, number: int) -> None:
+def keeps_its_promises(of: Mission, settings: Settings, number: int) -> list[RunRecord]:
     """Nobody collides, waits in vain or comes late."""
-    floor = floor_for(of, settings)
-    for found in runs_of(of, floor, settings, number):
+    runs = list(runs_of(of, floor_for(of, settings), settings, number))
+    for found in runs:
         assert (found.collisions, found.deadlock, found.late) == (0, False, 0)
         assert found.arrived
         assert found.mixes
@@ -45,6 +45,7 @@ def keeps_its_promises(of: Mission, settings: Settings, number: int) -> None:
         # Places are recorded to a millimetre, so that two of them may be 1.4 mm farther apart, and
         # so is the distance.
         assert 2 * settings.radius - 0.001 < found.nearest <= nearest(found) + 0.002
+    return runs
 
 
 @pytest.fixture(scope="module")
@@ -180,3 +181,32 @@ def test_within_a_word_robots_get_out_of_step() -> None:
         assert len(set(event.steps.values())) > 1, "one robot is ahead of the other"
         stopped = [event for event in run_.events if event.kind == "stopped"]
         assert len(stopped) == len({(*e.robots, e.steps[e.robots[0]]) for e in stopped})
+
+
+@pytest.mark.parametrize(
+    ("problem", "number"),
+    [
+        ("t-map/problem", 3),
+        ("grid/gw1-2x2", 3),
+        pytest.param("corridor/problem", 20, marks=pytest.mark.thorough),
+        pytest.param("grid/three-robots-3x3", 20, marks=pytest.mark.thorough),
+    ],
+)
+def test_robots_without_a_common_step_wait_for_passings_alone(problem: str, number: int) -> None:
+    folder, _, stem = problem.partition("/")
+    mission = mission_of(folder, stem, method="best", asynchronous=True)
+    found = keeps_its_promises(mission, Settings(step="passings"), number)
+    events = [event.kind for run_ in found for event in run_.events]
+    assert "contradicted" not in events
+    for run_ in found:
+        acts = [step for step in run_.steps if step.subaction]
+        assert 0 < run_.messages <= len(acts)
+
+
+def test_without_an_agreement_they_contradict_each_other_or_wait_for_ever() -> None:
+    mission = mission_of("t-map", agreement="nothing", method="best", asynchronous=True)
+    found = list(runs_of(mission, floor_for(mission), Settings(step="passings"), 8))
+    assert {run_.mixes for run_ in found} == {True, False}
+    assert all(run_.arrived for run_ in found if run_.mixes)
+    assert any(run_.deadlock for run_ in found)
+    assert any(event.kind == "contradicted" for run_ in found for event in run_.events)
