@@ -9,19 +9,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from math import sqrt
 from random import Random
 from typing import Any
 
 from benchmarks.frame import markdown
-from benchmarks.paper.late_robots import DelayTrials
+from benchmarks.paper.late_robots import DelayTrials, EventTrials
 from benchmarks.paper.plots import Lines, Series, lines
 from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
-from benchmarks.paper.suite import OTHERS, TITLES, WORLDS, language_for
+from benchmarks.paper.suite import OTHERS, TASKS, TITLES, WORLDS, World, language_for
 from benchmarks.paper.tables import by_world, rate
 from benchmarks.paper.task_choices import languages_in_tasks
 
 #: What is said: the whole plan, or a sentence of one of these languages.
-SAID = ("plan", "minimal", "flexible", "slack", "few", "silence")
+SAID = ("plan", "minimal", "slack", "few", "silence", "graph", "mixed", "free")
+#: Of these the ways of robots that keep no common step (`EventTrials`).
+_FREE = ("graph", "mixed", "free")
 #: Probabilities with which a robot is delayed in a step.
 DELAYS = (0.0, 0.05, 0.1, 0.2, 0.3)
 #: The one that the table shows.
@@ -36,10 +39,12 @@ _RUNS = 20
 def units(settings: Settings) -> list[Unit]:
     """List a unit for each world and what is said in it."""
     runs = _RUNS * settings.samples
+    worlds = [(name, said) for name in _WORLDS for said in SAID]
+    worlds += [(world.name, said) for world in TASKS for said in _FREE]
     return [
         Unit("delays", f"{name}/{said}", {"world": name, "said": said, "runs": runs})
-        for name in (("GW1", OTHERS[0].name) if settings.quick else _WORLDS)
-        for said in SAID
+        for name, said in worlds
+        if not settings.quick or name in ("GW1", OTHERS[0].name)
     ]
 
 
@@ -47,6 +52,8 @@ def run(unit: Unit, settings: Settings) -> Result:
     """Count the runs that end in the goal, and how late, for each probability, with and without."""
     said, together = unit.parameters["said"], unit.parameters["said"] == "plan"
     method, world = "minimal" if together else said, WORLDS[unit.parameters["world"]]
+    if said in _FREE:
+        return _without_step(world, unit, settings)
     candidates, language = language_for(world, method, settings.seed)
     trials = DelayTrials(list(languages_in_tasks(language, candidates)), together=together)
     found: Result = {"words": None if together else len(language.words), "tasks": candidates.count}
@@ -55,6 +62,17 @@ def run(unit: Unit, settings: Settings) -> Result:
         for delay in DELAYS:
             random = Random(f"{settings.seed} {unit.key} {name} {delay}")
             found[name].append(trials.sample(delay, yields, unit.parameters["runs"], random))
+    return found
+
+
+def _without_step(world: World, unit: Unit, settings: Settings) -> Result:
+    said = unit.parameters["said"]
+    candidates, language = language_for(world, "asynchronous", settings.seed)
+    trials = EventTrials(list(languages_in_tasks(language, candidates)), said)
+    found: Result = {"words": len(language.words), "tasks": candidates.count, "passings": []}
+    for delay in DELAYS:
+        random = Random(f"{settings.seed} {unit.parameters['world']} {delay}")
+        found["passings"].append(trials.sample(delay, unit.parameters["runs"], random))
     return found
 
 
@@ -71,7 +89,12 @@ sentence. In each step every robot that is not done is delayed with probability 
 a step that is no joint step is a failure. *Yielding*: robots that cannot do their steps wait; the
 run fails if all wait for ever, or miss the goal. The figure shows all *p*; the table has p = 0.1:
 runs that end in the goal in percent, as they come and yielding, and in brackets the mean
-steps of the yielding ones beyond the least makespan."""
+steps of the yielding ones beyond the least makespan.
+
+The last three rows are of robots that [keep no step](asynchronous.md) and wait for passings: all
+follow the plan with its dependency graph, or each draws a plan with its sentence in an asynchronous
+language, or chooses what may start now of what that leaves open. After the semicolon: how often in
+a run a robot that is not delayed waits, with 95 %. The last two worlds are single tasks."""
 
 
 def _table(worlds: Mapping[str, Sequence[Record]]) -> str:
@@ -87,6 +110,11 @@ def _table(worlds: Mapping[str, Sequence[Record]]) -> str:
 def _cell(record: Record) -> str:
     """The share of runs that end well, as they come and yielding, and how late the latter are."""
     shown = DELAYS.index(_SHOWN)
+    if "passings" in record.result:
+        runs, well, late, waits, squares = record.result["passings"][shown]
+        mean = waits / well
+        spread = 1.96 * sqrt((squares / well - mean**2) / well)
+        return f"{100 * well / runs:.1f} (+{late / well:.2f}; {mean:.3f} ± {spread:.3f})"
     (runs, well, _), (_, yielding, late) = (record.result[name][shown] for name in _YIELDING)
     mean = f" (+{late / yielding:.2f})" if yielding else ""
     return f"{100 * well / runs:.1f}, {100 * yielding / runs:.1f}{mean}"
@@ -95,7 +123,8 @@ def _cell(record: Record) -> str:
 def _figure(worlds: Mapping[str, Sequence[Record]]) -> Any:
     def series(record: Record, name: str) -> Series:
         said = record.parameters["said"]
-        points = [rate(well, runs) for runs, well, _ in record.result[name]]
+        found = record.result["passings" if "passings" in record.result else name]
+        points = [rate(well, runs) for runs, well, *_ in found]
         return Series(said, TITLES[said], *zip(*points, strict=True))
 
     unit = "runs that end in the goal (%)"

@@ -14,8 +14,12 @@ from random import Random
 import numpy as np
 
 from benchmarks.paper.task_choices import sentence_of
+from coordlang.execution.automaton import determinise
+from coordlang.execution.choices import knowing_own, monitor
+from coordlang.execution.monitor import EventMonitor
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.sentences import Sentence
+from coordlang.simulation.robot import drawn
 from planners.joint.model import JointModel
 from planners.joint.tables import Rows
 from planners.search.plans import Plan, Plans, counts
@@ -65,7 +69,7 @@ class Execution:
         while busy := [r for r, part in enumerate(parts) if done[r] < len(part)]:
             ready = [robot for robot in busy if not (delay and random.random() < delay)]
             for acting in _larger_first(ready) if yields else [tuple(ready)]:
-                after = self._after(state, {r: parts[r][done[r]] for r in acting})
+                after = self.after(state, {r: parts[r][done[r]] for r in acting})
                 if after is not None:
                     break
             else:
@@ -77,8 +81,8 @@ class Execution:
             state, steps = after, steps + 1
         return np.frombuffer(state, np.uint64), steps
 
-    def _after(self, state: bytes, acting: dict[int, int]) -> bytes | None:
-        """The state after a joint step in which these robots act and the others rest, if any."""
+    def after(self, state: bytes, acting: dict[int, int]) -> bytes | None:
+        """Return the state after a joint step in which these robots act and others rest, if any."""
         if state not in self._steps:
             found = self._model.successors(np.frombuffer(state, np.uint64)[None, :])
             self._steps[state] = {
@@ -158,6 +162,184 @@ class DelayTrials:
         if ended is None or not used.model.holds(goal, ended[0][None, :])[0]:
             return None
         return ended[1] - space.least_makespan(used.task)
+
+
+class EventTrials:
+    """Runs of robots that keep no common step, told of nothing but passings.
+
+    A plan is drawn, and its sentence said.  In each step a robot that is not delayed does an event,
+    as soon as those that it waits for have ended, be it in this step.
+
+    Parameters
+    ----------
+    languages
+        The asynchronous language in every task.
+    way
+        ``graph``: all follow the plan, with what its events wait for (its dependency graph);
+        ``mixed``: each draws a plan with the sentence; ``free``: each chooses, event by event, of
+        what the sentence leaves open what may start now.
+    """
+
+    def __init__(self, languages: Sequence[TaskLanguage], way: str) -> None:
+        self._languages, self._way = languages, way
+        self._execution = Execution(languages[0].in_step)
+        spaces = {id(used.space): used.space for used in languages}
+        self._plans = {number: counts(space) for number, space in spaces.items()}
+        self._said: dict[tuple[int, Sentence], tuple[Plans, list[EventMonitor]]] = {}
+
+    def sample(self, delay: float, runs: int, random: Random) -> tuple[int, ...]:
+        """Run tasks drawn uniformly.
+
+        Returns
+        -------
+        tuple of int
+            The runs; those that ended in the goal; the joint steps beyond the least makespan that
+            these took together; how often robots that were not delayed had to wait in these, and
+            the sum of the squares of that.
+        """
+        well = late = waited = squares = 0
+        for _ in range(runs):
+            used = self._languages[random.randrange(len(self._languages))]
+            ended = self._run(used, delay, random)
+            if ended is not None:
+                steps, waits = ended
+                well, waited, squares = well + 1, waited + waits, squares + waits**2
+                late += steps - used.space.least_makespan(used.task)
+        return runs, well, late, waited, squares
+
+    def _run(self, used: TaskLanguage, delay: float, random: Random) -> tuple[int, int] | None:
+        plans = Plans(used.space, used.start, self._plans[id(used.space)])
+        plan = _drawn(plans, random)
+        said, monitors = self._monitors(used, sentence_of(used, plan))
+        robots = range(len(monitors))
+        own_plans = [plan if self._way == "graph" else _drawn(said, random) for _ in robots]
+        labels = used.model.labels
+        parts = [
+            None
+            if self._way == "free"
+            else [labels[r][step[r]] for step in own_plans[r] if step[r]]
+            for r in robots
+        ]
+        team = _Team(used.in_step, self._execution, monitors, parts, random)
+        init = used.space.rows[used.space.state[used.start]]
+        ended = team.run(init, delay)
+        goal = used.space.goals[used.space.goal[used.start]]
+        if ended is None or not used.model.holds(goal, ended[0][None, :])[0]:
+            return None
+        return ended[1:]
+
+    def _monitors(self, used: TaskLanguage, words: Sentence) -> tuple[Plans, list[EventMonitor]]:
+        key = used.task, words
+        if key not in self._said:
+            fits = used.plans_with(words)
+            monitors = []
+            for robot in range(len(used.model.robots)):
+                own = monitor(fits, knowing_own(fits, determinise(fits, robot), robot), "")
+                assert isinstance(own, EventMonitor)
+                monitors.append(own)
+            self._said[key] = Plans.of(fits), monitors
+        plans, monitors = self._said[key]
+        return plans, [own.copy() for own in monitors]
+
+
+class _Team:
+    """One run; ``parts`` are the events of each robot, None for one that chooses as it goes."""
+
+    def __init__(
+        self,
+        model: JointModel,
+        execution: Execution,
+        monitors: Sequence[EventMonitor],
+        parts: Sequence[Sequence[str] | None],
+        random: Random,
+    ) -> None:
+        self._model, self._execution, self._random = model, execution, random
+        self._monitors, self._parts = monitors, parts
+        self._robots = range(len(monitors))
+        self._done = [0] * len(monitors)
+        self._chosen: dict[int, str] = {}
+
+    def run(self, init: Rows, delay: float) -> tuple[Rows, int, int] | None:
+        """The last state, the steps, and the waits; None if somebody waits for ever."""
+        state, steps, waits = init.tobytes(), 0, 0
+        while busy := self._busy():
+            ready = {r for r in busy if not (delay and self._random.random() < delay)}
+            begin, step, able = state, dict[int, int](), set(ready)
+            while block := self._block(able):
+                able.difference_update(block)
+                labels = {robot: self._label(robot) for robot in block}
+                after = self._execution.after(state, labels)
+                if after is None:
+                    return None
+                # What is done in a step must be a joint step.
+                if self._execution.after(begin, step | labels) == after:
+                    self._do(block)
+                    state, step = after, step | labels
+            still = self._busy()
+            if not step and ready == {*busy}:
+                return None if still else (np.frombuffer(state, np.uint64), steps, waits)
+            steps, waits = steps + 1, waits + sum(r in ready and r not in step for r in still)
+        return np.frombuffer(state, np.uint64), steps, waits
+
+    def _busy(self) -> list[int]:
+        return [robot for robot in self._robots if not self._is_done(robot)]
+
+    def _label(self, robot: int) -> int:
+        text = self._monitors[robot].subaction(self._chosen[robot])
+        return self._model.labels[robot].index(text)
+
+    def _is_done(self, robot: int) -> bool:
+        part = self._parts[robot]
+        return self._monitors[robot].finished if part is None else self._done[robot] == len(part)
+
+    def _block(self, able: set[int]) -> list[int]:
+        """Some of these robots that may start together now; none: nobody may."""
+        for robot in sorted(able):
+            if self._is_done(robot) or not self._chooses(robot):
+                continue
+            partners = self._monitors[robot].partners(self._chosen[robot])
+            block = [robot, *map(self._model.robots.index, partners)]
+            if able.issuperset(block) and not any(map(self._waits, block)):
+                return block
+        return []
+
+    def _waits(self, robot: int) -> bool:
+        return robot not in self._chosen or bool(self._monitors[robot].missing(self._chosen[robot]))
+
+    def _chooses(self, robot: int) -> bool:
+        """Whether the robot has chosen an event that waits for no other one."""
+        own, part = self._monitors[robot], self._parts[robot]
+        if robot not in self._chosen:
+            options = own.allowed() if part is None else (part[self._done[robot]],)
+            free = [
+                event
+                for event in options
+                if all(isinstance(its, str) for its in own.missing(event).values())
+            ]
+            if not free:
+                return False
+            event = drawn(own, self._random, free)
+            if event is None:
+                own.did(None)
+                return False
+            self._chosen[robot] = event
+            for name in own.partners(event):
+                other = self._monitors[self._model.robots.index(name)]
+                other.ready(own.robot, own.subaction(event))
+        return True
+
+    def _do(self, block: Sequence[int]) -> None:
+        events = {robot: self._chosen.pop(robot) for robot in block}
+        for robot, event in events.items():
+            self._monitors[robot].start(event)
+        for robot, event in events.items():
+            own = self._monitors[robot]
+            own.did(event)
+            self._done[robot] += 1
+            for other in self._robots:
+                if other != robot:
+                    text = own.subaction(event)
+                    self._monitors[other].ended(own.robot, text, self._done[robot])
 
 
 def _drawn(plans: Plans, random: Random) -> Plan:

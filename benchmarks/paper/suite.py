@@ -77,8 +77,13 @@ OTHERS = (
 #: The row on which the paper measures sentences and planning, and the one that takes its place in a
 #: quick run.
 ROW, QUICK_ROW = "GWB7", "GWB5"
+#: Single tasks whose sentences leave robots much to choose.
+TASKS = (
+    World("corners-4x4", "grid", "corners-4x4", "problem"),
+    World("three-robots", "grid", "three-robots-3x3", "problem"),
+)
 CORRIDOR = World("corridor", "corridor", "problem", "rooms.tasks.json")
-WORLDS = {world.name: world for world in (*ROWS, *OTHERS, CORRIDOR)}
+WORLDS = {world.name: world for world in (*ROWS, *OTHERS, *TASKS, CORRIDOR)}
 
 #: The methods that are compared where none are named, in the order of tables.
 METHODS = ("greedy", "separating", "minimal")
@@ -89,6 +94,9 @@ TITLES = {
     "separating": "separating",
     "minimal": "minimal",
     "flexible": "minimal, most flexible",
+    "graph": "plan with its dependency graph",
+    "mixed": "asynchronous, drawn",
+    "free": "asynchronous, as free",
     "slack": "greedy, slack 1",
     "few": "the best two words",
     "silence": "one word",
@@ -111,7 +119,8 @@ def language_for(
     """Return the candidate tasks of a world and a language for them.
 
     The method "flexible" is ``--method minimal --prefer flexible``, "slack" is ``--slack 1
-    --words-see-slack``, and "few" and "silence" are ``--words 2`` and ``1``.
+    --words-see-slack``, "asynchronous" is ``--asynchronous``, and "few" and "silence" are ``--words
+    2`` and ``1``.
 
     Raises
     ------
@@ -119,6 +128,8 @@ def language_for(
         If a limit ended the method early: what it then has depends on the machine.
     """
     options = ModelOptions(slack=1, words_see_slack=True) if method == "slack" else None
+    if method == "asynchronous":
+        options, method = ModelOptions(asynchronous=True), "best"
     candidates = world.candidates(listed, options)
     if method in ("few", "silence"):
         words = {"few": 2, "silence": 1}[method]

@@ -10,7 +10,7 @@ from random import Random
 
 import pytest
 
-from benchmarks.paper.late_robots import DelayTrials, Execution
+from benchmarks.paper.late_robots import DelayTrials, EventTrials, Execution
 from benchmarks.paper.suite import WORLDS, language_for
 from benchmarks.paper.task_choices import languages_in_tasks, sentence_of
 from coordlang.execution.task_language import TaskLanguage
@@ -90,3 +90,15 @@ def test_a_delay_by_hand() -> None:
     assert steps(rest, False, *late) is None  # r1 moves to b, where r2 still is
     assert steps(rest, True, *late) == 3
     assert steps(r2, False, 0.0, 1.0) is None  # r1 is late: r2 moves to a, where it still is
+
+
+@pytest.mark.parametrize("way", ["graph", "mixed", "free"])
+def test_robots_that_wait_for_passings_arrive(way: str) -> None:
+    """Without delays in the fewest steps; of three robots, too."""
+    for world in ("GW1", "three-robots"):
+        candidates, language = language_for(WORLDS[world], "asynchronous", 0)
+        trials = EventTrials(list(languages_in_tasks(language, candidates)), way)
+        assert trials.sample(0.0, 20, Random(1))[:3] == (20, 20, 0)
+        runs, well, late, *_ = trials.sample(0.5, 20, Random(1))
+        assert runs == well
+        assert late > 0
