@@ -150,7 +150,7 @@ _DEFINITION = """\
 Discs of radius 0.2 m with two driven wheels, in cells of 1 m: `coordlang simulate`. Wheels have
 10 % noise; robots know their place up to a standard deviation of 1 cm and 0.01 rad. Lidars stop
 robots for what is ahead. Every robot draws uniformly among its own choices. A *clock*, or a
-*barrier* before each step or *word*, [keeps step](simulation.md#three-ways-to-keep-step). A run
+*barrier* before each step or *word*, [keeps step](simulation.md#ways-to-keep-step). A run
 ends *well* if all arrive in time and nobody touches anything."""
 
 _FLOORS = """\
