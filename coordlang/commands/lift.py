@@ -54,6 +54,8 @@ from planners.system.errors import (
 from planners.system.limits import stop_clock
 from planners.system.notebook import Presented, counted
 
+#: What a lifted file says of the model.
+_MODEL = ("cost", "unowned", "remember_actions", "execution")
 _PRODUCER = {"program": "coordlang", "version": coordlang.__version__}
 
 
@@ -149,7 +151,7 @@ def lift(files: Arguments, options: LiftOptions) -> Lifted:
         learned.values,
         robots,
         provenance.domain,
-        {key: provenance.model[key] for key in ("cost", "unowned", "remember_actions")},
+        {key: provenance.model[key] for key in _MODEL if key in provenance.model},
         bool(first.loaded.options.names or first.loaded.options.robot_type),
         tuple(_verified(own, sizes) for own, sizes in zip(every, learned.sizes, strict=True)),
         _PRODUCER | {"seed": options.seed},

@@ -369,6 +369,7 @@ class LiftOptions(AnswerOptions, takes="DOMAIN PROBLEMS..."):
     Exit 0: written.  3: written, but a limit ended the search.  11: no features suffice.
     """
 
+    source: Source = group(Source, without="slack words_see_slack")
     tasks: Literal["all"] | None = option(None, "Tasks: every pair of reachable states.")
     check: Sequence[ProblemSource] = option(
         (), "Verify on this problem, too, or learn from it.", "PROBLEM", without="factored"
@@ -388,11 +389,6 @@ class LiftOptions(AnswerOptions, takes="DOMAIN PROBLEMS..."):
     @staticmethod
     def require(model: ModelOptions) -> None:
         """Raise `UsageError` for a model whose plans teach nothing: those of `load`, too."""
-        if model.asynchronous:
-            raise UsageError(
-                "--asynchronous: words over features are learned from plans in step",
-                remedy="Build a language of this problem: `coordlang build --asynchronous`.",
-            )
         if model.slack:
             raise UsageError(
                 "--slack: words over features are learned from optimal plans",

@@ -8,7 +8,6 @@ import re
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -111,7 +110,6 @@ def test_plans_that_differ_in_timing_alone_count_once(shell: Shell) -> None:
         "build SQUARE --asynchronous --slack 1 -o x.json",
         "build SQUARE --asynchronous --method greedy -o x.json",
         "build SQUARE --asynchronous --method separating -o x.json",
-        "lift SQUARE --asynchronous -o x.json",
     ],
 )
 def test_what_does_not_follow_refuses(command: str, made: Path, shell: Shell) -> None:
@@ -176,10 +174,18 @@ def test_choices_are_events(made: Path, shell: Shell) -> None:
     assert "AwaitStep" not in trees
 
 
-@pytest.mark.parametrize("options", [{"asynchronous": True}, {"slack": 1}])
-def test_words_over_features_are_not_learned_from_a_loaded_domain(options: dict[str, Any]) -> None:
+def test_words_over_features_carry_over(shell: Shell) -> None:
+    shell("lift SQUARE --tasks all --asynchronous -o lifted.json", 0, "verified by definition on")
+    assert json.loads(Path("lifted.json").read_text())["model"]["execution"] == "asynchronous"
+    shell("ground lifted.json SQUARE -o l.json", 0)
+    shell("verify l.json SQUARE", 0, "asynchronous: all optimal plans of one sentence mix freely")
+    loaded = library.load(*SQUARE, asynchronous=True)
+    assert library.lift(loaded, tasks="all").language.model["execution"] == "asynchronous"
+
+
+def test_words_over_features_are_not_learned_from_a_loaded_domain_with_slack() -> None:
     """Its options are not those of `lift`, and a lifted file would not say them."""
-    loaded = library.load(*FILES["CELLS"], **options)
+    loaded = library.load(*FILES["CELLS"], slack=1)
     with pytest.raises(UsageError, match="words over features are learned from"):
         library.lift(loaded)
 
