@@ -10,12 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from coordlang.commands.building import build_language
 from coordlang.language.candidates import all_pairs, from_problems
 from coordlang.language.partition import Partition
 from coordlang.verification.by_definition import verify
 from planners.joint.traces import Traces
 from planners.loading import build, load
+from planners.pddl import parse_problem
+from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
+from planners.pddl.sexpr import Source
 from planners.search.asynchronous import Timing, asynchronous
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
@@ -132,20 +136,45 @@ def test_one_plan_is_the_soonest_in_every_event(robots: int, seeds: range) -> No
     assert compared > 0
 
 
-@pytest.mark.parametrize(
-    ("folder", "stem", "in_step", "asynchronously"),
-    [
-        ("three-cells", "problem", 3, 3),
-        ("t-map", "problem", 3, 3),
-        ("grid", "gw1-2x2", 3, 5),
-        pytest.param("grid", "gw2-2x3", 5, 9, marks=pytest.mark.thorough),
-    ],
-)
-def test_least_words(folder: str, stem: str, in_step: int, asynchronously: int) -> None:
-    """As an independent brute force found them; every mixture arrives in every interleaving."""
-    (space,) = all_tasks(folder, stem).spaces
+#: Maps by their links, robots, fewest words in step and without.
+MAPS = [
+    ("ab bc ca", 2, 3, 3),
+    ("ab bc cd da", 2, 3, 5),
+    ("ab bc cd da ac", 2, 5, 6),
+    ("ab ac ad bc bd cd", 2, 4, 4),
+    ("ab ac ad", 2, 3, 3),
+    ("ab bc ca cd", 2, 3, 3),
+    ("ab bc cd da", 3, 3, 3),
+    *(
+        pytest.param(*one, marks=pytest.mark.thorough)
+        for one in (
+            ("ab ac ad ae", 2, 4, 4),
+            ("ab bc cd ce", 2, 3, 3),
+            ("ab bc ca ad be", 2, 3, 4),
+            ("ab bc ca cd de ec", 2, 3, 4),
+            ("ab bc cd da de", 2, 4, 6),
+            ("ab bc cd de ea", 2, 3, 5),
+            ("ab bc cd de cf", 2, 3, 4),
+            ("ab bc ad be cf", 2, 3, 4),
+            ("ab bc cd de ef fa", 2, 3, 5),
+            ("ab bc de ef ad be cf", 2, 5, 9),
+            ("ab bc ca cd", 3, 5, 5),
+            ("ab bc cd de ea", 3, 5, 8),
+        )
+    ),
+]
+
+
+@pytest.mark.parametrize(("links", "robots", "in_step", "asynchronously"), MAPS)
+def test_least_words(links: str, robots: int, in_step: int, asynchronously: int) -> None:
+    """As the brute force finds them; every mixture arrives in every interleaving."""
+    domain, problem = small_map(links, robots)
+    for options, words in ((None, in_step), (ModelOptions(asynchronous=True), asynchronously)):
+        built = build_language(all_pairs(domain, [problem], options), "minimal")
+        assert len(built.language.words) == built.language.guarantee.lower_bound == words
+    (space,) = all_pairs(domain, [problem]).spaces
     world = World(space.model)
-    plans = [Plans(world, space, task, 100) for task in range(len(space.starts))]
+    plans = [Plans(world, space, task, 200) for task in range(len(space.starts))]
     least, word = least_words(plans, range(len(space.rows)))
     assert least == asynchronously
     for task, own in enumerate(plans):
@@ -155,6 +184,20 @@ def test_least_words(folder: str, stem: str, in_step: int, asynchronously: int) 
             assert world.ends(row, mixed, goal) == {"arrived"}
     if in_step < asynchronously:
         assert sum(len(own.states) for own in plans) < sum(len(own.listed) for own in plans)
+
+
+def small_map(links: str, robots: int) -> tuple[Domain, Problem]:
+    """Robots of the grid on cells that are linked like this."""
+    domain, _ = read("grid", "gw1-2x2")
+    cells = sorted({*links} - {" "})
+    names = [f"r{number + 1}" for number in range(robots)]
+    ways = [f"(adjacent {x[0]} {x[1]}) (adjacent {x[1]} {x[0]})" for x in links.split()]
+    at = " ".join(f"(at {robot} {cell})" for robot, cell in zip(names, cells, strict=False))
+    text = (
+        f"(define (problem map) (:domain grid) (:objects {' '.join(names)} - robot "
+        f"{' '.join(cells)} - cell) (:init {at} {' '.join(ways)}) (:goal (and {at})))"
+    )
+    return domain, parse_problem(Source("map.pddl", text), domain)
 
 
 def test_who_leaves_a_cell_goes_before_who_follows() -> None:
