@@ -9,7 +9,7 @@ differ must separate ``u_i`` from ``v_j`` on some cell of *every* warping path.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 Pair = tuple[int, int]
 
@@ -22,20 +22,6 @@ _NO_PATH = 10**9
 def pair(a: int, b: int) -> Pair:
     """Two states as an unordered pair."""
     return (a, b) if a < b else (b, a)
-
-
-def warping_clause(
-    u: Sequence[int], v: Sequence[int], word: Mapping[int, int] | Sequence[int]
-) -> Clause | None:
-    """The non-identical pairs on a warping path with the fewest non-identical cells.
-
-    The path is one of ``u`` and ``v`` under ``word``.
-
-    None if the two sentences differ.  O(len(u) * len(v)).
-    """
-    first, second = [word[a] for a in u], [word[b] for b in v]
-    path = warping_path(u, v, [[a == b for b in second] for a in first])
-    return None if path is None else frozenset(pair(u[i], v[j]) for i, j in path if u[i] != v[j])
 
 
 def warping_path(
@@ -71,21 +57,3 @@ def _before(best: list[list[int]], i: int, j: int) -> tuple[int, int, int]:
         best[i - 1][j] if i else _NO_PATH,
         best[i][j - 1] if j else _NO_PATH,
     )
-
-
-def separation_clause(
-    sequences: Sequence[Sequence[int]], word: Mapping[int, int] | Sequence[int]
-) -> Clause | None:
-    """The clause of a failing tuple of plans.
-
-    The union of warping paths from the first to each other one.
-
-    None if not all of them have one sentence.
-    """
-    clause: set[Pair] = set()
-    for other in sequences[1:]:
-        pairs = warping_clause(sequences[0], other, word)
-        if pairs is None:
-            return None
-        clause |= pairs
-    return frozenset(clause)

@@ -192,13 +192,11 @@ def task_summary(language: TaskLanguage, world: World) -> dict[str, Any]:
     """Return the start and goal of a task in words and, as ``goals``, on the map."""
     space, model = language.space, language.model
     init = model.codec.decode(space.rows[space.state[language.start]])
-    text = goal_text(model, space.goals[space.goal[language.start]])
-    literals = split_atoms(text)
+    literals = split_atoms(goal_text(model, space.goals[space.goal[language.start]]))
     goals = world.located(literals)
     others = [a for a in literals if world.role(a)[0] != "at" and a not in init]
     return {
         "title": _title(world.located(init), goals, others),
-        "goal_text": text,
         "goals": [
             [world.things.index(thing), world.places.index(place)] for thing, place in goals.items()
         ],

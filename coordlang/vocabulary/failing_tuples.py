@@ -303,7 +303,7 @@ def _pairs(sequences: Ints, words: Ints, states: int) -> Ints:
 
 
 def _clauses(sequences: Ints, words: Ints, states: int) -> Iterator[tuple[int, Clause]]:
-    """`separation_clause` of each tuple that has one, with its row; see `_pairs`."""
+    """The clause of each tuple of one sentence, with its row; see `_pairs`."""
     pairs = _pairs(sequences, words, states)
     for row in np.flatnonzero((pairs != -2).all(axis=1)).tolist():
         codes = set(pairs[row].tolist()) - {-1}

@@ -17,7 +17,6 @@ from itertools import combinations, product
 from random import Random
 
 from coordlang.language.candidates import all_pairs
-from coordlang.language.warping import separation_clause
 from coordlang.vocabulary.sat import PartitionProblem
 from planners.grounding.actions import GroundAction
 from planners.joint import traces as joint
@@ -373,7 +372,7 @@ def _violated(plans: Sequence[Plans], word: Mapping[int, int]) -> list[frozenset
     for own in plans:
         for mixed, chosen in own.mixtures(word):
             if mixed not in own.states:
-                clause = separation_clause([own.states[parts] for parts in chosen], word)
+                clause = naive.separation_clause([own.states[parts] for parts in chosen], word)
                 assert clause is not None, "they have one sentence"
                 found.append(clause)
     return found

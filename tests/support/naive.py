@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from itertools import product
 from typing import TypeVar
 
 from coordlang.execution.task_language import TaskLanguage
+from coordlang.language.warping import Clause, Pair, pair, warping_path
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, counts
 
@@ -144,3 +145,35 @@ def plans_by_sentence(task_language: TaskLanguage) -> dict[tuple[str, ...], set[
     words = [language.states.get(key, language.default) for key in keys]
     groups = by_sentence(space, task_language.task, words.__getitem__, 1_000)
     return {said: set(plans) for said, plans in groups.items()}
+
+
+def warping_clause(
+    u: Sequence[int], v: Sequence[int], word: Mapping[int, int] | Sequence[int]
+) -> Clause | None:
+    """The non-identical pairs on a warping path with the fewest non-identical cells.
+
+    The path is one of ``u`` and ``v`` under ``word``.
+
+    None if the two sentences differ.  O(len(u) * len(v)).
+    """
+    first, second = [word[a] for a in u], [word[b] for b in v]
+    path = warping_path(u, v, [[a == b for b in second] for a in first])
+    return None if path is None else frozenset(pair(u[i], v[j]) for i, j in path if u[i] != v[j])
+
+
+def separation_clause(
+    sequences: Sequence[Sequence[int]], word: Mapping[int, int] | Sequence[int]
+) -> Clause | None:
+    """The clause of a failing tuple of plans.
+
+    The union of warping paths from the first to each other one.
+
+    None if not all of them have one sentence.
+    """
+    clause: set[Pair] = set()
+    for other in sequences[1:]:
+        pairs = warping_clause(sequences[0], other, word)
+        if pairs is None:
+            return None
+        clause |= pairs
+    return frozenset(clause)

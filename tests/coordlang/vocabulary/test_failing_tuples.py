@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from coordlang.language.sentences import sentence
-from coordlang.language.warping import separation_clause
 from coordlang.required.choices import Choices
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.vocabulary.counterexamples import Mixtures, many_counterexamples
 from coordlang.vocabulary.failing_tuples import FailingTuples
 from planners.search.plan_space import PlanSpace
 from tests.support.domains import all_tasks
+from tests.support.naive import separation_clause
 from tests.support.random_spaces import runs, separable_spaces
 
 

@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 
 from coordlang.commands.building import build_language
 from coordlang.language.sentences import sentence
-from coordlang.language.warping import pair, separation_clause, warping_clause
+from coordlang.language.warping import pair
 from coordlang.vocabulary.sat import PartitionProblem
 from tests.support.candidates import small_candidates
 from tests.support.domains import all_tasks
+from tests.support.naive import separation_clause, warping_clause
 
 
 @pytest.mark.parametrize(
