@@ -14,11 +14,11 @@ import numpy as np
 from coordlang.language.partition import Partition, read_key
 from coordlang.language.provenance import Guarantee, Provenance, Tolerance, UnknownFailures
 from planners.joint.model import JointModel
-from planners.system.notebook import counted, html_table
+from planners.system.notebook import Presented
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Language:
+class Language(Presented):
     """A partition of states as text, and where it comes from.
 
     ``states``: state key (`planners.joint.states.StateCodec.key`) -> word; ``default`` is the word
@@ -85,24 +85,16 @@ class Language:
 
         write_language(self, fspath(path))
 
-    def __repr__(self) -> str:
-        """The words and the guarantee, not the states: there may be millions."""
-        g = self.guarantee
-        return (
-            f"Language(words={len(self.words)}, lower_bound={g.lower_bound}, method={g.method!r}, "
-            f"states={len(self.states)}, robots={self.provenance.robots})"
-        )
-
-    def _repr_html_(self) -> str:
-        """A table for notebooks: the words with their numbers of states."""
-        sizes = self.sizes()
-        rows = [
-            (word, f"{sizes[word]:,}{' and every other state' * (word == self.default)}")
-            for word in self.words
-        ]
-        return html_table(
-            ("word", "states"), rows, f"{counted(len(rows), 'word')} ({self.guarantee.claim})"
-        )
+    def facts(self) -> dict[str, object]:
+        """The numbers of words and states, and what is known of them: there may be millions."""
+        guarantee = self.guarantee
+        return {
+            "words": len(self.words),
+            "lower_bound": guarantee.lower_bound,
+            "method": guarantee.method,
+            "states": len(self.states),
+            "robots": self.provenance.robots,
+        }
 
     def partition(self, model: JointModel) -> Partition:
         """Read the states' keys over a joint model.

@@ -3,12 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import ClassVar
-
-#: Rows of a table in a notebook.
-ROWS_SHOWN = 20
 
 
 class Presented:
@@ -26,21 +23,11 @@ class Presented:
         return f"{type(self).__name__}({shown})"
 
     def _repr_html_(self) -> str:
-        return html_table((), [(name, _plain(value)) for name, value in self.facts().items()])
-
-
-def html_table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
-    """Return an HTML table; with more than `ROWS_SHOWN` rows only their beginning."""
-    rows = list(rows)
-    lines = ["<table>"]
-    if caption:
-        lines.append(f"<caption>{escape(caption)}</caption>")
-    if head:
-        lines.append(_row("th", head))
-    lines += [_row("td", row) for row in rows[:ROWS_SHOWN]]
-    if len(rows) > ROWS_SHOWN:
-        lines.append(_row("td", [f".. and {len(rows) - ROWS_SHOWN:,} more"]))
-    return "\n".join([*lines, "</table>"])
+        rows = [
+            f"<tr><td>{escape(name)}</td><td>{escape(_plain(value))}</td></tr>"
+            for name, value in self.facts().items()
+        ]
+        return "\n".join(["<table>", *rows, "</table>"])
 
 
 def counted(number: int, noun: str) -> str:
@@ -58,10 +45,6 @@ def some(names: Sequence[str], most: int) -> str:
     """At most so many names as text: ``r1, r2 and 3 more``."""
     more = f" and {len(names) - most:,} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more
-
-
-def _row(cell: str, texts: Sequence[str]) -> str:
-    return f"<tr>{''.join(f'<{cell}>{escape(text)}</{cell}>' for text in texts)}</tr>"
 
 
 def _plain(value: object) -> str:
