@@ -48,7 +48,7 @@ COMMANDS = {
     "plan": "Find one optimal plan under a sentence, or under the best sentence.",
     "choices": "Show what each robot may do under a sentence, whatever the others choose.",
     "simulate": "Let robots with wheels do a task in a simulator.",
-    "export": "Write a task under a sentence as PDDL or LTLf, for other programs.",
+    "export": "Write a task under a sentence as PDDL, LTLf or behaviour trees.",
     "explain": "Show a language: words as formulas, sentences of a task.",
     "report": "Write a page that shows a language: words, sentences, plans played.",
     "domains": "List or copy the domains that come with coordlang.",
