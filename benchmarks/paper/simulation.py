@@ -19,7 +19,6 @@ from benchmarks.paper.recipe import Recipe, Record, Result, Section, Settings, U
 from benchmarks.paper.scenario import PLACE, detour, drawn_task, trading_rooms
 from benchmarks.paper.suite import CORRIDOR, language_for
 from benchmarks.paper.task_choices import languages_in_tasks
-from coordlang.simulation.pace import PACES
 from coordlang.simulation.record import RunRecord, WishRecord
 from coordlang.simulation.simulator import Settings as How
 from coordlang.simulation.simulator import require_simulator
@@ -27,9 +26,11 @@ from coordlang.simulation.team import Agreement
 from planners.search.plans import Plans
 from planners.system.errors import UsageError
 
+#: The ways to keep step, which these languages need.
+_PACES = ("clock", "barrier", "word")
 #: How robots drive: by each way to keep step, and where no lidar stops who was about to collide.
 _BLIND = "clock, no lidar"
-_WAYS = {**{pace: How(step=pace) for pace in PACES}, _BLIND: How(step="clock", lidar=False)}
+_WAYS = {**{pace: How(step=pace) for pace in _PACES}, _BLIND: How(step="clock", lidar=False)}
 #: What robots have agreed on, and how they drive then: without a sentence there is no word.
 _DRIVEN: Mapping[Agreement, Sequence[str]] = {
     "sentence": tuple(_WAYS),
@@ -99,7 +100,7 @@ def _run_detour(unit: Unit, settings: Settings) -> Result:
     prepared = mission_of(used, first, "sentence")
     wish = WishRecord("r1", _LEARNED, prepared.atom_at("r1", PLACE))
     found: Result = {"words": len(language.words), "known": detour(used), "steps": prepared.steps}
-    for pace in PACES:
+    for pace in _PACES:
         pairs = [
             (drive(prepared, How(step=pace), n), drive(prepared, How(step=pace), n, wishes=[wish]))
             for n in range(unit.parameters["runs"])
@@ -214,7 +215,7 @@ def _detour_text(record: Record) -> str:
             *(result[pace][what] for what in counts),
             *(f"{total / result[pace]['runs']:.1f}" for total in result[pace]["messages"]),
         ]
-        for pace in PACES
+        for pace in _PACES
     ]
     head = (
         *("step", "runs", "passed without the wish", "granted", "passed", "r2 does the same"),
