@@ -80,7 +80,8 @@ def section(records: Sequence[Record]) -> Section:
     """Render a table for one probability, and a figure for all."""
     worlds = by_world(records)
     alt = "Runs that end in the goal, by the probability of a delay"
-    return Section([_DEFINITION, _table(worlds), Figure("delays", alt, partial(_figure, worlds))])
+    figure = Figure("delays", alt, partial(_figure, worlds))
+    return Section([_DEFINITION, _table(worlds), _WAITS, _waits(worlds), figure])
 
 
 _DEFINITION = """\
@@ -96,6 +97,10 @@ follow the plan with its dependency graph, or each draws a plan with its sentenc
 language, or chooses what may start now of what that leaves open. After the semicolon: how often in
 a run a robot that is not delayed waits, with 95 %. The last two worlds are single tasks."""
 
+_WAITS = """\
+How often in a run a robot waits that is not delayed, with the dependency graph of one plan → each
+taking what is free, by *p*; and of all these runs those that end in the goal."""
+
 
 def _table(worlds: Mapping[str, Sequence[Record]]) -> str:
     cells = {
@@ -105,6 +110,19 @@ def _table(worlds: Mapping[str, Sequence[Record]]) -> str:
     }
     rows = [[TITLES[said], *(cells.get((name, said)) for name in worlds)] for said in SAID]
     return markdown(("said", *worlds), rows)
+
+
+def _waits(worlds: Mapping[str, Sequence[Record]]) -> str:
+    rows = []
+    for name, here in worlds.items():
+        found = {record.parameters["said"]: record.result.get("passings", []) for record in here}
+        own = [found[said] for said in _FREE]
+        means = [[waits / well for _, well, _, waits, _ in one] for one in own]
+        runs, well = (sum(sample[k] for one in own for sample in one) for k in (0, 1))
+        pairs = zip(means[0], means[-1], strict=True)
+        cells = [f"{graph:.3f} → {free:.3f}" for graph, free in pairs]
+        rows.append([name, *cells, f"{well:,} of {runs:,}"])
+    return markdown(("world", *(f"p = {delay:g}" for delay in DELAYS), "arrive"), rows)
 
 
 def _cell(record: Record) -> str:
@@ -123,14 +141,14 @@ def _cell(record: Record) -> str:
 def _figure(worlds: Mapping[str, Sequence[Record]]) -> Any:
     def series(record: Record, name: str) -> Series:
         said = record.parameters["said"]
-        found = record.result["passings" if "passings" in record.result else name]
-        points = [rate(well, runs) for runs, well, *_ in found]
+        points = [rate(well, runs) for runs, well, _ in record.result[name]]
         return Series(said, TITLES[said], *zip(*points, strict=True))
 
     unit = "runs that end in the goal (%)"
     panels = [
-        Lines(f"{world}, {name}", unit, [series(record, name) for record in here])
+        Lines(f"{world}, {name}", unit, [series(record, name) for record in own])
         for world, here in worlds.items()
+        if (own := [record for record in here if record.parameters["said"] not in _FREE])
         for name in _YIELDING
     ]
     return lines(panels, DELAYS, "probability of a delay", len(_YIELDING))
