@@ -18,8 +18,8 @@ import numpy as np
 
 from planners.grounding.actions import GroundAction
 from planners.joint.composition import ComposingStepper
-from planners.joint.model import JointModel, Options
-from planners.joint.tables import Bools, Ints, Rows
+from planners.joint.model import JointModel
+from planners.joint.tables import Bools, Rows
 from planners.pddl.formula_tree import literals
 from planners.pddl.lifted import Atom, StepAtom
 
@@ -65,6 +65,7 @@ class Traces:
         self._robots = range(len(model.robots))
         self.interfering = _interfering(model)
         self.has_ties = False
+        self._options: dict[bytes, tuple[set[int], ...]] = {}
         self._results: dict[tuple[bytes, Step], Rows | None] = {}
         self._blocks: dict[tuple[bytes, Step], tuple[Block, ...]] = {}
 
@@ -72,14 +73,26 @@ class Traces:
         """What a joint step leads to; None if it is none in this state."""
         key = row.tobytes(), step
         if key not in self._results:
-
-            def only(_: Rows, options: Options) -> Options:
-                return [_only(own, label) for own, label in zip(options, step, strict=True)]
-
-            found = self._model.successors(row[None, :], only)
-            mine = np.flatnonzero((found.labels == step).all(axis=1))
-            self._results[key] = found.result[mine[0]] if len(mine) else None
+            self._results[key] = self._made(row, step) if self.allows(row, step) else None
         return self._results[key]
+
+    def allows(self, row: Rows, step: Step) -> bool:
+        """Whether each subaction of a step may be done in a state, whatever the others do."""
+        key = row.tobytes()
+        if key not in self._options:
+            options = self._model.stepper.choices(self._model.codec.facts_part(row[None, :]))
+            self._options[key] = tuple(set(labels.tolist()) for _, labels in options)
+        return all(label in own for label, own in zip(step, self._options[key], strict=True))
+
+    def _made(self, row: Rows, step: Step) -> Rows | None:
+        model, facts = self._model, self._model.codec.facts_part(row[None, :])
+        only = [(np.array([0, 1]), np.array([label])) for label in step]
+        found = model.stepper.steps(facts, only)
+        mine = np.flatnonzero((found.labels == step).all(axis=1))  # joint actions heed no choices
+        result = found.result[mine]
+        if model.remembers:
+            result = model.codec.remembering(result, found.labels[mine])
+        return result[0] if len(mine) else None
 
     def follow(self, row: Rows, steps: Sequence[Step]) -> Rows | None:
         """Where joint steps one after another lead; None if one cannot be taken."""
@@ -149,6 +162,15 @@ class Traces:
                 found[robot] = Event(step[robot], tuple(counts), meets)
         return found
 
+    def interfere(self, block: Block, own: Step, step: Step) -> bool:
+        """Whether an event of some robots interferes with one of others in a step."""
+        return any(
+            self.interfering[robot, other][own[robot], label]
+            for robot in block
+            for other, label in enumerate(step)
+            if label and other not in block
+        )
+
     def _joined(self, step: Step) -> list[Block]:
         """Robots whose events interfere, by way of others too, together."""
         found: list[set[int]] = []
@@ -195,13 +217,6 @@ def ordered_partitions(robots: Block, number: int) -> Iterator[tuple[Block, ...]
         for first in combinations(robots, size):
             rest = tuple(robot for robot in robots if robot not in first)
             yield from ((first, *others) for others in ordered_partitions(rest, number - 1))
-
-
-def _only(options: tuple[Ints, Ints], label: int) -> tuple[Ints, Ints]:
-    """Of what a robot may choose in one state one label."""
-    _, labels = options
-    chosen = labels[labels == label]
-    return np.array([0, len(chosen)]), chosen
 
 
 def _interfering(model: JointModel) -> dict[tuple[int, int], Bools]:

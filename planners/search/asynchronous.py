@@ -177,13 +177,15 @@ class _Unfolding:
         )
         for block in traces.blocks(middle, second):
             others = tuple(robot for robot in self._robots if robot not in block)
-            sooner = tuple(second[r] if r in block else first[r] for r in self._robots)
-            steps = sooner, alone(others, second)
-            if (
-                idle.issuperset(block)
-                and any(steps[1])
-                and traces.leads(row, steps, end)
-                and traces.events(row, steps) == traces.events(row, (first, second))
+            own, rest = alone(block, second), alone(others, second)
+            if not (idle.issuperset(block) and any(rest) and traces.allows(row, own)):
+                continue
+            if not traces.interfere(block, own, first) and not traces.interfere(block, own, rest):
+                return True  # they commute with all of both steps
+            sooner = tuple(own[r] or first[r] for r in self._robots)
+            steps = sooner, rest
+            if traces.leads(row, steps, end) and (
+                traces.events(row, steps) == traces.events(row, (first, second))
             ):
                 return True
         return False
