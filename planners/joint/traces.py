@@ -62,10 +62,11 @@ class Traces:
 
     def __init__(self, model: JointModel) -> None:
         self._model = model
+        stepper = model.stepper
+        self._stepper = stepper if isinstance(stepper, ComposingStepper) else None
         self._robots = range(len(model.robots))
         self.interfering = _interfering(model)
         self.has_ties = False
-        self._options: dict[bytes, tuple[set[int], ...]] = {}
         self._results: dict[tuple[bytes, Step], Rows | None] = {}
         self._blocks: dict[tuple[bytes, Step], tuple[Block, ...]] = {}
 
@@ -77,15 +78,17 @@ class Traces:
         return self._results[key]
 
     def allows(self, row: Rows, step: Step) -> bool:
-        """Whether each subaction of a step may be done in a state, whatever the others do."""
-        key = row.tobytes()
-        if key not in self._options:
-            options = self._model.stepper.choices(self._model.codec.facts_part(row[None, :]))
-            self._options[key] = tuple(set(labels.tolist()) for _, labels in options)
-        return all(label in own for label, own in zip(step, self._options[key], strict=True))
+        """Whether a state allows each subaction of a step, whatever the others do.
+
+        True of joint actions: they are no subactions.
+        """
+        facts = self._model.codec.facts_part(row[None, :])[0]
+        return self._stepper is None or self._stepper.allows(facts, step)
 
     def _made(self, row: Rows, step: Step) -> Rows | None:
         model, facts = self._model, self._model.codec.facts_part(row[None, :])
+        if self._stepper is not None and self._stepper.is_fixed(step) and not model.remembers:
+            return self._stepper.fixed_step(row, step)
         only = [(np.array([0, 1]), np.array([label])) for label in step]
         found = model.stepper.steps(facts, only)
         mine = np.flatnonzero((found.labels == step).all(axis=1))  # joint actions heed no choices
@@ -186,7 +189,7 @@ class Traces:
         return sorted(tuple(sorted(one)) for one in found)
 
     def _finest(self, row: Rows, step: Step, together: Block) -> tuple[Block, ...]:
-        if len(together) == 1 or not isinstance(self._model.stepper, ComposingStepper):
+        if len(together) == 1 or self._stepper is None:
             return (together,)
         result = self.result(row, alone(together, step))
         assert result is not None, "what it does not interfere with is not needed"

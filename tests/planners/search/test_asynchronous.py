@@ -14,6 +14,7 @@ from coordlang.commands.building import build_language
 from coordlang.language.candidates import all_pairs, from_problems
 from coordlang.language.partition import Partition
 from coordlang.verification.by_definition import verify
+from planners.joint.composition import ComposingStepper
 from planners.joint.traces import Traces
 from planners.loading import build, load
 from planners.pddl import parse_problem
@@ -198,6 +199,29 @@ def small_map(links: str, robots: int) -> tuple[Domain, Problem]:
         f"{' '.join(cells)} - cell) (:init {at} {' '.join(ways)}) (:goal (and {at})))"
     )
     return domain, parse_problem(Source("map.pddl", text), domain)
+
+
+def test_single_steps_are_those_of_tables() -> None:
+    """What a state allows, and what one step leads to, whether it is looked up alone or not."""
+    seen: Counter[bool] = Counter()
+    for space, world, _, random in random_tasks(3, range(30)):
+        traces, model = Traces(space.model), space.model
+        if not isinstance(model.stepper, ComposingStepper):
+            continue
+        for row in space.rows[:20]:
+            options = model.stepper.choices(model.codec.facts_part(row[None, :]))
+            for robot, (_, labels) in enumerate(options):
+                for label in range(len(model.labels[robot])):
+                    step = tuple(label if r == robot else 0 for r in range(space.robots))
+                    assert traces.allows(row, step) == (label in labels)
+            for _ in range(30):
+                step = tuple(int(random.choice(labels.tolist())) for _, labels in options)
+                result = traces.result(row, step)
+                known = world.steps(row).get(step)
+                assert (result is None) == (known is None)
+                assert result is None or (result == known).all()
+                seen[result is None] += 1
+    assert min(seen.values()) > 100
 
 
 def test_who_leaves_a_cell_goes_before_who_follows() -> None:
