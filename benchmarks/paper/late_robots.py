@@ -8,7 +8,7 @@ in step, so delays may break what mixes freely, whatever was agreed.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import combinations, product
+from itertools import combinations
 from random import Random
 
 import numpy as np
@@ -89,9 +89,8 @@ class Execution:
                 tuple(labels): row.tobytes()
                 for labels, row in zip(found.labels.tolist(), found.result, strict=True)
             }
-        steps = self._steps[state]
-        choices = ([acting.get(r, 0)] for r in range(len(self._model.robots)))
-        return next((steps[labels] for labels in product(*choices) if labels in steps), None)
+        labels = tuple(acting.get(robot, 0) for robot in range(len(self._model.robots)))
+        return self._steps[state].get(labels)
 
 
 def _larger_first(robots: Sequence[int]) -> Iterator[tuple[int, ...]]:
@@ -113,10 +112,7 @@ class DelayTrials:
     def __init__(self, languages: Sequence[TaskLanguage], *, together: bool = False) -> None:
         self._languages, self._together = languages, together
         self._execution = Execution(languages[0].model)
-        self._counted = {id(used.space): [0] for used in languages}
-        for used in languages:
-            if self._counted[id(used.space)] == [0]:
-                self._counted[id(used.space)] = counts(used.space)
+        self._plans = _plans_of(languages)
         self._said: dict[tuple[int, Sentence], Plans] = {}
 
     def sample(self, delay: float, yields: bool, runs: int, random: Random) -> tuple[int, int, int]:
@@ -138,9 +134,7 @@ class DelayTrials:
 
     def _parts(self, task: int, random: Random) -> list[Part]:
         """What each robot does, in one run."""
-        used = self._languages[task]
-        plans = Plans(used.space, used.start, self._counted[id(used.space)])
-        plan = _drawn(plans, random)
+        used, plan = self._languages[task], _drawn(self._plans[task], random)
         robots = range(len(used.model.robots))
         if self._together:
             return [self._execution.part_of(plan, robot) for robot in robots]
@@ -158,8 +152,7 @@ class DelayTrials:
         space = used.space
         row = space.rows[space.state[used.start]]
         ended = self._execution.run(used.model.forgetting_slack(row), parts, delay, yields, random)
-        goal = space.goals[space.goal[used.start]]
-        if ended is None or not used.model.holds(goal, ended[0][None, :])[0]:
+        if ended is None or not _in_goal(used, ended[0]):
             return None
         return ended[1] - space.least_makespan(used.task)
 
@@ -183,8 +176,7 @@ class EventTrials:
     def __init__(self, languages: Sequence[TaskLanguage], way: str) -> None:
         self._languages, self._way = languages, way
         self._execution = Execution(languages[0].in_step)
-        spaces = {id(used.space): used.space for used in languages}
-        self._plans = {number: counts(space) for number, space in spaces.items()}
+        self._plans = _plans_of(languages)
         self._said: dict[tuple[int, Sentence], tuple[Plans, list[EventMonitor]]] = {}
 
     def sample(self, delay: float, runs: int, random: Random) -> tuple[int, ...]:
@@ -199,34 +191,30 @@ class EventTrials:
         """
         well = late = waited = squares = 0
         for _ in range(runs):
-            used = self._languages[random.randrange(len(self._languages))]
-            ended = self._run(used, delay, random)
+            task = random.randrange(len(self._languages))
+            ended = self._run(task, delay, random)
             if ended is not None:
-                steps, waits = ended
-                well, waited, squares = well + 1, waited + waits, squares + waits**2
-                late += steps - used.space.least_makespan(used.task)
+                lateness, waits = ended
+                well, late = well + 1, late + lateness
+                waited, squares = waited + waits, squares + waits**2
         return runs, well, late, waited, squares
 
-    def _run(self, used: TaskLanguage, delay: float, random: Random) -> tuple[int, int] | None:
-        plans = Plans(used.space, used.start, self._plans[id(used.space)])
-        plan = _drawn(plans, random)
+    def _run(self, task: int, delay: float, random: Random) -> tuple[int, int] | None:
+        """The steps beyond the least makespan and the waits, None: it does not end in the goal."""
+        used, plan = self._languages[task], _drawn(self._plans[task], random)
         said, monitors = self._monitors(used, sentence_of(used, plan))
-        robots = range(len(monitors))
-        own_plans = [plan if self._way == "graph" else _drawn(said, random) for _ in robots]
-        labels = used.model.labels
-        parts = [
-            None
-            if self._way == "free"
-            else [labels[r][step[r]] for step in own_plans[r] if step[r]]
-            for r in robots
-        ]
+        plans = [plan if self._way == "graph" else _drawn(said, random) for _ in monitors]
+        parts: list[list[str]] | None = None
+        if self._way != "free":
+            parts = [
+                [used.model.labels[robot][step[robot]] for step in own if step[robot]]
+                for robot, own in enumerate(plans)
+            ]
         team = _Team(used.in_step, self._execution, monitors, parts, random)
-        init = used.space.rows[used.space.state[used.start]]
-        ended = team.run(init, delay)
-        goal = used.space.goals[used.space.goal[used.start]]
-        if ended is None or not used.model.holds(goal, ended[0][None, :])[0]:
+        ended = team.run(used.space.rows[used.space.state[used.start]], delay)
+        if ended is None or not _in_goal(used, ended[0]):
             return None
-        return ended[1:]
+        return ended[1] - used.space.least_makespan(used.task), ended[2]
 
     def _monitors(self, used: TaskLanguage, words: Sentence) -> tuple[Plans, list[EventMonitor]]:
         key = used.task, words
@@ -243,14 +231,14 @@ class EventTrials:
 
 
 class _Team:
-    """One run; ``parts`` are the events of each robot, None for one that chooses as it goes."""
+    """One run; ``parts`` are the events of each robot, None if robots choose as they go."""
 
     def __init__(
         self,
         model: JointModel,
         execution: Execution,
         monitors: Sequence[EventMonitor],
-        parts: Sequence[Sequence[str] | None],
+        parts: Sequence[Sequence[str]] | None,
         random: Random,
     ) -> None:
         self._model, self._execution, self._random = model, execution, random
@@ -289,8 +277,9 @@ class _Team:
         return self._model.labels[robot].index(text)
 
     def _is_done(self, robot: int) -> bool:
-        part = self._parts[robot]
-        return self._monitors[robot].finished if part is None else self._done[robot] == len(part)
+        if self._parts is None:
+            return self._monitors[robot].finished
+        return self._done[robot] == len(self._parts[robot])
 
     def _block(self, able: set[int]) -> list[int]:
         """Some of these robots that may start together now; none: nobody may."""
@@ -308,14 +297,11 @@ class _Team:
 
     def _chooses(self, robot: int) -> bool:
         """Whether the robot has chosen an event that waits for no other one."""
-        own, part = self._monitors[robot], self._parts[robot]
+        own = self._monitors[robot]
         if robot not in self._chosen:
-            options = own.allowed() if part is None else (part[self._done[robot]],)
-            free = [
-                event
-                for event in options
-                if all(isinstance(its, str) for its in own.missing(event).values())
-            ]
+            free = own.free()
+            if self._parts is not None:
+                free = tuple(e for e in free if e == self._parts[robot][self._done[robot]])
             if not free:
                 return False
             event = drawn(own, self._random, free)
@@ -340,6 +326,18 @@ class _Team:
                 if other != robot:
                     text = own.subaction(event)
                     self._monitors[other].ended(own.robot, text, self._done[robot])
+
+
+def _plans_of(languages: Sequence[TaskLanguage]) -> list[Plans]:
+    """The plans of every task; those of one plan space are counted once."""
+    spaces = {id(used.space): used.space for used in languages}
+    counted = {number: counts(space) for number, space in spaces.items()}
+    return [Plans(used.space, used.start, counted[id(used.space)]) for used in languages]
+
+
+def _in_goal(used: TaskLanguage, row: Rows) -> bool:
+    goal = used.space.goals[used.space.goal[used.start]]
+    return bool(used.model.holds(goal, row[None, :])[0])
 
 
 def _drawn(plans: Plans, random: Random) -> Plan:

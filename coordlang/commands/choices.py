@@ -188,7 +188,7 @@ def _followed(
     try:
         at = found.monitor(found.robots[0])
         for subaction in history:
-            Monitor.did(at, subaction)  # whatever else it would have to wait for
+            at = at.after(subaction)
         return at, at.can(**detours) if any(detours.values()) else None
     except NotAllowed as error:
         raise Refuted(str(error), remedy="After that nothing is guaranteed any more.") from None

@@ -153,7 +153,7 @@ class Monitor:
         self._has_promised = False
 
     def _own_texts(self, entry: Mapping[str, Any], where: str) -> set[str]:
-        """Keys of 'next' that are known to be well written."""
+        """Keys of 'next' that are known to be well written; of events, after reading them."""
         return {IDLE}
 
     @classmethod
@@ -176,6 +176,12 @@ class Monitor:
         return other
 
     __copy__ = copy
+
+    def after(self, subaction: str | None) -> Self:
+        """A monitor of its own that has done this, whatever it would have to wait for."""
+        other = self.copy()
+        Monitor.did(other, subaction)
+        return other
 
     def __getstate__(self) -> dict[str, Any]:
         """What is open in a list: `pickle` and `deepcopy` would follow states too deeply."""
@@ -441,14 +447,22 @@ class EventMonitor(Monitor):
                 found[robot] = left
         return found
 
+    def free(self) -> tuple[str | None, ...]:
+        """The allowed events that wait for no event of another robot, but perhaps for partners."""
+        return tuple(
+            event
+            for event in self.allowed()
+            if all(isinstance(its, str) for its in self.missing(event).values())
+        )
+
     def may_start(self) -> tuple[str | None, ...]:
         """The allowed events that may start now; None: the robot may do no more."""
         return tuple(event for event in self.allowed() if not self.missing(event))
 
     def late(self) -> tuple[str, ...]:
         """The robots that every allowed event waits for."""
-        waits = [self.missing(event).keys() for event in self.allowed()]
-        return tuple(sorted(set.intersection(*map(set, waits)))) if waits else ()
+        waits = [{*self.missing(event)} for event in self.allowed()]
+        return tuple(sorted(set.intersection(*waits))) if waits else ()
 
     def start(self, event: str) -> None:
         """Tell that an own event starts.  Raises `NotAllowed`, and `NotPossible` while it waits."""

@@ -159,7 +159,7 @@ class Robot:
             ahead.did(chosen[-1])
         while not ahead.finished:
             chosen.append(drawn(ahead, random, ahead.allowed()))
-            Monitor.did(ahead, chosen[-1])  # whatever it would have to wait for
+            ahead = ahead.after(chosen[-1])
         return chosen
 
     def act(self, sensed: Sensed) -> Velocity:
@@ -175,9 +175,10 @@ class Robot:
             ):
                 return STANDING
             if isinstance(self._monitor, EventMonitor):
-                if not self._may_start(self._monitor):
+                event = self._started(self._monitor)
+                if event is None:
                     return STANDING
-                self._begin(self._start(self._monitor), sensed.time)
+                self._begin(event, sensed.time)
             else:
                 drew = drawn(self._monitor, self._random, self._monitor.allowed())
                 self._monitor.did(drew)
@@ -223,33 +224,23 @@ class Robot:
             except NotPossible:  # they have agreed on nothing
                 self._events.append(("contradicted", {}))
 
-    def _may_start(self, monitor: EventMonitor) -> bool:
-        """Choose among the events that wait for no other one; whether the chosen one may start.
-
-        It may not where partners are not ready: it tells them that it is.
-        """
-        if self._chosen is None:
-            free = [
-                event
-                for event in monitor.allowed()
-                if all(isinstance(its, str) for its in monitor.missing(event).values())
-            ]
-            if not free:
-                return False
-            self._chosen = drawn(monitor, self._random, free)
-            if self._chosen is None:
-                monitor.did(None)
-                return False
-            if monitor.partners(self._chosen):
-                self._tell("ready", self.done + 1, monitor.subaction(self._chosen))
-        return not monitor.missing(self._chosen)
-
-    def _start(self, monitor: EventMonitor) -> str:
-        event = self._chosen
-        assert event is not None, "an event is chosen"
+    def _started(self, monitor: EventMonitor) -> str | None:
+        """The event that starts now, of those that are free; None: there is none, or it waits."""
+        if self._chosen is None and (free := monitor.free()):
+            self._choose(monitor, drawn(monitor, self._random, free))
+        if self._chosen is None or monitor.missing(self._chosen):
+            return None
+        event, self._chosen = self._chosen, None
         monitor.start(event)
-        self._chosen = None
         return event
+
+    def _choose(self, monitor: EventMonitor, event: str | None) -> None:
+        """Settle on an event, and tell its partners; or do no more."""
+        self._chosen = event
+        if event is None:
+            monitor.did(None)
+        elif monitor.partners(event):
+            self._tell("ready", self.done + 1, monitor.subaction(event))
 
     def _tell(self, kind: Kind, number: int, subaction: str = "") -> None:
         self._messages.append(Message(self.name, kind, number, subaction))
@@ -303,9 +294,5 @@ class Robot:
 
 def drawn(monitor: Monitor, random: Random, allowed: Sequence[str | None]) -> str | None:
     """Draw what to do next: each own subplan that is left has the same probability."""
-    left = []
-    for subaction in allowed:
-        after = monitor.copy()
-        Monitor.did(after, subaction)  # whatever it would have to wait for
-        left.append(after.remaining)
+    left = [monitor.after(subaction).remaining for subaction in allowed]
     return allowed[bisect_right([*accumulate(left)], random.randrange(sum(left)))]

@@ -14,12 +14,7 @@ import pytest
 from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.commands.building import build_language
 from coordlang.execution.choices import SentenceChoices, choices, to_bytes
-from coordlang.execution.monitor import (
-    EventMonitor,
-    MonitorError,
-    NotAllowed,
-    NotPossible,
-)
+from coordlang.execution.monitor import EventMonitor, MonitorError, NotAllowed, NotPossible
 from coordlang.language.partition import Partition
 from planners.pddl.model_options import ModelOptions
 from planners.search.asynchronous import asynchronous
@@ -59,8 +54,7 @@ class Robots:
         self.seen: Counter[str] = Counter()
 
     def label(self, robot: int, event: str) -> int:
-        own = self.at[robot]._events[event]
-        return self.world.model.labels[robot].index(own.subaction)
+        return self.world.model.labels[robot].index(self.at[robot].subaction(event))
 
     def run(self) -> tuple[tuple[str, ...], ...]:
         """Until nothing can be done any more: what each robot did."""
@@ -75,40 +69,37 @@ class Robots:
             if robot in self.running:
                 yield partial(self.end, robot)
             elif robot in self.chosen:
-                if not own.missing(self.chosen[robot]):
-                    meets = self.at[robot]._events[self.chosen[robot]].meets
-                    block = [robot, *(self.names.index(name) for name in meets)]
-                    if all(not self.at[r].missing(self.chosen.get(r)) for r in block):
-                        yield partial(self.start, tuple(block))
-            else:
+                partners = map(self.names.index, own.partners(self.chosen[robot]))
+                block = robot, *partners
+                if all(r in self.chosen and not self.at[r].missing(self.chosen[r]) for r in block):
+                    yield partial(self.start, block)
+            elif not own.finished:
                 for event in own.allowed():
-                    if event is None:
-                        if own.may_start() == (None,):
-                            continue  # it has finished
+                    if event not in own.free():
+                        self.refuse(own, event)
+                    elif event is None:
                         yield partial(own.did, None)
-                        continue
-                    waits = own.missing(event)
-                    assert (event in own.may_start()) == (not waits)
-                    if waits and all(isinstance(its, int) for its in waits.values()):
-                        assert self.refuses(robot, event)
-                        self.seen["waits"] += 1
-                    elif not any(isinstance(its, int) for its in waits.values()):
+                    else:
                         yield partial(self.choose, robot, event)
 
-    def refuses(self, robot: int, event: str) -> bool:
+    def refuse(self, own: EventMonitor, event: str | None) -> None:
+        """What waits for an event can neither start nor have ended."""
+        assert event is not None
+        assert event not in own.may_start()
         with pytest.raises(NotPossible, match="it waits for"):
-            self.at[robot].start(event)
+            own.start(event)
         with pytest.raises(NotPossible, match="not started"):
-            self.at[robot].did(event)
-        return True
+            own.did(event)
+        self.seen["waits"] += 1
 
     def choose(self, robot: int, event: str) -> None:
         """Start at once, or tell the partners of the meeting."""
         self.chosen[robot] = event
-        own = self.at[robot]._events[event]
-        for name in own.meets:
+        own = self.at[robot]
+        assert (event in own.may_start()) == (not own.missing(event))
+        for name in own.partners(event):
             self.seen["meets"] += 1
-            self.at[self.names.index(name)].ready(self.names[robot], own.subaction)
+            self.at[self.names.index(name)].ready(own.robot, own.subaction(event))
 
     def start(self, block: tuple[int, ...]) -> None:
         for robot in block:
@@ -123,17 +114,17 @@ class Robots:
             self.running[robot] = event
 
     def end(self, robot: int) -> None:
-        event = self.running.pop(robot)
-        self.at[robot].did(event)
+        event, own = self.running.pop(robot), self.at[robot]
+        own.did(event)
         self.did[robot].append(event)
-        subaction = self.at[robot]._events[event].subaction
-        for other, at in enumerate(self.at):
-            if other != robot:
+        told = own.robot, own.subaction(event), len(self.did[robot])
+        for at in self.at:
+            if at is not own:
                 before = at.copy()
-                at.ended(self.names[robot], subaction, len(self.did[robot]))
+                at.ended(*told)
+                before.ended(*told)  # which has not heard of it
                 with pytest.raises(NotPossible, match="told before"):
-                    at.ended(self.names[robot], subaction, len(self.did[robot]))
-                assert before._counts is not at._counts or before._counts == at._counts
+                    at.ended(*told)
 
 
 @pytest.mark.parametrize(("robots", "seeds"), SEEDS)
