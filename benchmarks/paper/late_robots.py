@@ -175,7 +175,7 @@ class EventTrials:
 
     def __init__(self, languages: Sequence[TaskLanguage], way: str) -> None:
         self._languages, self._way = languages, way
-        self._execution = Execution(languages[0].in_step)
+        self._execution = Execution(languages[0].model.in_step)
         self._plans = _plans_of(languages)
         self._said: dict[tuple[int, Sentence], tuple[Plans, list[EventMonitor]]] = {}
 
@@ -210,7 +210,7 @@ class EventTrials:
                 [used.model.labels[robot][step[robot]] for step in own if step[robot]]
                 for robot, own in enumerate(plans)
             ]
-        team = _Team(used.in_step, self._execution, monitors, parts, random)
+        team = _Team(used.model.in_step, self._execution, monitors, parts, random)
         ended = team.run(used.space.rows[used.space.state[used.start]], delay)
         if ended is None or not _in_goal(used, ended[0]):
             return None

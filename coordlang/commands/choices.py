@@ -22,7 +22,7 @@ from coordlang.commands.witness import witness_text
 from coordlang.execution import choices as execution
 from coordlang.execution.choices import RobotChoices, SentenceChoices, to_bytes
 from coordlang.execution.drawing import choices_dot, distinguishing
-from coordlang.execution.monitor import Answer, EventMonitor, Monitor, MonitorError, NotAllowed
+from coordlang.execution.monitor import Answer, Monitor, MonitorError, NotAllowed
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import describe
 from coordlang.language.provenance import percent
@@ -39,6 +39,8 @@ from planners.system.writing import write_atomically
 _ADDITIONS = 1_000_000
 #: States of an automaton beyond which a table is cut.
 STATES_SHOWN = 40
+#: What a robot does, by what subplans are made of, that idles, or has no more to do.
+_IDLING = {"step": "idle", "event": "nothing more"}
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -199,7 +201,7 @@ def _followed(
 
 
 def _monitor_text(at: Monitor, answer: Answer | None) -> str:
-    unit, nothing = _unit_and_idling(isinstance(at, EventMonitor))
+    unit, nothing = at.unit, _IDLING[at.unit]
     may = " or ".join(text or nothing for text in at.allowed())
     lines = [
         f"{unit} {at.step + 1}: {at.robot} may do {may}; {counted(at.remaining, 'subplan')} left"
@@ -214,11 +216,6 @@ def _monitor_text(at: Monitor, answer: Answer | None) -> str:
         steps = enumerate(answer.subplan or (), at.step + 1)
         lines += [f"  {step:>4}  {text or nothing}" for step, text in steps]
     return "\n".join(lines) + "\n"
-
-
-def _unit_and_idling(is_asynchronous: bool) -> tuple[str, str]:
-    """What a subplan is made of, and what a robot does that idles, or has no more to do."""
-    return ("event", "nothing more") if is_asynchronous else ("step", "idle")
 
 
 def _monitor_json(at: Monitor, answer: Answer | None) -> str:
@@ -266,7 +263,7 @@ def _table(found: RobotsChoices, own: RobotChoices, width: int) -> list[str]:
     model, automaton = found.used.model, own.automaton
     subplans, states = counted(automaton.count, "subplan"), counted(len(automaton), "state")
     lines = [f"follow {subplans} ({states}):"]
-    unit, nothing = _unit_and_idling(model.is_asynchronous)
+    unit, nothing = model.unit, _IDLING[model.unit]
     rows: list[tuple[str, str, str, list[str], str]] = []
     for step, layer in enumerate(automaton.layers[:-1], 1):
         if layer.start >= STATES_SHOWN:

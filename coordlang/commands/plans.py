@@ -100,10 +100,11 @@ class OptimalPlans(Presented):
         return to_json(self._plans, [self._known(plan) for plan in listed])
 
     def _texts(self, plan: Plan) -> PlanSteps:
-        return texts(self._plans.model, self._plans.steps(plan))
+        return texts(self._plans.space.model.in_step, self._plans.steps(plan))
 
     def _numbers(self, plan: Sequence[Texts]) -> Plan | None:
-        steps = [self._plans.model.numbers(step) for step in plan]
+        model = self._plans.space.model.in_step
+        steps = [model.numbers(step) for step in plan]
         known = tuple(step for step in steps if step is not None)
         return self._plans.of_steps(known) if len(known) == len(steps) else None
 

@@ -79,7 +79,7 @@ def say(files: Arguments, options: SayOptions) -> Said:
             remedy="A step has one text for each robot, None where it idles.",
         )
     is_file = isinstance(plan, str | PathLike)
-    plans = read_plan_file(fspath(plan), used.in_step) if is_file else [plan]
+    plans = read_plan_file(fspath(plan), used.model.in_step) if is_file else [plan]
     sentences = []
     for number, steps in enumerate(plans, 1):
         try:
@@ -254,7 +254,7 @@ def plan(files: Arguments, options: PlanOptions) -> PlanUnderSentence:
     return PlanUnderSentence(
         used,
         used.text(words),
-        tuple(used.in_step.texts(step) for step in found.plan),
+        tuple(used.model.in_step.texts(step) for step in found.plan),
         options.heuristic,
         found,
         plan_under_sentence(used, None, bound, expanded),

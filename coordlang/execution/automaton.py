@@ -3,7 +3,7 @@
 
 The robot's subplans are what the plans of a plan space are when only its own subactions are seen.
 All of them have one length, so the automaton has no cycles and its states lie in layers, one a
-step.
+step.  Where robots keep no common step it is one an event of the robot, and who has no more idles.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Knowledge(NamedTuple):
 class Automaton:
     """A deterministic automaton over one robot's label numbers (0: idle); state 0 is its start.
 
-    ``layers[k]`` are the states after k joint steps, those of the last one are final.  For each
+    ``layers[k]`` are the states after k steps or events, those of the last one are final.  For each
     state ``moves`` has label -> next state, sorted, ``left`` the exact number of subplans from it
     on, at least 1, and ``known`` what the robot knows there, all empty where no knowledge was
     computed.
@@ -69,7 +69,7 @@ class Automaton:
 
     @property
     def steps(self) -> int:
-        """The length of its subplans in joint steps."""
+        """The length of its subplans in joint steps, or events."""
         return len(self.layers) - 1
 
     @property

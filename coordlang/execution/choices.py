@@ -127,7 +127,7 @@ def knowing(fits: PlanSpace, robot: int, facts: int) -> RobotChoices:
 
 def knowing_own(fits: PlanSpace, subplans: Automaton, robot: int) -> RobotChoices:
     """A robot's subplans; of what its own subactions alone change it knows the values."""
-    model = fits.model.in_step or fits.model
+    model = fits.model.in_step
     facts, changes = own_changes(model, robot)
     others = ((1 << len(model.codec.facts)) - 1) & ~facts
     start = model.codec.fact_bits(fits.rows[fits.state[fits.starts[0]]])
@@ -198,7 +198,7 @@ _Facts = list[Annotated[int, Meta(ge=0)]]
 class StateRecord(msgspec.Struct, frozen=True):
     """A state of a robot's automaton; state 0 is the start."""
 
-    step: Annotated[int, Meta(description="The number of steps done.", ge=0)]
+    step: Annotated[int, Meta(description="The number of steps or events done.", ge=0)]
     left: Annotated[Count, Meta(description="The number of own subplans that lead on from it.")]
     next: Annotated[
         dict[str, int], Meta(description="What the robot may do now -> the state after that.")
@@ -366,26 +366,20 @@ def _robot(fits: PlanSpace, own: RobotChoices) -> RobotRecord:
 def _passings(fits: PlanSpace, own: RobotChoices) -> Passings:
     """What a robot waits for in its subplans, and what it may hear of the others."""
     model, robot = fits.model, own.robot
-    in_step, robots = model.in_step, model.robots
-    assert in_step is not None, "there is a common step"
-    texts = in_step.labels
+    robots, texts = model.robots, model.in_step.labels
     others = [other for other in range(len(robots)) if other != robot]
-    #: For each robot and number of its events what it may be, with the least that it waits for.
-    may_be: dict[int, list[dict[int, int]]] = {other: [] for other in others}
-    for layer in range(len(fits.layers) - 1, 0, -1):
-        edges = fits.layer_edges(layer).edges
-        for other, found in may_be.items():
-            found.append({})
-            for number in np.unique(fits.robot_labels(other, edges)).tolist():
-                if event := model.events[other][number]:
-                    least = found[-1].get(event.label, event.waits[robot])
-                    found[-1][event.label] = min(least, event.waits[robot])
-    tables = Traces(in_step).interfering
-    events = [
-        (model.labels[robot][label], event)
+    may_be = {other: _events_of(fits, other, robot) for other in others}
+    interfering = Traces(model.in_step).interfering
+    events = {
+        model.labels[robot][label]: event
         for label in sorted(own.automaton.labels)
         if (event := model.events[robot][label])
-    ]
+    }
+
+    def interferes(label: int, other: int) -> list[str]:
+        its_labels = sorted({its for event in may_be[other] for its in event})
+        return [texts[other][its] for its in its_labels if interfering[robot, other][label, its]]
+
     return Passings(
         events={
             text: OwnEvent(
@@ -393,23 +387,33 @@ def _passings(fits: PlanSpace, own: RobotChoices) -> Passings:
                 {robots[other]: event.waits[other] for other in others if event.waits[other]},
                 {robots[other]: texts[other][its] for other, its in event.meets},
             )
-            for text, event in events
+            for text, event in events.items()
         },
         interferes={
-            texts[robot][label]: {
-                robots[other]: [
-                    texts[other][its]
-                    for its in sorted({its for found in may_be[other] for its in found})
-                    if tables[robot, other][label, its]
-                ]
-                for other in others
-            }
-            for label in sorted({event.label for _, event in events})
+            texts[robot][label]: {robots[other]: interferes(label, other) for other in others}
+            for label in sorted({event.label for event in events.values()})
         },
         others={
             robots[other]: [
-                {texts[other][its]: least for its, least in sorted(one.items())} for one in found
+                {texts[other][its]: least for its, least in one.items()} for one in its_events
             ]
-            for other, found in may_be.items()
+            for other, its_events in may_be.items()
         },
     )
+
+
+def _events_of(fits: PlanSpace, robot: int, waiting_for: int) -> list[dict[int, int]]:
+    """What a robot's first event may be, its second one and so on, by its label in step.
+
+    With the least number of events of another robot that it waits for.
+    """
+    found: list[dict[int, int]] = []
+    for layer in range(len(fits.layers) - 1, 0, -1):
+        numbers = np.unique(fits.robot_labels(robot, fits.layer_edges(layer).edges))
+        waits: dict[int, int] = {}
+        for event in (fits.model.events[robot][number] for number in numbers.tolist()):
+            if event is not None:
+                least = waits.get(event.label, event.waits[waiting_for])
+                waits[event.label] = min(least, event.waits[waiting_for])
+        found.append(dict(sorted(waits.items())))
+    return found

@@ -6,7 +6,7 @@ beside a choices file (docs/formats.md), which ``coordlang choices --format json
 
 A `Monitor` is where the robot is in what is open under the sentence.  All checks and larger pieces
 of work are done when the file is read, and in `Monitor.can` and `Monitor.commit`.  What a robot
-calls in every step takes the same time and memory however many steps were done before, opens no
+calls in every step or event takes the same time and memory however many were done before, opens no
 file and imports nothing.
 """
 
@@ -22,7 +22,7 @@ from decimal import Decimal
 from fnmatch import fnmatchcase
 from functools import cache, partial
 from io import BytesIO
-from typing import Any, NamedTuple, Self, TypeVar
+from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeVar
 
 FORMAT = "coordlang/choices"
 VERSION = 1
@@ -57,12 +57,17 @@ class NotAllowed(MonitorError):
     """
 
     def __init__(
-        self, robot: str, did: str | None, step: int, allowed: Sequence[str | None]
+        self,
+        robot: str,
+        did: str | None,
+        step: int,
+        allowed: Sequence[str | None],
+        unit: str = "step",
     ) -> None:
         could = " or ".join(text or IDLE for text in allowed[:_SHOWN])
         more = " or .." if len(allowed) > _SHOWN else ""
-        may = f"it may do {could}{more}" if allowed else "all its steps are done"
-        super().__init__(f"step {step + 1}: {robot} may not do {_shown(did or IDLE)}; {may}")
+        may = f"it may do {could}{more}" if allowed else f"all its {unit}s are done"
+        super().__init__(f"{unit} {step + 1}: {robot} may not do {_shown(did or IDLE)}; {may}")
         self.robot, self.did, self.step, self.allowed = robot, did, step, tuple(allowed)
 
 
@@ -88,9 +93,9 @@ class Answer:
 class _State:
     """A state of the automaton of the own subplans that are open; it has no cycles.
 
-    ``step`` steps are done there; ``known`` are the facts that are true (True) or may be true
-    (None).  ``moves`` lead on by what is done (None: idle; sorted, idling first); ``left`` is the
-    number of subplans from here on.
+    ``step`` steps or events are done there; ``known`` are the facts that are true (True) or may be
+    true (None).  ``moves`` lead on by what is done (None: idle; sorted, idling first); ``left`` is
+    the number of subplans from here on.
     """
 
     step: int
@@ -121,6 +126,9 @@ class Monitor:
 
     Raises `MonitorError` for data that is no choices file, or that contradicts itself.
     """
+
+    #: What the robot's subplans are made of.
+    unit: ClassVar[Literal["step", "event"]] = "step"
 
     def __init__(self, data: Mapping[str, Any], robot: str | None = None) -> None:
         if not isinstance(data, Mapping) or data.get("format") != FORMAT:
@@ -209,7 +217,7 @@ class Monitor:
 
     @property
     def step(self) -> int:
-        """How many steps are done."""
+        """How many steps are done; or events, and when it has finished all steps of the plans."""
         return self._here.step
 
     @property
@@ -239,7 +247,7 @@ class Monitor:
         plain = subaction if is_known else _plain(subaction)
         text = None if plain == IDLE else plain
         if text not in moves:
-            raise NotAllowed(self.robot, text, self.step, self.allowed())
+            raise NotAllowed(self.robot, text, self.step, self.allowed(), self.unit)
         self._here = moves[text]
 
     def known(self, atom: str) -> bool | None:
@@ -282,7 +290,7 @@ class Monitor:
         if found is None:
             kept = " together with what was promised before" if self._has_promised else ""
             raise NotPossible(
-                f"step {self.step + 1}: {self.robot} has no subplan left for this{kept}"
+                f"{self.unit} {self.step + 1}: {self.robot} has no subplan left for this{kept}"
             )
         self._has_promised = True
         self._start = self._here = found
@@ -381,6 +389,8 @@ class EventMonitor(Monitor):
     Parameters and errors are those of `Monitor`.
     """
 
+    unit = "event"
+
     def __init__(self, data: Mapping[str, Any], robot: str | None = None) -> None:
         super().__init__(data, robot)
         # Replaced and not changed, so that copies stay as they are: how many events were observed
@@ -435,7 +445,7 @@ class EventMonitor(Monitor):
         start together with this one.
         """
         if event not in self.allowed():
-            raise NotAllowed(self.robot, event, self.step, self.allowed())
+            raise NotAllowed(self.robot, event, self.step, self.allowed(), self.unit)
         if event is None or event == self._underway:
             return {}
         own = self._events[event]

@@ -94,7 +94,7 @@ def _executed(task_language: TaskLanguage, plan: Sequence[Texts]) -> tuple[Plan,
     cost.  Raises `NotAPlan` for a step that cannot be taken, or if the goal does not hold at the
     end.
     """
-    model, space = task_language.in_step, task_language.space
+    model, space = task_language.model.in_step, task_language.space
     init = model.forgetting_slack(space.rows[space.state[task_language.start]])
     numbers: list[tuple[int, ...]] = []
 
@@ -177,7 +177,7 @@ def _not_optimal(
     task_language: TaskLanguage, plan: Sequence[Texts], rows: Sequence[Rows], cost: int, step: int
 ) -> NotOptimal:
     """The error that says how much too expensive a plan is, and where it leaves optimal ones."""
-    model, space = task_language.in_step, task_language.space
+    model, space = task_language.model.in_step, task_language.space
     makespan, second = space.cost_of(task_language.task)
     excess = max(0, len(plan) - makespan), cost - second
     if excess[0]:

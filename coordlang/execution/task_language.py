@@ -96,11 +96,6 @@ class TaskLanguage:
         """The joint model of the task."""
         return self.space.model
 
-    @property
-    def in_step(self) -> JointModel:
-        """The model of joint steps, of which plans are made also without a common step."""
-        return self.model.in_step or self.model
-
     def words_of(self, text: str | Iterable[str]) -> tuple[int, ...]:
         """Word numbers of a sentence, ``"w2 w0"`` or ``("w2", "w0")``.
 

@@ -26,7 +26,7 @@ _STATES = 500
 #: Subplans of a robot that are listed one by one.
 FEW = 12
 
-#: A robot's subplan: the text of its subaction in each step, None for idling.
+#: A robot's subplan: the text of its subaction in each step, None for idling; or of its events.
 Subplan = list[str | None]
 
 
@@ -34,8 +34,8 @@ class RobotPart(msgspec.Struct, frozen=True):
     """What a sentence leaves to one robot.
 
     ``subplans`` is the number of its different subplans in the plans with the sentence; ``listed``
-    are all of them if they are few, else empty.  ``by_step`` are for each step the subactions that
-    it does then in some of the plans.
+    are all of them if they are few, else empty.  ``by_step`` are for each step, or number of an
+    event, the subactions that it does then in some of the plans.
     """
 
     robot: str
@@ -111,8 +111,7 @@ def sentence_demands(
     sentence = word[first].tolist()
     choices = Choices(space)
     changes = []
-    is_asynchronous = space.model.is_asynchronous
-    for number, pair in enumerate(pairwise(sentence) if not is_asynchronous else (), 1):
+    for number, pair in enumerate(() if space.model.is_asynchronous else pairwise(sentence), 1):
         order = _named_first(space.model.robots, formulas[partition.words[pair[1]]])
         changes.append(_change(space, partition, passed == number, pair, order))
     return SentenceDemands(
@@ -121,7 +120,7 @@ def sentence_demands(
         steps=space.cost_of(0)[0],
         parts=[_part(choices, robot) for robot in range(space.robots)],
         changes=changes,
-        unit="event" if is_asynchronous else "step",
+        unit=space.model.unit,
     )
 
 

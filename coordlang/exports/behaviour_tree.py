@@ -113,15 +113,14 @@ def _tree(model: JointModel, own: RobotChoices) -> ET.Element:
     ET.SubElement(steps, "Script", code="state := 0")
     actions = {
         action.label: action
-        for action in (model.in_step or model).actions
+        for action in model.in_step.actions
         if own.robot in action.owners and not action.parts
     }
     for step, states in enumerate(own.automaton.layers[:-1]):
         moves = [
             _Move(state, *move) for state in states for move in own.automaton.moves[state].items()
         ]
-        unit = "event" if model.is_asynchronous else "step"
-        here = ET.SubElement(steps, "Sequence", name=f"{unit} {step}")
+        here = ET.SubElement(steps, "Sequence", name=f"{model.unit} {step}")
         if not model.is_asynchronous:
             here.append(_leaf("AwaitStep", step=str(step)))
         here.append(_choosing(model, own, moves))
@@ -173,8 +172,8 @@ def _acting(
 
 def _awaiting(model: JointModel, robot: int, label: int, text: str) -> Iterator[ET.Element]:
     """What an event waits for."""
-    event = model.events[robot][label] if model.in_step else None
-    if event is None or model.in_step is None:
+    event = model.events[robot][label] if model.events else None
+    if event is None:
         return
     for name, count in zip(model.robots, event.waits, strict=True):
         if count:

@@ -123,7 +123,7 @@ def _candidates(
         tasks = (planning_task(first.model, domain, problem, one, position) for one in listed)
     for task in tasks:
         try:
-            space = as_executed(search(first.in_step, task))
+            space = as_executed(search(first.model.in_step, task))
         except ProvedImpossible:
             continue  # of two states one need not be reachable from the other
         word = first.partition.word_of(space.rows)[space.state]

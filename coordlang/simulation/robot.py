@@ -84,7 +84,7 @@ class Sensed:
 
 @dataclass(frozen=True, slots=True)
 class OwnStep:
-    """A step of a robot: its number from 0, the subaction (None: idle), its times in seconds.
+    """A robot's step or event: its number from 0, the subaction (None: idle), times in seconds.
 
     ``place`` is where it leads, None for a step in which the robot stays; ``end`` is None while it
     is under way.  ``words`` of the sentence are passed then, at most; None without a sentence.

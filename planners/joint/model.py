@@ -11,7 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -137,7 +137,7 @@ class JointModel:
     left, and so on.  ``impossible`` says what robots can never do, for messages.
     ``is_asynchronous``: robots keep no common step, and the labels of plan spaces are events
     (`planners.search.asynchronous`).  The model of such a space has these ``events`` by label, the
-    model ``in_step`` whose subactions they are, and ``has_ties`` (`planners.joint.traces.Traces`).
+    ``step_model`` whose subactions they are, and ``has_ties`` (`planners.joint.traces.Traces`).
     """
 
     name: str
@@ -156,8 +156,18 @@ class JointModel:
     impossible: tuple[Impossible, ...] = ()
     is_asynchronous: bool = False
     has_ties: bool = False
-    in_step: JointModel | None = None
+    step_model: JointModel | None = None
     events: tuple[tuple[Event | None, ...], ...] = ()
+
+    @property
+    def in_step(self) -> JointModel:
+        """The model of joint steps: this one, or where labels are events ``step_model``."""
+        return self.step_model or self
+
+    @property
+    def unit(self) -> Literal["step", "event"]:
+        """What a robot's part of a plan is made of: joint steps, or its own events."""
+        return "event" if self.is_asynchronous else "step"
 
     @property
     def kept_plan(self) -> str:
@@ -262,7 +272,7 @@ class JointModel:
 
     def subaction_text(self, robot: int, label: int) -> str | None:
         """The text of the subaction of a robot's label, be that an event; None is idling."""
-        if self.in_step is None:
+        if not self.events:
             return self.label_text(robot, label)
         event = self.events[robot][label]
         return self.in_step.label_text(robot, event.label) if event else None

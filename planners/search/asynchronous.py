@@ -30,8 +30,8 @@ _Queues = tuple[tuple[int, ...], ...]
 
 def as_executed(space: PlanSpace) -> PlanSpace:
     """A plan space as its model says that robots execute plans: in step, or without one."""
-    is_in_step = space.model.in_step is None
-    return asynchronous(space) if space.model.is_asynchronous and is_in_step else space
+    model = space.model
+    return asynchronous(space) if model.is_asynchronous and not model.events else space
 
 
 def asynchronous(space: PlanSpace) -> PlanSpace:
@@ -120,7 +120,7 @@ class _Unfolding:
             ),
             is_asynchronous=True,
             events=events,
-            in_step=old,
+            step_model=old,
             has_ties=self._traces.has_ties,
         )
         return self._graph.space(
@@ -320,9 +320,8 @@ class Timing:
     """
 
     def __init__(self, space: PlanSpace) -> None:
-        model = space.model
-        assert model.in_step is not None
-        self._space, self._model, self._traces = space, model, Traces(model.in_step)
+        self._space, self._model = space, space.model
+        self._traces = Traces(space.model.in_step)
 
     def steps(self, plan: Sequence[Step], states: Sequence[int]) -> tuple[Step, ...]:
         """The steps of a plan that does everything as soon as possible.

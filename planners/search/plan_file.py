@@ -109,7 +109,7 @@ def to_ipc(plans: Plans, plan: Plan) -> str:
     ``0: (move r1 a b)``, idling left out, a shared subaction once.  Then ``; makespan = 3``.
     """
     lines = [
-        text if plans.model.is_joint_action else f"{number}: {text}"
+        text if plans.space.model.is_joint_action else f"{number}: {text}"
         for number, text in numbered_actions(plans, plan)
     ]
     return "\n".join([*lines, f"; makespan = {len(plans.steps(plan))}"]) + "\n"
@@ -127,7 +127,7 @@ def to_plansys2(plans: Plans, plan: Plan) -> str:
 
 def numbered_actions(plans: Plans, plan: Plan) -> Iterator[tuple[int, str]]:
     """The actions of a plan, each with its joint step: joint actions, or robots' subactions."""
-    model, rows = plans.model, plans.space.rows
+    model, rows = plans.space.model.in_step, plans.space.rows
     steps = zip(plans.states(plan), plans.steps(plan), strict=False)
     for number, (state, labels) in enumerate(steps):
         whole = model.joint_action(rows[state], labels)
@@ -137,7 +137,7 @@ def numbered_actions(plans: Plans, plan: Plan) -> Iterator[tuple[int, str]]:
 
 def to_json(plans: Plans, listed: Sequence[Plan], task: int = 0) -> dict[str, Any]:
     """The data of a JSON plan file: the listed plans, the exact number of all, the optimal cost."""
-    model = plans.model
+    model = plans.space.model.in_step
     _, second = plans.space.cost_of(task)
     data: dict[str, Any] = {
         "plans": [

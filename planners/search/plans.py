@@ -12,7 +12,6 @@ from random import Random
 
 import numpy as np
 
-from planners.joint.model import JointModel
 from planners.search.asynchronous import Timing
 from planners.search.plan_space import PlanSpace
 from planners.search.slack import rests
@@ -61,14 +60,9 @@ class Plans:
         """How many plans there are, exactly."""
         return self.counted[self.start]
 
-    @property
-    def model(self) -> JointModel:
-        """The model whose subactions the joint `steps` are made of."""
-        return self.space.model.in_step or self.space.model
-
     @cached_property
     def _timing(self) -> Timing | None:
-        return Timing(self.space) if self.space.model.in_step else None
+        return Timing(self.space) if self.space.model.events else None
 
     def steps(self, plan: Plan) -> Plan:
         """The joint steps of a plan.
