@@ -25,7 +25,7 @@ from planners.joint.model import Goal, JointModel
 from planners.joint.tables import Rows
 from planners.pddl.formula_tree import literals
 from planners.pddl.lifted import Atom, StepAtom
-from planners.search.asynchronous import event_text
+from planners.search.asynchronous import asynchronous, event_text
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import CoordlangError
 from tests.support import naive
@@ -290,6 +290,23 @@ def random_tasks(robots: int, seeds: range) -> Iterator[tuple[PlanSpace, World, 
         for space in candidates.spaces:
             tasks = random.sample(range(len(space.starts)), min(4, len(space.starts)))
             yield space, World(candidates.model), tasks, random
+
+
+def random_plans(
+    robots: int, seeds: range, most: int
+) -> Iterator[tuple[World, PlanSpace, Plans, PlanSpace, Random]]:
+    """Tasks of random models, in step, with plans up to timing, and their graph.
+
+    Without those that have more than so many plans in step, or that change by themselves.
+    """
+    for space, world, tasks, random in random_tasks(robots, seeds):
+        for task in tasks:
+            own = space.with_tasks(space.starts[[task]], space.second[[task]])
+            try:
+                plans = Plans(world, own, 0, most)
+            except (naive.TooLarge, ChangesAlone):
+                continue
+            yield world, own, plans, asynchronous(own), random
 
 
 class Plans:

@@ -147,6 +147,12 @@ def plans_by_sentence(task_language: TaskLanguage) -> dict[tuple[str, ...], set[
     return {said: set(plans) for said, plans in groups.items()}
 
 
+def numbered_sentences(used: TaskLanguage, most: int = 1000) -> dict[tuple[int, ...], list[Plan]]:
+    """All optimal plans of the task by their sentences, as word numbers.  Raises `TooLarge`."""
+    word = used.partition.word_of(used.space.rows).tolist()
+    return by_sentence(used.space, used.task, word.__getitem__, most)
+
+
 def warping_clause(
     u: Sequence[int], v: Sequence[int], word: Mapping[int, int] | Sequence[int]
 ) -> Clause | None:

@@ -352,16 +352,9 @@ def test_detours(ask: Ask) -> None:
     ]
     no = ask(*asked, "--avoid", "(at r1 c)", "--json")
     assert no.code == 1
-    assert json.loads(no.out) == {
-        "robot": "r2",
-        "step": 0,
-        "allowed": [None, "(move r2 b a)"],
-        "left": 2,
-        "atoms": "exact",
-        "possible": False,
-        "subplans": 0,
-        "subplan": None,
-    }
+    here = {"robot": "r2", "step": 0, "allowed": [None, "(move r2 b a)"], "left": 2}
+    answer = {"atoms": "exact", "possible": False, "subplans": 0, "subplan": None}
+    assert json.loads(no.out) == here | answer
     done = ask(*asked, "--history", "(move r2 b a)", "--history", "idle")
     assert done.out == "r2 has done all its 2 steps\n"
     wrong = ask(*asked, "--history", "idle", "--history", "idle")

@@ -27,17 +27,6 @@ from tests.support.random_models import random_model
 from tests.support.task_languages import random_language
 
 
-def by_sentence(task_language: TaskLanguage, most: int) -> dict[tuple[int, ...], list[Plan]]:
-    word = task_language.partition.word_of(task_language.space.rows)
-    groups: dict[tuple[int, ...], list[Plan]] = {}
-    for plan in naive.listed(task_language.space, task_language.task, most):
-        said = naive.sentence(
-            [int(word[s]) for s in naive.states(task_language.space, task_language.task, plan)]
-        )
-        groups.setdefault(said, []).append(plan)
-    return groups
-
-
 def check(
     task_language: TaskLanguage,
     words: tuple[int, ...],
@@ -90,13 +79,12 @@ def test_against_listed_plans(robots: int, monkeypatch: pytest.MonkeyPatch) -> N
             continue
         if not 0 < candidates.count <= 300:
             continue
-        language = random_language(
-            Random(seed), candidates
-        )  # RC or not: what is asked is about listed plans
+        # A coordination language or not: what is asked is about listed plans.
+        language = random_language(Random(seed), candidates)
         formulas = all_covers(mapped_states(language, candidates.model))
         for task_language in list(languages_in_tasks(language, candidates))[:8]:
             try:
-                groups = by_sentence(task_language, 60)
+                groups = naive.numbered_sentences(task_language, 60)
             except naive.TooLarge:
                 continue
             for words, plans in groups.items():
@@ -124,7 +112,7 @@ def test_who_decides_a_change(folder: str, stem: str, every: int) -> None:
     formulas = all_covers(mapped_states(language, candidates.model))
     sizes: Counter[int] = Counter()
     for task_language in list(languages_in_tasks(language, candidates))[::every]:
-        for words in by_sentence(task_language, 1000):
+        for words in naive.numbered_sentences(task_language, 1000):
             fits = task_language.plans_with(words)
             found = sentence_demands(fits, task_language.partition, formulas)
             for number, change in enumerate(found.changes):
@@ -132,12 +120,8 @@ def test_who_decides_a_change(folder: str, stem: str, every: int) -> None:
                 robots = [task_language.model.robots.index(r) for r in change.robots]
                 assert settled(task_language, before, words[number + 1], robots)
                 for left_out in robots:
-                    assert not settled(
-                        task_language,
-                        before,
-                        words[number + 1],
-                        [r for r in robots if r != left_out],
-                    )
+                    fewer = [robot for robot in robots if robot != left_out]
+                    assert not settled(task_language, before, words[number + 1], fewer)
                 sizes[len(robots)] += 1
     assert sizes[1], sizes
     assert sizes[2], sizes
@@ -206,10 +190,8 @@ def test_json(coordlang: Command, language: object, t_map: tuple[object, object]
     refused = coordlang("explain", language, *t_map, "--task", "--sentence", "w3 w0")
     assert (refused.code, "no optimal plan has the sentence" in refused.err) == (1, True)
     for said in data["sentences"]:
-        assert said["sentence"].split() == [
-            said["changes"][0]["from"],
-            *(c["to"] for c in said["changes"]),
-        ]
+        words = [said["changes"][0]["from"], *(change["to"] for change in said["changes"])]
+        assert said["sentence"].split() == words
         assert [len(robot["listed"][0]) for robot in said["robots"]] == [said["steps"]] * 2
     each = coordlang("explain", language, *t_map, "--formula-per-word").out
     assert "every other state" not in each

@@ -91,23 +91,6 @@ def test_exactly_one_formula_is_true_in_every_mapped_state(robots: int) -> None:
     assert seen["several values"]
 
 
-@pytest.mark.parametrize(
-    ("folder", "stem", "method"),
-    [
-        ("t-map", "problem", "minimal"),
-        ("grid", "gwb2-3x3", "greedy"),
-        ("charger", "queue", "greedy"),
-        ("grid-joint", "gw2-2x3", "greedy"),
-    ],
-)
-def test_exact_on_shipped_domains(folder: str, stem: str, method: str) -> None:
-    domain = read_domain(DOMAINS / folder / "domain.pddl")
-    make = from_problems if folder == "charger" else all_pairs
-    candidates = make(domain, [read_problem(DOMAINS / folder / f"{stem}.pddl", domain)])
-    language = build_language(candidates, method).language
-    check_exact(language, candidates, all_covers(mapped_states(language, candidates.model)))
-
-
 def test_where_a_robot_is() -> None:
     """The three words of the running example say where one of the robots is."""
     candidates = all_tasks("three-cells")

@@ -22,10 +22,9 @@ from coordlang.execution.task_language import TaskLanguage
 from coordlang.exports.behaviour_tree import behaviour_trees
 from coordlang.language.partition import Partition
 from planners.joint.model import IDLE, JointModel
-from planners.search.asynchronous import asynchronous
 from planners.search.plans import Plan
 from tests.support import naive
-from tests.support.asynchronous import ChangesAlone, Event, Plans, World, random_tasks, texts
+from tests.support.asynchronous import Event, World, random_plans, texts
 from tests.support.naive_choices import listed
 from tests.support.task_languages import in_words, random_task_languages, shipped
 
@@ -271,19 +270,13 @@ class FreeTeam:
 @pytest.mark.parametrize(("robots", "seeds"), [(2, range(40)), (3, range(8))])
 def test_trees_without_a_common_step_do_every_mixture(robots: int, seeds: range) -> None:
     several = 0
-    for space, world, tasks, random in random_tasks(robots, seeds):
-        for task in tasks:
-            try:
-                plans = Plans(world, space, task, 30)
-                made = asynchronous(space.with_tasks(space.starts[[task]], space.second[[task]]))
-            except (naive.TooLarge, ChangesAlone):
-                continue
-            table = Partition.of_states(space.rows, dict.fromkeys(range(len(space.rows)), 0))
-            found = choices(in_words(None, table, made, 0), (0,))
-            if not found.guaranteed:
-                continue
-            xml = behaviour_trees(found)
-            for parts, _ in islice(plans.mixtures_of([*plans.states]), 3):
-                FreeTeam(xml, world, parts).run(random)
-                several += len(plans.states) > 1
+    for world, space, plans, made, random in random_plans(robots, seeds, 30):
+        table = Partition.of_states(space.rows, dict.fromkeys(range(len(space.rows)), 0))
+        found = choices(in_words(None, table, made, 0), (0,))
+        if not found.guaranteed:
+            continue
+        xml = behaviour_trees(found)
+        for parts, _ in islice(plans.mixtures_of([*plans.states]), 3):
+            FreeTeam(xml, world, parts).run(random)
+            several += len(plans.states) > 1
     assert several >= 3

@@ -22,13 +22,13 @@ from coordlang.explanation.words import Conjunction
 from coordlang.exports.ltlf import export_ltlf, symbols_of
 from coordlang.exports.membership import exclusive_terms, short_terms
 from coordlang.exports.pddl import PddlExport, plan_names
-from coordlang.language.sentences import sentence
 from planners.classical import ClassicalTask, action_names
 from planners.joint.model import show
 from planners.pddl.model_options import ModelOptions
 from planners.search.plans import Plan, Plans
 from planners.system.errors import BadInput, UsageError
 from tests.support.domains import DOMAINS, own_task
+from tests.support.naive import numbered_sentences
 from tests.support.naive_classical import optimal_plans
 from tests.support.task_languages import random_language, random_task_languages, task_languages
 
@@ -56,22 +56,12 @@ def tasks(lot: str) -> tuple[TaskLanguage, ...]:
 def rich() -> TaskLanguage:
     """A task with several sentences, one of which has several words and leaves several plans open."""
     for task_language in tasks("few"):
-        sentences = by_sentence(task_language)
+        sentences = numbered_sentences(task_language)
         if len(sentences) > 1 and any(
             len(plans) > 1 and len(words) > 1 for words, plans in sentences.items()
         ):
             return task_language
     raise AssertionError("no such task")
-
-
-def by_sentence(task_language: TaskLanguage) -> dict[tuple[int, ...], set[Plan]]:
-    """The definition: every optimal plan with the words of its states, repeated ones collapsed."""
-    plans = Plans.of(task_language.space, task_language.task)
-    found: dict[tuple[int, ...], set[Plan]] = {}
-    for plan in plans:
-        words = task_language.partition.word_of(task_language.space.rows[plans.states(plan)])
-        found.setdefault(sentence(words.tolist()), set()).add(plan)
-    return found
 
 
 def planned(exported: PddlExport, plans: Iterable[Sequence[int]] | None = None) -> list[Plan]:
@@ -85,7 +75,7 @@ def planned(exported: PddlExport, plans: Iterable[Sequence[int]] | None = None) 
 @BOTH
 def test_the_optimal_plans_are_the_plans_that_fit(lot: str) -> None:
     for task_language in tasks(lot):
-        for words, plans in islice(by_sentence(task_language).items(), 4):
+        for words, plans in islice(numbered_sentences(task_language).items(), 4):
             for form, limit in FORMS.items():
                 exported = PddlExport(task_language, words, limit)
                 assert exported.classical.form == form
@@ -98,7 +88,7 @@ def test_the_optimal_plans_are_the_plans_that_fit(lot: str) -> None:
 
 def test_the_tasks_are_worth_it() -> None:
     """Several say several sentences, some of which leave several plans open."""
-    listed = [[len(plans) for plans in by_sentence(used).values()] for used in tasks("few")]
+    listed = [[len(plans) for plans in numbered_sentences(used).values()] for used in tasks("few")]
     assert sum(len(found) > 1 for found in listed) >= 15
     assert sum(len(found) > 1 and max(found) > 1 for found in listed) >= 12
     for asked in ("remembers", "is_joint_action"):
@@ -177,7 +167,8 @@ def asked(
 ) -> Iterator[tuple[str, list[dict[str, bool]], bool]]:
     """Formulas of sentences; plans as symbols that hold in their states; which plan has which."""
     for used in tasks:
-        codec, every, listed = used.model.codec, Plans.of(used.space, used.task), by_sentence(used)
+        codec, every = used.model.codec, Plans.of(used.space, used.task)
+        listed = numbered_sentences(used)
         for words in islice(listed, sentences):
             exported = export_ltlf(used, words)
             for other, found in listed.items():
@@ -207,7 +198,7 @@ def test_an_independent_library_says_the_same() -> None:
 
 def test_the_formula_over_words_is_the_same_with_their_formulas() -> None:
     task_language = rich()
-    exported = export_ltlf(task_language, max(by_sentence(task_language), key=len))
+    exported = export_ltlf(task_language, max(numbered_sentences(task_language), key=len))
     text = re.sub(r"[a-z][a-z0-9_]*", lambda m: exported.words[m.group()], exported.over_words)
     assert text == exported.formula
 
@@ -227,7 +218,7 @@ def test_plan_files_of_other_planners() -> None:
 
 
 def test_a_plan_that_is_cut_off_or_none() -> None:
-    exported = PddlExport(rich(), max(by_sentence(rich()), key=len), 0)
+    exported = PddlExport(rich(), max(numbered_sentences(rich()), key=len), 0)
     names = action_names(exported.classical)
     plan = [names[n] for n in next(iter(optimal_plans(exported.classical)))]
     whole = exported.joint_plan([name.upper() for name in plan])
@@ -272,7 +263,7 @@ def every_plan(task: ClassicalTask) -> Iterator[tuple[int, ...]]:
 def test_every_plan_within_slack_has_the_sentence(folder: str, slack: int) -> None:
     """All of them, with all, some or none of the steps at rest at the end."""
     task_language = within_slack(folder, slack)
-    sentences = by_sentence(task_language)
+    sentences = numbered_sentences(task_language)
     assert len(sentences) > 1
     of_task = Plans.of(task_language.space, task_language.task)
     for words, plans in sentences.items():

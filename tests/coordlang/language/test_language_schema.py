@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import copy
-import gzip
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -17,9 +16,7 @@ from coordlang.commands.building import build_language
 from coordlang.language.file import (
     LANGUAGE,
     language_from_bytes,
-    read_language,
     to_bytes,
-    write_language,
 )
 from coordlang.language.provenance import Tolerance
 from planners.system.errors import BadInput, Position
@@ -48,21 +45,6 @@ def readable(data: object) -> bool:
     except BadInput:
         return False
     return True
-
-
-@pytest.mark.parametrize(
-    ("method", "folder", "stem"),
-    [("minimal", "three-cells", "problem"), ("greedy", "grid", "gw2-2x3")],
-)
-def test_what_is_written_is_valid(method: str, folder: str, stem: str, tmp_path: Path) -> None:
-    language = build_language(all_tasks(folder, stem), method).language
-    for name in ("l.json", "l.json.gz"):
-        write_language(language, tmp_path / name)
-        assert read_language(tmp_path / name) == language
-    assert valid(json.loads((tmp_path / "l.json").read_text()))
-    assert (
-        gzip.decompress((tmp_path / "l.json.gz").read_bytes()) == (tmp_path / "l.json").read_bytes()
-    )
 
 
 Change = Callable[[dict[str, Any]], object]

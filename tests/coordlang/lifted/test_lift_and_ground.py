@@ -298,24 +298,6 @@ def test_where_the_memory_does_not_suffice(
     assert json.loads(language.read_text())["tasks"]["count"] == 0
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code"),
-    [
-        (("lift", GRID), 2),
-        (("lift", GRID, OPEN, "--tasks", "all", "--complexity", "3", "-o", "x.json"), 11),
-        (("lift", GRID, "missing.pddl", "-o", "x.json"), 31),
-        (("ground", "missing.json", GRID, OPEN, "-o", "x.json"), 31),
-    ],
-)
-def test_exit_codes(
-    arguments: tuple[object, ...], code: int, coordlang: Command, tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
-    monkeypatch.chdir(tmp_path)
-    assert coordlang(*arguments).code == code
-    assert not (tmp_path / "x.json").exists()
-
-
 def test_the_report_shows_the_features(coordlang: Command, lifted: Path, tmp_path: Path) -> None:
     """Words have the same numbers, and so colours, on every map; states are coloured by them."""
     page = tmp_path / "page.html"
@@ -331,24 +313,6 @@ def test_the_report_shows_the_features(coordlang: Command, lifted: Path, tmp_pat
         if "(at r1 c0-0)" in {data["facts"][fact]["text"] for fact in state}
     ]
     assert set(corner) == {"w0"}
-
-
-def test_coordinates_beside_the_problem(coordlang: Command, tmp_path: Path) -> None:
-    """Places without telling names: a file says where they are, and features use it."""
-    text = OPEN.read_text().replace("c0-", "upper").replace("c1-", "lower")
-    domain, problem, out = tmp_path / "d.pddl", tmp_path / "p.pddl", tmp_path / "l.json"
-    domain.write_text(GRID.read_text())
-    problem.write_text(text)
-    points = {f"{row}{x}": [x, y] for y, row in enumerate(("upper", "lower")) for x in range(3)}
-    (tmp_path / "coordinates.json").write_text(json.dumps({"coordinates": points}))
-    outcome = coordlang(
-        "lift", domain, problem, "--tasks", "all", "--complexity", "5", "-o", out, "--jobs", "1"
-    )
-    assert outcome.code == 0
-    assert "column(at(" in outcome.out
-    assert coordlang("ground", out, domain, problem, "-o", tmp_path / "g.json").code == 0
-    explained = coordlang("explain", tmp_path / "g.json", domain, problem)
-    assert "column(at(" in explained.out
 
 
 def test_a_limit_ends_the_search_for_fewer_words(

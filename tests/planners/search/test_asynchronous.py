@@ -11,24 +11,33 @@ import numpy as np
 import pytest
 
 from coordlang.commands.building import build_language
-from coordlang.language.candidates import all_pairs, from_problems
+from coordlang.language.candidates import all_pairs
 from coordlang.language.partition import Partition
 from coordlang.verification.by_definition import verify
 from planners.joint.composition import ComposingStepper
+from planners.joint.model import Goal
+from planners.joint.tables import Rows
 from planners.joint.traces import Traces
 from planners.loading import build, load
 from planners.pddl import parse_problem
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
 from planners.pddl.sexpr import Source
-from planners.search.asynchronous import Timing, asynchronous
+from planners.search.asynchronous import asynchronous
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans as Paths
-from planners.search.plans import counts
 from planners.system.errors import BadInput
 from tests.support import naive
-from tests.support.asynchronous import ChangesAlone, Plans, World, least_words, random_tasks, texts
+from tests.support.asynchronous import (
+    ChangesAlone,
+    Plans,
+    World,
+    least_words,
+    random_plans,
+    random_tasks,
+    texts,
+)
 from tests.support.domains import DOMAINS, all_tasks, own_task, read
 from tests.support.random_models import random_model
 from tests.support.texts import parsed
@@ -41,7 +50,7 @@ SEEDS = [*RUNS, *(pytest.param(*run, marks=pytest.mark.thorough) for run in THOR
 def paths(space: PlanSpace, task: int) -> dict[tuple[tuple[str, ...], ...], tuple[int, ...]]:
     """The parts of a task's plans, as texts, each with the states that the plan passes."""
     found = {}
-    listed = Paths(space, int(space.starts[task]), counts(space))
+    listed = Paths.of(space, task)
     for plan in listed:
         columns = enumerate(zip(*plan, strict=True)) if plan else enumerate([()] * space.robots)
         parts = tuple(
@@ -51,6 +60,12 @@ def paths(space: PlanSpace, task: int) -> dict[tuple[tuple[str, ...], ...], tupl
         assert parts not in found, "plans with equal parts are one"
         found[parts] = tuple(listed.states(plan))
     return found
+
+
+def ends_of(space: PlanSpace, task: int) -> tuple[Rows, Goal]:
+    """The state in which a task begins, and its goal."""
+    start = space.starts[task]
+    return space.rows[space.state[start]], space.goals[space.goal[start]]
 
 
 @pytest.mark.parametrize(("robots", "seeds"), SEEDS)
@@ -63,7 +78,6 @@ def test_paths_are_the_plans_up_to_timing(robots: int, seeds: range) -> None:
         except BadInput:
             seen["refused"] += 1
             continue
-        timing = Timing(made)
         for task in tasks:
             try:
                 plans = Plans(world, space, task, 60)
@@ -72,11 +86,10 @@ def test_paths_are_the_plans_up_to_timing(robots: int, seeds: range) -> None:
             wanted = {texts(world.model, parts): states for parts, states in plans.states.items()}
             assert paths(made, task) == wanted
             seen["plans"] += len(wanted)
-            listed = Paths(made, int(made.starts[task]), counts(made))
+            listed = Paths.of(made, task)
             for plan in listed:
-                steps = timing.steps(plan, listed.states(plan))
-                assert steps in plans.listed
-                assert timing.labels(int(made.starts[task]), steps) == plan
+                assert listed.steps(plan) in plans.listed
+                assert listed.of_steps(listed.steps(plan)) == plan
     print(f"{robots} robots: {dict(seen)}")
     assert seen["plans"] >= 30
 
@@ -85,29 +98,20 @@ def test_paths_are_the_plans_up_to_timing(robots: int, seeds: range) -> None:
 def test_under_a_language_every_interleaving_ends_in_the_goal(robots: int, seeds: range) -> None:
     """A language by definition, whatever time events take; and `verify` agrees."""
     seen: Counter[str] = Counter()
-    for space, world, tasks, random in random_tasks(robots, seeds):
-        for task in tasks:
-            try:
-                plans = Plans(world, space, task, 40)
-            except (naive.TooLarge, ChangesAlone):
+    for world, space, plans, made, random in random_plans(robots, seeds, 40):
+        row, goal = ends_of(space, 0)
+        for many in (1, 2, 4):
+            word = {state: random.randrange(many) for state in range(len(space.rows))}
+            mixtures = [mixed for mixed, _ in plans.mixtures(word)]
+            if len(mixtures) > 100:
                 continue
-            one = space.with_tasks(space.starts[[task]], space.second[[task]])
-            made = asynchronous(one)
-            row = space.rows[space.state[space.starts[task]]]
-            goal = space.goals[space.goal[space.starts[task]]]
-            for many in (1, 2, 4):
-                word = {state: random.randrange(many) for state in range(len(space.rows))}
-                mixtures = [mixed for mixed, _ in plans.mixtures(word)]
-                if len(mixtures) > 100:
-                    continue
-                holds = all(mixed in plans.states for mixed in mixtures)
-                partition = Partition.of_states(space.rows, word)
-                assert verify(partition, [made]).holds == holds
-                ends = Counter(end for mixed in mixtures for end in world.ends(row, mixed, goal))
-                assert not holds or set(ends) == {"arrived"}
-                seen["language" if holds else "none"] += 1
-                seen["mixtures"] += len(mixtures)
-                seen["do not arrive"] += any(end != "arrived" for end in ends)
+            holds = all(mixed in plans.states for mixed in mixtures)
+            assert verify(Partition.of_states(space.rows, word), [made]).holds == holds
+            ends = Counter(end for mixed in mixtures for end in world.ends(row, mixed, goal))
+            assert not holds or set(ends) == {"arrived"}
+            seen["language" if holds else "none"] += 1
+            seen["mixtures"] += len(mixtures)
+            seen["do not arrive"] += any(end != "arrived" for end in ends)
     print(f"{robots} robots: {dict(seen)}")
     assert min(seen["language"], seen["none"]) >= 5
 
@@ -179,8 +183,7 @@ def test_least_words(links: str, robots: int, in_step: int, asynchronously: int)
     least, word = least_words(plans, range(len(space.rows)))
     assert least == asynchronously
     for task, own in enumerate(plans):
-        row = space.rows[space.state[space.starts[task]]]
-        goal = space.goals[space.goal[space.starts[task]]]
+        row, goal = ends_of(space, task)
         for mixed, _ in own.mixtures(word):
             assert world.ends(row, mixed, goal) == {"arrived"}
     if in_step < asynchronously:
@@ -267,28 +270,6 @@ def test_a_shared_action_and_two_that_lift_one_table_meet() -> None:
         for node, edge in zip(space.nodes_on(int(space.starts[0]), path), path, strict=False)
     ]
     assert any(len(block) == 2 for step in blocks for block in step)
-
-
-def test_in_joint_actions_all_who_act_meet() -> None:
-    (space,) = own_task("grid-joint", "corners-3x3").spaces
-    traces = Traces(space.model)
-    edge = space.first_path(int(space.starts[0]))[0]
-    row = space.rows[space.state[space.starts[0]]]
-    assert traces.blocks(row, space.labels_of(edge)) == ((0, 1),)
-
-
-def test_what_does_not_interfere_is_in_no_order() -> None:
-    """Far from each other robots wait for nothing, and their plans count once."""
-    domain, problem = read("grid", "corners-4x4")
-    candidates = from_problems(domain, [problem], ModelOptions(asynchronous=True))
-    (space,) = candidates.spaces
-    firsts = {
-        space.model.events[robot][label]
-        for edge in space.out_edges(int(space.starts[0]))
-        for robot, label in enumerate(space.labels_of(edge))
-    }
-    assert firsts
-    assert all(event is not None and event.waits == (0, 0) for event in firsts)
 
 
 NOT_ALL_AT_ONCE = """
