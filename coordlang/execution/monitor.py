@@ -155,7 +155,9 @@ class Monitor:
         self._atoms = {**dict.fromkeys(facts, False), **dict.fromkeys(sorted(others))}
         if len(self._atoms) < len(facts) + len(others):
             raise _broken(f"{where}: an atom occurs twice in 'facts' and 'others'")
-        states = _read_states(entry, facts, where, self._own_texts(entry, where))
+        texts = self._own_texts(entry, where)
+        states = _read_states(entry, facts, where, texts)
+        self._check_moves(texts, where)
         self._most = max(MAX_NODES, _NODES_OF_STATE * len(states))
         self._start = self._here = states[0]  # both, so that no step has states to give back
         self._has_promised = False
@@ -163,6 +165,9 @@ class Monitor:
     def _own_texts(self, entry: Mapping[str, Any], where: str) -> set[str]:
         """Keys of 'next' that are known to be well written; of events, after reading them."""
         return {IDLE}
+
+    def _check_moves(self, texts: set[str], where: str) -> None:
+        """Raise `MonitorError` if some of the well written keys of 'next' mean nothing."""
 
     @classmethod
     def read(cls, path: str, robot: str | None = None, *, max_bytes: int = MAX_BYTES) -> Self:
@@ -317,7 +322,7 @@ class Monitor:
         found = {(self._here, made): _State(self._here.step, self._here.known)}
         for state, before in (todo := list(found)):  # which grows meanwhile
             for text, to in state.moves.items():
-                now, then = made_by(text), made_in(to)
+                now, then = made_by(self._done_in(text)), made_in(to)
                 if now is None or then is None:
                     continue
                 after = to, before | now | then
@@ -335,6 +340,10 @@ class Monitor:
             new.left = int(not state.moves and made == whole)
             new.keep(new.moves)
         return new if new.left else None  # that of the present comes last
+
+    def _done_in(self, text: str | None) -> str | None:
+        """What is done in a move, by its text."""
+        return text
 
     def _made_in(self, visit: Sequence[str], avoid: Sequence[str], state: _State) -> int | None:
         """The visits made in a state, as bits; None if it is to be avoided."""
@@ -409,12 +418,19 @@ class EventMonitor(Monitor):
         self._others = _others(record, where)
         #: What the end of an event counts for: (robot, subaction), "" for the own robot.
         self._counted: dict[tuple[str, str], list[_Count]] = {}
-        for own, by_robot in _get(record, "interferes", dict, where).items():
+        interferes, where = _get(record, "interferes", dict, where), f"{where}: 'interferes'"
+        for own in interferes:
+            by_robot = _get(interferes, own, dict, where)
             for robot in by_robot:
-                for text in _get(by_robot, robot, list, f"{where}: 'interferes'"):
+                for text in _get(by_robot, robot, list, where):
+                    _check_plain(text, where)
                     self._counted.setdefault((robot, text), []).append(_Count(robot, own=own))
                     self._counted.setdefault(("", own), []).append(_Count(robot, its=text))
         return {IDLE, *self._events}
+
+    def _check_moves(self, texts: set[str], where: str) -> None:
+        if unknown := texts - self._events.keys() - {IDLE}:
+            raise _broken(f"{where}: 'events' lacks {_shown(min(unknown))}")
 
     @property
     def finished(self) -> bool:
@@ -428,6 +444,9 @@ class EventMonitor(Monitor):
     def subaction(self, event: str) -> str:
         """What is done in an event."""
         return self._events[event].subaction
+
+    def _done_in(self, text: str | None) -> str | None:
+        return None if text is None else self.subaction(text)
 
     def partners(self, event: str) -> tuple[str, ...]:
         """The robots that an event meets."""
@@ -562,9 +581,6 @@ def _others(record: Mapping[str, Any], where: str) -> dict[str, list[dict[str, i
 
 def _made_by(do: Sequence[str], never: Sequence[str], shift: int, text: str | None) -> int | None:
     """The dos that a subaction makes, as bits from ``shift`` on; None if it is never done."""
-    if text is not None:
-        subaction, waits, _ = text.partition(") (")  # of an event only what is done counts
-        text = subaction + waits[:1]
     if any(_matches(pattern, text) for pattern in never):
         return None
     return sum(1 << bit for bit, pattern in enumerate(do, shift) if _matches(pattern, text))

@@ -21,7 +21,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from coordlang.execution import monitor as monitor_module
-from coordlang.execution.monitor import Monitor, MonitorError, NotAllowed, NotPossible
+from coordlang.execution.monitor import EventMonitor, Monitor, MonitorError, NotAllowed, NotPossible
 from tests.fuzz.mutations import places
 
 
@@ -45,6 +45,20 @@ def choices_file(length: int = 3, cells: int = 4) -> dict[str, Any]:
     entry |= {"facts": facts, "others": ["(at r2 c0)"], "states": states}
     head = {"format": "coordlang/choices", "version": 1, "robots": ["r1", "r2"], "sentence": "w0"}
     return {**head, "choices": [entry]}
+
+
+def events_file() -> dict[str, Any]:
+    """The same of a robot that keeps no common step: each move waits for r2, and meets r3."""
+    data = choices_file()
+    (entry,) = data["choices"]
+    moves = sorted({text for state in entry["states"] for text in state["next"]} - {"idle"})
+    event = {"after": {"r2": 1}, "with": {"r3": "(help r3)"}}
+    entry["passings"] = {
+        "events": {text: {"subaction": text, **event} for text in moves},
+        "interferes": {text: {"r2": ["(go r2)"], "r3": []} for text in moves},
+        "others": {"r2": [{"(go r2)": 0}], "r3": [{"(help r3)": 1}]},
+    }
+    return data
 
 
 def message(call: Callable[[], object]) -> str | None:
@@ -320,21 +334,23 @@ def refused_or_sound(make: Callable[[], Monitor]) -> None:
     open_ends = [at]
     while open_ends:
         here = open_ends.pop()
-        subplans += here.finished
+        subplans += not here.allowed()
         for text in here.allowed():
-            open_ends.append(here.copy())
-            open_ends[-1].did(text)
+            open_ends.append(here.after(text))
+            if isinstance(here, EventMonitor):
+                assert here.missing(text) or text in here.may_start()
         for atom in ("(at r1 c0)", "(at r1 c1)", "(at r2 c0)"):
             said = message(partial(here.known, atom))
             assert said is None or "is no atom that can change" in said
     assert at.remaining == at.can().subplans == subplans
 
 
+@pytest.mark.parametrize("kind", [Monitor, EventMonitor])
 @settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.lists(st.tuples(st.integers(0), st.sampled_from("sdm"), NASTY), min_size=1, max_size=3))
-def test_mutated_data(mutations: list[tuple[int, str, Any]]) -> None:
+def test_mutated_data(kind: type[Monitor], mutations: list[tuple[int, str, Any]]) -> None:
     """Set, drop or move anything anywhere."""
-    data = choices_file()
+    data = choices_file() if kind is Monitor else events_file()
     for chosen, how, value in mutations:
         all_places = list(places(data))
         place, key = all_places[chosen % len(all_places)]
@@ -345,7 +361,14 @@ def test_mutated_data(mutations: list[tuple[int, str, Any]]) -> None:
             place[key] = copy.deepcopy(other[elsewhere])
         else:
             place[key] = value
-    refused_or_sound(partial(Monitor, data, "r1"))
+    refused_or_sound(partial(kind, data, "r1"))
+
+
+def test_every_move_is_an_event_of_the_file() -> None:
+    data = events_file()
+    data["choices"][0]["passings"]["events"].popitem()
+    with pytest.raises(MonitorError, match=r"'events' lacks \(move r1"):
+        EventMonitor(data)
 
 
 # ---- what a robot says
