@@ -24,7 +24,7 @@ from benchmarks.paper.task_choices import languages_in_tasks
 #: What is said: the whole plan, or a sentence of one of these languages.
 SAID = ("plan", "minimal", "slack", "few", "silence", "graph", "mixed", "free")
 #: Of these the ways of robots that keep no common step (`EventTrials`).
-_FREE = ("graph", "mixed", "free")
+_PASSINGS = ("graph", "mixed", "free")
 #: Probabilities with which a robot is delayed in a step.
 DELAYS = (0.0, 0.05, 0.1, 0.2, 0.3)
 #: The one that the table shows.
@@ -40,7 +40,7 @@ def units(settings: Settings) -> list[Unit]:
     """List a unit for each world and what is said in it."""
     runs = _RUNS * settings.samples
     worlds = [(name, said) for name in _WORLDS for said in SAID]
-    worlds += [(world.name, said) for world in TASKS for said in _FREE]
+    worlds += [(world.name, said) for world in TASKS for said in _PASSINGS]
     return [
         Unit("delays", f"{name}/{said}", {"world": name, "said": said, "runs": runs})
         for name, said in worlds
@@ -52,7 +52,7 @@ def run(unit: Unit, settings: Settings) -> Result:
     """Count the runs that end in the goal, and how late, for each probability, with and without."""
     said, together = unit.parameters["said"], unit.parameters["said"] == "plan"
     method, world = "minimal" if together else said, WORLDS[unit.parameters["world"]]
-    if said in _FREE:
+    if said in _PASSINGS:
         return _without_step(world, unit, settings)
     candidates, language = language_for(world, method, settings.seed)
     trials = DelayTrials(list(languages_in_tasks(language, candidates)), together=together)
@@ -116,7 +116,7 @@ def _waits(worlds: Mapping[str, Sequence[Record]]) -> str:
     rows = []
     for name, here in worlds.items():
         found = {record.parameters["said"]: record.result.get("passings", []) for record in here}
-        own = [found[said] for said in _FREE]
+        own = [found[said] for said in _PASSINGS]
         means = [[waits / well for _, well, _, waits, _ in one] for one in own]
         runs, well = (sum(sample[k] for one in own for sample in one) for k in (0, 1))
         pairs = zip(means[0], means[-1], strict=True)
@@ -148,7 +148,7 @@ def _figure(worlds: Mapping[str, Sequence[Record]]) -> Any:
     panels = [
         Lines(f"{world}, {name}", unit, [series(record, name) for record in own])
         for world, here in worlds.items()
-        if (own := [record for record in here if record.parameters["said"] not in _FREE])
+        if (own := [record for record in here if record.parameters["said"] not in _PASSINGS])
         for name in _YIELDING
     ]
     return lines(panels, DELAYS, "probability of a delay", len(_YIELDING))

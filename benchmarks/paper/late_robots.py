@@ -14,7 +14,6 @@ from random import Random
 import numpy as np
 
 from benchmarks.paper.task_choices import sentence_of
-from coordlang.execution.automaton import determinise
 from coordlang.execution.choices import knowing_own, monitor
 from coordlang.execution.monitor import EventMonitor
 from coordlang.execution.task_language import TaskLanguage
@@ -222,7 +221,7 @@ class EventTrials:
             fits = used.plans_with(words)
             monitors = []
             for robot in range(len(used.model.robots)):
-                own = monitor(fits, knowing_own(fits, determinise(fits, robot), robot), "")
+                own = monitor(fits, knowing_own(fits, robot), "")
                 assert isinstance(own, EventMonitor)
                 monitors.append(own)
             self._said[key] = Plans.of(fits), monitors

@@ -109,7 +109,7 @@ def choices(
         robots.append(
             RobotChoices(robot, exact, "exact")
             if exact
-            else knowing_own(fits, subplans[robot], robot)
+            else knowing_own(fits, robot, subplans[robot])
         )
     return SentenceChoices(task_language, tuple(words), fits, tuple(robots), mixtures)
 
@@ -125,8 +125,9 @@ def knowing(fits: PlanSpace, robot: int, facts: int) -> RobotChoices:
     return RobotChoices(robot, replace(found, known=known), "own")
 
 
-def knowing_own(fits: PlanSpace, subplans: Automaton, robot: int) -> RobotChoices:
+def knowing_own(fits: PlanSpace, robot: int, subplans: Automaton | None = None) -> RobotChoices:
     """A robot's subplans; of what its own subactions alone change it knows the values."""
+    subplans = subplans or determinise(fits, robot)
     model = fits.model.in_step
     facts, changes = own_changes(model, robot)
     others = ((1 << len(model.codec.facts)) - 1) & ~facts

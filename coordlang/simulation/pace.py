@@ -55,7 +55,9 @@ class Pace:
 
     def hears(self, messages: Iterable[Message]) -> None:
         """Take in how far the others are."""
-        for message in messages if self._way != "passings" else ():
+        if self._way == "passings":
+            return
+        for message in messages:
             self._heard[message.sender] = max(self._heard[message.sender], message.number)
 
     def told(self, steps: int, words: int, is_further: bool) -> Sequence[tuple[Kind, int]]:
@@ -73,7 +75,9 @@ class Pace:
         """
         if self._way == "clock":
             return abs(math.remainder(time, self.period)) < _SAME and begun < time
-        own = {"barrier": steps, "word": words, "passings": 0}[self._way]
+        if self._way == "passings":
+            return True
+        own = steps if self._way == "barrier" else words
         return all(heard >= own for heard in self._heard.values())
 
     def missed(self, steps: int, time: float) -> int:

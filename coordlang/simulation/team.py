@@ -90,7 +90,7 @@ class Mission:
             )
             words = None
             if fits.model.is_asynchronous:
-                own = knowing_own(fits, determinise(fits, robot), robot)
+                own = knowing_own(fits, robot)
             else:
                 own = knowing(fits, robot, self._places_of(name))
                 words = own_words(fits, self.task_language, robot) if agreed else None

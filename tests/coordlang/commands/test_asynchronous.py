@@ -58,9 +58,8 @@ def test_words_that_suffice_in_step_are_refuted(shell: Shell) -> None:
 
 
 def test_a_proof_is_checked(shell: Shell) -> None:
-    shell(
-        "build SQUARE --tasks all --method minimal --asynchronous -o l.json --certificate p.json", 0
-    )
+    build = "build SQUARE --tasks all --method minimal --asynchronous -o l.json --certificate"
+    shell(f"{build} p.json", 0)
     shell("verify l.json SQUARE --certificate p.json", 0, "lower bound 5")
 
 
@@ -86,10 +85,8 @@ def test_a_proof_by_symmetries_of_three_robots_is_checked(shell: Shell) -> None:
 
 
 def test_plans_that_differ_in_timing_alone_count_once(shell: Shell) -> None:
-    in_step, without = (
-        library.plans(*FILES["CELLS"]),
-        library.plans(*FILES["CELLS"], asynchronous=True),
-    )
+    in_step = library.plans(*FILES["CELLS"])
+    without = library.plans(*FILES["CELLS"], asynchronous=True)
     assert (in_step.count, without.count) == (4, 2)
     assert set(without) < set(in_step)
     assert [without.rank(plan) for plan in without] == [0, 1]
@@ -131,9 +128,8 @@ def test_plans_have_sentences_whatever_their_timing(made: Path, shell: Shell) ->
     shell("plans SQUARE --max 1", 0)
     Path("late.ipc").write_text(LATE)
     assert shell(f"say {made} SQUARE late.ipc", 0).out.strip() == said[1]
-    Path("late.ipc").write_text(
-        LATE.replace("1: (move r2 c1-1 c0-1)\n", "0: (move r2 c1-1 c1-0)\n")
-    )
+    wrong = LATE.replace("1: (move r2 c1-1 c0-1)\n", "0: (move r2 c1-1 c1-0)\n")
+    Path("late.ipc").write_text(wrong)
     shell(f"say {made} SQUARE late.ipc", 1, "this is no plan")
     detour = "0: (move r1 c0-0 c0-1)\n1: (move r1 c0-1 c0-0)\n"
     moved = [f"{int(line[0]) + 2}{line[1:]}" for line in LATE.splitlines()]

@@ -21,13 +21,9 @@ from tests.support.asynchronous import World, random_plans, texts
 from tests.support.domains import own_task
 from tests.support.task_languages import in_words, sentence_of, shipped
 
-SEEDS = [
-    *((2, range(40)), (3, range(10))),
-    *(
-        pytest.param(*run, marks=pytest.mark.thorough)
-        for run in ((2, range(40, 900)), (3, range(10, 500)), (4, range(60)))
-    ),
-]
+RUNS = [(2, range(40)), (3, range(10))]
+THOROUGH = [(2, range(40, 900)), (3, range(10, 500)), (4, range(60))]
+SEEDS = [*RUNS, *(pytest.param(*run, marks=pytest.mark.thorough) for run in THOROUGH)]
 
 
 def monitors_of(found: SentenceChoices) -> list[EventMonitor]:

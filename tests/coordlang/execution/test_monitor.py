@@ -149,13 +149,7 @@ def test_monitor_by_hand(three_cells: SentenceChoices) -> None:
     assert (at.step, at.remaining, at.finished) == (0, 2, False)
     assert at.allowed() == (None, "(move r2 b a)")
     assert at.known("(at r2 b)") is True
-    assert at.can(visit="(at r2 b)", avoid="(at r2 c)")
     assert not at.can(never=None)
-    assert at.can(never="(move r2 * c)", visit=["(at r2 a)", "(at r2 b)"]).subplan == (
-        None,
-        "(move r2 b a)",
-    )
-    assert not at.can(do="(move r2 b c)")
     assert at.can(do=["idle", "(move r2 * a)"]).subplans == 2
     with pytest.raises(
         NotAllowed,

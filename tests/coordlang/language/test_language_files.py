@@ -48,14 +48,11 @@ def test_contradictions(
     assert message in outcome.err
 
 
+T_MAP = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
 GRID_JOINT = DOMAINS / "grid-joint" / "domain.pddl", DOMAINS / "grid-joint" / "three-cells.pddl"
 
 
-@pytest.mark.parametrize(
-    "files",
-    [(DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"), GRID_JOINT],
-    ids=["t-map", "grid-joint"],
-)
+@pytest.mark.parametrize("files", [T_MAP, GRID_JOINT], ids=["t-map", "grid-joint"])
 def test_a_language_belongs_to_what_the_domain_says(
     files: tuple[Path, Path], coordlang: Command, tmp_path: Path
 ) -> None:
@@ -86,9 +83,8 @@ def test_a_language_belongs_to_what_the_domain_says(
 def test_the_file_says_which_predicates_keys_hold(
     flags: list[str], coordlang: Command, tmp_path: Path
 ) -> None:
-    domain, problem = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
     path = tmp_path / "l.json"
-    assert coordlang("build", domain, problem, "--tasks", "all", *flags, "-o", path).code == 0
+    assert coordlang("build", *T_MAP, "--tasks", "all", *flags, "-o", path).code == 0
     data = json.loads(path.read_text())
     held = {atom.split("(")[1].split()[0] for key in data["states"] for atom in key.split(") ")}
     assert set(data["domain"]["fluents"]) == held
