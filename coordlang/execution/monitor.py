@@ -57,12 +57,7 @@ class NotAllowed(MonitorError):
     """
 
     def __init__(
-        self,
-        robot: str,
-        did: str | None,
-        step: int,
-        allowed: Sequence[str | None],
-        unit: str = "step",
+        self, robot: str, did: str | None, step: int, allowed: Sequence[str | None], unit: str
     ) -> None:
         could = " or ".join(text or IDLE for text in allowed[:_SHOWN])
         more = " or .." if len(allowed) > _SHOWN else ""
@@ -155,9 +150,7 @@ class Monitor:
         self._atoms = {**dict.fromkeys(facts, False), **dict.fromkeys(sorted(others))}
         if len(self._atoms) < len(facts) + len(others):
             raise _broken(f"{where}: an atom occurs twice in 'facts' and 'others'")
-        texts = self._own_texts(entry, where)
-        states = _read_states(entry, facts, where, texts)
-        self._check_moves(texts, where)
+        states = _read_states(entry, facts, where, self._own_texts(entry, where))
         self._most = max(MAX_NODES, _NODES_OF_STATE * len(states))
         self._start = self._here = states[0]  # both, so that no step has states to give back
         self._has_promised = False
@@ -165,9 +158,6 @@ class Monitor:
     def _own_texts(self, entry: Mapping[str, Any], where: str) -> set[str]:
         """Keys of 'next' that are known to be well written; of events, after reading them."""
         return {IDLE}
-
-    def _check_moves(self, texts: set[str], where: str) -> None:
-        """Raise `MonitorError` if some of the well written keys of 'next' mean nothing."""
 
     @classmethod
     def read(cls, path: str, robot: str | None = None, *, max_bytes: int = MAX_BYTES) -> Self:
@@ -426,11 +416,11 @@ class EventMonitor(Monitor):
                     _check_plain(text, where)
                     self._counted.setdefault((robot, text), []).append(_Count(robot, own=own))
                     self._counted.setdefault(("", own), []).append(_Count(robot, its=text))
+        for number, state in enumerate(_get(entry, "states", list, where)):
+            for text in _get(state, "next", dict, f"state {number}"):
+                if text != IDLE and text not in self._events:
+                    raise _broken(f"state {number}: 'events' lacks {_shown(text)}")
         return {IDLE, *self._events}
-
-    def _check_moves(self, texts: set[str], where: str) -> None:
-        if unknown := texts - self._events.keys() - {IDLE}:
-            raise _broken(f"{where}: 'events' lacks {_shown(min(unknown))}")
 
     @property
     def finished(self) -> bool:

@@ -173,13 +173,7 @@ def check_own_atoms(
         for step, label in enumerate((*part, None)):
             true, possible = own.automaton.known[state]
             for number, fact in enumerate(facts):
-                says = (
-                    "true"
-                    if true >> number & 1
-                    else "unknown"
-                    if possible >> number & 1
-                    else "false"
-                )
+                says = ("false", "unknown", "true")[(true >> number & 1) + (possible >> number & 1)]
                 seen[says] += 1
                 assert (says == "unknown") == (not mask >> number & 1)
                 assert says == "unknown" or fact in known[part[:step]][says == "false"]

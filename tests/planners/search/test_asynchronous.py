@@ -38,7 +38,7 @@ from tests.support.asynchronous import (
     random_tasks,
     texts,
 )
-from tests.support.domains import DOMAINS, all_tasks, own_task, read
+from tests.support.domains import DOMAINS, own_task, read
 from tests.support.random_models import random_model
 from tests.support.texts import parsed
 
@@ -225,22 +225,6 @@ def test_single_steps_are_those_of_tables() -> None:
                 assert result is None or (result == known).all()
                 seen[result is None] += 1
     assert min(seen.values()) > 100
-
-
-def test_who_leaves_a_cell_goes_before_who_follows() -> None:
-    (space,) = all_tasks("three-cells").spaces
-    traces, followed = Traces(space.model), 0
-    for node in range(len(space)):
-        for edge in space.out_edges(node):
-            texts = space.model.texts(space.labels_of(edge))
-            moves = [text.strip("()").split() if text else None for text in texts]
-            blocks = traces.blocks(space.rows[space.state[node]], space.labels_of(edge))
-            one, two = moves
-            if one and two:
-                assert two[2] == one[3] or one[2] == two[3], "of three cells two are left"
-                assert blocks == (((1,), (0,)) if two[2] == one[3] else ((0,), (1,)))
-                followed += 1
-    assert followed > 0
 
 
 def test_robots_that_turn_in_a_ring_meet(tmp_path: Path) -> None:
