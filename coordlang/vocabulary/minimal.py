@@ -147,6 +147,8 @@ class MinimalSearch:
             return
         if self._pairs // _FIRST_PAIRS > _BEGINNING * self._most:
             return
+        if self._job.candidates.model.is_asynchronous:
+            self.merge()  # its first words are single states, from where no search gets far
         if self._is_one_task:
             for rounds in _WHERE_DEAR if self._is_dear else _FOR_KINDS:
                 self._find_fewer_tied(rounds)

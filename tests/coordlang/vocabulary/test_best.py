@@ -11,9 +11,11 @@ import pytest
 
 import coordlang as library
 from coordlang.commands.building import build_language
+from coordlang.language.candidates import all_pairs
+from planners.pddl.model_options import ModelOptions
 from planners.system.errors import UsageError
 from tests.support.command import Command
-from tests.support.domains import DOMAINS, all_tasks, own_task
+from tests.support.domains import DOMAINS, all_tasks, own_task, read
 
 CORNERS = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "corners-3x3.pddl"
 NINE = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "gw4-3x3.pddl"
@@ -66,3 +68,12 @@ def test_effort_belongs_to_it(coordlang: Command, tmp_path: Path) -> None:
         library.build(*CORNERS, method="minimal", effort=3)
     made = coordlang("build", *CORNERS, "--effort", -1, "-o", tmp_path / "l.json")
     assert made.code == 2
+
+
+def test_single_states_are_merged_before_effort_is_spent_on_bounds() -> None:
+    """Without a common step no words are greedy's: each state begins with its own."""
+    domain, problem = read("grid", "gw2-2x3")
+    candidates = all_pairs(domain, [problem], ModelOptions(asynchronous=True))
+    built = build_language(candidates, effort=1)
+    assert built.verdict.holds
+    assert len(built.job.states) == 30 > 2 * built.language.guarantee.size
