@@ -23,6 +23,7 @@ from coordlang.vocabulary.loop import Budget, Languages, between, close_bounds, 
 from coordlang.vocabulary.merging import merged
 from coordlang.vocabulary.partitions import Partitions, Refutation
 from coordlang.vocabulary.sat import Undecided
+from planners.search.sat import SolverName
 from planners.system.limits import run_until_stopped
 
 if TYPE_CHECKING:  # they load networkx
@@ -49,6 +50,8 @@ _FOR_KINDS, _WHERE_DEAR = (1, 2, 5, 10), (5, 10)
 _FEWER_WORDS = 5
 #: Merges in a row that fail before something else is tried.
 _VAIN = 15
+#: Pairs of the clauses that are all collected before long proofs without a common step.
+_SHORT = 3
 #: Merged words are verified once they are so many times the last ones that were.
 _FEWER = 0.9
 
@@ -116,7 +119,9 @@ class MinimalSearch:
     @cached_property
     def _partitions(self) -> Partitions:
         known = self.languages.known
-        return Partitions(self._job.states, known.clauses, known.group.permutations)
+        # Without a common step proofs are long, and longer with Glucose.
+        prover: SolverName = "cadical153" if self._is_asynchronous else "glucose42"
+        return Partitions(self._job.states, known.clauses, known.group.permutations, prover)
 
     @cached_property
     def _tied(self) -> TiedWords:
@@ -147,7 +152,7 @@ class MinimalSearch:
             return
         if self._pairs // _FIRST_PAIRS > _BEGINNING * self._most:
             return
-        if self._job.candidates.model.is_asynchronous:
+        if self._is_asynchronous:
             self.merge()  # its first words are single states, from where no search gets far
         if self._is_one_task:
             for rounds in _WHERE_DEAR if self._is_dear else _FOR_KINDS:
@@ -157,6 +162,8 @@ class MinimalSearch:
         if not self._is_one_task:
             self._decide_between(_SOON)
         self.merge(_VAIN)
+        if self._is_asynchronous and not self._is_one_task:
+            self._know_short_clauses()
         known = self.best
         close_bounds(lambda: (self.lower, self.upper), self._narrow, lambda: self._is_spent)
         if self.best is known and not self._is_spent:
@@ -164,8 +171,17 @@ class MinimalSearch:
             self.decide(self.lower, Budget())
 
     @property
+    def _is_asynchronous(self) -> bool:
+        return self._job.candidates.model.is_asynchronous
+
+    @property
     def _is_one_task(self) -> bool:
         return self._job.candidates.count == 1
+
+    def _know_short_clauses(self) -> None:
+        """Add clauses that refute no partition met so far: the last proof takes half as long."""
+        if self.lower < self.upper and not self._is_spent:
+            self.languages.known.add_all(self.languages.refuter.pool.short_clauses(_SHORT))
 
     def _decide_between(self, budget: Budget) -> None:
         """Decide numbers between the bounds, as long as that is quick."""

@@ -67,6 +67,8 @@ class Partitions:
         The known clauses about these states, a list that only grows.
     permutations
         Where symmetries take each state; the images of every clause must be clauses.
+    prover
+        The second solver.
 
     Attributes
     ----------
@@ -79,8 +81,10 @@ class Partitions:
         states: Sequence[int],
         clauses: Sequence[Clause],
         permutations: Sequence[Sequence[int]],
+        prover: SolverName = "glucose42",
     ) -> None:
         self._states, self._clauses, self._permutations = states, clauses, permutations
+        self._prover = prover
         self.conflicts = 0
         require = PartitionProblem.separate_one
         #: Numbers of words with which partitions are so few that the first solver finds none.
@@ -140,7 +144,7 @@ class Partitions:
         return problem
 
     def _start_up_to_symmetry(self, size: int, known: Sequence[Clause]) -> PartitionProblem:
-        problem = self._start(size, known, "glucose42")
+        problem = self._start(size, known, self._prover)
         pairs = most_frequent_pairs(known, _COMPARED_PAIRS)
         problem.add_lex_leaders(self._permutations, pairs)
         return problem
