@@ -13,11 +13,7 @@ from hypothesis import strategies as st
 
 from coordlang.commands.building import build_language
 from coordlang.language.sentences import sentence
-<<<<<<< HEAD
-from coordlang.language.warping import pair
-=======
-from coordlang.language.warping import Pair, pair, separation_clause, short_clauses, warping_clause
->>>>>>> aa0b77a2 (vocabulary: without a common step all short clauses of known plans are used before long proofs; 2x4 is proved in 74 s of CPU in place of 226)
+from coordlang.language.warping import Pair, pair, short_clauses
 from coordlang.vocabulary.sat import PartitionProblem
 from tests.support.candidates import small_candidates
 from tests.support.domains import all_tasks
