@@ -42,12 +42,12 @@ class Event:
     """One of a robot's events.
 
     ``waits`` says of how many events of each robot, that interfere with it, it waits for the end;
-    ``meets`` are the others of its meeting: robot, which of its events (from 0), and its label.
+    ``meets`` are the others of its meeting, each with its label.
     """
 
     label: int
     waits: tuple[int, ...]
-    meets: frozenset[tuple[int, int, int]]
+    meets: frozenset[tuple[int, int]]
 
 
 #: What one robot does, and all robots.
@@ -126,14 +126,9 @@ class World:
             if not any(step) and (self.steps(row)[step] != row).any():
                 raise ChangesAlone
             for block in self.blocks(row, step):
-                numbers = [len(done[robot]) for robot in block]
                 waits = [self._count(done, robot, step[robot]) for robot in block]
                 for robot, own in zip(block, waits, strict=True):
-                    meets = frozenset(
-                        (other, number, step[other])
-                        for other, number in zip(block, numbers, strict=True)
-                        if other != robot
-                    )
+                    meets = frozenset((other, step[other]) for other in block if other != robot)
                     done[robot].append(Event(step[robot], own, meets))
                     when[robot].append(time)
             row = self.steps(row)[step]
@@ -190,13 +185,10 @@ class World:
                 if all(have >= want for have, want in zip(seen, part[k].waits, strict=True)):
                     ready[robot] = part[k]
         for robot, event in ready.items():
-            block = tuple(sorted([robot, *(other for other, _, _ in event.meets)]))
+            block = tuple(sorted([robot, *(other for other, _ in event.meets)]))
             if block[0] == robot and ready.keys() >= set(block):
-                meeting = {(one, here.ended[one], ready[one].label) for one in block}
-                own = [
-                    ready[one].meets | {(one, here.ended[one], ready[one].label)} for one in block
-                ]
-                if all(meets == meeting for meets in own):
+                meeting = {(one, ready[one].label) for one in block}
+                if all(ready[one].meets | {(one, ready[one].label)} == meeting for one in block):
                     yield block
 
     def _started(self, parts: Parts, here: Moment, block: Block) -> Moment | str:
@@ -354,7 +346,7 @@ def texts(model: JointModel, parts: Parts) -> tuple[tuple[str, ...], ...]:
             event_text(
                 model,
                 robot,
-                joint.Event(e.label, e.waits, tuple(sorted((o, at) for o, _, at in e.meets))),
+                joint.Event(e.label, e.waits, tuple(sorted(e.meets))),
             )
             for e in part
         )
