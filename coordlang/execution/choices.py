@@ -127,8 +127,7 @@ def knowing(fits: PlanSpace, robot: int, facts: int) -> RobotChoices:
 
 def knowing_own(fits: PlanSpace, robot: int, subplans: Automaton | None = None) -> RobotChoices:
     """A robot's subplans; of what its own subactions alone change it knows the values."""
-    subplans = subplans or determinise(fits, robot)
-    model = fits.model.in_step
+    model, subplans = fits.model, subplans or determinise(fits, robot)
     facts, changes = own_changes(model, robot)
     others = ((1 << len(model.codec.facts)) - 1) & ~facts
     start = model.codec.fact_bits(fits.rows[fits.state[fits.starts[0]]])
@@ -142,7 +141,7 @@ def knowing_own(fits: PlanSpace, robot: int, subplans: Automaton | None = None) 
         for state, true in here:
             moves.append({})
             for label, to in subplans.moves[state].items():
-                adds, deletes = changes.get(fits.model.subaction_text(robot, label), (0, 0))
+                adds, deletes = changes.get(model.subaction_text(robot, label), (0, 0))
                 after = to, (true & ~deletes) | adds
                 moves[-1][label] = found.setdefault(after, len(found))
     left = tuple(subplans.left[state] for state, _ in found)
@@ -181,6 +180,8 @@ def own_changes(model: JointModel, robot: int) -> tuple[int, dict[str | None, tu
         if robot in action.owners:
             first = of_part.setdefault(action.part_of(robot), certain)
             others |= {f for f in first.keys() | certain.keys() if first.get(f) != certain.get(f)}
+    if model.is_asynchronous:  # that others do something while it idles is no event of it
+        others |= of_part.pop(None, {}).keys()
     facts = sum(1 << fact for fact in range(len(model.codec.facts)) if fact not in others)
 
     def changed(certain: Mapping[int, bool], adds: bool) -> int:
