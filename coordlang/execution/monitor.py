@@ -237,13 +237,17 @@ class Monitor:
 
         Raises `NotAllowed`, and is then as it was before.
         """
-        moves = self._here.moves
-        is_known = isinstance(subaction, str) and subaction in moves
-        plain = subaction if is_known else _plain(subaction)
-        text = None if plain == IDLE else plain
-        if text not in moves:
+        text = self._own(subaction)
+        if text not in self._here.moves:
             raise NotAllowed(self.robot, text, self.step, self.allowed(), self.unit)
-        self._here = moves[text]
+        self._here = self._here.moves[text]
+
+    def _own(self, subaction: str | None) -> str | None:
+        """What the robot does as it is written in the file; None for idling."""
+        if isinstance(subaction, str) and subaction in self._here.moves:
+            return subaction
+        plain = _plain(subaction)
+        return None if plain == IDLE else plain
 
     def known(self, atom: str) -> bool | None:
         """Whether an atom is true now, whatever the others did; None if that depends on them."""
@@ -381,9 +385,10 @@ class EventMonitor(Monitor):
     """Follows a robot that keeps no common step with the others.
 
     What it may do are events, subactions with what they wait for: ``(move r1 a b) (after-1 r2)``.
-    The robot chooses one of those that are `allowed`, says `start` when nothing is `missing`, and
-    `did` when it has ended.  It says what it observes of the others: what has `ended`, and who is
-    `ready` for a meeting.
+    The robot chooses one of those that are `allowed` (None: no more), says `start` when nothing is
+    `missing`, and `did` when it has ended; until then no other one is allowed, and what it changes
+    is not known.  It says what it observes of the others: what has `ended`, and who is `ready` for
+    a meeting.
 
     Parameters and errors are those of `Monitor`.
     """
@@ -406,6 +411,9 @@ class EventMonitor(Monitor):
             for text, event in _get(record, "events", dict, where).items()
         }
         self._others = _others(record, where)
+        for text, event in self._events.items():
+            if lost := (event.after.keys() | event.meets.keys()) - self._others.keys():
+                raise _broken(f"event {_shown(text)} waits for {_shown(min(lost))}: no such robot")
         #: What the end of an event counts for: (robot, subaction), "" for the own robot.
         self._counted: dict[tuple[str, str], list[_Count]] = {}
         interferes, where = _get(record, "interferes", dict, where), f"{where}: 'interferes'"
@@ -427,20 +435,16 @@ class EventMonitor(Monitor):
         """Whether there is no event that the robot may do."""
         return not any(self._here.moves)
 
-    def allowed(self) -> tuple[str | None, ...]:
-        """What the robot may do next (None: no more), sorted; while one is under way that one."""
-        return (self._underway,) if self._underway else super().allowed()
-
     def subaction(self, event: str) -> str:
         """What is done in an event."""
-        return self._events[event].subaction
+        return self._event(event).subaction
 
     def _done_in(self, text: str | None) -> str | None:
         return None if text is None else self.subaction(text)
 
     def partners(self, event: str) -> tuple[str, ...]:
         """The robots that an event meets."""
-        return tuple(self._events[event].meets)
+        return tuple(self._event(event).meets)
 
     def concerns(self, event: str) -> tuple[str, ...]:
         """The robots that may wait for an own event, and so should be told when it has ended."""
@@ -453,6 +457,7 @@ class EventMonitor(Monitor):
         By robot the number of its events that must end, or the subaction that it must be ready to
         start together with this one.
         """
+        event = self._own(event)
         if event not in self.allowed():
             raise NotAllowed(self.robot, event, self.step, self.allowed(), self.unit)
         if event is None or event == self._underway:
@@ -491,16 +496,28 @@ class EventMonitor(Monitor):
                 for robot, its in missing.items()
             )
             raise NotPossible(f"{self.robot} cannot start {event}: it waits for {waits}")
-        self._underway = event
+        text = self._own(event)
+        if text is None or text == self._underway:
+            return
+        here, to = self._here, self._here.moves[text]
+        # Until it has ended nothing else may be promised, and what it changes may be either.
+        values = {atom: self._value(here, atom) for atom in here.known.keys() | to.known.keys()}
+        known = {a: v if v is self._value(to, a) else None for a, v in values.items()}
+        self._here = _State(here.step, known, {text: to}, to.left)
+        self._underway = text
+        partners = self._events[text].meets
+        # They were ready for this meeting, not for the next one.
+        self._ready = {name: its for name, its in self._ready.items() if name not in partners}
 
     def did(self, subaction: str | None) -> None:
         """Tell that the event under way has ended; None: the robot does no more.
 
         Raises `NotAllowed`, and `NotPossible` for an event that was not started.
         """
-        if subaction in self.allowed() and subaction != self._underway:
-            raise NotPossible(f"{self.robot} cannot have done {subaction}: it has not started it")
-        super().did(subaction)
+        event = self._own(subaction)
+        if event and event in self.allowed() and event != self._underway:
+            raise NotPossible(f"{self.robot} cannot have done {event}: it has not started it")
+        super().did(event)
         while self.finished and self._here.moves:
             super().did(None)
         if self._underway:
@@ -516,7 +533,9 @@ class EventMonitor(Monitor):
         """
         may_be = self._events_of(robot)
         text = _plain(subaction)
-        what = f"{robot} cannot have done {text} as its event {number}"
+        if not _is_number(number):
+            raise MonitorError(f"events are numbered from 1: {_shown(number)} is no such number")
+        what = f"{robot} cannot have done {text} as its event {_shown(number)}"
         if not self._observed[robot] < number <= len(may_be):
             told = f"{self._observed[robot]} of {len(may_be)} were told before"
             raise NotPossible(f"{what}: {told}")
@@ -533,6 +552,15 @@ class EventMonitor(Monitor):
         """Tell that another robot is ready to start this together with an own event."""
         self._events_of(robot)
         self._ready = {**self._ready, robot: _plain(subaction)}
+
+    def _own(self, subaction: str | None) -> str | None:
+        is_event = isinstance(subaction, str) and subaction in self._events
+        return subaction if is_event else super()._own(subaction)
+
+    def _event(self, event: str) -> _OwnEvent:
+        if event not in self._events:
+            raise MonitorError(f"{_shown(event)} is no event of {self.robot}")
+        return self._events[event]
 
     def _events_of(self, robot: str) -> Sequence[Mapping[str, int]]:
         if robot not in self._others:

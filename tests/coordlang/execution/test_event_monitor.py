@@ -16,10 +16,14 @@ from coordlang.commands.building import build_language
 from coordlang.execution.choices import SentenceChoices, choices, to_bytes
 from coordlang.execution.monitor import EventMonitor, MonitorError, NotAllowed, NotPossible
 from coordlang.language.partition import Partition
+from planners.loading import build
 from planners.pddl.model_options import ModelOptions
+from planners.search.asynchronous import as_executed
+from planners.search.optimal_plans import search
 from tests.support.asynchronous import World, random_plans, texts
 from tests.support.domains import own_task
 from tests.support.task_languages import in_words, sentence_of, shipped
+from tests.support.texts import parsed
 
 RUNS = [(2, range(40)), (3, range(10))]
 THOROUGH = [(2, range(40, 900)), (3, range(10, 500)), (4, range(60))]
@@ -154,11 +158,15 @@ def test_robots_arrive_whatever_they_choose_and_whenever_they_start(
     assert min(seen["runs"], seen["no language"], seen["waits"], seen["several parts"]) >= 5
 
 
-def test_what_cannot_have_happened_is_refused() -> None:
+def turning_round() -> SentenceChoices:
     """r1 and r2 turn round on the 2x2 grid, each in two moves."""
     made = own_task("grid", "gw1-2x2", ModelOptions(asynchronous=True))
     used = next(languages_in_tasks(build_language(made, "minimal").language, made))
-    r1, r2 = monitors_of(choices(used, used.words_of(sentence_of(used))))
+    return choices(used, used.words_of(sentence_of(used)))
+
+
+def test_what_cannot_have_happened_is_refused() -> None:
+    r1, r2 = monitors_of(turning_round())
     (first,), (second,) = r1.allowed(), r2.allowed()
     assert first
     assert second
@@ -194,3 +202,105 @@ def test_each_file_has_its_kind_of_monitor() -> None:
     data = to_bytes(choices(in_step, in_step.words_of("w1 w0")))
     with pytest.raises(MonitorError, match="are for a Monitor"):
         EventMonitor(json.loads(data), "r1")
+
+
+def monitors_in(domain: str, problem: str) -> list[EventMonitor]:
+    """Of robots that may follow any optimal plan."""
+    read, read_problem = parsed(domain, problem)
+    loaded = build(read, [read_problem], ModelOptions(asynchronous=True))
+    space = as_executed(search(loaded.model, loaded.tasks[0]))
+    one_word = Partition.of_states(space.rows, dict.fromkeys(range(len(space.rows)), 0))
+    found = choices(in_words(None, one_word, space, 0), (0,))
+    assert found.guaranteed
+    return monitors_of(found)
+
+
+EITHER_WAY = """(define (domain either) (:types robot way) (:predicates (there ?r - robot))
+ (:action go :agent ?r - robot :parameters (?w - way)
+  :precondition (not (there ?r)) :effect (there ?r)))"""
+
+
+def test_while_an_event_is_under_way_it_is_all_that_may_end() -> None:
+    problem = """(define (problem p) (:domain either) (:objects r1 r2 - robot a b - way)
+     (:init) (:goal (there r1)))"""
+    r1, _ = monitors_in(EITHER_WAY, problem)
+    one, other = r1.allowed()
+    assert one is not None
+    with pytest.raises(NotPossible, match="it has not started it"):
+        r1.did("( GO r1  a )")
+    r1.start(one)
+    for did in (other, None):
+        with pytest.raises(NotAllowed, match="it may do"):
+            r1.did(did)
+    with pytest.raises(NotPossible, match="no subplan left"):
+        r1.commit(do=other)
+    assert (r1.remaining, r1.known("(there r1)")) == (1, None)
+    r1.did(one)
+    assert (r1.finished, r1.known("(there r1)")) == (True, True)
+
+
+LIFT = """(define (domain lift) (:types robot)
+ (:predicates (middle ?r - robot) (once ?r - robot) (twice ?r - robot))
+ (:action hold :agent ?r - robot :parameters ()
+  :precondition (and (not (middle ?r)) (not (twice ?r)) (exists (?o - robot) (lift ?o)))
+  :effect (and (once ?r) (when (once ?r) (twice ?r))))
+ (:action lift :agent ?r - robot :parameters ()
+  :precondition (and (middle ?r) (not (twice ?r)) (forall (?o - robot) (or (middle ?o) (hold ?o))))
+  :effect (and (once ?r) (when (once ?r) (twice ?r)))))"""
+
+
+def test_who_was_ready_for_a_meeting_is_not_ready_for_the_next_one() -> None:
+    """r1 and r3 hold what r2 lifts: they do not interfere, and r1 waits for no end of r3."""
+    problem = """(define (problem p) (:domain lift) (:objects r1 r2 r3 - robot) (:init (middle r2))
+     (:goal (and (twice r1) (twice r2) (twice r3))))"""
+    r1, _, _ = monitors_in(LIFT, problem)
+    r1.ready("r2", "(lift r2)")
+    r1.ready("r3", "(hold r3)")
+    (event,) = r1.may_start()
+    assert event is not None
+    r1.start(event)
+    r1.did(event)
+    r1.ended("r2", "(lift r2)", 1)
+    r1.ready("r2", "(lift r2)")
+    (event,) = r1.allowed()
+    assert r1.missing(event) == {"r3": "(hold r3)"}
+
+
+JOINT = """(define (domain together) (:predicates (p) (q))
+ (:action first :parameters ()
+  ; subaction r1 idle
+  ; subaction r2 (a)
+  :precondition (not (p)) :effect (p))
+ (:action second :parameters ()
+  ; subaction r1 (b)
+  ; subaction r2 idle
+  :precondition (p) :effect (q)))"""
+
+
+def test_what_others_do_while_a_robot_idles_is_not_known_to_it() -> None:
+    """Nobody tells it when that happens: idling is no event."""
+    problem = "(define (problem p) (:domain together) (:init) (:goal (q)))"
+    r1, r2 = monitors_in(JOINT, problem)
+    assert (r1.known("(p)"), r1.known("(q)")) == (None, False)
+    assert (r2.known("(p)"), r2.known("(q)")) == (False, None)
+
+
+def test_what_is_told_in_no_way_that_can_be_read() -> None:
+    r1, r2 = monitors_of(turning_round())
+    (its,) = r2.allowed()
+    for number in (1.0, True, "1", None):
+        with pytest.raises(MonitorError, match="numbered from 1"):
+            r1.ended("r2", str(its), number)  # type: ignore[arg-type]
+    for ask in (r1.subaction, r1.partners, r1.concerns):
+        with pytest.raises(MonitorError, match="no event of r1"):
+            ask("(move r1 c9 c9)")
+    with pytest.raises(NotAllowed, match=r"r1 may not do .*after-1 r2"):
+        r1.did(next(text for text in r1._events if "after" in text))
+
+
+def test_an_event_that_waits_for_a_robot_that_there_is_not_is_refused() -> None:
+    data = json.loads(to_bytes(turning_round()))
+    events = data["choices"][0]["passings"]["events"].values()
+    next(event for event in events if event["after"])["after"] = {"r3": 1}
+    with pytest.raises(MonitorError, match="waits for r3: no such robot"):
+        EventMonitor(data, "r1")
