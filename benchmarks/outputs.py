@@ -87,7 +87,6 @@ COMMANDS = {
         understand @one.json D problem.pddl "w1 w2 w0"
         understand @one.json D problem.pddl "w1 w2 w0" --count
         understand @one.json D problem.pddl "w1 w2 w0" --sample 3 --seed 1
-        understand @one.json D problem.pddl "w1 w2 w0" --format dot
         understand @one.json D problem.pddl "w1 w2"
         say @one.json D problem.pddl @plans.json
         say @one.json D problem.pddl @plans.json --json

@@ -48,8 +48,6 @@ DEFAULT_MAX = 10
 WRITTEN = ("domain.pddl", "problem.pddl")
 #: Beyond this many joint actions robots choose one after another in the exported PDDL.
 MAX_ACTIONS = 2000
-#: Nodes of a drawn DAG.
-NODES_DRAWN = 200
 
 #: What `export` writes.
 Target = Literal["pddl", "ltlf", "bt"]
@@ -422,18 +420,10 @@ class UnderstandOptions(
     module="sentences",
     doing="finding the plans with the sentence",
 ):
-    """Count, list, sample or draw the optimal plans that a SENTENCE ("w1 w0") leaves open."""
+    """Count, list or sample the optimal plans that a SENTENCE ("w1 w0") leaves open."""
 
     listing: Listing = group(Listing)
-    form: Literal["ipc", "json", "dot"] = form_option("ipc", "dot: drawn as one DAG.")
-    nodes: int | None = cli_option(
-        None,
-        f"Cut the DAG to about N nodes (default for dot: {NODES_DRAWN}).",
-        "N",
-        least=1,
-        needs="form dot json",
-        without="only_count",
-    )
+    form: Literal["ipc", "json"] = form_option("ipc", "json: with their graph.")
     output: str | None = output_option("Write to this file instead of stdout.")
 
 

@@ -12,15 +12,14 @@ from typing import Any
 
 from coordlang.commands.inputs import Arguments, InTask, public
 from coordlang.commands.plans import OptimalPlans, PlanSteps, show_listed
-from coordlang.commands.records import NODES_DRAWN, PlanOptions, SayOptions, UnderstandOptions
-from coordlang.commands.terminal import covered_code, echo, write
+from coordlang.commands.records import PlanOptions, SayOptions, UnderstandOptions
+from coordlang.commands.terminal import covered_code, echo
 from coordlang.execution.best_sentence import (
     BestSentence,
     Preference,
     best_sentence,
     read_preference,
 )
-from coordlang.execution.drawing import cut_note, plans_dot
 from coordlang.execution.guided_search import ExpandedStates, GuidedPlan, plan_under_sentence
 from coordlang.execution.open_plans import PlanDag, open_plans_data, plan_dag
 from coordlang.execution.plan_sentence import read_plan_file, sentence_of_plan
@@ -30,7 +29,7 @@ from planners.search import HeuristicName
 from planners.search.heuristics import HEURISTICS
 from planners.search.plan_file import Texts, json_count
 from planners.search.plans import Plans
-from planners.system.errors import CoordlangError, UsageError, note
+from planners.system.errors import CoordlangError, UsageError
 from planners.system.notebook import counted
 
 
@@ -98,7 +97,7 @@ def show_say(found: Said, options: SayOptions) -> int:
 
 
 class SentencePlans(OptimalPlans, InTask):
-    """The optimal plans that a sentence leaves open, as `OptimalPlans` with a drawn DAG."""
+    """The optimal plans that a sentence leaves open, as `OptimalPlans` with a DAG."""
 
     __slots__ = ("_words", "used")
     shown = ("sentence", *OptimalPlans.shown, "covered")
@@ -112,13 +111,9 @@ class SentencePlans(OptimalPlans, InTask):
         """The sentence."""
         return self.used.text(self._words)
 
-    def dag(self, nodes: int | None = None) -> PlanDag:
-        """Return the plans as the paths of a DAG, cut to about so many nodes (None: all)."""
-        return plan_dag(self.used, self._words, self._plans.space, nodes)
-
-    def dot(self, nodes: int = NODES_DRAWN) -> str:
-        """Return the DAG in the language of Graphviz."""
-        return plans_dot(self.dag(nodes))
+    def dag(self) -> PlanDag:
+        """Return the plans as the paths of a DAG."""
+        return plan_dag(self.used, self._words, self._plans.space)
 
     def data_with(self, listed: Sequence[Sequence[Texts]], graph: PlanDag | None) -> dict[str, Any]:
         """Return a JSON plan file with sentence and guarantee, and with the DAG if one is given."""
@@ -139,16 +134,10 @@ def understand(files: Arguments, options: UnderstandOptions) -> SentencePlans:
 
 
 def show_understand(found: SentencePlans, options: UnderstandOptions) -> int:
-    """Print, write or draw the plans."""
-    if options.form == "dot":
-        dag = found.dag(options.nodes or NODES_DRAWN)
-        write(plans_dot(dag), options.output)
-        if cut := cut_note(dag):
-            note(f"{cut}; --nodes N draws more")
-    else:
-        is_drawn = options.form == "json" and not options.listing.only_count
-        data = partial(found.data_with, graph=found.dag(options.nodes) if is_drawn else None)
-        show_listed(found, options, data, "plans", options.output)
+    """Print or write the plans."""
+    is_drawn = options.form == "json" and not options.listing.only_count
+    data = partial(found.data_with, graph=found.dag() if is_drawn else None)
+    show_listed(found, options, data, "plans", options.output)
     return covered_code(found)
 
 

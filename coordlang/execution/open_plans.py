@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The plans that a sentence leaves open: counted, as a layered graph that can be drawn, as JSON."""
+"""The plans that a sentence leaves open: counted, as a layered graph, as JSON."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import count
 from typing import Any
 
 from coordlang.execution.task_language import TaskLanguage
@@ -19,11 +18,10 @@ from planners.search.plans import Plan, Plans, counts
 
 @dataclass(frozen=True, slots=True)
 class DagNode:
-    """A joint state on a plan, or several states of one step that are drawn as one.
+    """A joint state on a plan, by its ``key``.
 
-    ``step`` joint steps are done, and ``plans`` pass through it.  ``key`` and ``word`` are the
-    state's, ``words`` of the sentence are passed, this one included; empty and 0 for several
-    states.  ``merged`` is their number; 0 for a single one.
+    ``step`` joint steps are done, ``words`` of the sentence passed, its own ``word`` included, and
+    ``plans`` pass through it.
     """
 
     step: int
@@ -31,7 +29,6 @@ class DagNode:
     word: str
     words: int
     plans: int
-    merged: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,56 +47,29 @@ class DagEdge:
 class PlanDag:
     """The plans that a sentence leaves open as the paths of a layered graph.
 
-    ``task`` is the task in words, ``count`` the number of plans.  Nodes are sorted by step, those
-    on most plans first; edges by source and target.  So many states were ``cut`` (merged); 0:
-    nothing is missing.
+    Nodes are sorted by step, those on most plans first; edges by source and target.
     """
 
     sentence: tuple[str, ...]
-    task: str
-    robots: tuple[str, ...]
-    count: int
     nodes: tuple[DagNode, ...]
     edges: tuple[DagEdge, ...]
-    cut: int
 
 
-def plan_dag(
-    task_language: TaskLanguage, words: Sequence[int], space: PlanSpace, most: int | None = None
-) -> PlanDag:
-    """The plans with a sentence as a DAG of at most about ``most`` nodes (None: all).
-
-    ``space`` is `TaskLanguage.plans_with` of the sentence.  A larger DAG is cut in its breadth:
-    every step keeps the nodes that most plans pass through, at least one, and the others of a step
-    are merged into one.
-    """
+def plan_dag(task_language: TaskLanguage, words: Sequence[int], space: PlanSpace) -> PlanDag:
+    """The plans with a sentence as a DAG; ``space`` is `TaskLanguage.plans_with` of it."""
     names, codec = task_language.partition.words, task_language.model.codec
     word = task_language.partition.word_of(space.rows)[space.state]
     passed = words_passed(space, word)
     through = _plans_through(space)
-    width = _width(space, most)
     nodes: list[DagNode] = []
     number: dict[int, int] = {}
     for step, span in enumerate(reversed(space.layers)):
-        here = sorted(range(span.start, span.stop), key=lambda n: (-through[n], n))
-        kept = here if len(here) <= width else here[: max(1, width - 1)]
-        for node in kept:
+        for node in sorted(range(span.start, span.stop), key=lambda n: (-through[n], n)):
             number[node] = len(nodes)
             key = codec.key(space.rows[space.state[node]])
             nodes.append(DagNode(step, key, names[word[node]], int(passed[node]), through[node]))
-        others = here[len(kept) :]
-        if others:
-            number.update(dict.fromkeys(others, len(nodes)))
-            nodes.append(DagNode(step, "", "", 0, sum(through[n] for n in others), len(others)))
-    return PlanDag(
-        sentence=tuple(names[w] for w in words),
-        task=describe(task_language.space, task_language.task),
-        robots=task_language.model.robots,
-        count=through[int(space.starts[0])],
-        nodes=tuple(nodes),
-        edges=_edges(space, number, nodes),
-        cut=sum(node.merged for node in nodes),
-    )
+    said = tuple(names[w] for w in words)
+    return PlanDag(said, tuple(nodes), _edges(space, number))
 
 
 def _plans_through(space: PlanSpace) -> list[int]:
@@ -114,25 +84,13 @@ def _plans_through(space: PlanSpace) -> list[int]:
     return [a * b for a, b in zip(above, below, strict=True)]
 
 
-def _width(space: PlanSpace, most: int | None) -> int:
-    """The largest breadth with which the DAG has at most ``most`` nodes."""
-    sizes: list[int] = [span.stop - span.start for span in space.layers]
-    if most is None or sum(sizes) <= most:
-        return max(sizes)
-    return next(w for w in count(2) if sum(min(size, w + 1) for size in sizes) > most)
-
-
-def _edges(
-    space: PlanSpace, number: dict[int, int], nodes: Sequence[DagNode]
-) -> tuple[DagEdge, ...]:
-    """Edges by pair of nodes; those from and to merged nodes without their many joint actions."""
+def _edges(space: PlanSpace, number: dict[int, int]) -> tuple[DagEdge, ...]:
+    """Edges by pair of nodes."""
     found: dict[tuple[int, int], list[tuple[str | None, ...]]] = {}
     for node in range(len(space)):
         for edge in space.out_edges(node):
             ends = number[node], number[space.target_of(edge)]
-            actions = found.setdefault(ends, [])
-            if not (nodes[ends[0]].merged or nodes[ends[1]].merged):
-                actions.append(space.model.texts(space.labels_of(edge)))
+            found.setdefault(ends, []).append(space.model.texts(space.labels_of(edge)))
     return tuple(DagEdge(a, b, tuple(actions)) for (a, b), actions in sorted(found.items()))
 
 
@@ -158,11 +116,9 @@ def open_plans_data(
     if graph is not None:
         data["nodes"] = [
             {
-                **(
-                    {"merged": node.merged}
-                    if node.merged
-                    else {"state": node.key, "word": node.word, "said": node.words}
-                ),
+                "state": node.key,
+                "word": node.word,
+                "said": node.words,
                 "step": node.step,
                 "plans": json_count(node.plans),
             }

@@ -149,7 +149,6 @@ say SPOKEN PLAN
 say SPOKEN PLAN --json
 understand SPOKEN SENTENCE --format ipc
 understand SPOKEN SENTENCE --format json
-understand SPOKEN SENTENCE --format dot
 plan SPOKEN SENTENCE
 plan SPOKEN SENTENCE --json
 choices SPOKEN SENTENCE --format text
