@@ -110,16 +110,16 @@ def plan_under_sentence(
 
 def _first(task_language: TaskLanguage, words: Sequence[int] | None) -> GuidedPlan:
     """The steps of the first plan, as soon as possible."""
-    space = task_language.space
+    space, start = task_language.space, task_language.start
+    cost = space.cost_of(task_language.task)
     if words is not None:
         space = task_language.plans_with(words)
-    plans = Plans(space, int(space.starts[0]), [])
-    path = space.first_path(plans.start)
-    passed = task_language.partition.word_of(space.rows)[
-        space.state[space.nodes_on(plans.start, path)]
-    ]
-    steps = plans.steps(tuple(map(space.labels_of, path)))
-    return GuidedPlan(steps, sentence(passed.tolist()), space.cost_of(0), 0, 0, 0)
+        start = int(space.starts[0])
+    path = space.first_path(start)
+    states = space.state[space.nodes_on(start, path)]
+    passed = task_language.partition.word_of(space.rows)[states]
+    steps = Plans(space, start, []).steps(tuple(map(space.labels_of, path)))
+    return GuidedPlan(steps, sentence(passed.tolist()), cost, 0, 0, 0)
 
 
 def _earliest(task_language: TaskLanguage, words: Sequence[int] | None) -> GuidedPlan:

@@ -7,13 +7,17 @@ from itertools import permutations
 
 import pytest
 
+from benchmarks.paper.task_choices import languages_in_tasks
+from coordlang.commands.building import build_language
 from coordlang.execution.guided_search import ExpandedStates, plan_under_sentence
 from coordlang.execution.task_language import NoPlanFits, TaskLanguage
-from coordlang.language.candidates import Candidates
+from coordlang.language.candidates import Candidates, all_pairs
 from coordlang.language.listed import ground_task
 from planners.check.validate import validate
+from planners.pddl.model_options import ModelOptions
 from planners.search.heuristics import HEURISTICS
 from planners.search.plan_file import texts
+from tests.support.domains import read
 from tests.support.naive import plans_by_sentence
 from tests.support.task_languages import RANDOM, SHIPPED, random_task_languages, shipped
 
@@ -60,3 +64,12 @@ def test_shipped_domains(name: str) -> None:
 def test_random_models(robots: int, number: int) -> None:
     for _, candidates, task_language in random_task_languages(robots, number):
         check(candidates, task_language, ("blind", "relaxed"))
+
+
+def test_without_a_common_step_it_is_the_plan_of_its_own_task() -> None:
+    domain, problem = read("grid", "gw1-2x2")
+    made = all_pairs(domain, [problem], ModelOptions(asynchronous=True))
+    for used in languages_in_tasks(build_language(made, "best").language, made):
+        found = plan_under_sentence(used, None)
+        assert found.words[0] == used.word[used.start]
+        assert found.cost == used.space.cost_of(used.task)
