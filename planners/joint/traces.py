@@ -12,13 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass
-from itertools import combinations
+from functools import lru_cache
+from itertools import combinations, permutations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planners.grounding.actions import GroundAction
 from planners.joint.composition import ComposingStepper
-from planners.joint.model import JointModel
+from planners.joint.model import JointModel, Stepper
 from planners.joint.tables import Bools, Rows
 from planners.pddl.formula_tree import literals
 from planners.pddl.lifted import Atom, StepAtom
@@ -65,7 +67,7 @@ class Traces:
         stepper = model.stepper
         self._stepper = stepper if isinstance(stepper, ComposingStepper) else None
         self._robots = range(len(model.robots))
-        self.interfering = _interfering(model)
+        self.interfering = _interfering(stepper, tuple(map(len, model.labels)))
         self.has_ties = False
         self._results: dict[tuple[bytes, Step], Rows | None] = {}
         self._blocks: dict[tuple[bytes, Step], tuple[Block, ...]] = {}
@@ -222,12 +224,12 @@ def ordered_partitions(robots: Block, number: int) -> Iterator[tuple[Block, ...]
             yield from ((first, *others) for others in ordered_partitions(rest, number - 1))
 
 
-def _interfering(model: JointModel) -> dict[tuple[int, int], Bools]:
-    stepper, robots = model.stepper, range(len(model.robots))
-    pairs = [(i, j) for i in robots for j in robots if i != j]
+@lru_cache(maxsize=1)  # each robot's choices, and each listing of plans, ask for the same one
+def _interfering(stepper: Stepper, sizes: tuple[int, ...]) -> dict[tuple[int, int], Bools]:
+    """By pair of robots which labels interfere; ``sizes`` are the numbers of labels."""
+    pairs = list(permutations(range(len(sizes)), 2))
     if not isinstance(stepper, ComposingStepper):
         # Nothing says whose part of a joint action does what.
-        sizes = [len(own) for own in model.labels]
         return {(i, j): np.ones((sizes[i], sizes[j]), np.bool_) for i, j in pairs}
     touched = [[_touches(action) for action in own] for own in stepper.labelled]
     leaves = sorted(
@@ -239,8 +241,9 @@ def _interfering(model: JointModel) -> dict[tuple[int, int], Bools]:
     )
     found = {}
     for i, j in pairs:
-        meets = writes[i] @ (reads[j] | writes[j]).T | reads[i] @ writes[j].T
-        found[i, j] = meets | names[i] @ selves[j].T | selves[i] @ (names[j] | selves[j]).T
+        meets = writes[i] @ (reads[j] + writes[j]).T + reads[i] @ writes[j].T
+        meets += names[i] @ selves[j].T + selves[i] @ (names[j] + selves[j]).T
+        found[i, j] = meets > 0
     return found
 
 
@@ -259,8 +262,9 @@ def _touches(action: GroundAction | None) -> _Touched:
     return reads, writes, names, {StepAtom(action.schema, action.args)}
 
 
-def _incidence(sets: Sequence[Set[object]], number: dict[object, int]) -> Bools:
-    table = np.zeros((len(sets), len(number)), np.bool_)
+def _incidence(sets: Sequence[Set[object]], number: dict[object, int]) -> NDArray[np.float32]:
+    """Which sets (rows) have which members, as 0 and 1: products of such tables are fast."""
+    table = np.zeros((len(sets), len(number)), np.float32)
     for row, own in enumerate(sets):
         table[row, [number[leaf] for leaf in own]] = True
     return table
