@@ -201,7 +201,7 @@ class EventTrials:
     def _run(self, task: int, delay: float, random: Random) -> tuple[int, int] | None:
         """The steps beyond the least makespan and the waits, None: it does not end in the goal."""
         used, plan = self._languages[task], _drawn(self._plans[task], random)
-        said, monitors = self._monitors(used, sentence_of(used, plan))
+        said, monitors = self._monitors(task, sentence_of(used, plan))
         plans = [plan if self._way == "graph" else _drawn(said, random) for _ in monitors]
         parts: list[list[str]] | None = None
         if self._way != "free":
@@ -215,12 +215,12 @@ class EventTrials:
             return None
         return ended[1] - used.space.least_makespan(used.task), ended[2]
 
-    def _monitors(self, used: TaskLanguage, words: Sentence) -> tuple[Plans, list[EventMonitor]]:
-        key = used.task, words
+    def _monitors(self, task: int, words: Sentence) -> tuple[Plans, list[EventMonitor]]:
+        key = task, words
         if key not in self._said:
-            fits = used.plans_with(words)
+            fits = self._languages[task].plans_with(words)
             monitors = []
-            for robot in range(len(used.model.robots)):
+            for robot in range(len(fits.model.robots)):
                 own = monitor(fits, knowing_own(fits, robot), "")
                 assert isinstance(own, EventMonitor)
                 monitors.append(own)
