@@ -98,8 +98,7 @@ def choices(
             raise
         mixtures = None
     # Without a common step a node is no state in which a robot is when it has done its events.
-    is_known = mixtures is not None and not model.is_asynchronous
-    space = mixtures.space if mixtures is not None and is_known else None
+    space = mixtures.space if mixtures and not model.is_asynchronous else None
     truth = [] if space is None else facts_at_nodes(space)
     robots = []
     for robot in range(len(model.robots)):

@@ -264,8 +264,7 @@ def _agreed(record: SimulationRecord) -> str:
     """What the robots have agreed on, and how they keep step, for a heading."""
     said = {"sentence": f'"{record.sentence}"', "plan": "one plan", "nothing": "no sentence"}
     steps = {"clock": "a clock", "barrier": "barrier per step", "word": "barrier per word"}
-    steps["passings"] = "passings"
-    return f"{said[record.agreement]}, {steps[record.step]}"
+    return f"{said[record.agreement]}, {steps.get(record.step, record.step)}"
 
 
 def _event_at(run: RunRecord, time: float) -> EventRecord | None:

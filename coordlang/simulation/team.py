@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from itertools import zip_longest
 from random import Random
 from typing import Literal
 
@@ -118,10 +117,9 @@ class Mission:
         Done in step; or without a common step, with what their events wait for.
         """
         own = [list(subplans[name]) for name in self.robots]
-        if self.task_language.model.is_asynchronous:
-            own = [[event for event in parts if event] for parts in own]
+        if self.task_language.model.is_asynchronous:  # a part may be shorter than the plan
             own = [parts + [None] * (self.steps - len(parts)) for parts in own]
-        steps = [self.task_language.model.numbers(step) for step in zip_longest(*own)]
+        steps = [self.task_language.model.numbers(step) for step in zip(*own, strict=True)]
         found = [step for step in steps if step is not None]
         return len(found) == self.steps and (
             self._plans.space.path_with(self._plans.start, found) is not None

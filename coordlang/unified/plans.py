@@ -46,7 +46,7 @@ class NoSteps(Exception):
 def to_up(found: Translated, plans: Plans, plan: Plan, kind: Any, environment: Any) -> Any:
     """A joint plan as a unified-planning plan of ``kind`` (a `PlanKind`)."""
     steps: list[list[Any]] = [[] for _ in plan]
-    for number, text in numbered_actions(plans, plan):
+    for number, text in numbered_actions(plans, plan, plans.steps(plan)):
         schema, *args = text[1:-1].split()
         members = found.schemas[schema]
         agent = None if None in members else args.pop(0)
