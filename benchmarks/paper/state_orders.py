@@ -38,7 +38,7 @@ def greedy_partitions(
         The name of the order, and the word number of every state of ``candidates.rows``.
     """
     differences = first_differences(candidates.spaces)
-    constraints, states = separations(differences.divergences), differences.states.tolist()
+    constraints, states = separations(differences.listed), differences.states.tolist()
     found = dict(systematic_orders(candidates, states))
     for number in range(1, orders + 1):
         found[f"random {number}"] = random.sample(states, len(states))

@@ -77,7 +77,7 @@ def run(unit: Unit, settings: Settings) -> Result:
     return {
         "tasks": candidates.count,
         "states": candidates.states,
-        "divergences": len(built.first_differences.divergences),
+        "divergences": len(built.first_differences.listed),
         "requiring": built.first_differences.requiring,
         "words": guarantee.size,
         "lower_bound": guarantee.lower_bound,

@@ -53,6 +53,8 @@ PREFERENCES: Mapping[BuildPreference, Callable[[Job, Outcome], Outcome]] = {
 }
 #: What a file says of how a limited number of words, or a repaired language, was found.
 FEW_WORDS, REPAIR = "few-words", "repair"
+#: Mixtures of next steps that may be looked at, in some seconds, for divergences of one task.
+_MIXTURES = 10_000_000
 #: Changed states that are shown to a person.
 _SHOWN = 12
 
@@ -87,12 +89,6 @@ def build_language(
         return _few_words(making, words, worst=worst, seed=options.seed)
     if start is not None:
         return repair_language(making, start, options.seed)
-    if candidates.model.is_asynchronous and method in ("greedy", "separating"):
-        raise UsageError(
-            f"--asynchronous: --method {method} parts plans where their states first differ, and "
-            "they may differ in what robots do next",
-            remedy="Use --method best or minimal.",
-        )
     if candidates.model.hides_slack and method in ("greedy", "separating"):
         raise UsageError(
             f"--method {method} parts plans where their states first differ, and with slack they "
@@ -172,7 +168,7 @@ def job_for_few_words(making: Making, seed: int = 0) -> Job:
     try:
         job = making.job(options)
     except Inseparable:
-        return making.job(options, first_differences(spaces, defined=False))
+        return making.job(options, first_differences(spaces, most=0))
     return replace(job, incumbent=first_language(job))
 
 
@@ -247,7 +243,8 @@ class Making:
         `Inseparable` if there is no language over states.
         """
         if found is None:
-            found = differences(self.candidates, self.workers, self.progress)
+            most = _most_divergences(options.method, self.candidates)
+            found = differences(self.candidates, self.workers, self.progress, most=most)
         return Job(
             self.candidates,
             tuple(found.states.tolist()),
@@ -293,6 +290,13 @@ class Making:
             provenance = replace(provenance, tolerance=replace(tolerance, slack=slack))
         language = Language.of(partition, self.candidates.model, provenance)
         return Built(language, job, verdict, found, self.seconds, **more)
+
+
+def _most_divergences(method: str, candidates: Candidates) -> float:
+    """How many mixtures may be looked at for divergences: what begins without them gets some."""
+    if method in ("greedy", "separating"):
+        return inf
+    return _MIXTURES if candidates.count == 1 else inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -425,7 +429,7 @@ class Built(Presented):
             "states": self.candidates.states,
             "states_on_plans": len(self.job.states),
             "tasks_requiring_coordination": first.requiring,
-            "divergences": len(first.divergences),
+            "divergences": None if first.divergences is None else len(first.divergences),
             "words": guarantee.size,
             "lower_bound": guarantee.lower_bound,
             "method": guarantee.method,
@@ -451,11 +455,13 @@ class Built(Presented):
         if self.few_words and not figures["verified"]:
             proof, verified = "", "no coordination language"
         words, tasks = counted(figures["words"], "word"), counted(figures["tasks"], "task")
+        number = figures["divergences"]
+        divergences = "divergences not listed" if number is None else f"{number:,} divergences"
         lines = [
             f"{words} ({figures['method']}, {proof}{verified}) for {tasks}, "
             f"{figures['tasks_requiring_coordination']:,} of which require coordination",
             f"{figures['states_on_plans']:,} states on {self.candidates.model.kept_plans}, "
-            f"{figures['divergences']:,} divergences, {figures['walk_nodes']:,} nodes of plans, "
+            f"{divergences}, {figures['walk_nodes']:,} nodes of plans, "
             f"{sum(figures['seconds'].values()):.2f} s",
             *self._what_would_be(),
             *self._how_often_robots_fail(),

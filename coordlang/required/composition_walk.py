@@ -148,9 +148,9 @@ class _Layer:
 
     With what links them to the layer below.
 
-    ``x`` (k, robots) are plan-space nodes, ``parts``, ``meets`` (links) say whether a link leads
-    from one node shared by all plans and their mixture to different ones, or from different nodes
-    to one from which the plans can stay together and still fail.
+    ``x`` (k, robots) are plan-space nodes, ``parts``, ``meets`` (links) say whether states differ
+    after a link for the first time since all plans and their mixture were at one node, or before it
+    for the last time on some way to a failure.
     """
 
     x: Ints
@@ -295,19 +295,25 @@ def _separated(word: Ints, shared: Ints, others: Ints) -> Bools:
 
 
 def _walk(space: PlanSpace) -> list[_Layer]:
-    """All layers, goals first, of nodes from which some mixture fails."""
-    choices, index, width = Choices(space), EdgeIndex.of(space), space.robots + 1
+    """All layers, goals first, of nodes from which some mixture fails.
+
+    The walk carries whether states differed since plans and mixture were at one node: where nodes
+    are more than states plans may part and pass the same states for a while.
+    """
+    choices, index, width = Choices(space), EdgeIndex.of(space), space.robots + 2
     sources: list[Ints] = []
     nodes = 0
 
     def expand(table: Ints) -> Ints:
         nonlocal nodes
         nodes += len(table)
-        bounds = [len(table), *[len(space) + 1] * width]
+        bounds = [len(table), *[len(space) + 1] * (width - 1), 2]
         links = [np.zeros((0, 1 + width), np.int64)]
-        for move in moves(space, index, table):
+        for move in moves(space, index, table[:, :-1]):
             targets = move.targets(space)
-            rows = np.column_stack((move.source, targets))[can_fail(choices, targets)]
+            parted = (table[move.source, -1] > 0) | ~_one_state(space, targets[:, :-1])
+            parted &= (targets != targets[:, :1]).any(axis=1)
+            rows = np.column_stack((move.source, targets, parted))[can_fail(choices, targets)]
             links.append(unique_tuples(rows, bounds)[0])
         together = np.concatenate(links)
         sources.append(together[:, 0])
@@ -321,16 +327,23 @@ def _walk(space: PlanSpace) -> list[_Layer]:
     tables, children = zip(
         *layered(space, np.flatnonzero(choices.requires), width, expand), strict=True
     )
-    x = tables[-1][:, :-1]
-    joined = tail = (x == x[:, :1]).all(axis=1)  # tail: can plans stay together and still fail?
+    x = tables[-1][:, :-2]
+    same = tail = _one_state(space, x)  # tail: can plans stay in the same states and still fail?
     none, nothing = np.zeros(0, np.int64), np.zeros(0, np.bool_)
     layers = [_Layer(x, none, none, nothing, nothing)]
     for table, source, child in zip(tables[-2::-1], sources[::-1], children[:0:-1], strict=True):
-        x = table[:, :-1]
-        together = (x == x[:, :1]).all(axis=1)
-        parts = together[source] & (table[source, -1] == x[source, 0]) & ~joined[child]
+        x = table[:, :-2]
+        together = _one_state(space, x)
+        parts = (table[source, -1] == 0) & ~same[child]
         layers.append(_Layer(x, source, child, parts, ~together[source] & tail[child]))
         stays = source[together[source] & tail[child]]
-        joined, tail = together, np.zeros(len(x), np.bool_)
+        same, tail = together, np.zeros(len(x), np.bool_)
         tail[stays] = True
     return layers
+
+
+def _one_state(space: PlanSpace, x: Ints) -> Bools:
+    """Whether all of some nodes (k, robots) are of one state."""
+    states = space.state[x]
+    one: Bools = (states == states[:, :1]).all(axis=1)
+    return one

@@ -18,10 +18,12 @@ where the mixed step leads, decides nearly all sets, and only the others are loo
 from __future__ import annotations
 
 from itertools import combinations, product
+from math import inf
 
 import numpy as np
 
 from coordlang.required.choices import Choices
+from coordlang.required.composition_walk import can_fail, layered, move_counts, moves
 from planners.joint.tables import (
     Bools,
     Ints,
@@ -45,19 +47,27 @@ def required_nodes(space: PlanSpace) -> Bools:
 _CHUNK = 1_000_000
 
 
-def divergences(choices: Choices, chunk: int = _CHUNK) -> Ints:
+class TooManyDivergences(Exception):
+    """To find divergences takes more work than it was given."""
+
+
+def divergences(choices: Choices, chunk: int = _CHUNK, most: float = inf) -> Ints:
     """Find the divergences of a plan space, (k, 1 + robots).
 
     The last shared state, then up to as many next states as there are robots, sorted, filled up
     with -1.  One may imply another one, see `minimal`; ``chunk`` rows are handled together.
+    Raises `TooManyDivergences` where more than ``most`` ways to mix next steps are to be looked at.
     """
+    if not choices.space.model.nodes_are_states:
+        return _walked_divergences(choices, most)
     space = choices.space
     nodes = np.flatnonzero(choices.requires)
     index = EdgeIndex.of(space)
     found: Rows = np.zeros((0, 1 + space.robots), np.uint64)
     for span in spans(space.out_degrees[nodes].astype(np.float64) ** 2, chunk):
-        here = _Mixing(choices, index, nodes[span])
+        here = _Mixing(choices, index, nodes[span], most)
         found = _with_failing(found, here, here.pairs(), chunk)
+        most -= here.looked_at
     return found.astype(np.int64)
 
 
@@ -80,6 +90,46 @@ def _with_failing(known: Rows, here: _Mixing, sets: Ints, chunk: int) -> Rows:
         larger = larger[~_implied(known, here.states_of(larger), last=larger.shape[1])]
         known = _with_failing(known, here, larger, chunk)
     return known
+
+
+def _walked_divergences(choices: Choices, most: float) -> Ints:
+    """`divergences` where nodes are more than states.
+
+    There plans may part and still pass the same states for a while: they are walked until their
+    states differ.  O(edges of this part of the composition walk).
+    """
+    space, index = choices.space, EdgeIndex.of(choices.space)
+    found: Rows = np.zeros((0, 1 + space.robots), np.uint64)
+
+    def expand(table: Ints) -> Ints:
+        nonlocal found, most
+        if (most := most - move_counts(space, table[:, :-1]).sum()) < 0:
+            raise TooManyDivergences
+        going_on = [np.zeros((0, table.shape[1]), np.int64)]
+        for move in moves(space, index, table):
+            targets = move.targets(space)
+            fails = can_fail(choices, targets)
+            last, after = space.state[table[move.source, 0]], space.state[targets[:, :-1]]
+            one = (after == after[:, :1]).all(axis=1)
+            rows = np.column_stack((last, _distinct(after)))[fails & ~one]
+            found, _ = unique_rows(np.concatenate((found, rows.astype(np.uint64))))
+            # From one node, which their mixture is at, too, all plans begin anyway.
+            going_on.append(targets[fails & one & (targets != targets[:, :1]).any(axis=1)])
+        return np.unique(np.concatenate(going_on), axis=0)
+
+    begin = np.flatnonzero(choices.requires)
+    for _ in layered(space, begin, 1 + space.robots, expand):
+        pass
+    return found.astype(np.int64)
+
+
+def _distinct(states: Ints) -> Ints:
+    """The different numbers of each row (k, robots), sorted, filled up with -1."""
+    ordered = np.sort(states, axis=1)
+    again = ordered[:, 1:] == ordered[:, :-1]
+    ordered[:, 1:][again] = np.iinfo(np.int64).max
+    ordered.sort(axis=1)
+    return np.where(ordered == np.iinfo(np.int64).max, -1, ordered)
 
 
 def minimal(rows: Ints) -> Ints:
@@ -121,11 +171,12 @@ class _Mixing:
 
     A *way* is a pair of a node and the target of some of its edges: ways are numbered by node, then
     by the target's state.  ``_labels[i]`` delimits, for each way, the labels of robot i on its
-    edges.
+    edges.  ``looked_at`` counts the mixtures.
     """
 
-    def __init__(self, choices: Choices, index: EdgeIndex, nodes: Ints) -> None:
-        self._choices, self._index = choices, index
+    def __init__(self, choices: Choices, index: EdgeIndex, nodes: Ints, most: float) -> None:
+        self._choices, self._index, self._most = choices, index, most
+        self.looked_at = 0
         space = self._space = choices.space
         position, edges = space.edges_from(nodes)
         target = space.targets(edges)
@@ -176,6 +227,9 @@ class _Mixing:
             if len(set(assigned)) < size:
                 continue
             rows = np.flatnonzero(~fails[number])
+            self.looked_at += len(rows)
+            if self.looked_at > self._most:
+                raise TooManyDivergences
             row, nodes, missing = self._mixed(sets[rows][:, assigned])
             fails[number[rows[missing]]] = True
             which = number[rows[row]]

@@ -8,14 +8,15 @@ portions, each a job; of goals that are images of each other under a symmetry on
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
 from coordlang.language.candidates import Candidates
 from coordlang.required.choices import Choices
-from coordlang.required.divergences import divergences, minimal
+from coordlang.required.divergences import TooManyDivergences, divergences, minimal
 from coordlang.required.miscoordination import Inseparable
 from coordlang.symmetry.group import checked_generators
 from coordlang.verification.by_definition import inseparable, refuting_goal
@@ -33,14 +34,15 @@ class FirstDifferences:
     """The first differences of all candidate tasks (the paper's ``alpha*``, each once).
 
     ``divergences`` (k, 1 + robots) are the last shared state and the different next states, sorted,
-    filled up with -1; states are numbers in the plan spaces' table.  With two robots a row is
-    ``alpha* = {last, s1, s2}``.  ``states`` are the numbers of the states on the tasks' plans,
-    sorted.  ``requiring`` counts the tasks that require coordination.  ``nodes`` and ``edges`` are
-    those of the plan spaces; ``sets`` counts the different sets of a robot's label sequences and
-    ``evaluations`` the mixtures of such sets that were looked at: the work.
+    filled up with -1, or None where they were not listed; states are numbers in the plan spaces'
+    table. With two robots a row is ``alpha* = {last, s1, s2}``. ``states`` are the numbers of the
+    states on the tasks' plans, sorted. ``requiring`` counts the tasks that require coordination.
+    ``nodes`` and ``edges`` are those of the plan spaces; ``sets`` counts the different sets of a
+    robot's label sequences and ``evaluations`` the mixtures of such sets that were looked at: the
+    work.
     """
 
-    divergences: Ints
+    divergences: Ints | None
     states: Ints
     requiring: int
     nodes: int
@@ -48,14 +50,20 @@ class FirstDifferences:
     sets: int
     evaluations: int
 
+    @property
+    def listed(self) -> Ints:
+        """The divergences, of methods for which all are listed."""
+        assert self.divergences is not None
+        return self.divergences
 
-def first_differences(spaces: Iterable[PlanSpace], *, defined: bool = True) -> FirstDifferences:
-    """Find them in plan spaces over one table of states.
 
-    Unless they are ``defined``, as they are where no plans are inseparable, there are no
-    divergences, and all the rest.
+def first_differences(spaces: Iterable[PlanSpace], *, most: float = inf) -> FirstDifferences:
+    """Find them in plan spaces over one table of states, without inseparable plans.
+
+    Divergences are not listed for which more than ``most`` mixtures were to be looked at: 0 for
+    spaces with inseparable plans, and where states hide slack.
     """
-    return _together([_found(space, defined=defined) for space in spaces])
+    return _together([_found(space, most) for space in spaces])
 
 
 def differences(
@@ -63,11 +71,12 @@ def differences(
     workers: Workers,
     progress: Callable[[str], None] = lambda _: None,
     portion: float = PORTION,
+    most: float = inf,
 ) -> FirstDifferences:
-    """Find them for candidate tasks, in jobs of about ``portion`` effort.
+    """`first_differences` of candidate tasks, in jobs of about ``portion`` effort.
 
-    Where nodes are more than states there are none to speak of: a plan may part from another one in
-    the state that they share, by waiting there, or by what robots say that they do next.
+    Where states hide slack divergences are not listed: a plan may part from another one in the
+    state that they share, by waiting there.
 
     Raises `Inseparable` with the plans of the first portion that has some.
     """
@@ -78,8 +87,8 @@ def differences(
         source, spoken_for = source.only(goals.chosen), goals.spoken_for[goals.chosen]
     portions = cut(source.efforts, portion)
     efforts = [float(source.efforts[own.start : own.stop].sum()) for own in portions]
-    identity = digest(source.identity, spoken_for, model.nodes_are_states)
-    shared = source, spoken_for, model.nodes_are_states
+    shared = source, spoken_for, 0 if model.hides_slack else most
+    identity = digest(source.identity, *shared[1:])
     batch = Batch("first differences", _of_goals, shared, portions, identity, efforts)
     found: list[Table] = []
 
@@ -97,23 +106,26 @@ def differences(
     return _together(found, goals)
 
 
-def _of_goals(shared: tuple[Source, Ints | None, bool], goals: range) -> Table:
+def _of_goals(shared: tuple[Source, Ints | None, float], goals: range) -> Table:
     """One job: what the tasks of some goals say; nothing if some plans are inseparable."""
-    source, spoken_for, defined = shared
+    source, spoken_for, most = shared
     space = source.portion(goals)
     if refuting_goal(space, np.arange(len(space.rows)))[0] is not None:
         return {}
     times = None if spoken_for is None else spoken_for[goals.start : goals.stop]
-    return _found(space, times, defined=defined)
+    return _found(space, most, times)
 
 
-def _found(space: PlanSpace, times: Ints | None = None, *, defined: bool) -> Table:
+def _found(space: PlanSpace, most: float, times: Ints | None = None) -> Table:
     """What one plan space says; ``times`` (goals): for how many goals each counts, None: itself."""
     choices = Choices(space)
     counts = np.ones(len(space), np.int64) if times is None else times[space.goal]
-    none = np.zeros((0, 1 + space.robots), np.int64)
+    listed: Table = {}
+    if most:
+        with suppress(TooManyDivergences):
+            listed = {"divergences": divergences(choices, most=most)}
     return {
-        "divergences": divergences(choices) if defined else none,
+        **listed,
         "states": np.unique(space.state),
         "figures": np.array(
             [
@@ -132,10 +144,13 @@ def _together(found: Sequence[Table], goals: SymmetricGoals | None = None) -> Fi
 
     Where the ``goals`` are some that speak for all, the other figures are those of all already.
     """
-    rows = minimal(np.concatenate([table["divergences"] for table in found]))
+    rows = None
+    if all("divergences" in table for table in found):
+        rows = minimal(np.concatenate([table["divergences"] for table in found]))
     states = np.unique(np.concatenate([table["states"] for table in found]))
     if goals is not None:
-        rows, states = minimal(goals.images_of_rows(rows)), goals.images_of_states(states)
+        states = goals.images_of_states(states)
+        rows = None if rows is None else minimal(goals.images_of_rows(rows))
     figures = np.stack([table["figures"] for table in found]).sum(axis=0)
     return FirstDifferences(rows, states, *figures.tolist())
 

@@ -16,14 +16,13 @@ from coordlang.vocabulary.separations import Separation, separations
 def greedy(job: Job) -> Outcome:
     """The greedy partition of a job's states in their own order."""
     return Outcome(
-        greedy_partition(job.states, separations(job.first_differences.divergences)),
-        job.lower_bound,
+        greedy_partition(job.states, separations(job.first_differences.listed)), job.lower_bound
     )
 
 
 def first_language(job: Job) -> Assignment:
-    """A language to begin with: greedy's, or a word for each state where nodes are more."""
-    if not job.candidates.model.nodes_are_states:
+    """A language to begin with: greedy's, or a word for each state without divergences."""
+    if job.first_differences.divergences is None:
         return {state: word for word, state in enumerate(job.states)}
     return greedy(job).partition
 

@@ -152,9 +152,6 @@ class MinimalSearch:
             return
         if self._pairs // _FIRST_PAIRS > _BEGINNING * self._most:
             return
-        if self._is_asynchronous and not self._is_one_task:
-            self.merge()  # its first words are single states, from where no search gets far
-            self._merges = 0  # as greedy in step it is no effort
         if self._is_one_task:
             for rounds in _WHERE_DEAR if self._is_dear else _FOR_KINDS:
                 self._find_fewer_tied(rounds)

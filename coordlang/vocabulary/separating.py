@@ -177,7 +177,7 @@ class _Alpha:
 
     def prepare(self) -> None:
         """List the constraints."""
-        self.known = separations(self._job.first_differences.divergences)
+        self.known = separations(self._job.first_differences.listed)
         self._edges = {p for c in self.known if len(c) == 1 for p in c[0].pairs}
         self.apart = clique(self._edges)
 

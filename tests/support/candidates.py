@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache
 from itertools import chain, count, islice, product
 from random import Random
@@ -16,7 +17,7 @@ from planners.joint.states import split_atoms
 from planners.pddl.model_options import ModelOptions
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan
-from planners.system.errors import ProvedImpossible
+from planners.system.errors import BadInput, ProvedImpossible
 from tests.support import naive
 from tests.support.composition_walk import first_break, steps_of
 from tests.support.random_models import graph_text, random_model
@@ -64,7 +65,13 @@ def states_of(spaces: Sequence[PlanSpace]) -> int:
 
 
 def small_candidates(
-    robots: int, *, states: int, plans: int = 0, tasks: int = 100, separable: bool = True
+    robots: int,
+    *,
+    states: int,
+    plans: int = 0,
+    tasks: int = 100,
+    separable: bool = True,
+    asynchronous: bool = False,
 ) -> Iterator[tuple[int, Candidates]]:
     """Random models by their seeds, as all pairs of states or with their own task, that are no
     larger.
@@ -72,10 +79,10 @@ def small_candidates(
     ``plans`` of one task are listed at most, 0: any number; ``separable``: no plans are inseparable.
     """
     for seed in count():
-        found = _random(seed, robots)
+        found = _random(seed, robots, asynchronous)
         if found is None:
             continue
-        with suppress(ProvedImpossible, naive.TooLarge):
+        with suppress(ProvedImpossible, BadInput, naive.TooLarge):
             if not 0 < found.count <= tasks or states_of(found.spaces) > states:
                 continue
             if separable and any(inseparable(space) is not None for space in found.spaces):
@@ -86,12 +93,13 @@ def small_candidates(
 
 
 @cache
-def _random(seed: int, robots: int) -> Candidates | None:
+def _random(seed: int, robots: int, asynchronous: bool) -> Candidates | None:
     """Made once in a process, for many files; None where nothing can be done."""
     domain, problem, options = random_model(seed, robots)
+    options = replace(options, asynchronous=asynchronous)
     try:
         return (all_pairs if seed % 3 else from_problems)(domain, [problem], options)
-    except ProvedImpossible:
+    except (ProvedImpossible, BadInput):
         return None
 
 

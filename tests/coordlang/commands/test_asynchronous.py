@@ -105,8 +105,6 @@ def test_plans_that_differ_in_timing_alone_count_once(shell: Shell) -> None:
         "simulate {} SQUARE --step clock",
         "plan {} SQUARE --prefer avoid:(at\\ r1\\ c0-0)(at\\ r2\\ c0-1)",
         "build SQUARE --asynchronous --slack 1 -o x.json",
-        "build SQUARE --asynchronous --method greedy -o x.json",
-        "build SQUARE --asynchronous --method separating -o x.json",
     ],
 )
 def test_what_does_not_follow_refuses(command: str, made: Path, shell: Shell) -> None:

@@ -67,7 +67,7 @@ def test_jobs_give_what_the_whole_gives(robots: int, number: int) -> None:
             continue
         assert (whole.states == parts.states).all()
         a, b = whole, parts
-        assert a.divergences.tolist() == b.divergences.tolist()
+        assert a.listed.tolist() == b.listed.tolist()
         assert (a.requiring, a.nodes, a.edges) == (b.requiring, b.nodes, b.edges)
         partition = Partition.of_states(candidates.rows, words(whole, seed))
         verdict = verify(partition, candidates.spaces)

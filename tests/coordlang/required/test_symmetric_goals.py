@@ -35,7 +35,7 @@ def agree(candidates: Candidates, portion: float = PORTION) -> bool:
         return False
     assert found.states.tolist() == every.states.tolist()
     one, other = found, every
-    assert one.divergences.tolist() == other.divergences.tolist()
+    assert one.listed.tolist() == other.listed.tolist()
     assert (one.requiring, one.nodes, one.edges) == (other.requiring, other.nodes, other.edges)
     return bool(one.requiring)
 

@@ -36,17 +36,27 @@ SIZES = [
 
 
 @cache
-def models(robots: int, most: int, number: int) -> list[Candidates]:
+def models(robots: int, most: int, number: int, asynchronous: bool = False) -> list[Candidates]:
     """Random candidate tasks whose plans can be listed, inseparable ones among them."""
-    found = small_candidates(robots, states=10**6, plans=most, tasks=300, separable=False)
+    found = small_candidates(
+        robots,
+        states=10**6,
+        plans=most,
+        tasks=300,
+        separable=False,
+        asynchronous=asynchronous,
+    )
     return [candidates for _, candidates in islice(found, number)]
 
 
+@pytest.mark.parametrize("asynchronous", [False, True])
 @pytest.mark.parametrize(("robots", "most", "number"), SIZES)
-def test_where_plans_that_require_coordination_part(robots: int, most: int, number: int) -> None:
+def test_where_plans_that_require_coordination_part(
+    robots: int, most: int, number: int, asynchronous: bool
+) -> None:
     """The last shared states and the next ones of all failing mixtures, and which tasks have any."""
     seen: Counter[str] = Counter()
-    for candidates in models(robots, most, number):
+    for candidates in models(robots, most, number, asynchronous):
         alphas, requires, same_states = set(), [], False
         for space, task, plans, _ in listed(candidates, most):
             failing = list(naive.failing(plans, robots))
@@ -67,7 +77,7 @@ def test_where_plans_that_require_coordination_part(robots: int, most: int, numb
         if not same_states:
             found = first_differences(candidates.spaces)
             assert found.requiring == sum(requires)
-            rows = found.divergences.tolist()
+            rows = found.listed.tolist()
             table = {(p, frozenset(s for s in q if s >= 0)) for p, *q in rows}
             assert table == naive.minimal(alphas)
             parts = [divergences(Choices(space), chunk=7) for space in candidates.spaces]

@@ -21,7 +21,7 @@ from tests.support.domains import own_task
 
 def classes(candidates: Candidates) -> list[Ints]:
     """All of them, coarse ones first."""
-    found = first_differences(candidates.spaces, defined=False)
+    found = first_differences(candidates.spaces, most=0)
     languages = Languages.of(Job(candidates, tuple(found.states.tolist()), found))
     return list(classes_by_facts(candidates, languages.refuter))
 

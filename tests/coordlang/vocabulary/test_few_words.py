@@ -57,7 +57,7 @@ def by_hand(candidates: Candidates, words: int) -> tuple[dict[str, Fraction], in
     """By the definition, over all partitions: the least mean, and the least worst task; how many."""
     every = [(space, task) for space in candidates.spaces for task in range(len(space.starts))]
     tasks = [own for own in every if naive.failure(*own, None, 100)]
-    states = first_differences(candidates.spaces, defined=False).states.tolist()
+    states = first_differences(candidates.spaces, most=0).states.tolist()
     least, tried = {"mean": Fraction(1), "worst": Fraction(1)}, 0
     for chosen in product(range(words), repeat=len(states)):
         number: dict[int, int] = {}
@@ -82,7 +82,7 @@ def test_two_words_are_the_best_of_all_partitions(folder: str, stem: str, mean: 
     """Design figures: 3.79 % on the open 2x2 grid, 0.76 % on the T-shaped map."""
     candidates = all_tasks(folder, stem)
     least, tried = by_hand(candidates, 2)
-    states = first_differences(candidates.spaces, defined=False).states.tolist()
+    states = first_differences(candidates.spaces, most=0).states.tolist()
     assert least["mean"] == mean
     assert tried == partition_count(len(states), 2) == 2_048
     for worst in (False, True):

@@ -61,12 +61,15 @@ def least(states: list[int], wanted: set[Demand]) -> int:
     raise AssertionError("all states apart separate everything")
 
 
-def small_models(robots: int, most: int, number: int) -> Iterator[tuple[int, Candidates]]:
+def small_models(
+    robots: int, most: int, number: int, asynchronous: bool
+) -> Iterator[tuple[int, Candidates]]:
     """Random models that require coordination, small enough to list plans and partitions."""
-    models = small_candidates(robots, states=7, plans=most)
+    models = small_candidates(robots, states=7, plans=most, asynchronous=asynchronous)
     return islice(((seed, found) for seed, found in models if requiring(found)), number)
 
 
+@pytest.mark.parametrize("asynchronous", [False, True])
 @pytest.mark.parametrize("written", [pytest.param(True, marks=pytest.mark.thorough), False])
 @pytest.mark.parametrize(
     ("robots", "most", "number"),
@@ -78,7 +81,12 @@ def small_models(robots: int, most: int, number: int) -> Iterator[tuple[int, Can
     ],
 )
 def test_against_the_theorem(
-    robots: int, most: int, number: int, written: bool, monkeypatch: pytest.MonkeyPatch
+    robots: int,
+    most: int,
+    number: int,
+    written: bool,
+    asynchronous: bool,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Least sizes with and without beta, and the order of the four methods.
 
@@ -87,7 +95,7 @@ def test_against_the_theorem(
     if not written:
         monkeypatch.setattr(DifferenceWalk, "every", lambda *_: None)
     seen: Counter[tuple[int, ...]] = Counter()
-    for seed, candidates in small_models(robots, most, number):
+    for seed, candidates in small_models(robots, most, number, asynchronous):
         both, alpha = (demands(candidates, most, beta=b) for b in (True, False))
         states = sorted({int(s) for space in candidates.spaces for s in space.state})
         full = build_language(candidates, "separating", seed=seed)
@@ -128,6 +136,7 @@ def test_known_minima(folder: str, stem: str, both: int, alpha: int) -> None:
 
 
 @pytest.mark.thorough
+@pytest.mark.parametrize("asynchronous", [False, True])
 @pytest.mark.parametrize(
     ("robots", "most", "number"),
     [
@@ -137,9 +146,11 @@ def test_known_minima(folder: str, stem: str, both: int, alpha: int) -> None:
         pytest.param(3, 14, 50, marks=pytest.mark.slow),
     ],
 )
-def test_every_constraint_and_no_other(robots: int, most: int, number: int) -> None:
+def test_every_constraint_and_no_other(
+    robots: int, most: int, number: int, asynchronous: bool
+) -> None:
     """What is written down are the demands of the failing tuples, all listed."""
-    for _, candidates in small_models(robots, most, number):
+    for _, candidates in small_models(robots, most, number, asynchronous):
         found = [DifferenceWalk(space).every(10**6) for space in candidates.spaces]
         every = {
             frozenset(frozenset(frozenset(p) for p in s.pairs) for s in constraint)

@@ -110,7 +110,7 @@ def test_methods_that_part_plans_where_states_first_differ_are_refused() -> None
         with pytest.raises(UsageError, match="with slack") as error:
             build_language(found, method)
         assert error.value.exit_code == 2
-    alphas = first_differences(found.spaces).divergences
+    alphas = first_differences(found.spaces).listed
     waiting = (alphas[:, 1:] == alphas[:, :1]).any(axis=1)
     assert waiting.any()  # no partition gives p, s1 and p three words, but there are languages
 
