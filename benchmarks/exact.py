@@ -137,10 +137,10 @@ def measured(key: str, name: str, seed: int, given: Namespace) -> Figures:
             )
     except (OutOfTime, OutOfMemory, ProvedImpossible):
         return {"row": key, "version": frame.project(), "cells": []}
-    guarantee = built.language.guarantee
+    guarantee, listed = built.language.guarantee, built.first_differences.divergences
     words = text_of(guarantee.lower_bound, guarantee.size)
     cells = [
-        bounds.greedy or guarantee.size,
+        "-" if listed is None else bounds.greedy or guarantee.size,
         words if bounds.early is None else bounds.early,
         words,
         *(int(built.figures.get(name, 0)) for name in FIGURES),

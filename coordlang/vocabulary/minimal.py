@@ -120,7 +120,7 @@ class MinimalSearch:
     def _partitions(self) -> Partitions:
         known = self.languages.known
         # Without a common step proofs are long, and longer with Glucose.
-        prover: SolverName = "cadical153" if self._is_asynchronous else "glucose42"
+        prover: SolverName = "cadical195" if self._is_asynchronous else "glucose42"
         return Partitions(self._job.states, known.clauses, known.group.permutations, prover)
 
     @cached_property

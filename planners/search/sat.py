@@ -22,7 +22,7 @@ _ROUNDS = 6
 
 #: The solvers in use.  None of MapleChrono and MapleCM: they take SIGALRM for themselves, below
 #: Python, so that no time limit would be heard any more.
-SolverName = Literal["cadical153", "glucose4", "glucose42", "maplesat", "minisat22"]
+SolverName = Literal["cadical153", "cadical195", "glucose4", "glucose42", "maplesat", "minisat22"]
 
 
 def sat_solver(name: SolverName, clauses: Iterable[Sequence[int]] = ()) -> Any:
