@@ -48,6 +48,8 @@ _DEAR = 30_000
 _FOR_KINDS, _WHERE_DEAR = (1, 2, 5, 10), (5, 10)
 #: .. with fewer words than the best language by this part at least.
 _FEWER_WORDS = 5
+#: Where rounds are dear words are many if they are more; so many searches for merges of few facts.
+_MANY, _MERGED_SOON = 100, 30
 #: Merges in a row that fail before something else is tried.
 _VAIN = 15
 #: Pairs of the clauses that are all collected before long proofs without a common step.
@@ -153,6 +155,8 @@ class MinimalSearch:
         if self._pairs // _FIRST_PAIRS > _BEGINNING * self._most:
             return
         if self._is_one_task:
+            if self._is_dear and self.upper > _MANY:
+                self._begin_with_few_facts()
             for rounds in _WHERE_DEAR if self._is_dear else _FOR_KINDS:
                 self._find_fewer_tied(rounds)
         while self.lower < self.upper and not self._is_spent and self.decide(self.lower, _SOON):
@@ -175,6 +179,13 @@ class MinimalSearch:
     @property
     def _is_one_task(self) -> bool:
         return self._job.candidates.count == 1
+
+    def _begin_with_few_facts(self) -> None:
+        """Words that say what a few facts say, merged a little: closer than a word for a state."""
+        found = self._tied.of_facts()
+        if found is not None and word_count(found) < self.upper:
+            self._offer(found)
+            self.merge(most=_MERGED_SOON)
 
     def _know_short_clauses(self) -> None:
         """Add clauses that refute no partition met so far: the last proof takes half as long."""
@@ -227,17 +238,18 @@ class MinimalSearch:
     def _is_spent(self) -> bool:
         return self.work >= self._most
 
-    def merge(self, vain: int = sys.maxsize) -> None:
+    def merge(self, vain: int = sys.maxsize, most: int = sys.maxsize) -> None:
         """Merge words of the best language as long as it stays a language.
 
-        After ``vain`` merges in a row that failed it is left, and the next call goes on there.
+        After ``vain`` searches in a row that failed, or ``most``, it is left, and the next call
+        goes on there.
         """
         if self.best is None or self.upper <= self.lower:
             return
         if self._merging is None or self._merging[0] is not self.best:
             self._merging = self.best, merged(self.best, self._job.states, self.languages.refuter)
         coarsest, failed = self.best, 0
-        for coarser in self._merging[1]:
+        for number, coarser in enumerate(self._merging[1], 1):
             failed += 1
             if word_count(coarser) < word_count(coarsest):
                 coarsest, failed = coarser, 0
@@ -245,7 +257,7 @@ class MinimalSearch:
                     self._offer(coarsest)  # what is not verified is lost when time is over
             self._merges += 1
             self._report(f"merging words: {word_count(coarser)} left")
-            if self._is_spent or failed >= vain:
+            if self._is_spent or failed >= vain or number >= most:
                 break
         if coarsest is not self.best:
             self._offer(coarsest)

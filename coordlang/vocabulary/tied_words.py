@@ -102,6 +102,14 @@ class TiedWords:
             found = iter(up_to_symmetry(tied, self._images))
         yield from map(_Ties, found)
 
+    def of_facts(self) -> Assignment | None:
+        """Of one task the language that says the steps to go and a few facts, if there is one."""
+        self._tied += islice(self._untied, max(0, 2 - len(self._tied)))
+        if len(self._tied) < 2:
+            return None
+        classes = self._tied[1].classes[self._states]
+        return dict(zip(self._states.tolist(), classes.tolist(), strict=True))
+
     def find(self, size: int, rounds: int) -> Assignment | None:
         """A language with at most ``size`` words; None if none was found with some effort.
 
