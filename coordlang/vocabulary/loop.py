@@ -158,7 +158,7 @@ def close_bounds(
     """Decide numbers until the bounds meet, or it is over.
 
     From below as long as that is quick; what is slow is first closed in from above, to have a good
-    language early.
+    language early: a number between, and if that is slow, too, numbers nearer to what suffices.
 
     Parameters
     ----------
@@ -177,8 +177,12 @@ def close_bounds(
             return
         if decide(lower, budget):
             continue
-        middle = between(lower, upper)
-        if middle == lower or not decide(middle, budget):
+        middle = max(lower + 1, between(lower, upper))
+        while middle < upper and not is_over():
+            if decide(middle, budget):
+                break
+            middle = max(middle + 1, between(middle, upper))
+        else:
             budget = budget.doubled()
 
 
