@@ -195,7 +195,8 @@ class MinimalSearch:
     def _decide_between(self, budget: Budget) -> None:
         """Decide numbers between the bounds, as long as that is quick."""
         while self.lower < self.upper and not self._is_spent:
-            if not self._find_or_refute(between(self.lower, self.upper), budget):
+            size = between(self.lower, self.upper)
+            if not (self._finds_tied(size, budget.rounds) or self._find_or_refute(size, budget)):
                 return
 
     def _find_fewer_tied(self, rounds: int) -> None:
