@@ -20,7 +20,7 @@ from coordlang.language.provenance import percent
 from coordlang.language.sentences import sentence_counts
 from coordlang.required.miscoordination import Inseparable
 from coordlang.vocabulary.few_words import few_words
-from coordlang.vocabulary.flexibility_bound import largest_boxes
+from coordlang.vocabulary.flexible import largest_boxes
 from coordlang.vocabulary.job import Assignment, words_of_states
 from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace

@@ -8,9 +8,8 @@ from random import Random
 
 from coordlang.language.candidates import Candidates
 from coordlang.vocabulary.first_differences import first_differences
-from coordlang.vocabulary.greedy import greedy_partition
+from coordlang.vocabulary.greedy import greedy_partition, separations
 from coordlang.vocabulary.job import words_of_states
-from coordlang.vocabulary.separations import separations
 from planners.joint.tables import Ints, find_rows
 
 #: Random orders of the states that experiments try.

@@ -44,7 +44,7 @@ from coordlang.unified import NAME
 from coordlang.unified.options import PLAN_KINDS, EngineOptions, in_parameters
 from coordlang.unified.plans import NoSteps, of_up, to_up
 from coordlang.unified.translation import FEATURES, Translated, translate
-from planners.check.validate import validate
+from planners.check.rules import validate
 from planners.grounding.instantiate import idling_schemas
 from planners.loading import build
 from planners.search.optimal_plans import search
@@ -234,7 +234,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
     # Validation.
 
     def _validate(self, problem: Any, plan: Any) -> ValidationResult:
-        """By the rules of joint steps (`planners.check.validate`).
+        """By the rules of joint steps (`planners.check.rules`).
 
         Under a sentence the plan must be optimal and have it, too.  A metric does not matter.
         """

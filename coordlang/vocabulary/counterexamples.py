@@ -20,8 +20,7 @@ import numpy as np
 
 from coordlang.required.choices import Choices
 from coordlang.vocabulary.sat import Undecided
-from coordlang.vocabulary.sentence_sets import NOTHING, Words
-from coordlang.vocabulary.spoken_choices import SpokenChoices
+from coordlang.vocabulary.spoken_choices import NOTHING, SpokenChoices, Words
 from planners.joint.tables import Ints
 from planners.search.edge_index import EdgeTrees
 
@@ -48,14 +47,8 @@ _Failing = tuple[list[list[int]], Words]
 class Counterexample:
     """A failing tuple of plans with one sentence, from a node that they share.
 
-    Attributes
-    ----------
-    start
-        The node of the plan space.
-    edges
-        Step by step, the edge of each plan.
-    states
-        The state numbers of each plan, that of ``start`` first.
+    ``start``: the node of the plan space.  ``edges``: step by step, the edge of each plan.
+    ``states``: the state numbers of each plan, that of ``start`` first.
     """
 
     start: int
@@ -67,14 +60,9 @@ class Counterexample:
 class Counterexamples:
     """Many failing tuples of plans, all with equally many steps.
 
-    Attributes
-    ----------
-    start
-        (tuples) the node that the plans of each share.
-    edges
-        (tuples, steps, robots) step by step the edge of each plan.
-    states
-        (tuples, robots, steps + 1) the state numbers of each plan.
+    ``start``: (tuples) the node that the plans of each share.  ``edges``: (tuples, steps, robots)
+    step by step the edge of each plan.  ``states``: (tuples, robots, steps + 1) the state numbers
+    of each plan.
     """
 
     start: Ints
@@ -106,23 +94,11 @@ def many_counterexamples(
     For each node that requires coordination, the rest of plans that begin alike; those with fewer
     steps to go first.
 
-    Parameters
-    ----------
-    mixtures
-        Those of the plan space.
-    word
-        (nodes) the word of each node of the plan space.
-    most
-        About how many are wanted.  If there is none at all, ``word`` is a language for the tasks.
-    ways
-        So many times as many are wanted from each node: it stands for so many images.
-    steps
-        Steps of robots that may be looked at.
-
-    Raises
-    ------
-    Undecided
-        After so many steps.
+    ``mixtures``: those of the plan space.  ``word``: (nodes) the word of each node of the plan
+    space.  ``most``: about how many are wanted.  If there is none at all, ``word`` is a language
+    for the tasks.  ``ways``: so many times as many are wanted from each node: it stands for so many
+    images.  ``steps``: steps of robots that may be looked at.  Raises `Undecided` after so many
+    steps.
     """
     choices, space = mixtures.choices, mixtures.choices.space
     if not choices.requires[space.starts].any():

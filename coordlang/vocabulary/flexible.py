@@ -9,21 +9,24 @@ before it counts.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from random import Random
 
 import numpy as np
 
-from coordlang.language.flexibility import Flexibility, Floats, flexibility
+from coordlang.language.flexibility import MANY, Flexibility, Floats, flexibility
 from coordlang.language.warping import Clause
+from coordlang.required.divergences import required_nodes
 from coordlang.required.plan_table import PlanTable, plan_table
-from coordlang.vocabulary.flexibility_bound import flexibility_bounds
 from coordlang.vocabulary.job import Assignment, Job, Outcome
 from coordlang.vocabulary.local_search import WORK, LocalSearch
 from coordlang.vocabulary.loop import Languages
 from planners.joint.tables import Ints
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import Plan, Plans, counts
 from planners.system.errors import OutOfMemory
 from planners.system.limits import run_until_stopped
 
@@ -37,13 +40,10 @@ def flexible(job: Job, found: Outcome, work: int = WORK) -> Outcome:
     Anytime: out of time or memory, or interrupted, the best verified language so far is returned,
     with the error in ``stopped``.
 
-    Returns
-    -------
-    Outcome
-        With the bound on the number of words that ``found`` has.  ``figures`` also hold
-        ``flexibility`` (plans left open, averaged over tasks), ``flexibility_before`` (that of
-        ``found``), ``flexibility_bound`` (which no language exceeds) and
-        ``communication_saving``; nothing of these where there are too many sentences to measure.
+    The bound on the number of words is that of ``found``.  ``figures`` also hold ``flexibility``
+    (plans left open, averaged over tasks), ``flexibility_before`` (that of ``found``),
+    ``flexibility_bound`` (which no language exceeds) and ``communication_saving``; nothing of these
+    where there are too many sentences to measure.
     """
     search = _Search(job, found)
     stopped = run_until_stopped(lambda: search.run(work))
@@ -136,3 +136,99 @@ class _Search:
     def _measured(self, partition: Assignment) -> Flexibility:
         job = self._job
         return flexibility(job.candidates.spaces, job.of_nodes(job.word(partition)))
+
+
+#: Plans of a task up to which its boxes are looked at, and boxes that cannot grow, of one task and
+#: one division of the robots.
+_PLANS, _BOXES = 3_000, 5_000
+
+
+def largest_boxes(spaces: Sequence[PlanSpace]) -> Iterator[tuple[int, list[int] | None]]:
+    """For each task the number of its plans and, of each, the size of its largest box.
+
+    No sizes (None) where no coordination is required, or there are too many plans; no less than the
+    size where there are too many boxes.
+    """
+    for space in spaces:
+        counted, required = counts(space), required_nodes(space)
+        for start in space.starts.tolist():
+            plans = Plans(space, start, counted)
+            is_unbounded = not required[start] or plans.count > _PLANS
+            yield plans.count, None if is_unbounded else _box_sizes(list(plans))
+
+
+def flexibility_bounds(spaces: Sequence[PlanSpace]) -> Floats:
+    """(tasks) an upper bound on E = sum_s n_s^2 / N under any language.
+
+    N where the task does not require coordination.
+    """
+    bounds = [
+        float(min(count, MANY)) if sizes is None else float(sum(sizes) / count)
+        for count, sizes in largest_boxes(spaces)
+    ]
+    return np.array(bounds, np.float64)
+
+
+def _box_sizes(plans: Sequence[Plan]) -> list[int]:
+    """For each plan the size of the largest box with it.
+
+    Of all divisions of the robots the least size counts.
+    """
+    robots = len(plans[0][0])
+    # With two robots both divisions are one table.
+    divisions = range(robots) if robots > 2 else range(1)
+    sizes = [_of_division(plans, robot) for robot in divisions]
+    return list(map(min, zip(*sizes, strict=True)))
+
+
+def _of_division(plans: Sequence[Plan], robot: int) -> list[int]:
+    """For each plan the size of the largest box with it; no less where there are many boxes."""
+    cells, rows = _table(plans, robot)
+    maximal = _intersections(rows)
+    if maximal is None:
+        return [_shared(rows, *cell) for cell in cells]
+
+    def size(columns: int) -> int:
+        return sum(row & columns == columns for row in rows) * columns.bit_count()
+
+    boxes = sorted(((size(columns), columns) for columns in maximal), reverse=True)
+    return [
+        next(n for n, columns in boxes if columns & column and not columns & ~rows[row])
+        for row, column in cells
+    ]
+
+
+def _shared(rows: Sequence[int], row: int, column: int) -> int:
+    """What the rows with a column share with one of them: no box with this cell is larger."""
+    return sum((rows[row] & other).bit_count() for other in rows if other & column)
+
+
+def _table(plans: Sequence[Plan], robot: int) -> tuple[list[tuple[int, int]], list[int]]:
+    """The row and the column of each plan, and the columns of each row; sets of columns are bits.
+
+    Rows are the parts of one robot, columns those of all others.
+    """
+    row_of: dict[tuple[int, ...], int] = {}
+    column_of: dict[tuple[tuple[int, ...], ...], int] = {}
+    cells, rows = [], defaultdict[int, int](int)
+    for plan in plans:
+        row = row_of.setdefault(tuple(step[robot] for step in plan), len(row_of))
+        rest = tuple(step[:robot] + step[robot + 1 :] for step in plan)
+        column = 1 << column_of.setdefault(rest, len(column_of))
+        rows[row] |= column
+        cells.append((row, column))
+    return cells, list(rows.values())
+
+
+def _intersections(rows: Iterable[int]) -> set[int] | None:
+    """All intersections of rows but the empty one: the column sets of boxes that cannot grow.
+
+    None if there are too many.
+    """
+    found: set[int] = set()
+    for row in sorted(set(rows)):
+        found |= {row & other for other in found} | {row}
+        if len(found) > _BOXES:
+            return None
+    found.discard(0)
+    return found

@@ -7,10 +7,14 @@ docs/concepts.md).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
+from coordlang.language.warping import Clause, pair
 from coordlang.vocabulary.job import Assignment, Job, Outcome
-from coordlang.vocabulary.separations import Separation, separations
+from planners.joint.tables import Ints
+
+#: Alternatives, of which one must hold: sets of pairs of states that lie in different words.
+Constraint = tuple[Clause, ...]
 
 
 def greedy(job: Job) -> Outcome:
@@ -27,13 +31,33 @@ def first_language(job: Job) -> Assignment:
     return greedy(job).partition
 
 
-def greedy_partition(
-    states: Sequence[int], constraints: Sequence[tuple[Separation, ...]]
-) -> dict[int, int]:
+def separations(divergences: Ints) -> list[Constraint]:
+    """For each divergence, a row of `FirstDifferences`, its alternatives (Theorem 3, alpha part).
+
+    With two robots there is one: all three pairs of ``alpha*``.  With n robots any two of the
+    different next states will do, together with the last shared state.
+    """
+    return [alternatives(last, [s for s in row if s >= 0]) for last, *row in divergences.tolist()]
+
+
+def alternatives(shared: int, others: Iterable[int]) -> Constraint:
+    """The ways to separate plans at a difference (Propositions 4 to 6 of docs/concepts.md).
+
+    Any two of the different states ``others``, with the shared state (-1: there is none, the plans
+    end in different states).
+    """
+    states = sorted(set(others))
+    return tuple(
+        frozenset({pair(a, b)} if shared < 0 else {pair(shared, a), pair(shared, b), pair(a, b)})
+        for n, b in enumerate(states)
+        for a in states[:n]
+    )
+
+
+def greedy_partition(states: Sequence[int], constraints: Sequence[Constraint]) -> dict[int, int]:
     """A partition of ``states`` that satisfies every constraint: state -> word number, from 0.
 
-    A constraint is a tuple of alternatives, at least one of which must hold; each is a set of pairs
-    to separate.  States are tried in the given order, which decides the number of words: the result
+    States are tried in the given order, which decides the number of words: the result
     is a language, not a smallest one (the paper, Algorithm 1).
 
     O(words * (states + constraints)).
@@ -42,7 +66,7 @@ def greedy_partition(
     alternatives_left = _Alternatives()
     for alternatives in constraints:
         if len(alternatives) == 1:
-            for a, b in alternatives[0].pairs:
+            for a, b in alternatives[0]:
                 clashes[a].add(b)
                 clashes[b].add(a)
         else:
@@ -74,27 +98,26 @@ class _Alternatives:
     """
 
     def __init__(self) -> None:
-        self._left: list[set[Separation]] = []
-        self._ruled_out_by: dict[tuple[int, int], list[tuple[int, Separation]]] = {}
+        self._left: list[set[Clause]] = []
+        self._ruled_out_by: dict[tuple[int, int], list[tuple[int, Clause]]] = {}
         self._states: set[int] = set()
 
-    def add(self, alternatives: tuple[Separation, ...]) -> None:
+    def add(self, alternatives: Constraint) -> None:
         """Add a constraint."""
         number = len(self._left)
         self._left.append(set(alternatives))
         for separation in alternatives:
-            for pair in separation.pairs:
-                self._ruled_out_by.setdefault(pair, []).append((number, separation))
-                self._states.update(pair)
+            for states in separation:
+                self._ruled_out_by.setdefault(states, []).append((number, separation))
+                self._states.update(states)
 
     def merge(self, state: int, members: Sequence[int]) -> bool:
         """Put ``state`` into a word with ``members`` if every constraint keeps an alternative."""
         if state not in self._states:
             return True
-        ruled_out: dict[int, set[Separation]] = {}
+        ruled_out: dict[int, set[Clause]] = {}
         for other in members:
-            pair = (state, other) if state < other else (other, state)
-            for number, separation in self._ruled_out_by.get(pair, ()):
+            for number, separation in self._ruled_out_by.get(pair(state, other), ()):
                 ruled_out.setdefault(number, set()).add(separation)
         if any(self._left[number] <= out for number, out in ruled_out.items()):
             return False

@@ -8,15 +8,15 @@ failing plans left: it is a language.  Work is counted, never timed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import isqrt
 from typing import Generic, TypeVar
 
 from coordlang.language.warping import Clause
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
-from coordlang.vocabulary.job import Assignment, Job, words_of_states
-from coordlang.vocabulary.necessary_clauses import NecessaryClauses
+from coordlang.vocabulary.clauses import without_implied
+from coordlang.vocabulary.job import Assignment, Evidence, Job, words_of_states
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from planners.joint.tables import Ints
@@ -29,28 +29,41 @@ Requirement = TypeVar("Requirement")
 _GROWTH = 2
 
 
+class NecessaryClauses:
+    """A growing list of necessary clauses with all their images under a group of symmetries.
+
+    ``clauses`` are in the order in which they were met, ``evidence`` says why each is necessary.
+    """
+
+    def __init__(self, group: SymmetryGroup) -> None:
+        self.group = group
+        self.clauses: list[Clause] = []
+        self.evidence: dict[Clause, Evidence] = {}
+
+    def add_all(self, found: Mapping[Clause, Evidence]) -> None:
+        """Add clauses with their images; those that others of them imply are left out."""
+        for clause in without_implied(found):
+            evidence = found[clause]
+            self._add([(clause, evidence)])
+            self._add(
+                (image, replace(evidence, symmetry=symmetry))
+                for image, symmetry in self.group.images(clause)
+            )
+
+    def _add(self, clauses: Iterable[tuple[Clause, Evidence]]) -> None:
+        for clause, evidence in clauses:
+            if clause not in self.evidence:
+                self.evidence[clause] = evidence
+                self.clauses.append(clause)
+
+
 class Languages:
     """Partitions looked at one after another: each is a language, or gives clauses.
 
-    Parameters
-    ----------
-    spaces, states
-        The optimal plans of the tasks, and the number of all states.
-    group
-        Symmetries of the tasks.
-    seed
-        Of what is drawn at random.
-    progress, workers
-        See `Job`.
-
-    Attributes
-    ----------
-    known
-        Clauses that every language satisfies.
-    refuter
-        Tells what is wrong with a partition.
-    rounds
-        The partitions looked at.
+    ``spaces`` are the optimal plans of the tasks, over a table of so many ``states``, and ``group``
+    their symmetries; for ``progress``, ``seed`` and ``workers`` see `Job`.  ``known`` are clauses
+    that every language satisfies, ``refuter`` tells what is wrong with a partition, and ``rounds``
+    counts the partitions looked at.
     """
 
     def __init__(
@@ -101,12 +114,8 @@ class Languages:
 class Budget:
     """What may be spent on one number.
 
-    Attributes
-    ----------
-    rounds
-        Partitions that may be found and refuted.
-    conflicts
-        Conflicts of the solver for each of them.
+    ``rounds``: partitions that may be found and refuted.  ``conflicts``: conflicts of the solver
+    for each of them.
     """
 
     rounds: int = 60
@@ -124,19 +133,9 @@ def find(
 ) -> dict[int, int] | None:
     """The first partition that holds, None if none is left.
 
-    Parameters
-    ----------
-    partition
-        The next one, found within so many conflicts, None if there is none.
-    holds
-        Whether it is what is looked for; if not, it must not come again.
-    budget
-        What may be spent.
-
-    Raises
-    ------
-    Undecided
-        If that was not enough.
+    ``partition``: the next one, found within so many conflicts, None if there is none.  ``holds``:
+    whether it is what is looked for; if not, it must not come again.  ``budget``: what may be
+    spent.  Raises `Undecided` if that was not enough.
     """
     for _ in range(budget.rounds):
         found = partition(budget.conflicts)
@@ -160,15 +159,9 @@ def close_bounds(
     From below as long as that is quick; what is slow is first closed in from above, to have a good
     language early: a number between, and if that is slow, too, numbers nearer to what suffices.
 
-    Parameters
-    ----------
-    bounds
-        Gives the number proved to be needed, and the number known to suffice.
-    decide
-        Decides a number, which moves a bound; False when the budget was not enough, which then is
-        doubled.
-    is_over
-        Whether to end early.
+    ``bounds``: gives the number proved to be needed, and the number known to suffice.  ``decide``:
+    decides a number, which moves a bound; False when the budget was not enough, which then is
+    doubled.  ``is_over``: whether to end early.
     """
     budget = Budget()
     while not is_over():
@@ -200,12 +193,8 @@ class ProblemsBySize(Generic[Requirement]):
 
     So a solver goes on where it stopped.
 
-    Parameters
-    ----------
-    start
-        Makes a problem for a number with all requirements that are known.
-    require
-        Adds one requirement to a problem.
+    ``start``: makes a problem for a number with all requirements that are known.  ``require``: adds
+    one requirement to a problem.
     """
 
     def __init__(

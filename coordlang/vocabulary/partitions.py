@@ -16,8 +16,7 @@ from coordlang.vocabulary.clauses import (
     without_implied,
 )
 from coordlang.vocabulary.job import Evidence
-from coordlang.vocabulary.loop import ProblemsBySize
-from coordlang.vocabulary.necessary_clauses import NecessaryClauses
+from coordlang.vocabulary.loop import NecessaryClauses, ProblemsBySize
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from planners.search.sat import SolverName
 
@@ -59,21 +58,10 @@ class Partitions:
     The second one is allowed only one of symmetric partitions: proofs are ten times shorter, but
     partitions harder to find.
 
-    Parameters
-    ----------
-    states
-        The states that need words.
-    clauses
-        The known clauses about these states, a list that only grows.
-    permutations
-        Where symmetries take each state; the images of every clause must be clauses.
-    prover
-        The second solver.
-
-    Attributes
-    ----------
-    conflicts
-        Those of the solvers so far.
+    ``states``: the states that need words.  ``clauses``: the known clauses about these states, a
+    list that only grows.  ``permutations``: where symmetries take each state; the images of every
+    clause must be clauses.  ``prover``: the second solver.  ``conflicts``: those of the solvers so
+    far.
     """
 
     def __init__(
@@ -95,17 +83,8 @@ class Partitions:
     def find(self, size: int, conflicts: int) -> dict[int, int] | None:
         """A partition into ``size`` words, or None if there is none.
 
-        Parameters
-        ----------
-        size
-            The number of words.
-        conflicts
-            Conflicts of the solver that are allowed.
-
-        Raises
-        ------
-        Undecided
-            After so many conflicts.
+        ``size``: the number of words.  ``conflicts``: conflicts of the solver that are allowed.
+        Raises `Undecided` after so many conflicts.
         """
         if size not in self._hard:
             with suppress(Undecided):

@@ -15,13 +15,14 @@ from random import Random
 import numpy as np
 
 from coordlang.language.warping import Clause
+from coordlang.required.choices import Choices
 from coordlang.symmetry.group import SymmetryGroup
-from coordlang.vocabulary.counterexamples import Counterexamples
+from coordlang.vocabulary.counterexample_walk import CounterexampleWalk
+from coordlang.vocabulary.counterexamples import Counterexamples, Mixtures, many_counterexamples
 from coordlang.vocabulary.failing_tuples import Agreeing, FailingTuples
 from coordlang.vocabulary.job import Evidence
-from coordlang.vocabulary.necessary_clauses import TaskPart
 from planners.joint.model import FullState
-from planners.joint.tables import Ints
+from planners.joint.tables import Bools, Ints
 from planners.parallel.batch import Batch, Table, digest
 from planners.parallel.workers import Workers
 from planners.search.plan_space import PlanSpace
@@ -32,6 +33,8 @@ _LEAST_PARTS = 8
 _TASKS_OF_A_PART = 1_500
 #: Failing tuples of a part that are collected at the beginning, and later at a time.
 _AT_FIRST, _LATER = 4_000, 100
+#: So many failing tuples are always wanted of a walk, which finds many in one go.
+_OF_WALK = 20_000
 #: Longer tuples are left out of what is looked at once there are so many.
 _ENOUGH = 2_000
 _COLUMNS = ("start", "edges", "states")
@@ -39,29 +42,45 @@ _COLUMNS = ("start", "edges", "states")
 
 @dataclass(frozen=True, slots=True)
 class _Walked:
-    """Tasks that are walked together, for themselves and for their images.
+    """Tasks of a plan space that are walked together, for themselves and for their images.
 
-    ``images`` are symmetries: those by their positions in the pool's that take the tasks to all of
-    their images, each once.
+    ``finder`` finds those of their plans that fail: for two robots a walk, else sets.  ``images``
+    are symmetries: those by their positions in the pool's that take the tasks to all of their
+    images, each once.
     """
 
-    part: TaskPart
+    space: PlanSpace
+    finder: CounterexampleWalk | Mixtures
     images: tuple[int, ...]
 
+    @classmethod
+    def of(cls, space: PlanSpace, tasks: Bools, images: tuple[int, ...]) -> _Walked:
+        """These tasks of a plan space."""
+        part = space.with_tasks(space.starts[tasks], space.second[tasks])
+        kind = CounterexampleWalk if space.robots == 2 else Mixtures
+        return cls(part, kind(Choices(part)), images)
+
     def failing(self, word: Ints, most: int, steps: int = sys.maxsize) -> list[Counterexamples]:
-        """See `TaskPart.failing`."""
-        return self.part.failing(word, most, len(self.images), steps)
+        """Failing tuples of plans with one sentence, about ``most``, as tables.
+
+        None only if ``word`` (states) is a language for these tasks.  Raises `Undecided` after so
+        many steps of robots, where sets are searched.
+        """
+        nodes, ways = word[self.space.state], len(self.images)
+        if isinstance(self.finder, CounterexampleWalk):
+            return self.finder.failing(nodes, max(most, _OF_WALK), ways)
+        return many_counterexamples(self.finder, nodes, most, ways, steps)
 
     @property
     def effort(self) -> float:
         """Of a walk under one word: the moves of as many plans as robots from one node."""
-        space = self.part.space
+        space = self.space
         return float((space.out_degrees.astype(np.float64) ** space.robots).sum())
 
     @property
     def identity(self) -> str:
         """A hash of all that `failing` depends on, the partition apart."""
-        space = self.part.space
+        space = self.space
         nodes = (space.state, space.goal, space.layer, space.first, space.starts)
         return digest(*nodes, space.target, space.labels, self.images)
 
@@ -74,12 +93,7 @@ class Refuter:
     tasks to the goal itself.  At the beginning plans are collected that refute the partition
     ``first``, by default a single word, where walks are longest: as jobs of ``workers``.
 
-    Attributes
-    ----------
-    pool
-        The failing tuples met so far.
-    walks
-        How often a part of the tasks was walked.
+    ``pool``: the failing tuples met so far.  ``walks``: how often a part of the tasks was walked.
     """
 
     def __init__(
@@ -122,21 +136,10 @@ class Refuter:
 
         Tasks are walked only where the pool has none, those that were refuted last first.
 
-        Parameters
-        ----------
-        word
-            (states) the word of each state number.
-        images
-            The symmetries under which images of tuples are looked at: by default all.
-        enough
-            Longer tuples are left out once there are so many.
-        steps
-            See `TaskPart.failing`.
-
-        Raises
-        ------
-        Undecided
-            After so many steps.
+        ``word``: (states) the word of each state number.  ``images``: the symmetries under which
+        images of tuples are looked at: by default all.  ``enough``: longer tuples are left out once
+        there are so many.  ``steps``: see `_Walked.failing`.  Raises `Undecided` after so many
+        steps.
         """
         known = self.pool.agreeing(word, images, enough)
         for number, walked in enumerate(self._parts):
@@ -165,7 +168,7 @@ class Refuter:
         """Add what a walk has found; whether that is anything."""
         self.walks += 1
         for table in found:
-            self.pool.add(table, walked.part.space)
+            self.pool.add(table, walked.space)
         return bool(found)
 
 
@@ -195,7 +198,7 @@ def _parts(spaces: Sequence[PlanSpace], images: Sequence[Ints], random: Random) 
             for number in range(count):
                 mine = np.isin(goal_of_start, goals[number::count])
                 if mine.any():
-                    parts.append(_Walked(TaskPart.of(space, mine), own))
+                    parts.append(_Walked.of(space, mine, own))
     return parts
 
 

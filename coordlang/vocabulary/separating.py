@@ -10,25 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
-from typing import Protocol
 
 import numpy as np
 
-from coordlang.language.warping import Pair, pair
-from coordlang.required.composition_walk import DifferenceWalk
+from coordlang.language.warping import Clause, Pair, pair
+from coordlang.required.composition_walk import Difference, DifferenceWalk
 from coordlang.symmetry.group import symmetry_group
 from coordlang.vocabulary.clauses import clique, most_constrained_first
-from coordlang.vocabulary.greedy import greedy_partition
+from coordlang.vocabulary.greedy import Constraint, alternatives, greedy_partition, separations
 from coordlang.vocabulary.job import Assignment, Job, Outcome
 from coordlang.vocabulary.loop import Budget, ProblemsBySize, close_bounds, find
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
-from coordlang.vocabulary.separations import (
-    Constraint,
-    Separation,
-    constraints,
-    ordered,
-    separations,
-)
 from planners.system.limits import run_until_stopped
 
 #: Greedy partitions, each under the constraints that the one before broke, before SAT takes over.
@@ -52,39 +44,17 @@ def separating(job: Job) -> Outcome:
     return Outcome(search.best, job.lower_bound, search.figures(), stopped)
 
 
-class _Source(Protocol):
-    """Where the constraints of separating partitions come from.
-
-    ``known`` are those that are listed, ``apart`` states that need words of their own.
-    """
-
-    known: list[Constraint]
-    apart: Sequence[int]
-
-    def prepare(self) -> None:
-        """List constraints."""
-
-    def greedy_partition(self) -> Assignment | None:
-        """A separating partition, None if none was found."""
-
-    def broken(self, partition: Assignment) -> list[Constraint]:
-        """Constraints that a partition breaks, none of them known yet; empty: it is separating."""
-
-    def figures(self) -> Mapping[str, float]:
-        """The work done."""
-
-
 class _Search:
     """Closes in on the least number of words from below.
 
     ``lower`` words are proved to be needed, ``best`` is separating (or the incumbent).
     """
 
-    def __init__(self, job: Job, source: _Source) -> None:
+    def __init__(self, job: Job, source: _Alpha) -> None:
         self._job, self._source = job, source
         self.lower = job.lower_bound
         self.best: Assignment | None = job.incumbent
-        self._problems = ProblemsBySize(self._start, _require)
+        self._problems = ProblemsBySize(self._start, PartitionProblem.separate_all_of_one)
         self._rounds = 0
 
     @property
@@ -146,7 +116,7 @@ class _Search:
         # On these problems quicker than the other solver, by a third and more.
         problem = PartitionProblem(states, size, "glucose4")
         for constraint in known:
-            _require(problem, constraint)
+            problem.separate_all_of_one(constraint)
         return problem
 
     def close(self) -> None:
@@ -166,7 +136,8 @@ class _Search:
 class _Alpha:
     """The constraints of alpha: all are listed.
 
-    With two robots they are the edges of a graph to colour.
+    With two robots they are the edges of a graph to colour.  ``known`` are the constraints that are
+    listed, ``apart`` states that need words of their own.
     """
 
     def __init__(self, job: Job) -> None:
@@ -178,26 +149,26 @@ class _Alpha:
     def prepare(self) -> None:
         """List the constraints."""
         self.known = separations(self._job.first_differences.listed)
-        self._edges = {p for c in self.known if len(c) == 1 for p in c[0].pairs}
+        self._edges = {p for c in self.known if len(c) == 1 for p in c[0]}
         self.apart = clique(self._edges)
 
-    def greedy_partition(self) -> Assignment:
-        """A separating partition."""
+    def greedy_partition(self) -> Assignment | None:
+        """A separating partition, None if none was found."""
         if all(len(constraint) == 1 for constraint in self.known):
             return _dsatur(self._job.states, self._edges)
         order = most_constrained_first(self._job.states, [frozenset(self._edges)])
         return greedy_partition(order, self.known)
 
     def broken(self, partition: Assignment) -> list[Constraint]:
-        """Nothing: all constraints are known."""
+        """Constraints that a partition breaks, none of them known yet; empty: it is separating."""
         return []
 
     def figures(self) -> Mapping[str, float]:
-        """Nothing: there is no walk."""
+        """The work done."""
         return {}
 
 
-class _AlphaOrBeta:
+class _AlphaOrBeta(_Alpha):
     """The constraints of alpha or beta: listed where they are few, so that proofs are short.
 
     Else those that a partition breaks are found by walks, with their images under the model's
@@ -205,9 +176,7 @@ class _AlphaOrBeta:
     """
 
     def __init__(self, job: Job) -> None:
-        self._job = job
-        self.known: list[Constraint] = []
-        self.apart: Sequence[int] = ()
+        super().__init__(job)
         self._met: set[Constraint] = set()
         self._walks: list[DifferenceWalk] = []
         self._permutations: list[list[int]] = []
@@ -221,7 +190,7 @@ class _AlphaOrBeta:
         self._walks = [DifferenceWalk(space) for space in job.candidates.spaces]
         for walk in self._walks:
             self._met.update(constraints(walk.every(_LISTED) or ()))
-        self.known = sorted(self._met, key=lambda c: [sorted(s.pairs) for s in c])
+        self.known = sorted(self._met, key=lambda c: [sorted(pairs) for pairs in c])
 
     def greedy_partition(self) -> Assignment | None:
         """A separating partition: constraints that the last one broke in, until it breaks none."""
@@ -236,7 +205,7 @@ class _AlphaOrBeta:
         return None
 
     def broken(self, partition: Assignment) -> list[Constraint]:
-        """Constraints that a partition breaks, and their images, as far as they are new."""
+        """See `_Alpha`; with the images of what it breaks, as far as they are new."""
         word = self._job.word(partition)
         return [
             constraint
@@ -260,17 +229,27 @@ class _AlphaOrBeta:
 
 
 def _most_constrained_first(states: Sequence[int], known: Sequence[Constraint]) -> list[int]:
-    return most_constrained_first(states, (s.pairs for constraint in known for s in constraint))
+    return most_constrained_first(states, (pairs for constraint in known for pairs in constraint))
 
 
-def _require(problem: PartitionProblem, constraint: Constraint) -> None:
-    problem.separate_all_of_one([s.pairs for s in constraint])
+def constraints(differences: Iterable[tuple[Difference, Difference]]) -> Iterator[Constraint]:
+    """What first and last differences of plans ask (Theorem 3): separate the one or the other."""
+    known: dict[Difference, Constraint] = {}
+    for first, last in differences:
+        for difference in (first, last):
+            if difference not in known:
+                known[difference] = alternatives(difference[0], difference[1:])
+        yield _ordered({*known[first], *known[last]})
+
+
+def _ordered(alternatives: Iterable[Clause]) -> Constraint:
+    """Alternatives in one order, so that equal constraints are equal."""
+    return tuple(sorted(alternatives, key=sorted))
 
 
 def _image(constraint: Constraint, permutation: Sequence[int]) -> Constraint:
-    return ordered(
-        Separation(frozenset(pair(permutation[a], permutation[b]) for a, b in s.pairs))
-        for s in constraint
+    return _ordered(
+        frozenset(pair(permutation[a], permutation[b]) for a, b in pairs) for pairs in constraint
     )
 
 

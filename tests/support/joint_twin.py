@@ -10,7 +10,7 @@ from itertools import islice
 import pytest
 
 from planners.check.meaning import State
-from planners.check.validate import validate
+from planners.check.rules import validate
 from planners.loading import PlanningInstance, task_of
 from planners.pddl.lifted import And, Formula, Not, Problem
 from planners.pddl.model_options import ModelOptions

@@ -2,7 +2,7 @@
 """Naive twin of the joint model: joint steps, reachable states and optimal plans by brute force.
 
 Every robot tries every type-correct argument tuple of every schema; what is a joint step is asked
-of `planners.check.validate`, one step at a time.  Nothing is shared with grounding, composition or
+of `planners.check.rules`, one step at a time.  Nothing is shared with grounding, composition or
 search.
 """
 

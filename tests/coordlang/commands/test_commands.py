@@ -18,7 +18,7 @@ import pytest
 
 from coordlang.commands.main import COMMANDS
 from coordlang.sites.shipped import domain_names, shipped_domains
-from planners.check.validate import validate
+from planners.check.rules import validate
 from planners.classical.fast_downward import FastDownwardAnswer
 from planners.loading import load
 from planners.pddl.model_options import ModelOptions

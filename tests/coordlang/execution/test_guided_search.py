@@ -13,7 +13,7 @@ from coordlang.execution.guided_search import ExpandedStates, plan_under_sentenc
 from coordlang.execution.task_language import NoPlanFits, TaskLanguage
 from coordlang.language.candidates import Candidates, all_pairs
 from coordlang.language.listed import ground_task
-from planners.check.validate import validate
+from planners.check.rules import validate
 from planners.pddl.model_options import ModelOptions
 from planners.search.heuristics import HEURISTICS
 from planners.search.plan_file import texts

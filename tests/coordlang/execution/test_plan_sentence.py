@@ -12,7 +12,7 @@ from coordlang.execution.plan_sentence import NotAPlan, NotOptimal, sentence_of_
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import Candidates
 from coordlang.language.listed import ground_task
-from planners.check.validate import validate
+from planners.check.rules import validate
 from planners.joint.model import PlanningTask
 from planners.joint.tables import Rows
 from planners.search.optimal_plans import search

@@ -18,8 +18,7 @@ from coordlang.execution.task_language import language_in_task
 from coordlang.language.candidates import all_pairs, from_problems
 from coordlang.language.sentences import sentence
 from coordlang.report import task as page_task
-from coordlang.report.data import page_data
-from coordlang.report.page import make_report
+from coordlang.report.page import make_report, page_data
 from coordlang.report.shown import select_tasks
 from coordlang.required.miscoordination import Inseparable
 from planners.search.plans import Plans

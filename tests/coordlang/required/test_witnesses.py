@@ -13,7 +13,7 @@ from coordlang.language.candidates import Candidates
 from coordlang.required.choices import Choices
 from coordlang.required.miscoordination import Miscoordination, Step, miscoordination
 from coordlang.verification.by_definition import inseparable
-from planners.check.validate import Verdict, validate
+from planners.check.rules import Verdict, validate
 from planners.joint.model import JointModel
 from planners.search.plan_space import PlanSpace
 from tests.support.composition_walk import first_break, steps_of

@@ -17,8 +17,7 @@ from coordlang.language.candidates import Candidates, from_listed
 from coordlang.language.flexibility import flexibility
 from coordlang.language.listed import read_task_file
 from coordlang.required.divergences import required_nodes
-from coordlang.vocabulary.flexibility_bound import flexibility_bounds
-from coordlang.vocabulary.flexible import flexible
+from coordlang.vocabulary.flexible import flexibility_bounds, flexible
 from coordlang.vocabulary.job import Assignment, Outcome
 from planners.search.plans import Plan
 from tests.support import naive

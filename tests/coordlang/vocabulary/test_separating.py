@@ -13,7 +13,7 @@ from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates
 from coordlang.required.composition_walk import DifferenceWalk
 from coordlang.vocabulary.exhaustive import partitions
-from coordlang.vocabulary.separations import constraints
+from coordlang.vocabulary.separating import constraints
 from tests.support import naive
 from tests.support.candidates import listed, requiring, small_candidates
 from tests.support.domains import all_tasks
@@ -153,7 +153,7 @@ def test_every_constraint_and_no_other(
     for _, candidates in small_models(robots, most, number, asynchronous):
         found = [DifferenceWalk(space).every(10**6) for space in candidates.spaces]
         every = {
-            frozenset(frozenset(frozenset(p) for p in s.pairs) for s in constraint)
+            frozenset(frozenset(frozenset(p) for p in pairs) for pairs in constraint)
             for differences in found
             if differences is not None
             for constraint in constraints(differences)

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from planners.check.rules import Labels, Rules
-from planners.check.validate import Verdict, validate
+from planners.check.rules import Labels, Rules, Verdict, validate
 from planners.pddl.lifted import And, Atom, Domain, Not, Problem
 from planners.pddl.model_options import ModelOptions, Unowned
 from planners.pddl.robots import Team, find_team

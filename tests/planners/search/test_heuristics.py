@@ -14,7 +14,7 @@ from planners.joint.tables import Ints
 from planners.loading import PlanningInstance, load
 from planners.search.goals import FAR
 from planners.search.heuristics import HEURISTICS, Bound, heuristic
-from planners.search.mutexes import mutexes
+from planners.search.plan_formula import mutexes
 from planners.search.reachable import Space, explore
 from planners.search.state_variables import StateVariable, state_variables
 from tests.support.domains import DOMAINS
