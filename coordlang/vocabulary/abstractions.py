@@ -37,15 +37,10 @@ _FAR = np.iinfo(np.int64).max
 class _Values:
     """The values of a state variable in all states, and the undirected graph of its values.
 
-    Attributes
-    ----------
-    of_state
-        (states) the number of the value, -1 where none of its facts is true.
-    names
-        Each value's fact, without the objects that all facts of the variable name: what two robots
-        have in common that are in the same place.
-    graph
-        Values are neighbours if an action takes one to the other.
+    ``of_state``: (states) the number of the value, -1 where none of its facts is true.  ``names``:
+    each value's fact, without the objects that all facts of the variable name: what two robots have
+    in common that are in the same place.  ``graph``: values are neighbours if an action takes one
+    to the other.
     """
 
     of_state: Ints
@@ -109,18 +104,8 @@ def abstractions(candidates: Candidates, states: Sequence[int]) -> list[Ints]:
     In each one variable is told, or a second one besides; and of the others colours, with nearness
     as seen from the first one.
 
-    Parameters
-    ----------
-    candidates
-        The tasks, whose table has the states.
-    states
-        Those that matter, by their numbers in the table.
-
-    Returns
-    -------
-    list[Ints]
-        (states of the table) the number of the abstract state of each.  All of them merge
-        some of the states that matter, and no two are the same.
+    Each is (states of the table of the ``candidates``) the number of the abstract state of each.
+    All of them merge some of the ``states`` that matter, given by number, and no two are the same.
     """
     if not 0 < len(candidates.rows) <= _STATES:
         return []
@@ -138,12 +123,8 @@ def abstractions(candidates: Candidates, states: Sequence[int]) -> list[Ints]:
 def up_to_symmetry(classes: Sequence[Ints], images: Sequence[Ints]) -> list[Ints]:
     """Abstractions without those that a symmetry makes of an earlier one.
 
-    Parameters
-    ----------
-    classes
-        (states) the abstract state of each state, of each abstraction.
-    images
-        (states) where symmetries take every state.
+    ``classes``: (states) the abstract state of each state, of each abstraction.  ``images``:
+    (states) where symmetries take every state.
     """
     met: set[bytes] = set()
     chosen = []

@@ -17,12 +17,8 @@ from coordlang.language.warping import Clause, Pair
 def without_implied(clauses: Iterable[Clause], comparisons: int = sys.maxsize) -> list[Clause]:
     """The clauses that no other one implies (by a subset of its pairs), shortest first.
 
-    Parameters
-    ----------
-    clauses
-        In any order; duplicates are dropped.
-    comparisons
-        Pairs of clauses that are compared; after so many the longer clauses are left as they are.
+    ``clauses``: in any order; duplicates are dropped.  ``comparisons``: pairs of clauses that are
+    compared; after so many the longer clauses are left as they are.
     """
     kept: list[Clause] = []
     compared = 0

@@ -37,12 +37,8 @@ _OBJECTS = 100
 class Part:
     """A contained instance.
 
-    Attributes
-    ----------
-    space
-        The optimal plans of the candidate tasks that stay in it.
-    group
-        Its own symmetries: there may be more of them than of the whole.
+    ``space``: the optimal plans of the candidate tasks that stay in it.  ``group``: its own
+    symmetries: there may be more of them than of the whole.
     """
 
     space: PlanSpace
@@ -50,15 +46,7 @@ class Part:
 
 
 class ContainedInstance:
-    """The loop of the exact method for a part alone, as far as it is a matter of lower bounds.
-
-    Parameters
-    ----------
-    part
-        The contained instance.
-    seed
-        Of what is drawn at random.
-    """
+    """The loop of the exact method for a part alone, as far as it is a matter of lower bounds."""
 
     def __init__(self, part: Part, seed: int) -> None:
         self._part, self._seed = part, seed
@@ -78,10 +66,7 @@ class ContainedInstance:
     def refute(self, size: int, budget: Budget) -> Refutation | None:
         """That so many words do not suffice; None if they do for this part.
 
-        Raises
-        ------
-        Undecided
-            The budget was not enough.
+        Raises `Undecided` if the budget was not enough.
         """
         partitions, languages = self._partitions, self.languages
         found = find(lambda most: partitions.find(size, most), languages.holds, budget)
@@ -168,12 +153,7 @@ def part_of(space: PlanSpace, inside: Bools, end: Ints) -> PlanSpace | None:
     It is one if a step out of it has a label that no robot has on steps in it: then mixtures of its
     plans that are optimal plans never leave it either.
 
-    Parameters
-    ----------
-    inside
-        (states) the states.
-    end
-        (goals) the state that each goal is.
+    ``inside``: (states) the states.  ``end``: (goals) the state that each goal is.
     """
     nodes = inside[space.state] & inside[end[space.goal]]
     part = space.within(nodes)

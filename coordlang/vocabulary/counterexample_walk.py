@@ -71,13 +71,7 @@ class _Layer:
 
 
 class CounterexampleWalk:
-    """Finds failing tuples of two robots' plans that have one sentence.
-
-    Parameters
-    ----------
-    choices
-        The robots' choices in the plan space.
-    """
+    """Finds failing tuples of two robots' plans, of their choices, that have one sentence."""
 
     def __init__(self, choices: Choices) -> None:
         self._choices, self._index = choices, EdgeIndex.of(choices.space)

@@ -35,12 +35,7 @@ def classes_by_facts(candidates: Candidates, refuter: Refuter) -> Iterator[Ints]
     none can be spared, then by more and more: each time by others that would suffice alone.  There
     are none if a state is met with several numbers of steps to go, as within slack.
 
-    Parameters
-    ----------
-    candidates
-        One task.
-    refuter
-        Tells what is wrong with a partition.
+    ``candidates``: one task.  ``refuter``: tells what is wrong with a partition.
     """
     (space,) = candidates.spaces
     steps = _steps_to_go(space)

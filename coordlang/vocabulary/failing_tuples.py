@@ -52,12 +52,8 @@ class Agreeing:
 class _Table:
     """Tuples of one length: ``states`` (tuples, robots, length), and where each comes from.
 
-    Attributes
-    ----------
-    by_step
-        (length, robots, tuples) the states: what is looked at together lies together.
-    source
-        (tuples, 2) the number of a batch and the row in it.
+    ``by_step``: (length, robots, tuples) the states: what is looked at together lies together.
+    ``source``: (tuples, 2) the number of a batch and the row in it.
     """
 
     states: Ints
@@ -74,12 +70,8 @@ class _Table:
 class FailingTuples:
     """A pool of failing tuples, closed under a group of symmetries.
 
-    Attributes
-    ----------
-    group
-        The symmetries of the tasks.
-    states
-        The number of states in the table of states.
+    ``group``: the symmetries of the tasks.  ``states``: the number of states in the table of
+    states.
     """
 
     group: SymmetryGroup
@@ -134,14 +126,9 @@ class FailingTuples:
     ) -> list[Agreeing]:
         """The tuples, shortest first, of which a partition gives some image one sentence.
 
-        Parameters
-        ----------
-        word
-            (states) the word of each state number.
-        images
-            The symmetries under which images are looked at: by default all.
-        enough
-            Longer tuples are left out once there are so many.
+        ``word``: (states) the word of each state number.  ``images``: the symmetries under which
+        images are looked at: by default all.  ``enough``: longer tuples are left out once there are
+        so many.
         """
         found: list[Agreeing] = []
         for length, table in sorted(self._tables.items()):
@@ -158,10 +145,7 @@ class FailingTuples:
     ) -> Ints:
         """Clauses of images of agreeing tuples, about so many at most: a row for each.
 
-        Returns
-        -------
-        Ints
-            (clauses, pairs) codes ``a * states + b`` with ``a < b``; -1 where there are fewer.
+        (clauses, pairs) codes ``a * states + b`` with ``a < b``; -1 where there are fewer.
         """
         total = sum(len(found.rows) for found in agreeing)
         tables = []
@@ -272,12 +256,8 @@ def _keys(states: Ints) -> Ints:
 def agree(word: Ints, by_step: Ints) -> Bools:
     """(tuples) whether all sequences of each have one sentence; rarely true where they have not.
 
-    Parameters
-    ----------
-    word
-        (states) the word of each state number.
-    by_step
-        (length, robots, tuples) the states.
+    ``word``: (states) the word of each state number.  ``by_step``: (length, robots, tuples) the
+    states.
     """
     return sequences_agree(word.take(by_step))
 
@@ -297,12 +277,8 @@ def sequences_agree(words: Ints) -> Bools:
 def _pairs(sequences: Ints, words: Ints, states: int) -> Ints:
     """The codes of the pairs in the clause of each tuple (tuples, robots, length); see `_cells`.
 
-    Parameters
-    ----------
-    sequences, words
-        The states of the tuples' plans, and their words.
-    states
-        More than every state number.
+    ``sequences`` and ``words``: the states of the tuples' plans, and their words.  ``states``: more
+    than every state number.
     """
     robots = sequences.shape[1]
     cells = [

@@ -50,29 +50,15 @@ def few_words(
 
     Anytime: when a limit comes, the best partition so far is returned.
 
-    Parameters
-    ----------
-    job
-        What it is for; its incumbent is a language, None where plans are inseparable.
-    worst
-        Minimise how often robots fail in the worst task, not in the mean.
-    start
-        Words, at most so many, that are as good as known: the result is no worse.
-    work
-        Plans that local search may measure.
+    The incumbent of the ``job`` is a language, None where plans are inseparable.  ``worst``:
+    minimise how often robots fail in the worst task, not in the mean.  ``start``: words, at most so
+    many, that are as good as known: the result is no worse.  ``work``: plans that local search may
+    measure.
 
-    Returns
-    -------
-    Outcome
-        ``figures`` hold how often robots fail in silence, ``least_of_all_partitions`` (whether all
-        were tried, or nothing fails), and how many were measured, and counted exactly.
-    FailureProbability
-        How often robots fail under the partition, exactly.
-
-    Raises
-    ------
-    TooManyToCount
-        If not even silence can be counted.
+    Returns the partition, and how often robots fail under it, exactly.  ``figures`` hold how often
+    they fail in silence, ``least_of_all_partitions`` (whether all were tried, or nothing fails),
+    and how many were measured, and counted exactly.  Raises `TooManyToCount` if not even silence
+    can be counted.
     """
     search = _Search(job, words, worst)
     stopped = run_until_stopped(lambda: search.run(start, work))

@@ -100,14 +100,8 @@ class Job:
 class Evidence:
     """Why a clause is necessary.
 
-    Attributes
-    ----------
-    space
-        The plan space of the plans.
-    example
-        Plans whose mixture fails.
-    symmetry
-        The clause is that of the plans' images under it; None: of the plans themselves.
+    ``space``: the plan space of the plans.  ``example``: plans whose mixture fails.  ``symmetry``:
+    the clause is that of the plans' images under it; None: of the plans themselves.
     """
 
     space: PlanSpace
@@ -119,21 +113,11 @@ class Evidence:
 class Outcome:
     """A partition with what is proved of it.
 
-    Attributes
-    ----------
-    partition
-        State number -> word number.
-    lower_bound
-        No partition with fewer words is a coordination language.
-    figures
-        The work done, by name.
-    stopped
-        The error that ended the search early, None if it came to its end.
-    refuting
-        Necessary clauses by which the bound was proved: no partition into ``lower_bound - 1`` words
-        satisfies them all.
-    languages
-        What the search met of all languages; None for methods that meet nothing.
+    ``partition``: state number -> word number.  ``lower_bound``: no partition with fewer words is a
+    coordination language.  ``figures``: the work done, by name.  ``stopped``: the error that ended
+    the search early, None if it came to its end.  ``refuting``: necessary clauses by which the
+    bound was proved: no partition into ``lower_bound - 1`` words satisfies them all.
+    ``languages``: what the search met of all languages; None for methods that meet nothing.
     """
 
     partition: Assignment

@@ -42,17 +42,10 @@ WORK, _MOVE = 60_000_000, 2_000
 class Objective(Protocol):
     """What a local search minimises, and what becomes of the partitions that it finds.
 
-    Attributes
-    ----------
-    table
-        The plans by which partitions are measured.
-    norm
-        Minimised is this norm of the values of all tasks: 1 for their sum, more for the worst.
-    clauses
-        What must be separated, a list that only grows.
-    best, best_word
-        The value of the best partition so far, by which a cooling pays or not, and the word of each
-        state in it, from which the next one begins.
+    ``table``: the plans by which partitions are measured.  ``norm``: minimised is this norm of the
+    values of all tasks: 1 for their sum, more for the worst.  ``clauses``: what must be separated,
+    a list that only grows.  ``best`` and ``best_word``: the value of the best partition so far, by
+    which a cooling pays or not, and the word of each state in it, from which the next one begins.
     """
 
     table: PlanTable
@@ -74,21 +67,9 @@ class Objective(Protocol):
 class LocalSearch:
     """A partition into some number of words on its way.
 
-    Parameters
-    ----------
-    objective
-        What is minimised.
-    states, words
-        The states that need words, and how many words there are, two or more.
-    permutations
-        Where symmetries take each state.
-    random, work
-        What is drawn, and the plans that may be measured.
-
-    Attributes
-    ----------
-    moves
-        The moves so far.
+    The ``objective`` is minimised over partitions of the ``states`` into ``words`` words, two or
+    more.  ``permutations`` are where symmetries take each state; ``random`` draws, ``work`` plans
+    may be measured, and ``moves`` counts the moves so far.
     """
 
     def __init__(

@@ -36,14 +36,8 @@ def merged(
     takes too long to decide is left for later, and then given twice the work.  Of the last language
     no two words can be merged.  The best one so far comes after each search.
 
-    Parameters
-    ----------
-    language
-        The language to begin with.
-    states
-        Numbers of the states that need words.
-    refuter
-        Tells what is wrong with a partition.
+    ``language`` is the one to begin with, ``states`` are those that need words, and ``refuter``
+    tells what is wrong with a partition.
     """
     mine, pool = np.array(states), refuter.pool
     word = _numbered(language, mine, pool.states)

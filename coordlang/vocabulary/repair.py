@@ -31,21 +31,11 @@ _COMPARISONS = 5_000_000
 class Repair:
     """A partition, and how far it is from the old words.
 
-    Attributes
-    ----------
-    partition
-        State number -> word number, below ``old_words`` for an old word.
-    changed
-        The states that had another word.
-    new_words
-        How many words are new.
-    changes_bound, new_words_bound
-        No language changes the words of fewer states; of those that change so few, none has fewer
-        new words.
-    figures
-        The work done, by name.
-    stopped
-        The error that ended the search early, None if it came to its end.
+    ``partition``: state number -> word number, below ``old_words`` for an old word.  ``changed``:
+    the states that had another word.  ``new_words``: how many words are new.  ``changes_bound`` and
+    ``new_words_bound``: no language changes the words of fewer states; of those that change so few,
+    none has fewer new words.  ``figures``: the work done, by name.  ``stopped``: the error that
+    ended the search early, None if it came to its end.
     """
 
     partition: Assignment
@@ -63,17 +53,10 @@ def repair(job: Job, kept: Assignment, old_words: int, default: int) -> Repair:
     Anytime: out of time or memory, or interrupted, it returns the best language so far, with the
     error in ``stopped``; before there is one it raises that error.
 
-    Parameters
-    ----------
-    job
-        What the language is for.  ``check`` is called for every better one.
-    kept
-        State number -> old word number, below ``old_words``.  States that are not named here are
-        new: whatever word they get, they do not change it.
-    old_words
-        The number of old words.
-    default
-        The old word that a new state gets where any will do.
+    ``job`` is what the language is for; its ``check`` is called for every better one.  ``kept``
+    gives state numbers their old words, numbers below ``old_words``.  States that are not named
+    there are new: whatever word they get, they do not change it.  ``default`` is the old word that
+    a new state gets where any will do.
     """
     with closing(_Repair(job, kept, old_words, default)) as search:
         stopped = run_until_stopped(search.run)

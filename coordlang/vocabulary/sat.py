@@ -19,18 +19,11 @@ class PartitionProblem:
     Variables: state has word, pair is separated.  Words are interchangeable; the symmetry is broken
     by the order of ``states``: a state may take word w only if an earlier state has word w - 1.
 
-    Parameters
-    ----------
-    states
-        Numbers of states, in the order by which words are named.
-    size
-        The number of words that may be used.
-    solver
-        A solver of python-sat, by name.
-    named
-        Whether words are named in the order of the states: proofs are shorter, and partitions are
-        harder to find.  If not, only `separate_one` may be asked for: a state may have several
-        words then, and those of two separated states all differ.
+    ``states``: numbers of states, in the order by which words are named.  ``size``: the number of
+    words that may be used.  ``solver``: a solver of python-sat, by name.  ``named``: whether words
+    are named in the order of the states: proofs are shorter, and partitions are harder to find.  If
+    not, only `separate_one` may be asked for: a state may have several words then, and those of two
+    separated states all differ.
     """
 
     def __init__(
@@ -87,12 +80,7 @@ class PartitionProblem:
         That is the one that separates the first of ``pairs`` (and of such the one that separates
         the second, ..).  No proof is lost if the images of every requirement are required as well.
 
-        Parameters
-        ----------
-        symmetries
-            Where each takes every state.
-        pairs
-            The pairs that are compared.
+        ``symmetries``: where each takes every state.  ``pairs``: the pairs that are compared.
         """
         for symmetry in symmetries:
             equal_so_far = 0  # the variable; 0: nothing was compared yet
@@ -117,10 +105,7 @@ class PartitionProblem:
     def solve(self, conflicts: int | None = None) -> dict[int, int] | None:
         """A partition (state -> word), or None if it is proved that there is none.
 
-        Raises
-        ------
-        Undecided
-            After about so many ``conflicts`` of the solver.
+        Raises `Undecided` after about so many ``conflicts`` of the solver.
         """
         if not satisfiable(self._solver, conflicts=conflicts):
             return None
@@ -195,17 +180,7 @@ class PartitionProblem:
 def at_most(literals: Sequence[int], number: int, last: int) -> tuple[list[list[int]], int]:
     """Clauses by which at most so many literals are true, as a sequential counter.
 
-    Parameters
-    ----------
-    literals, number
-        Of which at most so many are true.
-    last
-        The greatest variable that is in use.
-
-    Returns
-    -------
-    clauses, last
-        The clauses, and the greatest variable that is in use then.
+    With them the greatest variable that is in use then; ``last`` is the greatest one before.
     """
     from pysat.card import CardEnc, EncType
 
@@ -226,19 +201,9 @@ def satisfiable(
 ) -> bool:
     """Whether the clauses of a solver of python-sat can be satisfied.
 
-    Parameters
-    ----------
-    solver
-        Made by `planners.search.sat.sat_solver`; signals are heard between slices of its work.
-    assumptions
-        Literals that are assumed besides.
-    conflicts
-        Conflicts of the solver that are allowed, None without limit.
-
-    Raises
-    ------
-    Undecided
-        After so many conflicts.
+    ``solver``: made by `planners.search.sat.sat_solver`; signals are heard between slices of its
+    work.  ``assumptions``: literals that are assumed besides.  ``conflicts``: conflicts of the
+    solver that are allowed, None without limit.  Raises `Undecided` after so many conflicts.
     """
     spent = 0
     while conflicts is None or spent < conflicts:
