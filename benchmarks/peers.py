@@ -81,7 +81,8 @@ def asked(python: str, planner: str, folder: Path, limit: int) -> Figures:
 
 def measured(name: str, given: argparse.Namespace) -> Figures:
     """The figures of a row."""
-    from planners.classical import compile_classical, to_pddl
+    from planners.classical import compile_classical
+    from planners.classical.task import to_pddl
 
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)

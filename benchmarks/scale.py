@@ -108,8 +108,9 @@ def build(grid: Grid) -> Figures:
     from coordlang.language.candidates import all_pairs, from_problems
     from coordlang.language.partition import Partition
     from coordlang.verification.by_definition import verify_candidates
-    from coordlang.vocabulary import Job, greedy
     from coordlang.vocabulary.first_differences import differences
+    from coordlang.vocabulary.greedy import greedy
+    from coordlang.vocabulary.job import Job
     from planners.parallel.workers import Workers
 
     clock, here = Clock(), Workers()

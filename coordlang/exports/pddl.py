@@ -5,19 +5,7 @@ The plain task of `planners.classical` gets one more fact per word of the senten
 joint step two actions without cost: the state is *named* by its word, and then the sentence *stays*
 at this word or *goes on* to the next one.
 
-Why its optimal plans are exactly the plans with the sentence, one to one:
-
-1. Without naming, its plans stand one to one for the joint plans of the task, at the same cost
-   (`planners.classical`). Naming costs nothing and only forbids.  So no plan is cheaper than an
-   optimal plan of the task.
-2. In a state on an optimal plan of the task exactly one naming is possible, that of its word
-   (`exclusive_terms`), and after it at most one action: which one, the word decides.  So an optimal
-   plan of the task has at most one counterpart, and has it exactly if its words are, one after
-   another, those of the sentence.
-3. Some plan has the sentence (`TaskLanguage.plans_with`), so the optimal cost is that of the task.
-   Then each plan of that cost is an optimal plan of the task, passes only through states on optimal
-   plans of the task, and by 2 it has the sentence.
-
+Its optimal plans are exactly the plans with the sentence, one to one (docs/use.md has the proof).
 With slack the sentence is followed at most as many times as joint steps are allowed.  Then every
 plan, not only the optimal ones, is a plan within the slack that has the sentence, with all, some or
 none of its rest at the end.
@@ -38,12 +26,12 @@ from coordlang.execution.guided_search import plan_under_sentence
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.variables import truth
 from coordlang.exports.membership import Terms, exclusive_terms, refuse_seen_slack
-from planners.classical import (
+from planners.classical import compile_classical
+from planners.classical.task import (
     ClassicalAction,
     ClassicalTask,
     Condition,
     action_names,
-    compile_classical,
     to_pddl,
     with_positive_conditions,
     with_positive_goal,

@@ -142,13 +142,9 @@ def from_listed(
     A small space is explored once for all of them; in a large one each task is searched by itself,
     and of its initial state only state variables are checked (a note says what is not).
 
-    Raises
-    ------
-    ProvedImpossible
-        A task without a plan; with ``skip_unsolvable`` only if no other task is left.
-    BadInput
-        An empty list, an atom that the problem does not have, or an initial state that the
-        problem's initial state does not reach (such a state is taken for a mistake).
+    Raises `ProvedImpossible` for a task without a plan; with ``skip_unsolvable`` only if no other
+    task is left.  Raises `BadInput` for an empty list, an atom that the problem does not have, or
+    an initial state that the problem's does not reach (such a state is taken for a mistake).
     """
     if not listed:
         raise BadInput(

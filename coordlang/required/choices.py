@@ -255,10 +255,7 @@ class Choices:
     def fails_each(self, nodes: Ints) -> Bools:
         """Of nodes ``(x_1 .. x_n, y)`` whether some mixture of plans from the x_i fails from y.
 
-        Parameters
-        ----------
-        nodes
-            (k, robots + 1), of one layer in each row.
+        ``nodes``: (k, robots + 1), of one layer in each row.
         """
         mixed = nodes[:, self._robots]
         fails = np.zeros(len(nodes), np.bool_)

@@ -22,14 +22,4 @@ METHODS: dict[str, Callable[[Job], Outcome]] = {
 #: Those that find the least number of words.
 EXACT = ("minimal", "exhaustive")
 
-__all__ = [
-    "EXACT",
-    "METHODS",
-    "Job",
-    "Outcome",
-    "best",
-    "exhaustive",
-    "greedy",
-    "minimal",
-    "separating",
-]
+__all__ = ["EXACT", "METHODS", "Job", "Outcome"]

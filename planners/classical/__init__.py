@@ -23,32 +23,9 @@ from contextlib import suppress
 from planners.classical.explicit import TooManyError, explicit
 from planners.classical.selection import select_then_apply
 from planners.classical.selectors import Selectors, selectors_of
-from planners.classical.task import (
-    LONGEST,
-    ClassicalAction,
-    ClassicalTask,
-    Condition,
-    Form,
-    action_names,
-    to_pddl,
-    with_positive_conditions,
-    with_positive_goal,
-)
+from planners.classical.task import LONGEST, ClassicalTask, Form
 from planners.classical.writer import Writer
 from planners.joint.model import Goal, JointModel, PlanningTask, show
-
-__all__ = [
-    "LONGEST",
-    "ClassicalAction",
-    "ClassicalTask",
-    "Condition",
-    "Form",
-    "action_names",
-    "compile_classical",
-    "to_pddl",
-    "with_positive_conditions",
-    "with_positive_goal",
-]
 
 
 def compile_classical(

@@ -19,14 +19,8 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from planners.classical import (
-    LONGEST,
-    ClassicalTask,
-    Form,
-    action_names,
-    compile_classical,
-    to_pddl,
-)
+from planners.classical import compile_classical
+from planners.classical.task import LONGEST, ClassicalTask, Form, action_names, to_pddl
 from planners.joint.model import JointModel, PlanningTask
 from planners.system.errors import CoordlangError, OutOfMemory
 from planners.system.limits import default_memory_limit, has_memory_limit, memory_left, more_memory

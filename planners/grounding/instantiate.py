@@ -63,10 +63,7 @@ _MANY = 1000
 class Bindings:
     """The objects of a problem, its static facts and its possible subactions.
 
-    Parameters
-    ----------
-    instances
-        Action -> the arguments with which it may ever be done.
+    ``instances``: action -> the arguments with which it may ever be done.
     """
 
     def __init__(

@@ -35,14 +35,9 @@ Block = tuple[int, ...]
 class Event:
     """One of a robot's events, with what it waits for.
 
-    Attributes
-    ----------
-    label
-        The number of the subaction.
-    waits
-        For each robot how many of its events that interfere with this one come before it.
-    meets
-        The other robots of its meeting, each with the number of its subaction.
+    ``label``: the number of the subaction.  ``waits``: for each robot how many of its events that
+    interfere with this one come before it.  ``meets``: the other robots of its meeting, each with
+    the number of its subaction.
     """
 
     label: int
@@ -53,13 +48,9 @@ class Event:
 class Traces:
     """The events of a model's joint steps, in order.
 
-    Attributes
-    ----------
-    interfering
-        For robots ``i`` and ``j`` a table (labels of i, labels of j).
-    has_ties
-        Whether blocks of a step that was looked at could be done in another order: then the order
-        of robots decides, which symmetries need not keep.
+    ``interfering``: for robots ``i`` and ``j`` a table (labels of i, labels of j).  ``has_ties``:
+    whether blocks of a step that was looked at could be done in another order: then the order of
+    robots decides, which symmetries need not keep.
     """
 
     def __init__(self, model: JointModel) -> None:

@@ -55,12 +55,9 @@ def read_domain(path: str | Path) -> Domain:
 def parse_domain(source: Source) -> Domain:
     """Read a domain: plain PDDL, MA-PDDL (``:agent``, ``:private``) or joint-action PDDL.
 
-    Raises
-    ------
-    BadInput
-        With file, line and column, what was found and what was expected.
-    Unsupported
-        For durative actions, numeric fluents, derived predicates and other non-classical features.
+    Raises `BadInput` with file, line and column, what was found and what was expected, and
+    `Unsupported` for durative actions, numeric fluents, derived predicates and other non-classical
+    features.
     """
     root = parse(source)
     name, sections = read_header(root, "domain")

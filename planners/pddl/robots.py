@@ -79,12 +79,9 @@ def objects_of(domain: Domain, problem: Problem, types: Sequence[str]) -> tuple[
 def find_team(domain: Domain, problem: Problem, choice: ModelOptions) -> Team:
     """The robots: from subaction comments, ``:agent``, the user's choice, or by detection.
 
-    Raises
-    ------
-    BadInput
-        No robot, or more than one way to tell who the robots are (the candidates are listed).
-    UsageError
-        The user's choice contradicts the files or names an unknown object or type.
+    Raises `BadInput` for no robot, or more than one way to tell who the robots are (the candidates
+    are listed), and `UsageError` for a choice that contradicts the files or names an unknown object
+    or type.
     """
     robots, by = _found(domain, problem, choice)
     if not robots:

@@ -37,11 +37,8 @@ def as_executed(space: PlanSpace) -> PlanSpace:
 def asynchronous(space: PlanSpace) -> PlanSpace:
     """The optimal plans of a plan space as plans of robots that keep no common step.
 
-    Raises
-    ------
-    BadInput
-        If a state changes in a joint step in which all robots idle, or no plan is the soonest of
-        those that differ in timing alone.
+    Raises `BadInput` if a state changes in a joint step in which all robots idle, or no plan is the
+    soonest of those that differ in timing alone.
     """
     unfolding = _Unfolding(space)
     with reaching(unfolding.so_far, space.model.smaller("smaller or fewer tasks")):
@@ -52,21 +49,12 @@ def asynchronous(space: PlanSpace) -> PlanSpace:
 class _Node:
     """A node of the plan space, with what the past says about what may follow.
 
-    Attributes
-    ----------
-    node
-        The node of the plan space.
-    past
-        How many events were met that later ones may wait for, by `_Waits`.
-    idles
-        Of each robot that has events to come how often it has idled; 0 for others.
-    allowed
-        The edges out of it; others do later what can be done at once.
-    moves
-        The numbers of the robots' events, 0 where one idles; the edge; and where it leads.
-    queues
-        What robots say next on the plans from here, as many events as each has idled: each choice
-        with a node of the graph that is made.
+    ``node``: the node of the plan space.  ``past``: how many events were met that later ones may
+    wait for, by `_Waits`.  ``idles``: of each robot that has events to come how often it has idled;
+    0 for others.  ``allowed``: the edges out of it; others do later what can be done at once.
+    ``moves``: the numbers of the robots' events, 0 where one idles; the edge; and where it leads.
+    ``queues``: what robots say next on the plans from here, as many events as each has idled: each
+    choice with a node of the graph that is made.
     """
 
     node: int
@@ -241,15 +229,9 @@ class _Unfolding:
 class _Waits:
     """Counts of events that others wait for.
 
-    Attributes
-    ----------
-    none
-        (columns) no event was met; a column is a pair of robots and what events of the one may
-        wait for.
-    matter
-        (nodes, columns) whether some event after a node may wait for such events.
-    acting
-        By node, for each robot whether it has events to come.
+    ``none``: (columns) no event was met; a column is a pair of robots and what events of the one
+    may wait for.  ``matter``: (nodes, columns) whether some event after a node may wait for such
+    events.  ``acting``: by node, for each robot whether it has events to come.
     """
 
     def __init__(self, space: PlanSpace, traces: Traces) -> None:
@@ -311,13 +293,7 @@ def _future(space: PlanSpace, robot: int) -> Bools:
 
 
 class Timing:
-    """Turns plans of robots that keep no common step into plans in step, and back.
-
-    Parameters
-    ----------
-    space
-        Made by `asynchronous`.
-    """
+    """Turns plans of a plan space made by `asynchronous` into plans in step, and back."""
 
     def __init__(self, space: PlanSpace) -> None:
         self._space, self._model = space, space.model

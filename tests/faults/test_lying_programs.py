@@ -16,8 +16,9 @@ import pytest
 from coordlang.commands.inputs import load
 from coordlang.verification.certificate_file import Certificate
 from coordlang.verification.make_certificate import certify
-from planners.classical import LONGEST, compile_classical, fast_downward
+from planners.classical import compile_classical, fast_downward
 from planners.classical.fast_downward import FastDownwardFailed, answered, total_cost
+from planners.classical.task import LONGEST
 from planners.search import sat
 from tests.support.command import Command
 from tests.support.domains import DOMAINS

@@ -10,7 +10,7 @@ from functools import cache
 
 import networkx as nx
 
-from planners.classical import ClassicalTask
+from planners.classical.task import ClassicalTask
 
 PlainState = frozenset[int]
 

@@ -17,8 +17,8 @@ import pytest
 
 import coordlang as door
 from coordlang.commands.export import ExportedTask
-from planners.classical import action_names
 from planners.classical.fast_downward import total_cost
+from planners.classical.task import action_names
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
 from planners.system.errors import UsageError

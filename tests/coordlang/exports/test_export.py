@@ -22,7 +22,7 @@ from coordlang.explanation.words import Conjunction
 from coordlang.exports.ltlf import export_ltlf, symbols_of
 from coordlang.exports.membership import exclusive_terms, short_terms
 from coordlang.exports.pddl import PddlExport, plan_names
-from planners.classical import ClassicalTask, action_names
+from planners.classical.task import ClassicalTask, action_names
 from planners.joint.model import show
 from planners.pddl.model_options import ModelOptions
 from planners.search.plans import Plan, Plans

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import event, example, given, reject, settings
 from hypothesis import strategies as st
 
-from planners.classical import compile_classical, to_pddl
+from planners.classical import compile_classical
+from planners.classical.task import to_pddl
 from planners.joint.model import JointModel, PlanningTask
 from planners.pddl.model_options import Cost, ModelOptions
 from planners.search.optimal_plans import search
