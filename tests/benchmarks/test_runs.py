@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs of the paper's experiments: what is known is not run again, limits are kept, interrupts."""
+"""Runs of the paper's experiments: what is known is not run again, limits, interrupts; simulated runs."""
 
 from __future__ import annotations
 
@@ -12,8 +12,13 @@ import pytest
 
 from benchmarks.paper import communication, game
 from benchmarks.paper.__main__ import main
+from benchmarks.paper.driving import counted, is_well
+from benchmarks.paper.floors import FLOORS, tasks_of
 from benchmarks.paper.recipe import Settings
 from benchmarks.paper.runner import attempt, is_known, kept, run
+from coordlang.simulation.record import EventRecord, RunRecord
+from planners.search.plans import Plans
+from tests.support import naive
 
 GAME, COMMUNICATION = game.RECIPE, communication.RECIPE
 QUICK = Settings(samples=2, quick=True)
@@ -84,3 +89,46 @@ def test_command(finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[s
         main(["everything"])
     assert caught.value.code == 2
     assert "invalid choice: 'everything'" in capsys.readouterr().err
+
+
+def record(**changed: Any) -> RunRecord:
+    """A run that ended well, but for what is changed."""
+    usual: dict[str, Any] = {
+        "seed": 0,
+        "collisions": 0,
+        "deadlock": False,
+        "late": 0,
+        "messages": 3,
+        "seconds": 10.0,
+        "arrived": True,
+        "mixes": True,
+        "subplans": {},
+        "steps": [],
+        "events": [
+            EventRecord(9.0, "stopped", ["r1"]),
+            EventRecord(10.0, "arrived", ["r1"], steps={"r1": 4}, places={"r1": ["c0-0", "c0-1"]}),
+        ],
+        "poses": {},
+        "nearest": 0.7,
+    }
+    return RunRecord(**usual | changed)
+
+
+def test_how_runs_end_is_counted() -> None:
+    found = [
+        record(),
+        record(late=2, nearest=0.6),
+        record(arrived=False, deadlock=True, mixes=False, seconds=20.0),
+        record(arrived=False, collisions=2, nearest=0.38),
+    ]
+    assert [is_well(run) for run in found] == [True, False, False, False]
+    once = dict.fromkeys(("well", "collisions", "deadlocks", "late"), 1)
+    rest = {"late_steps": 2, "messages": 12, "seconds": 50.0, "nearest": 0.38}
+    assert counted(found) == {"runs": 4, **once, **rest, "mixes": 3, "agree": 2}
+
+
+def test_tasks_of_floors_require_coordination() -> None:
+    language, tasks = tasks_of(FLOORS["T-map, 2 robots"], 0)
+    assert (len(language.words), len(tasks)) == (3, 12)
+    plans = [[*Plans.of(used.space, used.task)] for used in tasks]
+    assert all(any(naive.failing(own, 2)) for own in plans)

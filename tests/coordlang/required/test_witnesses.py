@@ -1,23 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Miscoordination shown without a walk, against the walk along n plans: its twin."""
+"""Miscoordination shown without a walk, against the walk along n plans: its twin; and last differences."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from itertools import combinations
+from random import Random
 
 import numpy as np
 import pytest
 
 from coordlang.language.candidates import Candidates
+from coordlang.language.partition import Partition
 from coordlang.required.choices import Choices
+from coordlang.required.composition_walk import Difference, DifferenceWalk
 from coordlang.required.miscoordination import Miscoordination, Step, miscoordination
-from coordlang.verification.by_definition import inseparable
+from coordlang.verification.by_definition import inseparable, verify
 from planners.check.rules import Verdict, validate
 from planners.joint.model import JointModel
+from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
 from tests.support.composition_walk import first_break, steps_of
-from tests.support.random_spaces import random_spaces, runs
+from tests.support.random_spaces import random_spaces, runs, separable_spaces
 
 
 def breaks(candidates: Candidates, space: PlanSpace, found: Miscoordination) -> None:
@@ -91,3 +96,31 @@ def test_breaks_equal_the_walk(robots: int | None, seeds: range) -> None:
     for kind in ("inseparable", "break"):
         assert answers[kind, True] >= 2
         assert answers[kind, False] >= 2
+
+
+def left_together(difference: Difference, word: Ints) -> bool:
+    """No two of the states and the shared one lie in three words; where none is shared, in two."""
+    shared, *states = difference
+    needed = 3 - (shared < 0)
+    common = set() if shared < 0 else {int(word[shared])}
+    return all(len({*word[[*two]].tolist()} | common) < needed for two in combinations(states, 2))
+
+
+@pytest.mark.parametrize(("robots", "seeds"), runs(60, 30, 20))
+def test_the_demands_that_a_partition_breaks(robots: int | None, seeds: range) -> None:
+    random = Random(seeds.start)
+    answers: Counter[bool] = Counter()
+    for space in separable_spaces(seeds, robots):
+        walk = DifferenceWalk(space)
+        every = walk.every(10**6)
+        assert every is not None
+        for words in (1, 2, 3):
+            word = np.array([random.randrange(words) for _ in space.rows], np.int64)
+            left = {pair for pair in every if all(left_together(one, word) for one in pair)}
+            broken = {*walk.unseparated(word, np.random.default_rng(words))}
+            assert broken <= left
+            assert {first for first, _ in broken} == {first for first, _ in left}
+            table = Partition(("w0", "w1", "w2"), space.rows, word, 0)
+            assert broken or verify(table, [space]).holds
+        answers[bool(every)] += 1
+    assert min(answers[True], answers[False]) >= 3

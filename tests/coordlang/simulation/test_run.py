@@ -15,7 +15,7 @@ from coordlang.commands.building import build_language
 from coordlang.execution.best_sentence import best_sentence
 from coordlang.execution.task_language import language_in_task
 from coordlang.language.candidates import from_problems
-from coordlang.simulation.record import RunRecord
+from coordlang.simulation.record import EventRecord, RunRecord, WishRecord
 from coordlang.simulation.run import runs_of
 from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Mission
@@ -210,3 +210,28 @@ def test_without_an_agreement_they_contradict_each_other_or_wait_for_ever() -> N
     assert all(run_.arrived for run_ in found if run_.mixes)
     assert any(run_.deadlock for run_ in found)
     assert any(event.kind == "contradicted" for run_ in found for event in run_.events)
+
+
+def detours(found: RunRecord) -> list[EventRecord]:
+    return [event for event in found.events if event.kind == "detour"]
+
+
+def test_a_detour_that_own_choices_allow_is_made() -> None:
+    wish = WishRecord("r2", 2, "(at r2 c0-4)")
+    for found in runs("corridor", "sentence", Settings(), 2, wish):
+        (event,) = detours(found)
+        assert (event.visit, event.steps["r2"]) == ("(at r2 c0-4)", 2)
+        places = {step.place for step in found.steps if step.robot == "r2"}
+        assert event.granted == ("c0-4" in places)
+        assert found.arrived
+        assert found.late == 0
+
+
+def test_under_a_whole_plan_a_detour_can_be_had_only_if_it_is_on_it() -> None:
+    wish = WishRecord("r2", 2, "(at r2 c0-4)")
+    granted = set()
+    for found in runs("corridor", "plan", Settings(), 4, wish):
+        (event,) = detours(found)
+        granted.add(event.granted)
+        assert event.granted == ("(move r2 c1-4 c0-4)" in found.subplans["r2"])
+    assert granted == {True, False}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Partitions refuted over sets and by a walk, against listed plans and every mixture of them."""
+"""Partitions refuted over sets and by a walk, against listed plans and every mixture; failing tuples."""
 
 from __future__ import annotations
 
@@ -12,14 +12,19 @@ import numpy as np
 import pytest
 
 from coordlang.language.candidates import from_problems
+from coordlang.language.sentences import sentence
 from coordlang.required.choices import Choices
+from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.vocabulary.counterexample_walk import CounterexampleWalk
 from coordlang.vocabulary.counterexamples import Counterexample, Mixtures, many_counterexamples
+from coordlang.vocabulary.failing_tuples import FailingTuples
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import BadInput, ProvedImpossible, UsageError
 from tests.support import naive
+from tests.support.domains import all_tasks
+from tests.support.naive import separation_clause
 from tests.support.random_models import random_model
-from tests.support.random_spaces import random_spaces, runs
+from tests.support.random_spaces import random_spaces, runs, separable_spaces
 
 #: Plans of a task up to which every mixture is made, by the number of robots.
 MOST = {1: 40, 2: 40, 3: 14, 4: 7}
@@ -88,3 +93,73 @@ def test_plans_within_slack_are_refuted_like_optimal_ones() -> None:
     answers = compared(with_slack(range(60)), Random(1))
     print(dict(answers))
     assert min(answers[True], answers[False]) >= 5
+
+
+def filled(space: PlanSpace, group: SymmetryGroup) -> tuple[FailingTuples, list[list[list[int]]]]:
+    """A pool with the failing plans of a plan space, and the sequences of states of all of them."""
+    silence = np.zeros(len(space), np.int64)
+    found = many_counterexamples(Mixtures(Choices(space)), silence, 300)
+    pool = FailingTuples(group, len(space.rows))
+    new = sum([pool.add(table, space) for table in found])
+    assert new == len(pool)
+    assert sum([pool.add(table, space) for table in found]) == 0, "known by now"
+    return pool, [plans for table in found for plans in table.states.tolist()]
+
+
+def has_one_sentence(plans: list[list[int]], word: list[int]) -> bool:
+    return len({tuple(sentence(word[s] for s in plan)) for plan in plans}) == 1
+
+
+@pytest.mark.parametrize(("robots", "seeds"), runs(60, 30, 20))
+def test_tuples_agree_iff_their_plans_have_one_sentence(robots: int | None, seeds: range) -> None:
+    """And their clauses are those of the definition, as short ones as there are."""
+    random, rng = Random(seeds.start), np.random.default_rng(0)
+    answers: Counter[bool] = Counter()
+    for space in separable_spaces(seeds, robots):
+        pool, whole = filled(space, SymmetryGroup(()))
+        for words in (1, 2, 3, 5):
+            word = [random.randrange(words) for _ in space.rows]
+            agreeing = pool.agreeing(np.array(word))
+            assert bool(agreeing) == any(has_one_sentence(plans, word) for plans in whole)
+            kept = [plans for a in agreeing for plans in pool.sequences(a, a.rows).tolist()]
+            assert all(has_one_sentence(plans, word) for plans in kept)
+            clauses = pool.clauses(np.array(word), agreeing, rng)
+            assert bool(clauses) == bool(agreeing)
+            lengths = sorted(len(separation_clause(plans, word) or ()) for plans in whole)
+            shortest = [n for n in lengths if n]
+            for clause, evidence in clauses.items():
+                assert all(word[a] == word[b] for a, b in clause)
+                assert has_one_sentence([list(s) for s in evidence.example.states], word)
+            if clauses:
+                assert min(map(len, clauses)) == shortest[0]
+            answers[bool(agreeing)] += 1
+    assert answers[True] >= 5
+    if robots:
+        assert answers[False] >= 5
+
+
+def test_images_under_symmetries_are_known() -> None:
+    """One of all images is kept; whichever image is asked for, it is known."""
+    candidates = all_tasks("grid", "gw1-2x2")
+    group = symmetry_group(candidates)
+    space = candidates.spaces[0]
+    plain, _ = filled(space, SymmetryGroup(()))
+    pool, whole = filled(space, group)
+    assert 0 < len(pool) < len(plain)
+    random, answers = Random(3), Counter[bool]()
+    images = [list(range(len(space.rows))), *group.permutations]
+    for _ in range(200):
+        word = [random.randrange(9) for _ in space.rows]
+        expected = any(
+            has_one_sentence([[to[s] for s in plan] for plan in plans], word)
+            for plans in whole
+            for to in images
+        )
+        agreeing = pool.agreeing(np.array(word))
+        assert bool(agreeing) == expected
+        some = pool.agreeing(np.array(word), enough=1)
+        assert [a.length for a in some] == [
+            a.length for a in agreeing if a.length == some[0].length
+        ]
+        answers[expected] += 1
+    assert min(answers[True], answers[False]) >= 5, answers

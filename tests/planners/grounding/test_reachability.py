@@ -10,12 +10,16 @@ import time
 
 import pytest
 
+import planners.grounding.instantiate
 from planners.grounding.reachability import reachable_arguments
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.sexpr import Source
 from planners.system.errors import OutOfTime
 from planners.system.limits import time_limit
+from tests.support.joint_twin import check_model
+from tests.support.random_pddl import RandomModel
+from tests.support.texts import model_of
 
 DOMAIN = """(define (domain views) (:requirements :typing :multi-agent) (:types robot place)
   (:predicates (at ?r - robot ?p - place) (seen ?a ?b ?c - place))
@@ -95,3 +99,83 @@ except MemoryError:
 def test_the_memory_limit_ends_clingo(left: int) -> None:
     run = subprocess.run([sys.executable, "-c", SMALL, str(left)], capture_output=True, text=True)
     assert (run.returncode, run.stdout, run.stderr) == (0, "no memory\n", "")
+
+
+HALLS = """(define (domain halls) (:types robot place - thing hall - place)
+  (:constants home - hall)
+  (:predicates (at ?r - robot ?p - place) (way ?a ?b) (way ?a) (lit ?p - place) (loop ?a ?b ?c))
+  (:action act :agent ?r - robot :parameters (?p - place)
+    :precondition (and (at ?r ?p) {condition})
+    :effect (and (lit ?p) (forall (?x - place) (when (and (way ?p ?x) (not (lit ?x))) (lit ?x))))))"""
+PROBLEM = """(define (problem p) (:domain halls) (:objects r1 r2 - robot p10 p2 p1 - place h - hall)
+  (:init (at r1 p1) (at r2 home) (way p1 p2) (way p2 p1) (way p2 p10) (way p1 home) (way home h) (way p1 r2) (way p2 p2)
+         (way r1 p1) (way p10) (way home) (loop p1 p1 p2) (loop p1 p1 p1) (loop h home h))
+  (:goal (lit home)))"""
+#: As the domain has it, and where robots act anywhere from where there is a way home.
+CONDITIONS = [
+    "(exists (?x - place) (and (way ?p ?x) (lit ?x)))",
+    "(exists (?x) (and (lit ?x) (way ?x ?p)))",
+    "(exists (?x - hall) (and (way ?p ?x) (not (lit ?x))))",
+    "(forall (?x - place) (or (not (way ?p ?x)) (lit ?x)))",
+    "(forall (?x - place) (imply (and (way ?p ?x) (way ?x ?p)) (lit ?x)))",
+    "(forall (?x ?y - place) (or (not (way ?p ?x)) (not (way ?x ?y)) (lit ?y)))",
+    "(exists (?x ?y - place) (and (way ?x ?y) (way ?y ?p) (lit ?x)))",
+    "(not (exists (?x - place) (and (way ?p ?x) (lit ?x))))",
+    "(not (forall (?x - place) (or (not (way ?p ?x)) (lit ?x))))",
+    "(exists (?x - place) (and (way ?x ?x) (lit ?x)))",
+    "(exists (?x - place) (and (loop ?x ?x ?p) (lit ?x)))",
+    "(exists (?x - place ?y - hall) (and (loop ?y home ?y) (lit ?x)))",
+    "(exists (?x - place) (and (way home ?x) (lit ?x)))",
+    "(exists (?x - place) (and (way ?x) (lit ?x)))",
+    # The inner ?p is another one.
+    "(exists (?p - place) (and (way ?p home) (lit ?p)))",
+    "(forall (?x - place) (exists (?p - place) (and (way ?x ?p) (not (way ?p ?x)) (lit ?p))))",
+    # A guard that is one part of a disjunction is none.
+    "(exists (?x - place) (or (way ?p ?x) (lit ?x)))",
+    "(forall (?x - place) (and (not (way ?p ?x)) (lit ?x)))",
+    "(or (lit home) (forall (?x - place) (and (way ?p ?x) (lit ?x))))",
+    # Guards that speak of a step.
+    "(forall (?o - robot ?x - place) (or (= ?o ?r) (not (way ?x ?p)) (not (act ?o ?x))))",
+    "(exists (?o - robot ?x - place) (and (not (= ?o ?r)) (way ?p ?x) (act ?o ?x)))",
+    "(exists (?x) (and (at ?r ?p) (way home ?x) (not (= ?x home))))",
+    "(forall (?o - robot ?x - place) (not (act ?o ?x)))",
+    "(forall (?x - place) (not (act ?r ?x)))",
+    "(forall (?o - robot ?x) (or (= ?o ?r) (not (way ?p ?x)) (not (act ?o ?x))))",
+    "(forall (?o - robot ?x - place) (imply (act ?o ?x) (lit ?x)))",
+    "(forall (?o - robot ?x - place) (and (lit ?x) (not (act ?o ?x))))",
+    "(not (exists (?o - robot) (and (act ?o ?p) (not (lit ?p)))))",
+    "(exists (?o - robot ?x - place) (and (not (= ?o ?r)) (act ?o ?x)))",
+    "(not (forall (?x - place) (not (act ?r ?x))))",
+    "(or (lit home) (not (exists (?o - robot ?x - place) (and (not (= ?o ?r)) (act ?o ?x)))))",
+]
+
+
+def anywhere(condition: str) -> str:
+    """The domain in which robots act anywhere from where there is a way home."""
+    return HALLS.format(condition=f"(way ?p home) {condition}").replace("(at ?r ?p)", "")
+
+
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_the_same_joint_steps_as_by_definition(
+    condition: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where there are many subactions, of which only the possible ones are tried."""
+    met: list[str] = []
+    check_model(RandomModel(HALLS.format(condition=condition), PROBLEM), met.append)
+    check_model(RandomModel(anywhere(condition), PROBLEM), met.append)
+    monkeypatch.setattr(planners.grounding.instantiate, "_MANY", 0)
+    check_model(RandomModel(anywhere(condition), PROBLEM), met.append)
+    assert "too large" not in met
+
+
+def test_few_instances_are_tried() -> None:
+    """Of 9,000 subactions that a precondition forbids those that can be done; of 3,000 places those
+    to which there is a way.  Looking at all takes minutes.
+    """
+    places = " ".join(f"q{n}" for n in range(3000))
+    problem = PROBLEM.replace("p1 - place", f"p1 {places} - place")
+    forbidding = anywhere("(forall (?o - robot ?x - place) (not (act ?o ?x)))")
+    nested = "(forall (?x ?y - place) (or (not (way ?p ?x)) (not (way ?x ?y)) (lit ?y)))"
+    with time_limit(30):
+        for domain in (forbidding, HALLS.format(condition=nested)):
+            assert {a.label for a in model_of(domain, problem).model.actions} >= {"(act r1 p1)"}

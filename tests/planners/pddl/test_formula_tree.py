@@ -1,15 +1,35 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Formulas taken apart and put together, against the definition on random formulas."""
+"""Formulas taken apart and put together, against the definition on random formulas; domains as text."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
+from pathlib import Path
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planners.pddl.domain import parse_domain, read_domain
 from planners.pddl.formula_tree import conjuncts, joined, negated, signed, substituted
-from planners.pddl.lifted import FALSE, TRUE, And, Atom, Formula, Not, Or, StepAtom, Truth
+from planners.pddl.lifted import (
+    FALSE,
+    TRUE,
+    And,
+    Atom,
+    Domain,
+    Formula,
+    Not,
+    Or,
+    Problem,
+    StepAtom,
+    Truth,
+)
+from planners.pddl.pddl_text import domain_text, problem_text
+from planners.pddl.problem import parse_problem, read_problem
+from planners.pddl.sexpr import Source
+from tests.support.domains import DOMAINS, SHARED
 
 LEAVES: tuple[Formula, ...] = (Atom("a", ()), Atom("b", ()), StepAtom("move", ("r1", "x")))
 #: Ground formulas, not in negation normal form.
@@ -51,3 +71,42 @@ def test_the_meaning_is_kept(formula: Formula) -> None:
         assert true(substituted(formula, lambda leaf: leaf), values) == meant
         decided = substituted(formula, lambda leaf: Truth(values[leaf]))  # noqa: B023 - now
         assert decided == Truth(meant)
+
+
+NOWHERE = Source("nowhere", "")
+OWN = sorted(DOMAINS.glob("*/domain.pddl"))
+FOREIGN = sorted(
+    path for path in SHARED.glob("[cf]o*/*/domain*.pddl") if "factored" not in str(path)
+)
+
+
+def bare(domain: Domain) -> Domain:
+    """A domain without its text."""
+    return replace(domain, source=NOWHERE)
+
+
+def check(path: Path) -> None:
+    domain = read_domain(path)
+    again = parse_domain(Source("again", domain_text(domain)))
+    assert bare(again) == bare(domain)
+    files = [p for p in path.parent.glob("*.pddl") if "(problem" in p.read_text("latin-1").lower()]
+    for file in sorted(files)[:3]:
+        problem = read_problem(file, domain)
+        found = parse_problem(Source("again", problem_text(problem, domain)), again)
+        assert _bare(found) == _bare(problem)
+
+
+def _bare(problem: Problem) -> Problem:
+    return replace(problem, source=NOWHERE)
+
+
+@pytest.mark.parametrize("path", OWN, ids=lambda path: path.parent.name)
+def test_own_domains(path: Path) -> None:
+    check(path)
+
+
+@pytest.mark.foreign
+@pytest.mark.skipif(not SHARED.is_dir(), reason=f"no inputs of others here: {SHARED}")
+@pytest.mark.parametrize("path", FOREIGN, ids=lambda path: f"{path.parent.name}-{path.stem}")
+def test_domains_of_others(path: Path) -> None:
+    check(path)
