@@ -45,10 +45,8 @@ Figures = dict[str, Any]
 class PrintedTable:
     """A table that is printed line by line while a benchmark runs.
 
-    Parameters
-    ----------
-    columns
-        Pairs (head, width); cells stand on the right, or on the left where the width is negative.
+    ``columns``: pairs (head, width); cells stand on the right, or on the left where the width is
+    negative.
     """
 
     def __init__(self, *columns: tuple[str, int]) -> None:
@@ -87,13 +85,9 @@ def text_of(cell: object, none: str) -> str:
 def asked_for(names: Iterable[str], given: Sequence[str]) -> list[str]:
     """Return the rows that are asked for by their names, or by how their names begin.
 
-    Parameters
-    ----------
-    names
-        All rows' names, whose order is kept.
-    given
-        Names, each of which asks for its row alone, and beginnings of names, each of which asks for
-        all rows that begin with it; none ask for all rows.
+    ``names``: all rows' names, whose order is kept.  ``given``: names, each of which asks for its
+    row alone, and beginnings of names, each of which asks for all rows that begin with it; none ask
+    for all rows.
     """
     names = list(names)
     exact = {*names}.intersection(given)
@@ -104,12 +98,7 @@ def asked_for(names: Iterable[str], given: Sequence[str]) -> list[str]:
 class KeptRows:
     """Rows by name, each one a line of JSON in a file; a last line that was cut off is left out.
 
-    Parameters
-    ----------
-    path
-        The file; None keeps nothing.
-    key
-        What a line calls the name of its row.
+    ``path``: the file; None keeps nothing.  ``key``: what a line calls the name of its row.
     """
 
     def __init__(self, path: Path | None, key: str = "row") -> None:

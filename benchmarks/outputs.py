@@ -7,7 +7,7 @@ Runs a fixed list of commands in the current directory, a checkout, each as a pr
 ``FOLDER/WORLD/COMMAND.txt`` holds the exit code and stdout of a command, beside it lie the files
 that it wrote. Versions behave alike if and only if ``diff -r`` of their folders is empty. What
 differs from run to run is left out: seconds, the ``producer`` of a file and the place of FOLDER.
-Messages on stderr are not compared, and of commands with bad input only the exit codes are.
+Messages on stderr are not compared.
 
 ``--only`` runs the commands whose ``WORLD/COMMAND`` contains a match of the regular expression,
 and those that write the files that they read.
@@ -29,22 +29,22 @@ from time import perf_counter
 
 DOMAINS = Path("domains")
 
-#: World -> the problems that every general command is run on.
+#: World -> the problems that every general command is run on, the world's example first.
 PROBLEMS = {
-    "charger": "in-turn queue three-robots",
+    "charger": "queue in-turn three-robots",
     "corridor": "problem",
-    "elevator": "one-robot same-floor two-calls",
+    "elevator": "two-calls one-robot same-floor",
     "flags": "parade two-up",
-    "grid": "corners-3x3 corners-4x4 gw1-2x2 gw2-2x3 gwb1-2x4 gwb5-3x3 three-robots-3x3",
+    "grid": "corners-4x4 corners-3x3 gw1-2x2 gw2-2x3 gwb1-2x4 gwb5-3x3 three-robots-3x3",
     "grid-joint": "corners-3x3 gw1-2x2 gwb1-2x4 t-map three-cells",
-    "handover": "exchange one-door three-rooms two-doors",
+    "handover": "two-doors exchange one-door three-rooms",
     "lock": "both-in let-in three-robots",
     "push-box": "around next-door three-robots",
     "t-map": "problem",
     "three-cells": "problem",
-    "tray": "in-hand serve three-robots",
+    "tray": "serve in-hand three-robots",
     "two-arms": "exchange own-sides pass-on",
-    "vans": "alone one-van two-each two-vans",
+    "vans": "one-van alone two-each two-vans",
 }
 
 #: Run on every problem ``P``.
@@ -55,6 +55,17 @@ plans D P --max 3 --format json
 coordination D P --json
 """
 
+#: Run on the example ``P`` of every world.
+ON_EVERY_EXAMPLE = """
+coordination D P
+build D P -o @example.json --method minimal --json
+verify @example.json D P
+explain @example.json D P --task
+plan @example.json D P --prefer most-plans --json
+plan @example.json D P --prefer shortest
+report @example.json D P -o @example.html
+"""
+
 #: World -> further commands. ``D`` is the world's domain, ``@name`` a file in FOLDER; other names
 #: of files are looked up in the world's directory.
 COMMANDS = {
@@ -63,7 +74,6 @@ COMMANDS = {
         plans D problem.pddl --count
         plans D problem.pddl --sample 3 --seed 1
         plans D problem.pddl --cost makespan+actions --json
-        coordination D problem.pddl
         check D problem.pddl --json
         tasks D problem.pddl --start "(at r1 ?)" --goal "(at r2 ?)" -o @some.tasks.json --json
         build D problem.pddl --tasks @some.tasks.json --method minimal -o @some.json --json
@@ -103,12 +113,10 @@ COMMANDS = {
         export @one.json D problem.pddl "w1 w0" --max-actions 0
         export @one.json D problem.pddl "w1 w0" --to ltlf
         export @one.json D problem.pddl "w1 w0" --to ltlf --json
-        report @one.json D problem.pddl -o @one.html
         schema
         """,
     "t-map": """
         plans D problem.pddl --sample 3 --seed 1 --json
-        coordination D problem.pddl
         check D problem.pddl --json
         build D problem.pddl --tasks all -o @greedy.json
         build D problem.pddl --tasks all --method separating -o @separating.json --json
@@ -121,64 +129,41 @@ COMMANDS = {
         explain @minimal.json D problem.pddl --task
         explain @greedy.json D problem.pddl --task --json
         plan @minimal.json D problem.pddl --prefer first:r1 --json
-        plan @greedy.json D problem.pddl --prefer shortest --heuristic blind
         understand @minimal.json D problem.pddl "w0 w2 w1 w0"
         understand @minimal.json D problem.pddl "w0" --json
         choices @minimal.json D problem.pddl "w0 w2 w1 w0"
         export @minimal.json D problem.pddl "w0"
         export @minimal.json D problem.pddl "w0" --to ltlf
-        report @minimal.json D problem.pddl -o @minimal.html
         """,
     "charger": """
         coordination D queue.pddl in-turn.pddl
-        build D queue.pddl --tasks queue.tasks.json --method minimal -o @queue.json --json
         build D queue.pddl --tasks queue.tasks.json -o @greedy.json
         build D three-robots.pddl --method minimal -o @three.json
         build D three-robots.pddl --method separating -o @separating.json
-        verify @queue.json D queue.pddl --json
-        explain @queue.json D queue.pddl --task
         explain @three.json D three-robots.pddl --task --json
-        plan @three.json D three-robots.pddl --prefer most-plans --json
-        plan @queue.json D queue.pddl --prefer shortest
-        report @three.json D three-robots.pddl -o @three.html
         """,
     "corridor": """
-        coordination D problem.pddl
         build D problem.pddl --tasks rooms.tasks.json -o @greedy.json --json
-        build D problem.pddl --method minimal -o @minimal.json
         tasks D problem.pddl --start "(at r1 ?)" --goal "(at r1 c0-8)" --goal "(at r2 ?)" -o @t.json
-        explain @minimal.json D problem.pddl --task
         explain @greedy.json D problem.pddl --json
-        plan @minimal.json D problem.pddl --prefer most-plans --json
-        plan @minimal.json D problem.pddl --prefer most-plans --heuristic projections
-        report @minimal.json D problem.pddl -o @minimal.html
+        plan @example.json D problem.pddl --prefer most-plans --heuristic projections
         """,
     "elevator": """
-        coordination D two-calls.pddl
         check D one-robot.pddl --json
         build D two-calls.pddl --tasks all --method minimal -o @minimal.json
         build D two-calls.pddl --tasks all -o @greedy.json --json
-        verify @minimal.json D two-calls.pddl
-        explain @minimal.json D two-calls.pddl --task
-        plan @minimal.json D two-calls.pddl --prefer shortest --json
-        report @greedy.json D two-calls.pddl -o @greedy.html
         """,
     "flags": """
-        coordination D parade.pddl
         plans D parade.pddl --sample 3 --seed 1
         build D parade.pddl --method minimal -o @minimal.json --certificate @proof.json
         build D parade.pddl --method separating -o @separating.json --json
         verify @minimal.json D parade.pddl --certificate @proof.json
-        explain @minimal.json D parade.pddl --task
-        plan @minimal.json D parade.pddl --prefer most-plans --json
-        report @minimal.json D parade.pddl -o @minimal.html
         """,
     "grid": """
         inspect D gw3-2x4.pddl --states
         plans D corners-10x10.pddl --count
         plans D corners-8x8.pddl --sample 3 --seed 1
         plans D corners-8x8.pddl --count --json --cost makespan+actions
-        coordination D corners-6x6.pddl
         build D gw1-2x2.pddl --tasks all -o @gw1-greedy.json --json
         build D gw1-2x2.pddl --tasks all --method minimal -o @gw1.json --certificate @gw1.proof.json
         build D gw2-2x3.pddl --tasks all --method minimal -o @gw2.json --json
@@ -186,7 +171,6 @@ COMMANDS = {
         build D gw3-2x4.pddl --tasks all -o @gw3.json.gz
         build D gwb1-2x4.pddl --tasks all --method minimal -o @gwb1.json --prefer flexible
         build D gwb5-3x3.pddl --tasks gwb5-3x3.tasks.json --method minimal -o @gwb5.json
-        build D corners-4x4.pddl --method minimal -o @corners.json --json
         build D corners-4x4.pddl --cost makespan+actions --method minimal -o @few-actions.json
         build D corners-3x3.pddl gw4-3x3.pddl --method separating -o @two-problems.json --json
         build D three-robots-3x3.pddl --method minimal -o @three.json --json
@@ -196,33 +180,21 @@ COMMANDS = {
         verify @two-problems.json D corners-3x3.pddl gw4-3x3.pddl --json
         explain @gw2.json D gw2-2x3.pddl
         explain @gwb5.json D gwb5-3x3.pddl --task --json
-        explain @corners.json D corners-4x4.pddl --task
-        plan @corners.json D corners-4x4.pddl --prefer most-plans --json
         plan @few-actions.json D corners-4x4.pddl --prefer shortest
         plan @three.json D three-robots-3x3.pddl --prefer first:r3 --json
-        report @corners.json D corners-4x4.pddl -o @corners.html
         report @gwb5.json D gwb5-3x3.pddl --tasks-shown 5 --seed 3 -o @gwb5.html
         """,
     "grid-joint": """
         coordination D t-map.pddl
         check D three-cells.pddl
         build D gw1-2x2.pddl --tasks all --method minimal -o @gw1.json --json
-        build D corners-3x3.pddl --method minimal -o @corners.json
-        explain @corners.json D corners-3x3.pddl --task
-        plan @corners.json D corners-3x3.pddl --prefer most-plans
         """,
     "handover": """
-        coordination D two-doors.pddl
         build D two-doors.pddl --tasks all -o @greedy.json --json
-        build D two-doors.pddl --method minimal -o @minimal.json --json
         build D three-rooms.pddl --method minimal -o @three.json
-        explain @minimal.json D two-doors.pddl --task
-        plan @minimal.json D two-doors.pddl --prefer most-plans --json
         plan @three.json D three-rooms.pddl --prefer shortest
-        report @minimal.json D two-doors.pddl -o @minimal.html
         """,
     "lock": """
-        coordination D both-in.pddl
         build D three-robots.pddl -o @inseparable.json
         build D three-robots.pddl --remember-actions --method minimal -o @remember.json --json
         build D three-robots.pddl --remember-actions --cost makespan+actions -o @remember-cost.json
@@ -230,73 +202,28 @@ COMMANDS = {
         verify @remember.json D three-robots.pddl
         verify @minimal.json D both-in.pddl --certificate @proof.json --json
         explain @remember.json D three-robots.pddl --task
-        explain @minimal.json D both-in.pddl --task --json
         plan @remember.json D three-robots.pddl --prefer most-plans --json
-        plan @minimal.json D both-in.pddl --prefer first:r2
-        report @remember.json D three-robots.pddl -o @remember.html
         """,
     "push-box": """
-        coordination D around.pddl
         build D around.pddl --tasks all -o @greedy.json --json
         build D three-robots.pddl --method separating -o @three.json
-        build D around.pddl --method minimal -o @minimal.json
-        explain @greedy.json D around.pddl --task
         plan @three.json D three-robots.pddl --prefer shortest --json
-        report @minimal.json D around.pddl -o @minimal.html
         """,
     "tray": """
-        coordination D serve.pddl
         build D serve.pddl --tasks all --method minimal -o @minimal.json --json
         build D three-robots.pddl --method minimal -o @three.json
-        verify @minimal.json D serve.pddl
-        explain @minimal.json D serve.pddl
         explain @three.json D three-robots.pddl --task
         plan @three.json D three-robots.pddl --prefer most-plans --json
-        report @minimal.json D serve.pddl -o @minimal.html
         """,
     "two-arms": """
-        coordination D exchange.pddl
         build D exchange.pddl --tasks exchange.tasks.json -o @greedy.json --json
-        build D exchange.pddl --method minimal -o @minimal.json
-        explain @minimal.json D exchange.pddl --task --json
-        plan @minimal.json D exchange.pddl --prefer shortest --json
-        report @minimal.json D exchange.pddl -o @minimal.html
         """,
     "vans": """
-        coordination D two-each.pddl
         plans D alone.pddl --cost makespan+cost --json
         build D one-van.pddl --tasks one-van.tasks.json --method minimal -o @minimal.json --json
         build D two-vans.pddl --cost makespan+cost --method minimal -o @cost.json
-        verify @minimal.json D one-van.pddl
-        explain @minimal.json D one-van.pddl --task
-        plan @minimal.json D one-van.pddl --prefer most-plans --json
-        report @minimal.json D one-van.pddl -o @minimal.html
         """,
 }
-
-#: Bad input, run in ``t-map``: only the exit code is compared.
-BAD = """
-sing D problem.pddl
-plans D nowhere.pddl
-plans problem.pddl D
-plans D problem.pddl --max minus
-plans D problem.pddl --count --max 3
-plans D problem.pddl --robots r1,r7
-plans D problem.pddl --memory-limit 3X
-plans D ../lock/both-in.pddl
-build D problem.pddl --method best -o @bad.json
-build D problem.pddl
-build D problem.pddl -o nowhere/bad.json
-build D problem.pddl --tasks problem.pddl -o @bad.json
-build D problem.pddl --tasks all --method exhaustive --time-limit 0.01 -o @bad.json
-verify problem.pddl D problem.pddl
-verify @minimal.json D problem.pddl --cost makespan+actions
-verify @minimal.json ../lock/domain.pddl ../lock/both-in.pddl
-say @minimal.json D problem.pddl D
-understand @minimal.json D problem.pddl "w0 w9"
-plan @minimal.json D problem.pddl --prefer anything
-choices @minimal.json D problem.pddl "w0" --robot r9
-"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,13 +232,12 @@ class Command:
 
     world: str
     line: str
-    bad: bool = False
 
     @property
     def name(self) -> str:
         """``WORLD/COMMAND`` with a file name made of the line."""
         words = re.sub(r"[^\w@.+=:-]+", "_", self.line).strip("_")
-        return f"{self.world}/{'bad_' if self.bad else ''}{words.replace('@', '')}"
+        return f"{self.world}/{words.replace('@', '')}"
 
     @property
     def files(self) -> list[str]:
@@ -340,15 +266,18 @@ class Command:
 def commands() -> list[Command]:
     """All commands, each after those that write what it reads."""
     found: list[Command] = []
-    for world, problems in PROBLEMS.items():
-        found += (
-            Command(world, line.replace(" P ", f" {problem}.pddl "))
-            for problem in problems.split()
-            for line in ON_EVERY_PROBLEM.strip().splitlines()
-        )
-        found += (Command(world, line.strip()) for line in COMMANDS[world].strip().splitlines())
-        if world == "t-map":
-            found += (Command(world, line, bad=True) for line in BAD.strip().splitlines())
+    for world, named in PROBLEMS.items():
+        problems = named.split()
+        for lines, over in (
+            (ON_EVERY_PROBLEM, problems),
+            (ON_EVERY_EXAMPLE, problems[:1]),
+            (COMMANDS[world], ["P"]),
+        ):
+            found += (
+                Command(world, re.sub(r"\bP\b", f"{problem}.pddl", line.strip()))
+                for problem in over
+                for line in lines.strip().splitlines()
+            )
     return found
 
 
@@ -358,7 +287,7 @@ def selected(listed: list[Command], pattern: str) -> list[Command]:
     kept: list[Command] = []
     for command in reversed(listed):
         written = {(command.world, file) for file in command.writes}
-        if re.search(pattern, command.name) or (written & needed and not command.bad):
+        if re.search(pattern, command.name) or written & needed:
             kept.append(command)
             needed |= {(command.world, file) for file in command.files}
     return kept[::-1]
@@ -380,9 +309,8 @@ def run(program: str, command: Command, folder: Path) -> None:
         text=True,
         check=False,
     )
-    shown = "" if command.bad else without_times(ended.stdout, folder)
     place = folder / command.world / f"{command.name.split('/', 1)[1][:180]}.txt"
-    place.write_text(f"exit code {ended.returncode}\n{shown}")
+    place.write_text(f"exit code {ended.returncode}\n{without_times(ended.stdout, folder)}")
 
 
 def settle(path: Path, folder: Path) -> None:

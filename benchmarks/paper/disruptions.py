@@ -32,14 +32,9 @@ from planners.system.errors import OutOfMemory
 class SuccessRates:
     """Exact success rates of one task under one disruption, over plans drawn uniformly.
 
-    Attributes
-    ----------
-    plan
-        The share of optimal plans that need no forbidden subaction.
-    sentence
-        The share of optimal plans under whose sentence every robot has a choice that needs none.
-    possible
-        Whether any optimal plan needs none: what robots could reach that agree again.
+    ``plan``: the share of optimal plans that need no forbidden subaction.  ``sentence``: the share
+    of optimal plans under whose sentence every robot has a choice that needs none.  ``possible``:
+    whether any optimal plan needs none: what robots could reach that agree again.
     """
 
     plan: float
@@ -55,17 +50,9 @@ def success_rates(
     The plans of a sentence are RC-free, so some plan with the sentence succeeds exactly if every
     robot has a successful choice: the successful sentences are those of the successful plans.
 
-    Parameters
-    ----------
-    word
-        (nodes) The word number of each plan-space node.
-    most
-        The most steps of counting sentences, see `sentence_counts`.
-
-    Raises
-    ------
-    OutOfMemory
-        If there are more sentences than ``most`` allows.
+    ``word``: (nodes) The word number of each plan-space node.  ``most``: the most steps of counting
+    sentences, see `sentence_counts`.  Raises `OutOfMemory` if there are more sentences than
+    ``most`` allows.
     """
     every = sentence_counts(space, word, most_steps=most)
     starts = space.starts.tolist()

@@ -43,13 +43,10 @@ def is_well(found: RunRecord) -> bool:
 def counted(found: Sequence[RunRecord]) -> dict[str, Any]:
     """Count how runs ended, and how often the joint model says the same of the robots' choices.
 
-    Returns
-    -------
-    dict
-        ``well``, ``collisions``, ``deadlocks``, ``late``: runs; ``late_steps``, ``messages``,
-        ``seconds`` (simulated): sums; ``nearest``: the least distance of two robots, in metres;
-        ``mixes``: runs in which the robots' own subplans, done in step, are an optimal plan;
-        ``agree``: runs that ended well iff they are.
+    ``well``, ``collisions``, ``deadlocks``, ``late``: runs; ``late_steps``,
+    ``messages``, ``seconds`` (simulated): sums; ``nearest``: the least distance of two robots, in
+    metres; ``mixes``: runs in which the robots' own subplans, done in step, are an optimal plan;
+    ``agree``: runs that ended well iff they are.
     """
     distances = [record.nearest for record in found if record.nearest is not None]
     return {

@@ -36,21 +36,11 @@ FOREIGN = SHARED / "mapf"
 class Floor:
     """A map and a number of robots.
 
-    Attributes
-    ----------
-    name
-        What tables call it.
-    robots
-        How many robots are on it.
-    world
-        A shipped domain with its candidate tasks; or one whose map is used, with drawn tasks; or
-        the grid domain, for a foreign map.
-    draws
-        Whether tasks are drawn.
-    foreign
-        The name of a map in `FOREIGN`, read there and only there.
-    known
-        Coordinates of places whose names do not say them.
+    ``name``: what tables call it.  ``robots``: how many robots are on it.  ``world``: a shipped
+    domain with its candidate tasks; or one whose map is used, with drawn tasks; or the grid domain,
+    for a foreign map.  ``draws``: whether tasks are drawn.  ``foreign``: the name of a map in
+    `FOREIGN`, read there and only there.  ``known``: coordinates of places whose names do not say
+    them.
     """
 
     name: str

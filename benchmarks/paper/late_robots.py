@@ -55,14 +55,9 @@ class Execution:
     ) -> tuple[Rows, int] | None:
         """The state in which all parts are done and the joint steps that it took, None: it failed.
 
-        Parameters
-        ----------
-        init
-            The row of the initial state.
-        delay
-            The probability, below 1, with which a robot that is not done is delayed in a step.
-        yields
-            Whether robots wait for each other where they cannot all do their steps.
+        ``init``: the row of the initial state.  ``delay``: the probability, below 1, with which a
+        robot that is not done is delayed in a step.  ``yields``: whether robots wait for each other
+        where they cannot all do their steps.
         """
         state, done, steps = init.tobytes(), [0] * len(parts), 0
         while busy := [r for r, part in enumerate(parts) if done[r] < len(part)]:
@@ -100,12 +95,8 @@ def _larger_first(robots: Sequence[int]) -> Iterator[tuple[int, ...]]:
 class DelayTrials:
     """Runs of tasks under one language: a plan is drawn, something is said, and each robot draws.
 
-    Parameters
-    ----------
-    languages
-        The language in every task.
-    together
-        Whether the whole plan is said, so that all robots follow it.
+    ``languages``: the language in every task.  ``together``: whether the whole plan is said, so
+    that all robots follow it.
     """
 
     def __init__(self, languages: Sequence[TaskLanguage], *, together: bool = False) -> None:
@@ -115,13 +106,9 @@ class DelayTrials:
         self._said: dict[tuple[int, Sentence], Plans] = {}
 
     def sample(self, delay: float, yields: bool, runs: int, random: Random) -> tuple[int, int, int]:
-        """Run tasks drawn uniformly.
+        """Run drawn tasks; count runs, those that ended in the goal, and their late steps.
 
-        Returns
-        -------
-        tuple of int
-            The runs; those that ended in the goal; the joint steps beyond the least makespan that
-            these took together.
+        Tasks are drawn uniformly; late are steps beyond the least makespan, summed up.
         """
         well = late = 0
         for _ in range(runs):
@@ -162,14 +149,10 @@ class EventTrials:
     A plan is drawn, and its sentence said.  In each step a robot that is not delayed does an event,
     as soon as those that it waits for have ended, be it in this step.
 
-    Parameters
-    ----------
-    languages
-        The asynchronous language in every task.
-    way
-        ``graph``: all follow the plan, with what its events wait for (its dependency graph);
-        ``mixed``: each draws a plan with the sentence; ``free``: each chooses, event by event, of
-        what the sentence leaves open what may start now.
+    ``languages``: the asynchronous language in every task.  ``way``: ``graph``: all follow the
+    plan, with what its events wait for (its dependency graph); ``mixed``: each draws a plan with
+    the sentence; ``free``: each chooses, event by event, of what the sentence leaves open what may
+    start now.
     """
 
     def __init__(self, languages: Sequence[TaskLanguage], way: str) -> None:
@@ -179,14 +162,10 @@ class EventTrials:
         self._said: dict[tuple[int, Sentence], tuple[Plans, list[EventMonitor]]] = {}
 
     def sample(self, delay: float, runs: int, random: Random) -> tuple[int, ...]:
-        """Run tasks drawn uniformly.
+        """Run drawn tasks; count runs, those that ended in the goal, and their late steps.
 
-        Returns
-        -------
-        tuple of int
-            The runs; those that ended in the goal; the joint steps beyond the least makespan that
-            these took together; how often robots that were not delayed had to wait in these, and
-            the sum of the squares of that.
+        Tasks are drawn uniformly; late are steps beyond the least makespan, summed up.  The others
+        are how often robots that were not delayed had to wait in these, and the squares of that.
         """
         well = late = waited = squares = 0
         for _ in range(runs):

@@ -72,11 +72,8 @@ def expansions(
 ) -> tuple[int, int, int]:
     """Count the nodes that A* expands in one task.
 
-    Returns
-    -------
-    tuple of int
-        Without a sentence; with the sentence of the plan found, only pruning, as in the paper; and
-        with the number of remaining words as a bound, too.
+    Without a sentence; with the sentence of the plan found, only pruning, as in the paper; and with
+    the number of words left as a bound, too.
     """
     alone = plan_under_sentence(language, None, bound, states)
     pruned = plan_under_sentence(language, alone.words, bound, states, count_words=False)

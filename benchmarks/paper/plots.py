@@ -78,20 +78,10 @@ def save(figure: Figure, path: Path) -> None:
 class Series:
     """Values to draw; None where there is no value.
 
-    Attributes
-    ----------
-    kind
-        Chooses colour and marker.
-    label
-        The text of the legend.
-    values
-        One value for each category or number.
-    low, high
-        Intervals around the values, if any.
-    exact
-        What the values estimate, if it is known.
-    x
-        The numbers that the values belong to, if they have others than the series beside it.
+    ``kind``: chooses colour and marker.  ``label``: the text of the legend.  ``values``: one value
+    for each category or number.  ``low`` and ``high``: intervals around the values, if any.
+    ``exact``: what the values estimate, if it is known.  ``x``: the numbers that the values belong
+    to, if they have others than the series beside it.
     """
 
     kind: str

@@ -19,16 +19,9 @@ Result = dict[str, Any]
 class Settings:
     """How experiments are run.
 
-    Attributes
-    ----------
-    seed
-        Of all random choices.
-    samples
-        Random runs (the paper: 100); a hundred times as many where intervals are computed.
-    quick
-        Only the smallest rows and sizes.
-    limit
-        Seconds for one work unit.
+    ``seed``: of all random choices.  ``samples``: random runs (the paper: 100); a hundred times as
+    many where intervals are computed.  ``quick``: only the smallest rows and sizes.  ``limit``:
+    seconds for one work unit.
     """
 
     seed: int = 0
@@ -97,16 +90,10 @@ class Section:
 class Recipe:
     """An experiment.
 
-    Attributes
-    ----------
-    name, title
-        Its name on the command line, and its title on the page.
-    units
-        Lists the work units.
-    run
-        Does one unit; a function of a module, since it is sent to other processes by name.
-    section
-        Renders the records of units that ended without meeting a limit, in the order of ``units``.
+    ``name`` and ``title``: its name on the command line, and its title on the page.  ``units``:
+    lists the work units.  ``run``: does one unit; a function of a module, since it is sent to other
+    processes by name.  ``section``: renders the records of units that ended without meeting a
+    limit, in the order of ``units``.
     """
 
     name: str

@@ -94,12 +94,9 @@ def freedom(tasks: Sequence[TaskLanguage]) -> dict[str, int]:
 
     An option is a cell that a robot enters or, where there are no cells, a subaction.
 
-    Returns
-    -------
-    dict
-        ``plan``: options in the robots' parts of the agreed plans; ``sentence``: further ones in
-        their choices under the plans' sentences; ``optimal``: further ones in all optimal plans of
-        the tasks, which would take another agreement.
+    ``plan``: options in the robots' parts of the agreed plans; ``sentence``: further
+    ones in their choices under the plans' sentences; ``optimal``: further ones in all optimal plans
+    of the tasks, which would take another agreement.
     """
     plan = sentence = optimal = 0
     known: TaskChoices | None = None

@@ -25,15 +25,9 @@ MOST_LISTED = 1000
 class SentenceStatistics:
     """The sentences of one task.
 
-    Attributes
-    ----------
-    steps
-        The makespan of its optimal plans, in joint steps.
-    plans
-        Sentence -> the exact number of optimal plans with it.
-    first, last
-        The sentences of the first and of the last plan, in the order of
-        `planners.search.plans.Plans`.
+    ``steps``: the makespan of its optimal plans, in joint steps.  ``plans``: sentence -> the exact
+    number of optimal plans with it.  ``first`` and ``last``: the sentences of the first and of the
+    last plan, in the order of `planners.search.plans.Plans`.
     """
 
     steps: int
@@ -140,16 +134,9 @@ def compare(
 class Comparison:
     """The results of `comparison_units`.
 
-    Attributes
-    ----------
-    row
-        The row of Table 1.
-    languages
-        One for each method, on the row.
-    others
-        The languages of other worlds.
-    orders
-        What was measured of the greedy method in random and in systematic orders, by their names.
+    ``row``: the row of Table 1.  ``languages``: one for each method, on the row.  ``others``: the
+    languages of other worlds.  ``orders``: what was measured of the greedy method in random and in
+    systematic orders, by their names.
     """
 
     row: str

@@ -23,18 +23,9 @@ def greedy_partitions(
 ) -> Iterator[tuple[str, Ints]]:
     """Yield the partitions that the greedy method makes with the states in different orders.
 
-    All of them separate all first differences (alpha), so they are coordination languages
-    (Theorem 3).
-
-    Parameters
-    ----------
-    orders
-        The number of random orders, beside the systematic ones.
-
-    Yields
-    ------
-    tuple
-        The name of the order, and the word number of every state of ``candidates.rows``.
+    Each is the order's name, and the word number of every state of ``candidates.rows``.  All of
+    them separate all first differences (alpha), so they are coordination languages (Theorem 3).
+    ``orders``: the number of random orders, beside the systematic ones.
     """
     differences = first_differences(candidates.spaces)
     constraints, states = separations(differences.listed), differences.states.tolist()

@@ -22,16 +22,9 @@ from planners.pddl.model_options import ModelOptions
 class World:
     """A domain, one of its problems, and candidate tasks.
 
-    Attributes
-    ----------
-    name
-        What tables call it.
-    folder, problem
-        The folder below that of all domains, and the name of the problem file.
-    tasks
-        ``"all"`` (pairs of states), ``"problem"`` or the name of a task file.
-    domains
-        The folder of all domains.
+    ``name``: what tables call it.  ``folder`` and ``problem``: the folder below that of all
+    domains, and the name of the problem file.  ``tasks``: ``"all"`` (pairs of states),
+    ``"problem"`` or the name of a task file.  ``domains``: the folder of all domains.
     """
 
     name: str
@@ -122,10 +115,8 @@ def language_for(
     --words-see-slack``, "asynchronous" is ``--asynchronous``, and "few" and "silence" are ``--words
     2`` and ``1``.
 
-    Raises
-    ------
-    OutOfTime, OutOfMemory
-        If a limit ended the method early: what it then has depends on the machine.
+    Raises `OutOfTime` or `OutOfMemory` if a limit ended the method early: what it then has
+    depends on the machine.
     """
     options = ModelOptions(slack=1, words_see_slack=True) if method == "slack" else None
     if method == "asynchronous":

@@ -51,13 +51,7 @@ class Disruption:
 
 
 class TaskChoices:
-    """The tasks of one plan space in a language.
-
-    Parameters
-    ----------
-    language
-        The language in any of these tasks.
-    """
+    """The tasks of one plan space, in the language ``language``."""
 
     def __init__(self, language: TaskLanguage) -> None:
         self.language = language
