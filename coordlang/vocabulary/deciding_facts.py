@@ -8,7 +8,7 @@ differ in.  Few facts make few classes of states, so that a language with few wo
 them where the loop would have to learn thousands of clauses about single states.
 
 Two plans have one sentence under such classes iff they are in one class after each step, so that
-nothing else tells them apart (Proposition 32 of docs/concepts.md).
+nothing else tells them apart (Proposition 28 of docs/concepts.md).
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ All optimal plans of a task have equally many steps.  So under such a partition 
 sentence iff they are in one word after each step, and of all warping paths of a failing tuple only
 the one that goes step by step is left: one clause rules the tuple out, where any partition may need
 one for each path.  On published tasks languages of this kind are found with a tenth of the words
-(Proposition 31 of docs/concepts.md).  That there is none says nothing of other partitions.
+(Proposition 27 of docs/concepts.md).  That there is none says nothing of other partitions.
 """
 
 from __future__ import annotations
