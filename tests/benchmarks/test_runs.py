@@ -4,21 +4,26 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 
-from benchmarks.paper import communication, game
-from benchmarks.paper.__main__ import main
+from benchmarks.paper import communication, game, table1
+from benchmarks.paper.__main__ import RECIPES, main
 from benchmarks.paper.driving import counted, is_well
 from benchmarks.paper.floors import FLOORS, tasks_of
+from benchmarks.paper.page import page_of
 from benchmarks.paper.recipe import Settings
+from benchmarks.paper.reported import TABLE_1
 from benchmarks.paper.runner import attempt, is_known, kept, run
 from coordlang.simulation.record import EventRecord, RunRecord
 from planners.search.plans import Plans
 from tests.support import naive
+from tests.support.domains import ROOT
 
 GAME, COMMUNICATION = game.RECIPE, communication.RECIPE
 QUICK = Settings(samples=2, quick=True)
@@ -132,3 +137,53 @@ def test_tasks_of_floors_require_coordination() -> None:
     assert (len(language.words), len(tasks)) == (3, 12)
     plans = [[*Plans.of(used.space, used.task)] for used in tasks]
     assert all(any(naive.failing(own, 2)) for own in plans)
+
+
+PAGE, FOLDER = ROOT / "docs" / "evaluation.md", ROOT / "docs" / "evaluation"
+WHOLE = Settings(limit=180)
+
+
+def test_the_page_is_what_the_results_say() -> None:
+    text, sections = page_of(RECIPES, WHOLE, FOLDER, "evaluation")
+    assert set(sections) == {recipe.name for recipe in RECIPES}
+    assert PAGE.read_text() == text, (
+        "run: python -m benchmarks.paper all --results docs/evaluation --page docs/evaluation.md"
+    )
+
+
+def test_the_results_are_of_a_whole_run() -> None:
+    """Every unit with its default parameters, and each experiment of one state of the code."""
+    for recipe in RECIPES:
+        rows = kept(FOLDER, recipe)
+        units = recipe.units(WHOLE)
+        assert [unit.key for unit in units if not is_known(unit, rows, WHOLE)] == []
+        assert set(rows.rows) == {unit.key for unit in units}
+        assert len({line["code"] for line in rows.rows.values()}) == 1
+
+
+def test_figures_are_small_and_self_contained() -> None:
+    shown = re.findall(r"!\[[^]]+\]\(evaluation/([\w-]+\.svg)\)", PAGE.read_text())
+    assert sorted(shown) == sorted(path.name for path in FOLDER.glob("*.svg"))
+    assert len(shown) >= 8
+    for name in shown:
+        data = (FOLDER / name).read_bytes()
+        assert len(data) < 300_000
+        root = ElementTree.fromstring(data)
+        outside = [
+            value
+            for element in root.iter()
+            for key, value in element.attrib.items()
+            if key.endswith("href") and not value.startswith("#")
+        ]
+        assert not outside
+
+
+def test_table_1_has_the_papers_tasks_and_states() -> None:
+    of = {key: line["result"] for key, line in kept(FOLDER, table1.RECIPE).rows.items()}
+    for name, paper in TABLE_1.items():
+        columns = ("minimal", "separating", "least alpha", "greedy")
+        found = [of[f"{name}/{column}"] for column in columns]
+        assert (found[-1]["tasks"], found[-1]["states"]) == (paper.tasks, paper.states)
+        words = [result["words"] for result in found]
+        assert words == sorted(words)
+        assert all(result["verified"] for result in found)

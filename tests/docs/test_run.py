@@ -1,16 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pages are run: Python blocks in one namespace, console blocks with their output compared."""
+"""The pages and their programs are run: Python blocks in one namespace, console output compared."""
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.support.domains import ROOT
-from tests.support.pages import PAGES, blocks, commands, matches, run_command, run_python
+from coordlang.commands.main import run
+from coordlang.language.candidates import all_pairs
+from coordlang.language.file import read_language
+from coordlang.language.listed import read_task_file
+from coordlang.language.recorded import options_of
+from coordlang.language.sentences import sentence
+from planners.search.plans import Plans, counts
+from tests.support.command import Command
+from tests.support.domains import ROOT, read
+from tests.support.pages import DOCS, PAGES, blocks, commands, matches, run_command, run_python
 
 
 @pytest.mark.parametrize(
@@ -89,3 +101,128 @@ def test_example(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         line += cell.count("\n")
     imported = set(re.findall(r"(?m)^ *(?:import|from) ((?:coordlang|planners)[\w.]*)", text))
     assert imported == {"coordlang"}
+
+
+SCRIPT = ROOT / "docs" / "examples" / "check_certificate.sh"
+SOLVER, CHECKER = os.environ.get("SOLVER", "cadical"), os.environ.get("DRAT_TRIM", "drat-trim")
+installed = pytest.mark.skipif(
+    not (shutil.which(SOLVER) and shutil.which(CHECKER)),
+    reason=f"{SOLVER} and {CHECKER} are not both installed (SOLVER and DRAT_TRIM name others)",
+)
+
+
+def refutation(formula: Path, **environment: object) -> subprocess.CompletedProcess[str]:
+    named = {name: str(value) for name, value in environment.items()}
+    return subprocess.run(
+        ["sh", SCRIPT, formula], capture_output=True, text=True, env=os.environ | named
+    )
+
+
+@pytest.fixture
+def formula(coordlang: Command, t_map: tuple[Path, Path], tmp_path: Path) -> Path:
+    language, proof, formula = tmp_path / "l.json", tmp_path / "c.json", tmp_path / "f.cnf"
+    options = ("--tasks", "all", "--method", "minimal", "-o", language, "--certificate", proof)
+    assert coordlang("build", *t_map, *options).code == 0
+    made = coordlang("verify", language, *t_map, "--certificate", proof, "--dimacs", formula)
+    assert made.code == 0
+    return formula
+
+
+@installed
+def test_a_certificate_is_verified(formula: Path) -> None:
+    done = refutation(formula)
+    assert done.returncode == 0, done.stderr
+    assert f"refuted by {SOLVER} in " in done.stdout
+    assert f"proof verified by {CHECKER} in " in done.stdout
+
+
+def program(path: Path, text: str) -> Path:
+    path.write_text(f"#!/bin/sh\n{text}\n")
+    path.chmod(0o755)
+    return path
+
+
+def test_the_answers_of_both_programs_count(tmp_path: Path) -> None:
+    """No answer but "unsatisfiable" of the one and "verified" of the other is taken for a proof."""
+    formula = tmp_path / "f.cnf"
+    formula.write_text("p cnf 1 2\n1 0\n-1 0\n")
+    refutes = program(tmp_path / "refutes", 'echo "s UNSATISFIABLE"; echo 0 > "$2"; exit 20')
+    satisfied = program(tmp_path / "satisfied", "exit 10")
+    gives_up = program(tmp_path / "gives-up", "exit 0")
+    verifies = program(tmp_path / "verifies", 'echo "s VERIFIED"')
+    refuses = program(tmp_path / "refuses", 'echo "s NOT VERIFIED"; exit 1')
+    fails = program(tmp_path / "fails", "exit 139")
+    codes = {
+        (refutes, verifies): 0,
+        (refutes, refuses): 1,
+        (refutes, fails): 1,
+        (satisfied, verifies): 1,
+        (gives_up, verifies): 1,
+        (refutes, tmp_path / "missing"): 77,
+        (tmp_path / "missing", verifies): 77,
+    }
+    for (solver, checker), code in codes.items():
+        assert refutation(formula, SOLVER=solver, DRAT_TRIM=checker).returncode == code
+    assert refutation(tmp_path / "none.cnf").returncode == 2
+
+
+DOMAIN, PROBLEM = (ROOT / "domains" / "t-map" / name for name in ("domain.pddl", "problem.pddl"))
+
+
+@pytest.fixture(scope="module")
+def reader() -> dict[str, Any]:
+    text = next(b.text for b in blocks(DOCS / "formats.md") if b.kind == "python")
+    namespace: dict[str, Any] = {}
+    exec(text, namespace)
+    return namespace
+
+
+def test_reader_needs_the_standard_library_only() -> None:
+    text = next(b.text for b in blocks(DOCS / "formats.md") if b.kind == "python")
+    assert len(text.splitlines()) < 40
+    imported = set(re.findall(r"(?m)^ *(?:import|from) (\w+)", text))
+    assert imported
+    assert imported <= sys.stdlib_module_names
+
+
+@pytest.mark.parametrize("flags", [[], ["--remember-actions"]], ids=["states", "actions"])
+@pytest.mark.parametrize("ending", [".json", ".json.gz"])
+def test_reader_says_the_same(
+    flags: list[str], ending: str, reader: dict[str, Any], tmp_path: Path
+) -> None:
+    path = tmp_path / f"language{ending}"
+    build = "build", str(DOMAIN), str(PROBLEM), "--method", "greedy"
+    assert run([*build, "--tasks", "all", "-o", str(path), *flags]) == 0
+    plain = reader["read_language"](path)
+    language = read_language(path)
+    domain, problem = read("t-map")
+    candidates = all_pairs(domain, [problem], options_of(language))
+    table = language.partition(candidates.model)
+    codec = candidates.model.codec
+    compared, words = 0, set()
+    for space in candidates.spaces:
+        counted, word = counts(space), table.word_of(space.rows)
+        for start in space.starts.tolist():
+            for plan in Plans(space, start, counted):
+                states = Plans(space, start, counted).states(plan)
+                expected = [language.words[w] for w in sentence(int(word[s]) for s in states)]
+                atoms = [set(codec.decode(space.rows[s])) for s in states]  # in no order
+                assert reader["sentence"](plain, atoms) == expected
+                compared += 1
+                words.update(expected)
+    assert compared >= 132
+    assert len(words) > 2
+
+
+def test_files_of_the_page(reader: dict[str, Any], tmp_path: Path) -> None:
+    """Tasks can be built for; the language by hand is one, also for the plain reader."""
+    tasks, by_hand, built = (tmp_path / name for name in ("tasks.json", "hand.json", "l.json"))
+    shown = [b.text for b in blocks(DOCS / "formats.md") if b.kind == "json"]
+    for path, text in zip((tasks, by_hand), shown, strict=False):
+        path.write_text(text)
+    cells = [str(ROOT / "domains" / "three-cells" / f"{n}.pddl") for n in ("domain", "problem")]
+    assert len(read_task_file(tasks)) == 2
+    build = ["build", *cells, "--tasks", str(tasks), "--method", "greedy", "-o", str(built)]
+    assert run(build) == 0
+    assert run(["verify", str(by_hand), *cells, "--tasks", "all"]) == 0
+    assert reader["word"](reader["read_language"](by_hand), ["(at r2 b)", "(at r1 c)"]) == "r2-in-b"

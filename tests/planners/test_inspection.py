@@ -3,13 +3,35 @@
 
 from __future__ import annotations
 
+import math
 import re
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import pytest
 
 from planners.inspection import inspect
 from planners.joint.composition import ComposingStepper
-from planners.loading import PlanningInstance
+from planners.joint.model import Options, Stepper, Steps
+from planners.joint.tables import Rows
+from planners.loading import PlanningInstance, load
 from planners.pddl.model_options import ModelOptions
-from planners.search.reachable import explore
+from planners.search.optimal_plans import search
+from planners.search.reachable import PieceSizes, count, explore
+from planners.system.errors import OutOfMemory, OutOfTime
+from planners.system.limits import (
+    address_space,
+    limited_memory,
+    little_time_after,
+    memory_left,
+    reaching,
+    run_until_stopped,
+    time_left,
+    time_limit,
+)
+from tests.support.domains import DOMAINS
 from tests.support.random_pddl import random_model
 from tests.support.texts import model_of
 
@@ -102,3 +124,208 @@ def test_the_example_can_happen_in_random_models() -> None:
         assert both_possible(loaded, *named(loaded, found.example)), (seed, found.example)
     assert shown >= 15
     assert hidden >= 2, "some clash only between what is never possible together"
+
+
+def late() -> OutOfTime:
+    """What the alarm raises."""
+    try:
+        with time_limit(0.01):
+            while True:
+                pass
+    except OutOfTime as error:
+        return error
+
+
+# What is said
+
+
+def test_the_innermost_block_speaks() -> None:
+    with (
+        pytest.raises(OutOfTime) as caught,
+        reaching(lambda: "the whole", "less of everything"),
+        reaching(lambda: f"{2 + 1} of 9 parts", "fewer parts"),
+    ):
+        raise late()
+    assert str(caught.value).splitlines()[1:] == [
+        "  Reached: 3 of 9 parts.",
+        "  Use a larger --time-limit, or fewer parts.",
+    ]
+
+
+def test_memory_that_is_used_up_is_an_error_with_a_code() -> None:
+    with (
+        limited_memory(900 << 30),
+        pytest.raises(OutOfMemory) as caught,
+        reaching(lambda: "half of it", "fewer parts"),
+    ):
+        raise MemoryError
+    assert caught.value.exit_code == 22
+    assert "Reached: half of it." in str(caught.value)
+    assert "Use a larger --memory-limit, or fewer parts." in str(caught.value)
+
+
+def test_an_estimate_keeps_its_own_remedy_and_other_errors_pass() -> None:
+    with pytest.raises(OutOfMemory) as caught, reaching(lambda: "half of it", "fewer parts"):
+        raise OutOfMemory("this would need 9 GiB", remedy="Use fewer robots.")
+    assert str(caught.value) == "this would need 9 GiB\n  Reached: half of it.\n  Use fewer robots."
+    with pytest.raises(KeyError), reaching(lambda: "half of it", "fewer parts"):
+        raise KeyError
+
+
+# The clock
+
+
+class Finalized:
+    """Its end lasts until the alarm rings, and loses what the alarm raises."""
+
+    lost = False
+
+    def __del__(self) -> None:
+        try:
+            while True:
+                pass
+        except OutOfTime:
+            Finalized.lost = True
+            raise
+
+
+def test_an_alarm_lost_in_a_finalizer_rings_again() -> None:
+    def work() -> None:
+        Finalized()
+        assert Finalized.lost
+        for _ in range(200):  # without the second alarm this ends, and nothing is raised
+            time.sleep(0.01)
+
+    hook = sys.unraisablehook
+    with pytest.raises(OutOfTime), time_limit(0.05):
+        work()
+    assert sys.unraisablehook is hook
+
+
+def test_limits_within_limits() -> None:
+    """The one that is over first rings; leaving the inner block gives the outer its time back."""
+    with time_limit(100):
+        with time_limit(50):
+            assert 25 < time_left() <= 50
+        assert 75 < time_left() <= 100
+        with time_limit(200):
+            assert 75 < time_left() <= 100
+        assert 75 < time_left() <= 100
+    assert time_left() == math.inf
+    with pytest.raises(OutOfTime, match=r"limit of 0\.05 s"), time_limit(0.05), time_limit(10):
+        time.sleep(2)
+
+    def inner_then_outer() -> None:
+        with pytest.raises(OutOfTime, match=r"limit of 0\.05 s"), time_limit(0.05):
+            time.sleep(2)
+        time.sleep(2)
+
+    with pytest.raises(OutOfTime, match=r"limit of 0\.3 s"), time_limit(0.3):
+        inner_then_outer()
+
+
+def test_what_follows_on_stopped_work_is_stopped_soon() -> None:
+    def work() -> None:
+        raise OutOfTime("the time limit of the test is over")
+
+    def busy() -> None:
+        while True:
+            pass
+
+    with time_limit(60):
+        stopped = run_until_stopped(work)
+        assert isinstance(stopped, OutOfTime)
+        with pytest.raises(OutOfTime, match="limit of the test"), little_time_after(stopped):
+            busy()
+        with little_time_after(None):
+            assert time_left() == math.inf  # the clock is stopped
+
+
+# How far work got
+
+
+@dataclass(frozen=True)
+class Stopping(Stepper):
+    """A stepper that a limit stops after some tables of states."""
+
+    stepper: Stepper
+    error: BaseException
+    left: list[int]
+
+    def steps(self, rows: Rows, options: Options | None = None) -> Steps:
+        self.left[0] -= 1
+        if self.left[0] < 0:
+            raise self.error
+        return self.stepper.steps(rows, options)
+
+    def choices(self, rows: Rows) -> Options:
+        return self.stepper.choices(rows)
+
+    def most_steps(self, rows: Rows) -> int:
+        return self.stepper.most_steps(rows)
+
+    def why_not(self, row: Rows, labels: Sequence[int]) -> str:
+        return self.stepper.why_not(row, labels)
+
+
+def corners(problem: str = "corners-3x3") -> PlanningInstance:
+    return load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / f"{problem}.pddl"])
+
+
+def stopped(after: int, error: BaseException) -> PlanningInstance:
+    loaded = corners()
+    stepper = Stopping(loaded.model.stepper, error, [after])
+    return replace(loaded, model=replace(loaded.model, stepper=stepper))
+
+
+@pytest.mark.parametrize("error", [late(), MemoryError()], ids=["time", "memory"])
+def test_search_says_how_far_it_got(error: BaseException) -> None:
+    loaded = stopped(4, error)  # two tables of states to choose a bound
+    with pytest.raises((OutOfTime, OutOfMemory)) as caught:
+        search(loaded.model, loaded.tasks[0])
+    # Within four steps every step leads nearer: 2 * 2 states after one, and after two both robots
+    # are in different ones of three cells between the corners.
+    assert (
+        f"11 states within 2 steps of the initial state of {loaded.tasks[0].name} with a bound of "
+        "4, 6 of them new in the last step" in str(caught.value)
+    )
+
+
+def test_exploring_says_how_far_it_got() -> None:
+    loaded = stopped(1, late())
+    with pytest.raises(OutOfTime, match=r"time limit") as caught:
+        explore(loaded.model, loaded.tasks[0].init[None, :])
+    assert caught.value.reached == (
+        "Reached: 9 states within 1 steps of the initial states, 9 joint steps; 8 states are new in the last step."
+    )
+
+
+def test_exploring_in_pieces_is_the_same_work() -> None:
+    loaded, small = corners("corners-4x4"), PieceSizes(states=7, steps=40)
+    init = loaded.tasks[0].init[None, :]
+    space = explore(loaded.model, init)
+    assert count(loaded.model, init, small) == (len(space), len(space.target))
+    again = explore(loaded.model, init, small)
+    for name in ("rows", "first", "target", "labels", "cost"):
+        assert (getattr(again, name) == getattr(space, name)).all(), name
+
+
+def test_combinations_that_do_not_fit_are_not_made() -> None:
+    loaded = corners("three-robots-3x3")
+    assert isinstance(loaded.model.stepper, ComposingStepper)
+    loaded.model.stepper.piece = 10
+    loaded.model.stepper.memory_left = lambda: 1000
+    # Each robot in its corner may go two ways or stay; two of them may not go to the one cell
+    # between them.
+    with pytest.raises(
+        OutOfMemory, match="3 of 3 robots have 24 combinations of subactions in 1 state: about"
+    ):
+        search(loaded.model, loaded.tasks[0])
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+def test_what_linux_says_of_memory_is_what_psutil_says() -> None:
+    import psutil
+
+    assert address_space() == pytest.approx(psutil.Process().memory_info().vms, rel=0.02)
+    assert memory_left() <= psutil.virtual_memory().available * 1.1

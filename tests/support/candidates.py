@@ -19,7 +19,6 @@ from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan
 from planners.system.errors import BadInput, ProvedImpossible
 from tests.support import naive
-from tests.support.composition_walk import first_break, steps_of
 from tests.support.random_models import graph_text, random_model
 from tests.support.texts import parsed
 
@@ -147,3 +146,38 @@ def small_worlds(states: int = 7, number: int = 16) -> tuple[Candidates, ...]:
         for n in (2, 3)
     )
     return tuple(islice(chain.from_iterable(zip(two, three, strict=True)), number))
+
+
+Nodes = tuple[int, ...]
+#: For each node the next one by the labels of the step.
+Steps = list[dict[Nodes, int]]
+
+
+def steps_of(space: PlanSpace) -> Steps:
+    steps: Steps = [{} for _ in range(len(space))]
+    table = zip(space.sources.tolist(), space.labels.tolist(), space.target.tolist(), strict=True)
+    for node, labels, target in table:
+        steps[node][tuple(labels)] = target
+    return steps
+
+
+def first_break(steps: Steps, robots: int, starts: list[int], *, together: bool) -> int | None:
+    """The least step after which a mixture of plans from one of the nodes begins no optimal plan;
+    with ``together`` of plans in the same states only.
+    """
+    layer, step = {((start,) * robots, start) for start in starts}, 0
+    seen = {*layer}
+    while layer:
+        after = set()
+        for plans, mixture in layer:
+            for chosen in product(*(steps[node].items() for node in plans)):
+                ends = tuple(target for _, target in chosen)
+                if together and len({*ends}) > 1:
+                    continue
+                mixed = tuple(labels[robot] for robot, (labels, _) in enumerate(chosen))
+                if mixed not in steps[mixture]:
+                    return step
+                after.add((ends, steps[mixture][mixed]))
+        layer, step = after - seen, step + 1
+        seen |= after
+    return None

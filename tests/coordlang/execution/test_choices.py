@@ -21,8 +21,8 @@ from planners.search.plans import Plans
 from planners.system.errors import OutOfMemory
 from tests.support import naive
 from tests.support.domains import read
-from tests.support.layered_spaces import layered_space
 from tests.support.naive_choices import Listed, accepted, listed
+from tests.support.random_spaces import layered_space
 from tests.support.task_languages import (
     RUNS,
     in_built_languages,

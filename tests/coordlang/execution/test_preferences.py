@@ -15,8 +15,8 @@ from coordlang.execution.best_sentence import PlanPreference, best_sentence, rea
 from coordlang.execution.task_language import TaskLanguage
 from planners.search.plans import Plan, Plans
 from planners.system.errors import OutOfMemory, UsageError
-from tests.support.layered_spaces import layered_space
 from tests.support.naive import plans_by_sentence, sentence
+from tests.support.random_spaces import layered_space
 from tests.support.task_languages import SHIPPED, random_task_languages, shipped
 
 #: The value of a wish, for the sentence and its plans; smaller is better.

@@ -21,7 +21,7 @@ from planners.check.rules import Verdict, validate
 from planners.joint.model import JointModel
 from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
-from tests.support.composition_walk import first_break, steps_of
+from tests.support.candidates import first_break, steps_of
 from tests.support.random_spaces import random_spaces, runs, separable_spaces
 
 

@@ -4,19 +4,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from itertools import product
 
 import numpy as np
 import pytest
 
+from planners.joint.model import JointModel, PlanningTask
 from planners.loading import PlanningInstance, build, load
 from planners.pddl.model_options import ModelOptions
 from planners.search.optimal_plans import plan_spaces, search
-from planners.search.plans import Plans
+from planners.search.plans import Plan, Plans
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, ProvedImpossible, UsageError
 from tests.support.domains import DOMAINS
-from tests.support.naive_slack import Sequences, TooMany
 from tests.support.random_models import random_model
 
 #: Problems, their least makespans, and their numbers of plans within slack 0, 1 and 2 (the sums
@@ -143,3 +144,49 @@ def test_what_is_no_slack_is_refused(options: dict[str, object], message: str) -
     robots_cannot_wait = loaded("grid-joint", "corners-3x3", 1)
     with pytest.raises(UsageError, match="must be able to wait"):
         search(robots_cannot_wait.model, robots_cannot_wait.tasks[0])
+
+
+#: A joint step: its labels, its cost, and the state that it leads to.
+Step = tuple[tuple[int, ...], int, bytes]
+
+
+class TooMany(Exception):
+    """More sequences than a twin should list."""
+
+
+class Sequences:
+    """The sequences of joint steps of a task that end in its goal, by their number of steps."""
+
+    def __init__(self, model: JointModel, task: PlanningTask, most: int = 4_000) -> None:
+        self.model, self.task, self.most = model.without_slack, task, most
+        self.steps = cache(self._steps)
+
+    def _steps(self, state: bytes) -> list[Step]:
+        found = self.model.successors(np.frombuffer(state, np.uint64)[None, :])
+        rows = zip(found.labels.tolist(), found.cost.tolist(), found.result, strict=True)
+        return [(tuple(labels), cost, row.tobytes()) for labels, cost, row in rows]
+
+    def of_length(self, length: int) -> dict[Plan, int]:
+        """All that end in the goal after so many steps, each with what it costs."""
+        reached: list[tuple[Plan, int, bytes]] = [((), 0, self.task.init.tobytes())]
+        for _ in range(length):
+            reached = [
+                ((*plan, labels), paid + cost, after)
+                for plan, paid, state in reached
+                for labels, cost, after in self.steps(state)
+            ]
+            if len(reached) > self.most:
+                raise TooMany
+        rows = np.frombuffer(b"".join(state for *_, state in reached), np.uint64)
+        rows = rows.reshape(len(reached), len(self.task.init))
+        holds = self.model.holds(self.task.goal, rows)
+        return {plan: paid for (plan, paid, _), ends in zip(reached, holds, strict=True) if ends}
+
+    def within(self, slack: int) -> set[Plan] | None:
+        """The plans within slack, with a rest at the end; None where the task is too hard."""
+        makespan = next((k for k in range(5) if self.of_length(k)), None)
+        if makespan is None:
+            return None
+        found = self.of_length(makespan + slack)
+        cheapest = min(found.values(), default=0)
+        return {plan for plan, paid in found.items() if paid == cheapest}
