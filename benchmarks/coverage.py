@@ -200,8 +200,7 @@ def on_map(path: Path, file: Path, agents: int) -> PlanningInstance:
     with tempfile.TemporaryDirectory() as folder:
         for file_name, text in texts.items():
             (Path(folder) / file_name).write_text(text)
-        (problem,) = [n for n in texts if n.endswith(".pddl") and n != "domain.pddl"]
-        return load_files(Path(folder) / "domain.pddl", [Path(folder) / problem])
+        return load_files(Path(folder) / "domain.pddl", [Path(folder) / "problem.pddl"])
 
 
 def one(name: str, cost: str, heuristic: str) -> Figures:

@@ -54,7 +54,8 @@ def command_of(name: str, record: type[CommandOptions]) -> click.Command:
             with working(record.doing) as context.meta[SAYING]:
                 files = [(each, given[each.name]) for each in on_cli.values() if each.name in given]
                 check_outputs(*_files(arguments, files, options))
-                result = getattr(module, name).with_record(options, **read)
+                function = getattr(module, record.function or name)
+                result = function.with_record(options, **read)
             shown: int | None = getattr(module, f"show_{name}")(result, options)
             return shown
 
@@ -77,7 +78,7 @@ def _positional(
     given: Mapping[str, object],
     options: Mapping[str, Option],
 ) -> dict[str, object]:
-    """The arguments that are given, by what usage calls them; those of ``PROBLEMS...`` as a tuple.
+    """The arguments that are given, by what usage calls them; those of ``..S...`` as a tuple.
 
     One in brackets may be left out.  ``--factored`` stands for DOMAIN and PROBLEM.  Raises
     `click.UsageError` for too few or too many.
@@ -87,13 +88,13 @@ def _positional(
     names = [] if alone else record.takes.split()
     asked = [name for name in names if not (is_factored and name in _PDDL)]
     least = sum(not name.startswith("[") for name in asked)
-    is_open = "PROBLEMS..." in asked
+    is_open = bool(asked) and asked[-1].endswith("...")
     fits = least <= len(arguments) and (is_open or len(arguments) <= len(asked))
     if not fits or (alone and is_factored):
         raise click.UsageError(f"expected {_usage(record.takes, alone)}")
     read: dict[str, object] = dict(zip(asked, arguments, strict=False))
     if is_open:
-        read["PROBLEMS..."] = arguments[len(asked) - 1 :]
+        read[asked[-1]] = arguments[len(asked) - 1 :]
     return {name.strip("[]"): value for name, value in read.items()}
 
 

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``coordlang domains`` and ``tasks``: shipped domains, maps as problems of theirs, task files."""
+"""``coordlang domains`` and ``tasks``: shipped domains, task files."""
 
 from __future__ import annotations
 
 import json
 import os
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,20 +14,17 @@ from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.records import DomainsOptions, OutputFile, TasksOptions
 from coordlang.commands.terminal import echo, write
 from coordlang.language.listed import ListedTask, tasks_text, varied_tasks
-from coordlang.sites.movingai import planning_files
 from coordlang.sites.shipped import about, domain_names, shipped_domains
 from planners.system.errors import UsageError
-from planners.system.messages import echoed, visible
+from planners.system.messages import echoed
 from planners.system.notebook import counted
-from planners.system.writing import copy_folders, write_texts
+from planners.system.writing import copy_folders
 
 
 @public(DomainsOptions)
 def domains(_: Arguments, options: DomainsOptions) -> list[str]:
-    """The names of the domains that are listed or were copied, or of the files of a map."""
+    """The names of the domains that are listed or were copied."""
     copy, shipped = options.copy, shipped_domains()
-    if options.map is not None and options.scen is not None:
-        return _write_map(options.map, options.scen, options.agents or 0, options.output or "")
     names = domain_names(shipped)
     if copy is None:
         return names
@@ -38,7 +34,10 @@ def domains(_: Arguments, options: DomainsOptions) -> list[str]:
         )
     names, target = names if copy[0] == "all" else [copy[0]], copy[1]
     for name in names:  # nobody's changes are written over
-        _require_new(path := os.path.join(target, name) if target else "")
+        path = os.path.join(target, name) if target else ""
+        if os.path.lexists(path):
+            remedy = "Remove it, or name another folder."
+            raise UsageError(f"{path} is there already", remedy=remedy)
         check_outputs([OutputFile("--copy", path, makes_folder=True)], [])
     copy_folders([shipped / name for name in names], target)
     return names
@@ -47,13 +46,7 @@ def domains(_: Arguments, options: DomainsOptions) -> list[str]:
 def show_domains(names: list[str], options: DomainsOptions) -> None:
     """Print the names, or what was written."""
     shipped = shipped_domains()
-    if options.output is not None and options.agents is not None:
-        if options.as_json:
-            echo(json.dumps({"folder": options.output, "files": names}))
-        else:
-            robots, place = counted(options.agents, "robot"), visible(options.output)
-            echo(f"{robots}, written to {place}: {', '.join(names)}")
-    elif options.as_json:
+    if options.as_json:
         echo(json.dumps({"domains": [_data(shipped / name) for name in names]}))
     elif options.copy is not None:
         number = counted(len(names), "domain")
@@ -62,27 +55,6 @@ def show_domains(names: list[str], options: DomainsOptions) -> None:
         width = max(map(len, names))
         for name in names:
             echo(f"{name:<{width}}  {about(shipped / name)}")
-
-
-def _write_map(map_file: str, scen: str, agents: int, output: str) -> list[str]:
-    """Write a map's files, over none that says something else; their names are returned."""
-    texts = planning_files(Path(map_file), Path(scen), agents)
-    paths = {name: os.path.join(output, name) for name in texts}
-    check_outputs([OutputFile("-o", path, True) for path in paths.values()], (map_file, scen))
-    for name, path in paths.items():
-        with suppress(OSError):
-            if Path(path).read_bytes() == texts[name].encode():
-                continue
-        _require_new(path, ", and says something else")
-    write_texts(output, texts)
-    return sorted(texts)
-
-
-def _require_new(path: str, what: str = "") -> None:
-    """Raise `UsageError` for what is there already: nothing is written over."""
-    if os.path.lexists(path):
-        remedy = "Remove it, or name another folder."
-        raise UsageError(f"{path} is there already{what}", remedy=remedy)
 
 
 def _data(folder: Path) -> dict[str, object]:

@@ -52,7 +52,7 @@ def public(
     word_of = {word.strip(".").lower(): word for word in words}
     parameters, of = [], inspect.Parameter
     for name, word in word_of.items():
-        is_many = word == "PROBLEMS..."
+        is_many = word.endswith("...")
         # What a command can do without its function can, too.
         is_needed = word == words[0] != "DOMAIN" and not getattr(record, "alone", "")
         default = of.empty if is_needed or is_many else None

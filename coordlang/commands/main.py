@@ -38,6 +38,7 @@ COMMANDS = {
     "plans": "Count, list or sample all optimal plans of a task.",
     "check": "Compare our optimal cost with Fast Downward's.",
     "coordination": "Decide which tasks require coordination, with a miscoordination shown.",
+    "import": "Write a map or a building as domain, problem and coordinates.",
     "tasks": "Write a task file: a problem with other starts and goals.",
     "build": "Build a coordination language and verify it.",
     "verify": "Check by definition that a file holds a coordination language.",

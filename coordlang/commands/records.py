@@ -99,13 +99,14 @@ class CommandOptions:
 
     Each record that is made of this one is a frozen dataclass.  The command ``takes`` arguments as
     the usage line shows them, and none where the option ``alone`` is given.  A terminal shows what
-    it is ``doing``.  Its function is in the ``module`` of its name, unless another one is named,
-    and searches no task again that was searched before if it ``keeps_plans``.
+    it is ``doing``.  Its ``function`` has its name and is in the ``module`` of its name, unless
+    others are named, and searches no task again that was searched before if it ``keeps_plans``.
     """
 
     takes: ClassVar[str] = ""
     doing: ClassVar[str] = "finding all optimal plans"
     module: ClassVar[str | None] = None
+    function: ClassVar[str | None] = None
     keeps_plans: ClassVar[bool] = True
     alone: ClassVar[str] = ""
 
@@ -556,18 +557,48 @@ class ReportOptions(PlanningOptions, takes="LANGUAGE DOMAIN PROBLEMS...", doing=
 
 
 class DomainsOptions(CommandOptions, doing="copying", keeps_plans=False):
-    """List or copy the domains that come with coordlang, or write a map as PDDL."""
+    """List or copy the domains that come with coordlang."""
 
     copy: tuple[str, str] | None = option(
-        None, "Copy this domain, or all, into DIR/NAME.", "NAME|all DIR", without="map"
-    )
-    map: str | None = option(None, "A map of movingai.com.", "FILE.map", needs="scen")
-    scen: str | None = option(None, "Who starts and goes where.", "FILE.scen", needs="agents")
-    agents: int | None = option(None, "The first K robots of the scenario.", "K", needs="output")
-    output: str | None = option(
-        None, "The folder for a map's domain and problem.", "DIR", names="-o", needs="map"
+        None, "Copy this domain, or all, into DIR/NAME.", "NAME|all DIR"
     )
     as_json: bool = json_option()
+
+
+class ImportOptions(
+    CommandOptions,
+    takes="FILES...",
+    module="importing",
+    function="import_site",
+    doing="reading",
+    keeps_plans=False,
+):
+    """Write FILE.map with FILE.scen, or FILE.building.yaml of Open-RMF, as PDDL."""
+
+    robots: int | str | Sequence[str] | None = option(
+        None, "How many, or their names (default: those that spawn in a building).", "N|NAMES"
+    )
+    task: Sequence[str] = option((), "A robot ends in a place; may be repeated.", "ROBOT:PLACE")
+    clearance: float | None = option(
+        None, "Robots of a building do not come nearer (default: 0).", "METRES"
+    )
+    output: str = cli_option(
+        "",
+        "The folder for domain.pddl, problem.pddl, coordinates.json.",
+        "DIR",
+        names="-o --output",
+        is_output=True,
+        files=(*WRITTEN, "coordinates.json"),
+        required=True,
+    )
+    as_json: bool = json_option()
+
+    def __post_init__(self) -> None:
+        if self.clearance is not None and not 0 <= self.clearance < 1e6:
+            raise UsageError(
+                f"--clearance {self.clearance}: expected metres from 0",
+                remedy="Say --clearance 0.5.",
+            )
 
 
 def record_of(command: str) -> Any:

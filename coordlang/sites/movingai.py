@@ -108,7 +108,7 @@ def read_agents(path: Path, grid: MovingMap, agents: int) -> tuple[Agent, ...]:
     if lines and lines[0][1].split()[0] == "version":
         lines = lines[1:]
     if len(lines) < agents:
-        fewer = f"Say --agents {len(lines)} or fewer."
+        fewer = f"Say --robots {len(lines)} or fewer."
         what = f"this scenario has {len(lines):,} robots, and {agents:,} are asked for"
         raise _wrong(what, fewer if lines else f"Expected a line for each: {_COLUMNS}.", path)
     found: list[Agent] = []
@@ -137,7 +137,7 @@ def planning_files(map_file: Path, scenario: Path, agents: int) -> dict[str, str
     """
     if agents < 1:
         raise UsageError(
-            f"--agents {agents}: at least one robot is needed", remedy="Use --agents 2 or more."
+            f"{agents} robots: at least one is needed", remedy="Say --robots 2 or more."
         )
     grid = read_map(map_file)
     found = read_agents(scenario, grid, agents)
@@ -151,7 +151,7 @@ def planning_files(map_file: Path, scenario: Path, agents: int) -> dict[str, str
         grid.near,
         [cell_name(agent.start) for agent in found],
         [cell_name(agent.goal) for agent in found],
-        written_by="coordlang domains --map",
+        written_by="coordlang import",
     )
     places = (
         f'"{cell_name((row, column))}": [{column}, {row}]'
@@ -161,7 +161,7 @@ def planning_files(map_file: Path, scenario: Path, agents: int) -> dict[str, str
     domain = shipped_domains() / "grid" / "domain.pddl"
     return {
         "domain.pddl": domain.read_text(encoding="utf-8"),
-        f"{stem}-{agents}.pddl": text,
+        "problem.pddl": text,
         "coordinates.json": f'{{"coordinates": {{{", ".join(places)}}}}}\n',
     }
 
@@ -261,7 +261,7 @@ def _agent(path: Path, line: int, text: str, grid: MovingMap) -> Agent:
     width, height, start_x, start_y, goal_x, goal_y = known
     if (height, width) != (grid.height, grid.width):
         what = f"this line is for a map of width {width} and height {height}, not "
-        remedy = "Give --map the map of this scenario, not scaled."
+        remedy = "Give the map of this scenario, not scaled."
         raise _wrong(f"{what}{grid.width} and {grid.height}", remedy, path, line)
     agent = Agent((start_y, start_x), (goal_y, goal_x))
     for which, cell in (("start", agent.start), ("goal", agent.goal)):

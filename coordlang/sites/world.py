@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
-from itertools import combinations, permutations
+from itertools import permutations
 
 from planners.grounding.actions import GroundAction
 from planners.joint.model import JointModel, show
@@ -35,7 +35,7 @@ class Link:
 class World:
     """The things (robots first), the places, and the role of every atom by its text.
 
-    Links are what moves join, and what static atoms relate.
+    Links are what moves join, and what static atoms with two places relate.
     """
 
     things: tuple[str, ...]
@@ -161,14 +161,13 @@ def _other_role(atom: Atom, places: frozenset[str], things: set[str]) -> Role:
 def _links(
     model: JointModel, locations: Sequence[_Reading], places: frozenset[str]
 ) -> Iterator[Link]:
-    """What moves join, and what static atoms relate."""
+    """What moves join, and what static atoms with two places relate."""
     moves = {pair for reading in locations for pair in reading.moves if places.issuperset(pair)}
     moved = {tuple(sorted(pair)) for pair in moves}
     related = {
         tuple(sorted(pair))
         for atom in model.statics
-        for pair in combinations([arg for arg in atom.args if arg in places], 2)
-        if pair[0] != pair[1]
+        if len(pair := {arg for arg in atom.args if arg in places}) == 2
     }
     for first, second in sorted(moved | related):
         yield Link((first, second), (first, second) in moved)

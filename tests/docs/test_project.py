@@ -18,6 +18,7 @@ PACKAGES: dict[str, set[str]] = {
     "ir-sim": {"irsim"},
     "pillow": {"PIL"},
     "python-sat": {"pysat"},
+    "pyyaml": {"yaml"},
     "unified-planning": {"unified_planning"},
     "up-fast-downward": set(),  # an engine that unified-planning finds by itself
 }

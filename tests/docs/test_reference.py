@@ -23,9 +23,9 @@ CLI = DOCS / "cli.md"
 SHARED = {"cores and machines": "Cores and machines", "limits": "Limits"}
 #: Sections of options that all commands have, but some.
 BUT = {
-    "Model options": ("domains", "schema"),
+    "Model options": ("domains", "import", "schema"),
     "Limits": ("domains", "schema"),
-    "Plans that are kept": ("check", "domains", "inspect", "schema", "tasks"),
+    "Plans that are kept": ("check", "domains", "import", "inspect", "schema", "tasks"),
 }
 
 

@@ -29,7 +29,7 @@ LIMIT = 3.0
 #: Seconds after the limit in which a command has to end, and what a busy machine may add to them.
 AFTER, BUSY = 2.0, 8.0
 #: Commands that do no work that grows.
-WITHOUT = {"schema"}
+WITHOUT = {"schema", "domains"}
 #: Words in capitals are files that `given` has.
 EVERY = """
 inspect DOMAIN MAP
@@ -57,7 +57,8 @@ simulate LANGUAGE DOMAIN HUGE
 export LANGUAGE DOMAIN HUGE w0 -o exported
 explain LANGUAGE DOMAIN HUGE --task
 report LANGUAGE DOMAIN HUGE -o report.html
-domains --map BIG-MAP --scen BIG-SCEN --agents 2 -o map
+import BIG-MAP BIG-SCEN --robots 2 -o map
+import BIG-BUILDING --robots 2 --clearance 9 -o building
 """.strip().splitlines()
 
 
@@ -71,7 +72,7 @@ def on_open_floor(
     scenario.write_text("\n".join(["version 1", *lines, ""]))
     if name != "big":
         for file, text in planning_files(grid, scenario, len(ways)).items():
-            (folder / file).write_text(text)
+            (folder / file.replace("problem", f"{name}-{len(ways)}")).write_text(text)
     return folder / f"{name}-{len(ways)}.pddl"
 
 
@@ -82,6 +83,13 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     corners = [(0, 0, 19, 19), (19, 19, 0, 0), (0, 19, 19, 0), (19, 0, 0, 19)]
     still = on_open_floor(folder, "still", 20, [(x, y, x, y) for x, y, _, _ in corners])
     on_open_floor(folder, "big", 1500, [(k, 0, k, 9) for k in range(2)])
+    (folder / "big.building.yaml").write_text(
+        "levels: {L1: {vertices: ["
+        + ", ".join(f"[{x}, {y}, 0, '']" for y in range(60) for x in range(60))
+        + "], lanes: ["
+        + ", ".join(f"[{k}, {k + 1}]" for k in range(3599))
+        + "], measurements: [[0, 1, {distance: [3, 1]}]]}}"
+    )
     found = {
         "DOMAIN": folder / "domain.pddl",
         "HUGE": on_open_floor(folder, "huge", 20, corners),
@@ -94,6 +102,7 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "PLAN": folder / "plan.plan",
         "BIG-MAP": folder / "big.map",
         "BIG-SCEN": folder / "big.scen",
+        "BIG-BUILDING": folder / "big.building.yaml",
     }
     library.build(found["DOMAIN"], still, method="greedy").language.save(found["LANGUAGE"])
     library.lift(found["GRID"], GRID / "gw1-2x2.pddl").save(found["LIFTED"])

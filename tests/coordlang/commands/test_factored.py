@@ -20,7 +20,7 @@ from tests.support.hall import factored
 
 UNIFIED = "ma-basic", "ma-loader", "ma_buttons"
 DRIVERLOG = SHARED / "foreign" / "driverlog-factored"
-NO_TASK = {"schema", "domains"}
+NO_TASK = {"schema", "domains", "import"}
 
 
 @cache

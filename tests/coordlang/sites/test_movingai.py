@@ -34,8 +34,7 @@ def files(folder: Path, agents: list[str], head: str = "version 1\n") -> tuple[P
 def loaded(folder: Path, texts: dict[str, str]) -> PlanningInstance:
     for name, text in texts.items():
         (folder / name).write_text(text)
-    (problem,) = (n for n in texts if n.endswith(".pddl") and n != "domain.pddl")
-    return load(folder / "domain.pddl", [folder / problem])
+    return load(folder / "domain.pddl", [folder / "problem.pddl"])
 
 
 def test_columns_are_x_and_rows_are_y(tmp_path: Path) -> None:
@@ -43,7 +42,7 @@ def test_columns_are_x_and_rows_are_y(tmp_path: Path) -> None:
     agents = read_agents(scenario, read_map(grid), 2)
     assert agents == (Agent((2, 0), (0, 2)), Agent((0, 3), (0, 0)))
     texts = planning_files(grid, scenario, 2)
-    assert sorted(texts) == ["coordinates.json", "domain.pddl", "some-2.pddl"]
+    assert sorted(texts) == ["coordinates.json", "domain.pddl", "problem.pddl"]
     assert texts["domain.pddl"] == (DOMAINS / "grid" / "domain.pddl").read_text()
     model = loaded(tmp_path, texts)
     assert model.problems[0].name == "some-2"
@@ -80,7 +79,7 @@ def test_a_name_that_pddl_does_not_have(tmp_path: Path) -> None:
     grid, scenario = files(tmp_path, ["0 2 2 0"])
     named = scenario.rename(tmp_path / "32 Rooms (a).scen")
     texts = planning_files(grid, named, 1)
-    assert "(problem map-32-rooms-a-1)" in texts["32 Rooms (a)-1.pddl"]
+    assert "(problem map-32-rooms-a-1)" in texts["problem.pddl"]
     loaded(tmp_path, texts)
 
 
@@ -113,28 +112,34 @@ def test_what_is_wrong_with_a_scenario_and_where(
 
 
 def test_no_robots(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="at least one robot"):
+    with pytest.raises(UsageError, match="at least one is needed"):
         planning_files(*files(tmp_path, ["0 0 1 1"]), 0)
 
 
 def test_command(coordlang: Command, tmp_path: Path) -> None:
     grid, scenario = files(tmp_path, ["0 2 2 0", "3 0 0 0"])
-    arguments = ["domains", "--map", grid, "--scen", scenario, "--agents", 2]
+    arguments = ["import", grid, scenario, "--robots", 2]
     outcome = coordlang(*arguments, "-o", tmp_path / "new" / "folder", "--json")
     assert outcome.code == 0
     assert json.loads(outcome.out) == {
         "folder": str(tmp_path / "new" / "folder"),
-        "files": ["coordinates.json", "domain.pddl", "some-2.pddl"],
+        "files": ["coordinates.json", "domain.pddl", "problem.pddl"],
+        "robots": ["r1", "r2"],
+        "unused": {},
     }
     assert coordlang(*arguments, "-o", tmp_path / "new" / "folder").code == 0  # the same again
     (tmp_path / "new" / "folder" / "domain.pddl").write_text("mine")
     outcome = coordlang(*arguments, "-o", tmp_path / "new" / "folder")
     assert (outcome.code, "says something else" in outcome.err) == (2, True)
     assert (tmp_path / "new" / "folder" / "domain.pddl").read_text() == "mine"
-    for partial in (arguments, arguments[:5], ["domains", "--agents", 2], [*arguments[:3]]):
-        assert coordlang(*partial).code == 2
-    copying = [*arguments, "-o", tmp_path / "x", "--copy", "grid", tmp_path / "y"]
-    assert coordlang(*copying).code == 2
+    to = ("-o", tmp_path / "x")
+    for robots in (["--robots", "r1,r2"], ["--robots", 0], []):
+        assert coordlang("import", grid, scenario, *robots, *to).code == 2
+    for more in (["--task", "r1:c0-0"], ["--clearance", 1], [grid]):
+        assert coordlang(*arguments, *more, *to).code == 2
+    assert coordlang(*arguments).code == coordlang("import", grid, "--robots", 2, *to).code == 2
+    (tmp_path / "swapped").mkdir()
+    assert coordlang("import", scenario, grid, "--robots", 2, "-o", tmp_path / "swapped").code == 0
     scenario.write_text("version 1\nnothing\n")
     outcome = coordlang(*arguments, "-o", tmp_path / "x")
     assert (outcome.code, not (tmp_path / "x").exists()) == (31, True)
@@ -151,7 +156,7 @@ def test_maps_of_others_are_read(tmp_path: Path) -> None:
         scenario = tmp_path / "own.scen"
         line = f"0 m {grid.width} {grid.height} {column} {row} {column} {row} 0\n"
         scenario.write_text(line)
-        assert f"(at r1 c{row}-{column})" in planning_files(path, scenario, 1)["own-1.pddl"]
+        assert f"(at r1 c{row}-{column})" in planning_files(path, scenario, 1)["problem.pddl"]
     given = SHARED / "mapf" / "random-32-32-10-random-1.scen"
     grid = read_map(given.with_name("random-32-32-10.map"))
     assert len(read_agents(given, grid, 400)) == 400

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""YAML of others: plain data within bounds, each value with its place in the file."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from planners.system.errors import BadInput, Position
+from planners.system.files import check_utf8, read_bytes
+from planners.system.messages import echoed
+
+#: What a file may hold at most: bytes, values, and lists and mappings in one another.
+_MOST_BYTES = 2**25
+_MOST_VALUES = 1_000_000
+_DEEPEST = 32
+#: libyaml's parser where PyYAML has it: the same events, some ten times sooner.
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+#: Decimal numbers; `float` also reads other ones, which YAML reads in another way (``010``).
+_NUMBER = re.compile(r"[-+]?(0|[1-9]\d*|(?=\.))(\.\d*)?(e[-+]?\d+)?", re.ASCII | re.IGNORECASE)
+_FLAGS = {"true": True, "false": False}
+_NULL = "tag:yaml.org,2002:null"
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """A value of a YAML file, and where it stands."""
+
+    path: str
+    node: yaml.Node
+
+    @property
+    def position(self) -> Position:
+        """Where it begins."""
+        return _position(self.path, self.node.start_mark)
+
+    @property
+    def is_list(self) -> bool:
+        """Whether it is a list."""
+        return isinstance(self.node, yaml.SequenceNode)
+
+    def wrong(self, what: str, remedy: str) -> BadInput:
+        """The error of this value, with file, line and column (the caller raises it)."""
+        return BadInput(what, position=self.position, remedy=remedy)
+
+    def mapping(self) -> dict[str, Value]:
+        """The values of a mapping by their keys; none for an empty value."""
+        if self.node.tag == _NULL:
+            return {}
+        if not isinstance(self.node, yaml.MappingNode):
+            raise self._not("a mapping")
+        found: dict[str, Value] = {}
+        for key, value in self.node.value:
+            name = Value(self.path, key).text()
+            if name in found:
+                remedy = "Remove one of them, or give it another name."
+                raise Value(self.path, key).wrong(f"the key {echoed(name)} occurs twice", remedy)
+            found[name] = Value(self.path, value)
+        return found
+
+    def list(self, least: int = 0) -> list[Value]:
+        """The values of a list of at least so many; none for an empty value."""
+        if self.node.tag == _NULL and not least:
+            return []
+        if not isinstance(self.node, yaml.SequenceNode) or len(self.node.value) < least:
+            raise self._not(f"a list of {least} or more" if least else "a list")
+        return [Value(self.path, each) for each in self.node.value]
+
+    def text(self) -> str:
+        """A text; a number or a flag as it is written, and nothing for an empty value."""
+        if not isinstance(self.node, yaml.ScalarNode):
+            raise self._not("a text")
+        return "" if self.node.tag == _NULL else str(self.node.value)
+
+    def number(self) -> float:
+        """A finite decimal number."""
+        text = self._scalar()
+        if not (_NUMBER.fullmatch(text) and abs(number := float(text)) < 1e12):
+            raise self._not("a number")
+        return number
+
+    def index(self, below: int | None = None) -> int:
+        """A whole number from 0, and below another one if there is one."""
+        text = self._scalar()
+        number = int(text) if text.isascii() and text.isdecimal() and len(text) < 10 else -1
+        if number < 0 or (below is not None and number >= below):
+            until = "" if below is None else f" to {below - 1:,}"
+            raise self._not(f"a whole number from 0{until}")
+        return number
+
+    def flag(self) -> bool:
+        """``true`` or ``false``."""
+        flag = _FLAGS.get(self._scalar().lower())
+        if flag is None:
+            raise self._not("true or false")
+        return flag
+
+    def _scalar(self) -> str:
+        """What is written for one value, and nothing for a list, a mapping or a quoted text."""
+        is_plain = isinstance(self.node, yaml.ScalarNode) and not self.node.style
+        return self.node.value if is_plain else ""
+
+    def _not(self, expected: str) -> BadInput:
+        kinds = {"sequence": "a list", "mapping": "a mapping"}
+        found = kinds.get(self.node.id) or echoed(self.node.value)
+        return self.wrong(f"expected {expected}, found {found}", "Is it the right file?")
+
+
+def read_yaml(path: Path) -> Value:
+    """Read a file of one YAML document; nothing of it is constructed.
+
+    Raises `BadInput`, with the line, for what is no YAML, for tags, anchors and aliases (with them
+    a short file is an endless one), and for too many or too deep values.
+    """
+    data, file = read_bytes(path, most=_MOST_BYTES), str(path)
+    check_utf8(data, Position(file))
+    text = data.decode("utf-8-sig")
+    try:
+        _check(text, file)
+        root = yaml.compose(text, _LOADER)
+    except yaml.YAMLError as error:
+        said = getattr(error, "problem", None) or getattr(error, "reason", "")
+        mark = getattr(error, "problem_mark", None)
+        remedy = "Write it with traffic editor, or correct it in a text editor."
+        raise BadInput(
+            f"this is no YAML: {said}", position=_position(file, mark), remedy=remedy
+        ) from None
+    if root is None:
+        raise BadInput("the file is empty", position=Position(file), remedy="Is it the right file?")
+    return Value(file, root)
+
+
+def _check(text: str, file: str) -> None:
+    """Raise `BadInput` for what no plain data has, one event after another."""
+    depth = 0
+    for number, event in enumerate(yaml.parse(text, _LOADER)):
+        what = ""
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+        if isinstance(event, yaml.NodeEvent) and event.anchor is not None:
+            what = "anchors and aliases are not read"
+        elif getattr(event, "tag", None) is not None:
+            what = f"tags are not read: {echoed(event.tag)}"
+        elif depth > _DEEPEST:
+            what = f"more than {_DEEPEST} lists and mappings in one another"
+        elif number > _MOST_VALUES:
+            what = f"more than {_MOST_VALUES:,} values"
+        if what:
+            remedy = "A building is plain data: write out what it stands for."
+            raise BadInput(what, position=_position(file, event.start_mark), remedy=remedy)
+
+
+def _position(file: str, mark: yaml.Mark | None) -> Position:
+    return Position(file) if mark is None else Position(file, mark.line + 1, mark.column + 1)
