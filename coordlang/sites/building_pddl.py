@@ -205,8 +205,7 @@ def _exclusions(
     for place, lane in blocked:
         yield f"    (keeps-clear {place} {lane.start} {lane.end})"
     for one, other in pairs:
-        first, second = f"{one.start} {one.end}", f"{other.start} {other.end}"
-        yield f"    (excludes {first} {second}) (excludes {second} {first})"
+        yield f"    (excludes {one.start} {one.end} {other.start} {other.end})"
 
 
 def _started(

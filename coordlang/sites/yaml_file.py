@@ -104,8 +104,9 @@ class Value:
         return self.node.value if is_plain else ""
 
     def _not(self, expected: str) -> BadInput:
-        kinds = {"sequence": "a list", "mapping": "a mapping"}
-        found = kinds.get(self.node.id) or echoed(self.node.value)
+        found = "a mapping" if self.node.id == "mapping" else echoed(self.node.value)
+        if self.is_list:
+            found = f"a list of {len(self.node.value):,}"
         return self.wrong(f"expected {expected}, found {found}", "Is it the right file?")
 
 
