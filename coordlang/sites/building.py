@@ -78,11 +78,6 @@ class Building:
     unscaled: tuple[str, ...]
     unused: Mapping[str, int]
 
-    @property
-    def graphs(self) -> tuple[int, ...]:
-        """The numbers of the graphs: each robot drives on the lanes of one."""
-        return tuple(sorted({lane.graph for lane in self.lanes}))
-
     def coordinates(self) -> dict[str, Point]:
         """Where places are drawn, in metres: the levels side by side."""
         drawn: dict[str, Point] = {}

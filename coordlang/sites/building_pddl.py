@@ -192,8 +192,10 @@ def _graph(number: int) -> str:
 
 def _lanes(places: Iterable[str], lanes: Sequence[Lane], *, with_graphs: bool) -> Iterator[str]:
     """The lanes out of each place in a line, and the graphs that have them."""
-    for place in places:
-        out = [lane for lane in lanes if lane.start == place]
+    leaving: dict[str, list[Lane]] = {place: [] for place in places}
+    for lane in lanes:
+        leaving[lane.start].append(lane)
+    for place, out in leaving.items():
         yield from _wrapped(list(dict.fromkeys(f"(lane {place} {lane.end})" for lane in out)))
         if with_graphs:
             yield from _wrapped([f"(on-graph {place} {n.end} {_graph(n.graph)})" for n in out])

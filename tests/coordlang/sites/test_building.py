@@ -87,7 +87,7 @@ def test_what_is_read(tmp_path: Path) -> None:
     assert [name for name, place in found.places.items() if place.is_charger] == ["north-west"]
     assert [name for name, place in found.places.items() if place.is_parking] == ["lift"]
     assert found.unused == {"doors": 2, "speed_limit": 1}
-    assert (found.graphs, found.unscaled) == ((0,), ())
+    assert ({lane.graph for lane in found.lanes}, found.unscaled) == ({0}, ())
 
 
 def test_the_problem_is_understood(tmp_path: Path) -> None:
@@ -171,7 +171,7 @@ def test_lifts_join_levels_and_fiducials_scale_them(tmp_path: Path) -> None:
         (lane.graph, lane.start, lane.end) for lane in found.lanes if "lift_cabin Up" in lane.groups
     ]
     assert rides == [(3, "l1-1", "p-2-1"), (3, "p-2-1", "l1-1")]
-    assert found.graphs == (1, 3)
+    assert {lane.graph for lane in found.lanes} == {1, 3}
     texts, robots = building_files(found, ["s", "r"], ["s:a"], 0)
     assert robots == ("s", "r")
     # The first graph with a lane where r starts leads into the lift, and not out of it again.
@@ -504,7 +504,12 @@ OTHERS = {
 @pytest.mark.parametrize("name", OTHERS)
 def test_buildings_of_others(name: str, tmp_path: Path) -> None:
     found = read_building(BUILDINGS / f"{name}.building.yaml")
-    counts = len(found.places), len(found.lanes), len(found.graphs), len(found.spawning)
+    counts = (
+        len(found.places),
+        len(found.lanes),
+        len({n.graph for n in found.lanes}),
+        len(found.spawning),
+    )
     assert counts == OTHERS[name]
     assert found.unscaled == ()
     texts, robots = building_files(found, None, [], 0.2)
