@@ -5,14 +5,14 @@
                                [--limit SECONDS] [--kept FILE]
 
 Rows are those of Table 1, ``open-RxC`` and ``ring-RxC`` (two robots, all pairs of states),
-``open-RxC-N`` (N robots), and the problems of the CoDMAP domains by their names in
-`benchmarks.coverage` (``codmap``: the first ten of each domain), one task under ``--cost``.
-Without any, Table 1 and some larger grids.  The columns: greedy's words; words after 10 s, and at
-the end, with the proved bound where that is smaller (7..8); refuted partitions (*rounds*); failing
-tuples up to symmetry; walks of a part of the tasks; clauses; wall and CPU seconds of the whole
-build; and the load of the machine over the last minute.  Every number of words is that of a
-language verified by definition.  The time limit is for each row and seed; a row that has no
-language, or no greedy words within the limits, is left out.
+``open-RxC-N`` (N robots), and CoDMAP problems by their names in `benchmarks.coverage`
+(``codmap``: the first ten of each domain), one task under ``--cost``.  Without any, Table 1 and
+some larger grids.  The columns: greedy's words (- where first differences are too many to list);
+words after 10 s, and at the end, with the proved bound where that is smaller (7..8); refuted
+partitions (*rounds*); failing tuples up to symmetry; walks of a part of the tasks; clauses; wall
+and CPU seconds of the whole build; and the load of the machine over the last minute.  Every number
+of words is that of a language verified by definition.  The time limit is for each row and seed; a
+row that has no language within the limits is left out.
 """
 
 from __future__ import annotations

@@ -311,7 +311,7 @@ def _walk(space: PlanSpace) -> list[_Layer]:
         links = [np.zeros((0, 1 + width), np.int64)]
         for move in moves(space, index, table[:, :-1]):
             targets = move.targets(space)
-            parted = (table[move.source, -1] > 0) | ~_one_state(space, targets[:, :-1])
+            parted = (table[move.source, -1] > 0) | ~in_one_state(space, targets[:, :-1])
             parted &= (targets != targets[:, :1]).any(axis=1)
             rows = np.column_stack((move.source, targets, parted))[can_fail(choices, targets)]
             links.append(unique_tuples(rows, bounds)[0])
@@ -328,12 +328,12 @@ def _walk(space: PlanSpace) -> list[_Layer]:
         *layered(space, np.flatnonzero(choices.requires), width, expand), strict=True
     )
     x = tables[-1][:, :-2]
-    same = tail = _one_state(space, x)  # tail: can plans stay in the same states and still fail?
+    same = tail = in_one_state(space, x)  # tail: can plans stay in the same states and still fail?
     none, nothing = np.zeros(0, np.int64), np.zeros(0, np.bool_)
     layers = [_Layer(x, none, none, nothing, nothing)]
     for table, source, child in zip(tables[-2::-1], sources[::-1], children[:0:-1], strict=True):
         x = table[:, :-2]
-        together = _one_state(space, x)
+        together = in_one_state(space, x)
         parts = (table[source, -1] == 0) & ~same[child]
         layers.append(_Layer(x, source, child, parts, ~together[source] & tail[child]))
         stays = source[together[source] & tail[child]]
@@ -342,7 +342,7 @@ def _walk(space: PlanSpace) -> list[_Layer]:
     return layers
 
 
-def _one_state(space: PlanSpace, x: Ints) -> Bools:
+def in_one_state(space: PlanSpace, x: Ints) -> Bools:
     """Whether all of some nodes (k, robots) are of one state."""
     states = space.state[x]
     one: Bools = (states == states[:, :1]).all(axis=1)

@@ -23,7 +23,7 @@ from math import inf
 import numpy as np
 
 from coordlang.required.choices import Choices
-from coordlang.required.composition_walk import can_fail, layered, move_counts, moves
+from coordlang.required.composition_walk import can_fail, in_one_state, layered, move_counts, moves
 from planners.joint.tables import (
     Bools,
     Ints,
@@ -110,7 +110,7 @@ def _walked_divergences(choices: Choices, most: float) -> Ints:
             targets = move.targets(space)
             fails = can_fail(choices, targets)
             last, after = space.state[table[move.source, 0]], space.state[targets[:, :-1]]
-            one = (after == after[:, :1]).all(axis=1)
+            one = in_one_state(space, targets[:, :-1])
             rows = np.column_stack((last, _distinct(after)))[fails & ~one]
             found, _ = unique_rows(np.concatenate((found, rows.astype(np.uint64))))
             # From one node, which their mixture is at, too, all plans begin anyway.

@@ -7,7 +7,6 @@ https://github.com/open-rmf/rmf_traffic_editor has the editor.
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,6 +16,7 @@ from statistics import fmean
 
 from coordlang.sites.coordinates import Point
 from coordlang.sites.yaml_file import Value, read_yaml
+from planners.pddl.pddl_text import named_like
 from planners.system.files import require_seen
 from planners.system.messages import echoed
 
@@ -26,8 +26,6 @@ _READ = {"vertices", "lanes", "measurements", "fiducials"}
 _IGNORED = ("dock_name", "orientation", "speed_limit")
 #: The parameter of the places in a lift.
 _LIFT = "lift_cabin"
-#: Characters of names that PDDL has in names, too.
-_UNNAMED = re.compile(r"[^a-z0-9_-]+")
 #: Metres between levels that are drawn side by side.
 _BETWEEN = 5.0
 
@@ -93,7 +91,7 @@ class Building:
 
 def pddl_name(text: str) -> str:
     """A name that PDDL has, too, as like a text as may be; empty if nothing is left."""
-    name = _UNNAMED.sub("-", text.lower()).strip("-")
+    name = named_like(text)
     return name if not name or name[0].isalpha() else f"p-{name}"
 
 

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 
+import networkx as nx
+
 from coordlang.sites.building import Building, Lane, Place, pddl_name
 from coordlang.sites.clearance import Motion, clash, excluded, motions, staying
 from planners.system.errors import BadInput, Position, UsageError, note
@@ -298,14 +300,6 @@ def _too_near(one: Place, other: Place, clearance: float) -> bool:
 
 
 def _reached(building: Building, start: str, graph: int) -> frozenset[str]:
-    """Where the lanes of a graph lead from a place."""
-    ahead: dict[str, list[str]] = {}
-    for lane in building.lanes:
-        if lane.graph == graph:
-            ahead.setdefault(lane.start, []).append(lane.end)
-    found, left = {start}, [start]
-    while left:
-        new = [end for end in ahead.get(left.pop(), ()) if end not in found]
-        found.update(new)
-        left += new
-    return frozenset(found)
+    """Where the lanes of a graph lead from a place that is on some of them."""
+    lanes = nx.DiGraph((lane.start, lane.end) for lane in building.lanes if lane.graph == graph)
+    return frozenset({start, *nx.descendants(lanes, start)})

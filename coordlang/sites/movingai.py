@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coordlang.sites.shipped import shipped_domains
+from planners.pddl.pddl_text import named_like
 from planners.system.errors import BadInput, Position, UsageError
 from planners.system.files import read_bytes
 from planners.system.messages import echoed
@@ -17,8 +18,6 @@ from planners.system.messages import echoed
 PASSABLE = ".GS"
 BLOCKED = "@OTW"
 _UNKNOWN = re.compile(f"[^{PASSABLE}{BLOCKED}]")
-#: Characters of names that PDDL has in names, too.
-_UNNAMED = re.compile(r"[^a-z0-9_-]+")
 #: The columns of a scenario file.
 _COLUMNS = "bucket, map, width, height, start x, start y, goal x, goal y, optimal length"
 
@@ -142,7 +141,7 @@ def planning_files(map_file: Path, scenario: Path, agents: int) -> dict[str, str
     grid = read_map(map_file)
     found = read_agents(scenario, grid, agents)
     stem = scenario.name.removesuffix(".scen")
-    name = f"{_UNNAMED.sub('-', stem.lower()).strip('-')}-{agents}"
+    name = f"{named_like(stem)}-{agents}"
     cells = [list(map(cell_name, grid.in_row(row))) for row in range(grid.height)]
     text = grid_problem_text(
         name if name[:1].isalpha() else f"map-{name}",

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The least number of words, with proof: counterexamples in, SAT out.
 
-The words of a known language are merged first, which gives the upper bound; then numbers of words
-are decided by the loop (`coordlang.vocabulary.loop`), with clauses that every language must satisfy
-(`coordlang.language.warping`), from below, and from above where that takes long.  The result is
-least among partitions (the paper's ``D_MinW+``); Proposition 8 of docs/concepts.md allows for
-symmetries.
+Words that some states decide, and the words of a known language, merged, give the first upper
+bound; numbers of words are decided by the loop (`coordlang.vocabulary.loop`), with clauses that
+every language must satisfy (`coordlang.language.warping`), from below, and from above where that
+takes long.  The result is least among partitions (the paper's ``D_MinW+``); Proposition 8 of
+docs/concepts.md allows for symmetries.
 """
 
 from __future__ import annotations
@@ -48,7 +48,8 @@ _DEAR = 30_000
 _FOR_KINDS, _WHERE_DEAR = (1, 2, 5, 10), (5, 10)
 #: .. with fewer words than the best language by this part at least.
 _FEWER_WORDS = 5
-#: Where rounds are dear words are many if they are more; so many searches for merges of few facts.
+#: More words than these are many where rounds are dear: then words that a few facts say come first,
+#: and so many searches for merges of them.
 _MANY, _MERGED_SOON = 100, 30
 #: Merges in a row that fail before something else is tried.
 _VAIN = 15
@@ -195,8 +196,7 @@ class MinimalSearch:
     def _decide_between(self, budget: Budget) -> None:
         """Decide numbers between the bounds, as long as that is quick."""
         while self.lower < self.upper and not self._is_spent:
-            size = between(self.lower, self.upper)
-            if not (self._finds_tied(size, budget.rounds) or self._find_or_refute(size, budget)):
+            if not self.decide(between(self.lower, self.upper), budget):
                 return
 
     def _find_fewer_tied(self, rounds: int) -> None:

@@ -7,10 +7,22 @@ arguments restrict nothing.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 
 from planners.pddl.formula_tree import declaration, formula_text, label
 from planners.pddl.lifted import TRUE, And, Constraint, Domain, Effect, Formula, Problem, Schema
+
+#: Characters that are in no name of what coordlang writes for others' names.
+_UNNAMED = re.compile(r"[^a-z0-9_-]+")
+
+
+def named_like(text: str) -> str:
+    """A text with the characters of PDDL names alone; empty if none is left.
+
+    It may begin with a digit, which no name does.
+    """
+    return _UNNAMED.sub("-", text.lower()).strip("-")
 
 
 def domain_text(domain: Domain) -> str:
