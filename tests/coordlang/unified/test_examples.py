@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -199,7 +200,10 @@ LONG = pytest.param("ma_buttons", marks=pytest.mark.thorough)
 
 
 @pytest.mark.parametrize("name", [LONG if name == "ma_buttons" else name for name in SUPPORTED])
-def test_what_is_solved_is_what_others_say(name: str) -> None:
+def test_what_is_solved_is_what_others_say(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # Fast Downward's output.sas is in the working directory
     example = EXAMPLES[name]
     problem = without_metrics(example.problem)
     central = Central(problem) if isinstance(problem, MultiAgentProblem) else None
