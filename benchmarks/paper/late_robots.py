@@ -15,10 +15,9 @@ import numpy as np
 
 from benchmarks.paper.task_choices import sentence_of
 from coordlang.execution.choices import knowing_own, monitor
-from coordlang.execution.monitor import EventMonitor
+from coordlang.execution.monitor import EventMonitor, drawn
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.sentences import Sentence
-from coordlang.simulation.robot import drawn
 from planners.joint.model import JointModel
 from planners.joint.tables import Rows
 from planners.search.plans import Plan, Plans, counts

@@ -48,6 +48,7 @@ COMMANDS = {
     "understand": "Count, list, sample or draw the plans that a sentence leaves open.",
     "plan": "Find one optimal plan under a sentence, or under the best sentence.",
     "choices": "Show what each robot may do under a sentence, whatever the others choose.",
+    "robot": "Execute one robot's part, beside the processes of the other robots.",
     "simulate": "Let robots with wheels do a task in a simulator.",
     "export": "Write a task under a sentence as PDDL, LTLf or behaviour trees.",
     "explain": "Show a language: words as formulas, sentences of a task.",

@@ -462,6 +462,33 @@ class ChoicesOptions(
     output: str | None = output_option("Write to this file instead of stdout.")
 
 
+class RobotOptions(
+    PlanningOptions,
+    takes="LANGUAGE DOMAIN PROBLEM [SENTENCE]",
+    doing="finding the robot's choices",
+):
+    """Execute one robot's part under SENTENCE ("w1 w0"), or one that robots agree on.
+
+    The words are asynchronous.  JSON lines on stdout say what to start, those on stdin what is
+    done (docs/robots.md).  Exit 0: its part is done.
+    """
+
+    robot: str = option("", "Who this is.", "R", required=True)
+    bus: str = option("unix", "How robots hear each other.", "unix[:FOLDER]|zenoh[:CONFIG]")
+    prefer: str | Sequence[str] = option(
+        (), "Without SENTENCE: what it wishes, as for plan; may be repeated.", "PREFERENCE"
+    )
+    silent_after: float = option(10.0, "Name a robot that says nothing so long.", "SECONDS")
+    play: int | None = option(None, "Play the robot, too, with times drawn by this seed.", "SEED")
+    speed: float = option(10.0, "How fast it is played, a second.", "METRES", needs="play")
+    coordinates: CoordinatesSource | None = coordinates_option()
+
+    def __post_init__(self) -> None:
+        for name, value in (("silent-after", self.silent_after), ("speed", self.speed)):
+            if not 0 < value < 1e6:
+                raise UsageError(f"--{name} {value}: expected a number above 0", remedy="Say 1.5.")
+
+
 class SimulateOptions(
     AnswerOptions, takes="LANGUAGE DOMAIN PROBLEM", doing="simulating", alone="replay"
 ):

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from heapq import heapify, heappop, heappush
 from typing import Any
 
@@ -222,6 +222,20 @@ def best_sentence(task_language: TaskLanguage, preferences: Sequence[Preference]
                 f"{more_memory()}.",
             )
     raise AssertionError("a task has at least one sentence")
+
+
+def grants(
+    task_language: TaskLanguage, words: Sequence[int], preferences: Sequence[Preference]
+) -> bool:
+    """Whether every plan with a sentence has the best grade, for each preference over plans."""
+    automata = [one for one in preferences if isinstance(one, PlanPreference)]
+    fits = replace(task_language, space=task_language.plans_with(words), task=0)
+    return all(
+        one.grade(memory) == 0
+        for (_, memories), after in zip(*_points(fits, automata), strict=True)
+        if not after
+        for one, memory in zip(automata, memories, strict=True)
+    )
 
 
 class _Graph:

@@ -16,12 +16,15 @@ import gzip
 import json
 import re
 import zlib
+from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from fnmatch import fnmatchcase
 from functools import cache, partial
 from io import BytesIO
+from itertools import accumulate
+from random import Random
 from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeVar
 
 FORMAT = "coordlang/choices"
@@ -571,6 +574,12 @@ class EventMonitor(Monitor):
     def _count(self, ended: tuple[str, str]) -> None:
         counted = self._counted.get(ended, ())
         self._counts = self._counts | {key: self._counts.get(key, 0) + 1 for key in counted}
+
+
+def drawn(monitor: Monitor, random: Random, allowed: Sequence[str | None]) -> str | None:
+    """Draw what to do next: each own subplan that is left has the same probability."""
+    left = [monitor.after(subaction).remaining for subaction in allowed]
+    return allowed[bisect_right([*accumulate(left)], random.randrange(sum(left)))]
 
 
 def _own_event(record: Any, where: str) -> _OwnEvent:

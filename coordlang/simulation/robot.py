@@ -10,13 +10,11 @@ monitor only, and numbers and texts are all that goes in and out.
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate
 from random import Random
 
-from coordlang.execution.monitor import IDLE, EventMonitor, Monitor, NotPossible
+from coordlang.execution.monitor import IDLE, EventMonitor, Monitor, NotPossible, drawn
 from coordlang.simulation.pace import Kind, Message, OwnWords, Pace
 
 #: Metres x, metres y, heading in radians (0: to the right, counterclockwise).
@@ -290,9 +288,3 @@ class Robot:
             self._events.append(("stopped", {}))
         ahead = _GAIN * math.dist(sensed.pose[:2], target) * max(0.0, math.cos(angle))
         return max(0.0, min(_bounded(ahead, SPEED), room)), turn
-
-
-def drawn(monitor: Monitor, random: Random, allowed: Sequence[str | None]) -> str | None:
-    """Draw what to do next: each own subplan that is left has the same probability."""
-    left = [monitor.after(subaction).remaining for subaction in allowed]
-    return allowed[bisect_right([*accumulate(left)], random.randrange(sum(left)))]

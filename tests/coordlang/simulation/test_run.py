@@ -25,6 +25,7 @@ import pytest
 import coordlang.simulation.robot as logic
 from coordlang.commands.building import build_language
 from coordlang.execution.best_sentence import best_sentence
+from coordlang.execution.monitor import drawn
 from coordlang.execution.task_language import language_in_task
 from coordlang.language.candidates import from_problems
 from coordlang.simulation.pace import Kind, Message
@@ -38,7 +39,7 @@ from coordlang.simulation.record import (
     to_bytes,
 )
 from coordlang.simulation.recording import ROBOTS, Scene, frames, new_figure, recorded
-from coordlang.simulation.robot import Sensed, drawn
+from coordlang.simulation.robot import Sensed
 from coordlang.simulation.run import record_of, runs_of
 from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Mission

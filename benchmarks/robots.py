@@ -1,0 +1,300 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Processes of robots that act under a sentence in buildings of Open-RMF.
+
+    python -m benchmarks.robots [ROW ..] [--runs N] [--kill] [--kept FILE]
+
+A row is a building and a number of robots, ``office-2``, each of which drives to a place that is
+drawn; there are some tasks for each row.  Every robot is a process (forked when its choices are
+known), plays itself, and hears the others over ``--bus unix``.  With ``--kill`` one of them is
+killed at some moment and started again.  The lines that the processes wrote are checked by
+definition: no event overlaps one that it interferes with, and all events in the order of their
+starts are a plan that the independent checker accepts.  The columns: runs; runs in which something
+overlapped, in which somebody had not ended after a minute, and in which all arrived; robots killed;
+events and messages of a run; microseconds of `EventMonitor.may_start`, the median and 99.9 %.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from pathlib import Path
+from random import Random
+from time import monotonic, perf_counter, sleep
+from typing import Any
+
+import coordlang
+from benchmarks import frame
+from benchmarks.frame import SHARED, Figures, KeptRows, PrintedTable
+from coordlang.commands.records import RobotOptions
+from coordlang.commands.robot import RobotInTask, robot
+from coordlang.execution.monitor import EventMonitor, Monitor, drawn
+from planners.check.rules import validate
+from planners.joint.traces import Traces
+from planners.loading import PlanningInstance
+from planners.pddl import parse_domain, parse_problem
+from planners.pddl.sexpr import Source
+from planners.system.errors import CoordlangError
+from planners.system.limits import time_limit
+
+BUILDINGS = ("office", "hotel", "campus", "triple_H")
+ROWS = [f"{name}-{robots}" for name in BUILDINGS for robots in (2, 3, 4)]
+#: Tasks of a row, metres a second, seconds after which a run is stuck.
+TASKS, SPEED, STUCK = 5, 60.0, 60.0
+COLUMNS = (
+    ("row", -18),
+    ("tasks", 5),
+    ("runs", 5),
+    ("overlaps", 8),
+    ("stuck", 5),
+    ("arrived", 7),
+    ("killed", 6),
+    ("events", 6),
+    ("messages", 8),
+    ("us", 6),
+    ("99.9 %", 6),
+)
+
+#: What one robot did: the start, the end, what is done, and with whom it meets.
+Span = tuple[float, float, str, tuple[str, ...]]
+
+
+def spans(lines: Sequence[Mapping[str, Any]]) -> list[Span]:
+    """The events of a robot by what its processes wrote; an event that is told again is one."""
+    starts: dict[int, Mapping[str, Any]] = {}
+    ends: dict[int, float] = {}
+    for line in lines:
+        if "start" in line:
+            starts.setdefault(line["event"], line)
+        elif "done" in line:
+            ends[line["event"]] = line["time"]
+    return [
+        (line["time"], ends[number], line["start"], tuple(line.get("with", ())))
+        for number, line in sorted(starts.items())
+        if number in ends
+    ]
+
+
+def overlaps(did: Mapping[str, Sequence[Span]], loaded: PlanningInstance) -> list[str]:
+    """The pairs of events that interfere, meet not, and overlap."""
+    model = loaded.model.in_step
+    interfering = Traces(model).interfering
+    found = []
+    for one, other in combinations(model.robots, 2):
+        i, j = model.robots.index(one), model.robots.index(other)
+        for start, end, text, met in did[one]:
+            label = model.labels[i].index(text)
+            for its_start, its_end, its, _ in did[other]:
+                is_apart = end <= its_start or its_end <= start or other in met
+                if not is_apart and interfering[i, j][label, model.labels[j].index(its)]:
+                    found.append(f"{text} and {its}")
+    return found
+
+
+def has_arrived(did: Mapping[str, Sequence[Span]], loaded: PlanningInstance) -> bool:
+    """Whether all events in the order of their starts, those that meet at once, are a plan."""
+    model, order = loaded.model, []
+    for robot_ in model.robots:
+        order += [(span, robot_) for span in did[robot_]]
+    steps: list[dict[str, str]] = []
+    waiting = sorted(order)
+    while waiting:
+        (_, _, text, met), own = waiting.pop(0)
+        step = {own: text}
+        for other in met:
+            at = next(n for n, (_, name) in enumerate(waiting) if name == other)
+            step[other] = waiting.pop(at)[0][2]
+        steps.append(step)
+    plan = [tuple(step.get(name) for name in model.robots) for step in steps]
+    return validate(loaded.domain, loaded.problems[0], loaded.team, plan).valid
+
+
+class Run:
+    """One run of forked processes; ``lines`` are what each robot's processes wrote."""
+
+    def __init__(self, team: Mapping[str, RobotInTask], folder: Path, seed: int) -> None:
+        self.team, self.folder, self.random, self.seed = team, folder, Random(seed), seed
+        self.pids = {name: self._fork(name) for name in team}
+        self.killed = 0
+
+    def _fork(self, name: str) -> int:
+        pid = os.fork()
+        if pid:
+            return pid
+        code = 1
+        try:
+            with open(self.folder / f"{name}.lines", "a", buffering=1) as file:
+                sys.stdin = None
+                own = self.team[name]
+                options = RobotOptions(
+                    robot=name,
+                    bus=f"unix:{self.folder}",
+                    play=self.seed,
+                    speed=SPEED,
+                )
+                own.act(options, lambda line: print(json.dumps(line), file=file))
+                file.write(json.dumps({"messages": own.executive.sent}) + "\n")
+            code = 0
+        finally:
+            os._exit(code)
+
+    def wait(self, kill_at: float | None) -> bool:
+        """Whether all ended well in time; one process is killed and started again at some time."""
+        begun = monotonic()
+        again: tuple[float, str] | None = None
+        while self.pids or again:
+            now = monotonic() - begun
+            if now > STUCK:
+                for pid in self.pids.values():
+                    os.kill(pid, signal.SIGKILL)
+                    os.waitpid(pid, 0)
+                return False
+            if kill_at is not None and now > kill_at and len(self.pids) == len(self.team):
+                name = self.random.choice(sorted(self.pids))
+                os.kill(self.pids[name], signal.SIGKILL)
+                os.waitpid(self.pids.pop(name), 0)
+                self.killed, kill_at = 1, None
+                again = now + self.random.uniform(0, 0.3), name
+            if again and now > again[0]:
+                self.pids[again[1]] = self._fork(again[1])
+                again = None
+            for name, pid in [*self.pids.items()]:
+                done, status = os.waitpid(pid, os.WNOHANG)
+                if done:
+                    del self.pids[name]
+                    if status:
+                        return False
+            sleep(0.002)
+        return True
+
+    def lines(self, name: str) -> list[dict[str, Any]]:
+        """What the processes of a robot wrote; a last line that was cut off is left out."""
+        text = (self.folder / f"{name}.lines").read_text()
+        return [json.loads(line) for line in text.split("\n") if line.endswith("}")]
+
+
+def tasks_of(
+    name: str, robots: int
+) -> tuple[dict[str, tuple[float, float]], list[PlanningInstance]]:
+    """Where the places of a building lie, and tasks: each robot to another place that is drawn."""
+    random = Random(f"{name} {robots}")
+    path = SHARED / "rmf" / f"{name}.building.yaml"
+    found: list[PlanningInstance] = []
+    site = coordlang.import_site(path, robots=robots)
+    read = json.loads(site.texts["coordinates.json"])["coordinates"]
+    points = {place: (x, y) for place, (x, y) in read.items()}
+    for _ in range(4 * TASKS):
+        goals = random.sample(sorted(points), robots)
+        pairs = [f"{own}:{place}" for own, place in zip(site.robots, goals, strict=True)]
+        texts = coordlang.import_site(path, robots=robots, task=pairs).texts
+        domain = parse_domain(Source("domain.pddl", texts["domain.pddl"]))
+        problem = parse_problem(Source("problem.pddl", texts["problem.pddl"]), domain)
+        loaded = coordlang.load(domain, problem, asynchronous=True)
+        try:
+            with time_limit(30):
+                coordlang.plans(loaded, problem)
+        except CoordlangError:
+            continue
+        found.append(loaded)
+        if len(found) == TASKS:
+            break
+    return points, found
+
+
+def measured(row: str, runs: int, is_killing: bool) -> Figures:
+    """The figures of a row."""
+    name, _, robots = row.rpartition("-")
+    points, tasks = tasks_of(name, int(robots))
+    figures: Figures = dict.fromkeys((head for head, _ in COLUMNS), 0)
+    figures |= {"row": row, "tasks": len(tasks)}
+    times: list[float] = []
+    for number, loaded in enumerate(tasks):
+        problem = loaded.problems[0]
+        language = coordlang.build(loaded, problem).language
+        team = {
+            own: robot(language, loaded, problem, robot=own, coordinates=points)
+            for own in loaded.model.robots
+        }
+        for seed in range(number, runs, len(tasks)):
+            _count(figures, team, loaded, seed, is_killing)
+        words = coordlang.plan(language, loaded, problem, prefer="most-plans").sentence
+        found = coordlang.choices(language, loaded, problem, words)
+        for _ in range(20):
+            own = {name: found.monitor(name) for name in found.robots}
+            _run_here(own, Random(len(times)), times)
+    times.sort()
+    if figures["runs"]:
+        figures["events"] = round(figures["events"] / figures["runs"])
+        figures["messages"] = round(figures["messages"] / figures["runs"])
+    figures["us"] = round(1e6 * times[len(times) // 2], 1)
+    figures["99.9 %"] = round(1e6 * times[int(len(times) * 0.999)], 1)
+    return figures
+
+
+def _count(
+    figures: Figures,
+    team: Mapping[str, RobotInTask],
+    loaded: PlanningInstance,
+    seed: int,
+    is_killing: bool,
+) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        run = Run(team, Path(folder), seed)
+        has_ended = run.wait(run.random.uniform(0, 0.6) if is_killing else None)
+        lines = {name: run.lines(name) for name in team}
+    did = {name: spans(its) for name, its in lines.items()}
+    figures["runs"] += 1
+    figures["stuck"] += not has_ended
+    figures["killed"] += run.killed
+    figures["overlaps"] += bool(overlaps(did, loaded))
+    figures["arrived"] += has_ended and has_arrived(did, loaded)
+    figures["events"] += sum(map(len, did.values()))
+    figures["messages"] += sum(line.get("messages", 0) for its in lines.values() for line in its)
+
+
+def _run_here(own: Mapping[str, Monitor], random: Random, times: list[float]) -> None:
+    """Run all robots in this process; takes the seconds of each `EventMonitor.may_start`."""
+    done = dict.fromkeys(own, 0)
+    while waiting := [name for name in own if not own[name].finished]:
+        moved = False
+        for name in waiting:
+            at = own[name]
+            assert isinstance(at, EventMonitor)
+            begun = perf_counter()
+            may = at.may_start()
+            times.append(perf_counter() - begun)
+            if not may:
+                continue
+            event, moved = drawn(at, random, may), True
+            if event is None:
+                at.did(None)
+                continue
+            at.start(event)
+            at.did(event)
+            done[name] += 1
+            for other in own.values():
+                if other is not at and isinstance(other, EventMonitor):
+                    other.ended(name, at.subaction(event), done[name])
+        if not moved:
+            return  # a meeting
+
+
+def main() -> None:
+    """Print the rows that are asked for."""
+    parser = frame.arguments(__doc__)
+    parser.add_argument("--runs", type=int, default=100, help="of a row (100)")
+    parser.add_argument("--kill", action="store_true", help="kill one process in each run")
+    given = parser.parse_args()
+    kept = KeptRows(given.kept)
+    table = PrintedTable(*COLUMNS)
+    for row in frame.asked_for(ROWS, given.rows):
+        figures = kept.get(row, lambda: measured(row, given.runs, given.kill))  # noqa: B023
+        table.print(*(figures[head] for head, _ in COLUMNS))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``coordlang robot``: one robot's executive, a process of its own."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import selectors
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from hashlib import sha256
+from random import Random
+from time import monotonic, time
+from typing import Any
+
+from coordlang.commands.inputs import Arguments, InTask, public, read_coordinates_of
+from coordlang.commands.records import RobotOptions
+from coordlang.commands.terminal import echo
+from coordlang.execution.agreement import Agreement
+from coordlang.execution.best_sentence import best_sentence, grants, read_preference
+from coordlang.execution.bus import Bus, opened
+from coordlang.execution.choices import choices, monitor
+from coordlang.execution.executive import Executive
+from coordlang.execution.monitor import EventMonitor
+from coordlang.execution.task_language import TaskLanguage
+from coordlang.language.file import to_data
+from coordlang.language.provenance import domain_sha256
+from coordlang.sites.coordinates import Point
+from planners.system.errors import BadInput, Refuted, UsageError
+
+#: What robots without wishes propose.
+_WISHES = ("most-plans",)
+#: Seconds until what could not be sent is sent again.
+_AGAIN = 0.005
+#: Bytes that are read of the driver at once.
+_CHUNK = 1 << 16
+#: A played event takes up to this part less or more than its way needs, and now and then so many
+#: times that long; before the next one the robot rests for this part of a metre's time.
+_UNEVEN, _LATE, _REST = 0.5, 5.0, 0.3
+_HOW_OFTEN_LATE = 0.1
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class RobotInTask(InTask):
+    """One robot in a task under a language, ready to act: ``executive`` says what it may start.
+
+    ``run`` names what robots must have alike to hear each other, ``points`` are where places lie.
+    """
+
+    used: TaskLanguage
+    executive: Executive
+    run: str
+    points: Mapping[str, Point]
+    shown = ("run",)
+
+    def act(self, options: RobotOptions, write: Callable[[Mapping[str, Any]], None]) -> None:
+        """Act until its part is done and nobody needs it; ``write`` is given each line.
+
+        Raises `UsageError` if the bus cannot be opened, and `BadInput` if stdin, which says what
+        is done, ends too early.
+        """
+        own, robots = self.executive, self.used.model.robots
+        own.life = int.from_bytes(os.urandom(6))
+        player = None
+        if options.play is not None:
+            own.random = Random(f"{options.play} {own.robot}")
+            player = Player(own.random, self.points, options.speed)
+        with closing(opened(options.bus, self.run, own.robot, robots)) as bus:
+            _Loop(own, bus, player, write).run()
+
+
+@public(RobotOptions)
+def robot(files: Arguments, options: RobotOptions) -> RobotInTask:
+    """Prepare one robot's executive in a task.
+
+    Raises `UsageError` for a robot that there is not, for words in step, and for a sentence and
+    wishes at once; `Refuted` where the language guarantees nothing; `NoPlanFits` and `BadInput` for
+    a sentence that is none.
+    """
+    sentence = files.values.get("SENTENCE")
+    if sentence is not None and options.prefer:
+        raise UsageError("--prefer: the sentence is given", remedy="Leave out one of the two.")
+    read = files.task(options.coordinates)
+    used, robots = read.used, read.used.model.robots
+    if options.robot not in robots:
+        raise UsageError(
+            f"--robot {options.robot}: there is no such robot",
+            remedy=f"The robots are {', '.join(robots)}.",
+        )
+    if not used.model.is_asynchronous:
+        raise UsageError(
+            "the words are for joint steps, and a process keeps no common step",
+            remedy="Build with --asynchronous.",
+        )
+    if not used.guaranteed:
+        raise Refuted("the language guarantees nothing in this task", remedy="Build one for it.")
+    if sentence is not None:
+        words = used.words_of(sentence)
+        used.plans_with(words)
+        sentence = used.text(words)
+    number, others = robots.index(options.robot), [r for r in robots if r != options.robot]
+    wishes = (options.prefer,) if isinstance(options.prefer, str) else tuple(options.prefer)
+    for wish in wishes:
+        read_preference(used, wish)
+
+    def best(wished: Sequence[str]) -> str:
+        wanted = [read_preference(used, wish) for wish in wished or _WISHES]
+        return used.text(best_sentence(used, wanted).words)
+
+    def accepts(proposed: str, wished: Sequence[str]) -> bool:
+        wanted = [read_preference(used, wish) for wish in wished]
+        return grants(used, used.words_of(proposed), wanted)
+
+    def monitor_of(agreed: str) -> EventMonitor:
+        found = choices(used, used.words_of(agreed))
+        own = monitor(found.fits, found.robots[number], agreed)
+        assert isinstance(own, EventMonitor)
+        return own
+
+    data = {key: value for key, value in to_data(used.language).items() if key != "producer"}
+    same = [domain_sha256(read.files.domain), read.files.problems[0].source.sha256, data]
+    run = sha256(json.dumps(same, sort_keys=True).encode()).hexdigest()[:16]
+    executive = Executive(
+        options.robot,
+        others,
+        run,
+        Agreement(options.robot, others, sentence, wishes, best, accepts),
+        monitor_of,
+        options.silent_after,
+    )
+    points = read_coordinates_of(options.coordinates, read.files.problems[0])
+    return RobotInTask(used, executive, run, points)
+
+
+def show_robot(found: RobotInTask, options: RobotOptions) -> int:
+    """Act, and print each line at once."""
+
+    def write(line: Mapping[str, Any]) -> None:
+        echo(json.dumps(line))
+        sys.stdout.flush()
+
+    found.act(options, write)
+    return 0
+
+
+class _Loop:
+    """Carries lines and messages between an executive, its driver, its bus, and the time."""
+
+    def __init__(
+        self,
+        own: Executive,
+        bus: Bus,
+        player: Player | None,
+        write: Callable[[Mapping[str, Any]], None],
+    ) -> None:
+        self._own, self._bus, self._player, self._write = own, bus, player, write
+        self._read = b""
+        self._since = time() - monotonic()
+        self._selector = selectors.SelectSelector()  # which takes files, too
+        self._selector.register(bus.fileno(), selectors.EVENT_READ)
+        self._stdin = None if sys.stdin is None or sys.stdin.closed else sys.stdin.fileno()
+        if self._stdin is not None:
+            self._selector.register(self._stdin, selectors.EVENT_READ)
+
+    @property
+    def _now(self) -> float:
+        """Seconds since the epoch, that never go back."""
+        return self._since + monotonic()
+
+    def run(self) -> None:
+        """Until nobody needs the robot any more, and all that it had to say is sent."""
+        is_sent = False
+        while not (is_sent and self._own.may_leave(self._now)):
+            due = (
+                self._own.due() if self._player is None else min(self._own.due(), self._player.due)
+            )
+            wait = max(0.0, due - self._now)
+            ready = {key.fd for key, _ in self._selector.select(wait if is_sent else _AGAIN)}
+            if self._stdin in ready:
+                self._hears_driver()
+            for data in self._bus.receive():
+                self._own.hears(data, self._now)
+            self._own.tick(self._now)
+            if self._player is not None:
+                self._player.act(self._own, self._now)
+            is_sent = self._tells()
+
+    def _tells(self) -> bool:
+        """Write lines, then messages: what others know of was told to the driver before."""
+        lines, self._own.lines = self._own.lines, []
+        for line in lines:
+            self._write(line)
+        unsent = [to for to, data in self._own.messages() if not self._bus.send(to, data)]
+        for to in unsent:
+            self._own.unsent(to)
+        return not unsent
+
+    def _hears_driver(self) -> None:
+        assert self._stdin is not None
+        read = os.read(self._stdin, _CHUNK)
+        if not read:
+            self._selector.unregister(self._stdin)
+            self._stdin = None
+            if self._player is None and not self._own.is_done:
+                raise BadInput(
+                    "stdin ended before the robot's part was done",
+                    remedy='It says what is done: {"event": 1, "done": true}; or use --play.',
+                )
+        *lines, self._read = (self._read + read).split(b"\n")
+        for line in lines:
+            if line.strip():
+                self._own.reads(line.decode(errors="replace"), self._now)
+
+
+class Player:
+    """Plays a robot: an event takes as long as its way at some speed, and random delays.
+
+    ``points`` are the places in metres; what leads nowhere counts as one metre.
+    """
+
+    def __init__(self, random: Random, points: Mapping[str, Point], speed: float) -> None:
+        self._random, self._points, self._speed = random, points, speed
+        self._number = 0
+        #: When it has something to do.
+        self.due = math.inf
+
+    def act(self, own: Executive, now: float) -> None:
+        """Begin or end the event that is under way, if it is time."""
+        if own.underway is None:
+            return
+        number, subaction = own.underway
+        if number != self._number:
+            self._number, self.due = number, now + self._seconds(subaction)
+        if now < self.due:
+            return
+        self.due = math.inf
+        own.lines.append({"event": number, "done": subaction, "time": now})
+        own.holds_until = now + self._random.expovariate(1 / (_REST / self._speed))
+        own.reads(json.dumps({"event": number, "done": subaction}), now)
+
+    def _seconds(self, subaction: str) -> float:
+        names = subaction.strip("()").split()
+        places = [self._points[name] for name in names if name in self._points]
+        metres = math.dist(places[0], places[-1]) if len(places) > 1 else 1.0
+        times = self._random.uniform(1 - _UNEVEN, 1 + _UNEVEN)
+        if self._random.random() < _HOW_OFTEN_LATE:
+            times *= _LATE
+        return metres * times / self._speed

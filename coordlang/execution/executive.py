@@ -1,0 +1,425 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One robot's executive: when it starts which event, by what it hears of the others.
+
+An `Executive` does no input and output and never waits: it is told lines of its driver, messages of
+the other robots and the time, and leaves lines and messages to be written.  It keeps no common step
+with the others.  What makes it safe is that of another robot only *ended* events count; all else
+here is about losing nothing:
+
+- A robot begins when it has heard of every other one, and knows of itself what they know.
+- An event is begun when another robot has confirmed that it knows of it, and only then the driver
+  is told.  So a robot that is started again learns from the others where it is.
+- Who has finished stays until all have, to be asked.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from random import Random
+from typing import Any
+
+from coordlang.execution.agreement import Agreement
+from coordlang.execution.fleet_log import (
+    Contradiction,
+    Event,
+    Message,
+    RobotLog,
+    Version,
+    decoded,
+    encoded,
+)
+from coordlang.execution.monitor import EventMonitor, MonitorError, NotPossible, drawn
+
+#: In the time after which a robot counts as silent each one is heard so often, if it has nothing
+#: else to tell.
+_BEATS = 4
+#: Who is done waits so many times that long for a silent robot to come back.
+_PATIENCE = 6
+#: Parts of a wish, as `Monitor.can` names them.
+_DETOURS = frozenset({"visit", "avoid", "do", "never"})
+#: Characters of a refused line that are shown, and different messages that are refused with a line.
+_SHOWN, _REFUSED = 200, 100
+
+
+class Executive:
+    """One robot's executive.
+
+    Parameters
+    ----------
+    robot, others
+        The names.
+    run
+        Names what all must have alike: domain, task and words.
+    agreement
+        On which sentence.
+    monitor_of
+        The robot's choices under a sentence.
+    silent_after
+        Seconds after which a robot that says nothing is named to the driver.
+
+    ``lines`` are for the driver, oldest first; whoever writes them takes them away.  ``life`` is
+    another number for every process that ever is this robot.  ``random`` draws what to do; without
+    it the robot does as little as it may, and keeps most open.  So many messages were ``sent``.
+    """
+
+    def __init__(
+        self,
+        robot: str,
+        others: Sequence[str],
+        run: str,
+        agreement: Agreement,
+        monitor_of: Callable[[str], EventMonitor],
+        silent_after: float,
+    ) -> None:
+        self.robot, self.others, self.lines = robot, tuple(others), list[dict[str, Any]]()
+        self.life = self.sent = 0
+        self.random: Random | None = None
+        #: Nothing begins before this time.
+        self.holds_until = 0.0
+        self._run, self._agreement = run, agreement
+        self._monitor_of, self._silent_after = monitor_of, silent_after
+        self._monitor: EventMonitor | None = None
+        self._logs = {name: RobotLog() for name in (robot, *others)}
+        self._own = self._logs[robot]
+        #: What the monitor was told: own events that started and ended, and those of the others.
+        self._started = 0
+        self._counted = dict.fromkeys(self._logs, 0)
+        #: Of each other robot its process, whether it has heard of this one, and what it knows.
+        self._lives: dict[str, int] = {}
+        self._heard_us: dict[str, bool] = dict.fromkeys(others, False)
+        self._their: dict[str, Mapping[str, Version]] = {name: {} for name in others}
+        self._heard_at: dict[str, float] = {}
+        self._silent: set[str] = set()
+        self._refused: set[str] = set()
+        self._wishes: list[dict[str, Any]] = []
+        self._to_tell = set(others)
+        self._beat_at = 0.0
+        self._has_finished = False
+
+    # ---- what its driver and the loop see
+
+    @property
+    def is_done(self) -> bool:
+        """Whether its part is done."""
+        return self._own.version.is_done
+
+    @property
+    def underway(self) -> tuple[int, str] | None:
+        """The number (from 1) and the subaction of the event that the driver does now."""
+        version = self._own.version
+        if version.told == version.ended:
+            return None
+        return version.told, self._own.events[version.ended].subaction
+
+    def may_leave(self, now: float) -> bool:
+        """Whether nobody needs it any more: all are done and know that it is, or seem lost."""
+        patience = _PATIENCE * self._silent_after
+        return self.is_done and all(
+            now - self._heard_at[name] >= patience
+            or (self._logs[name].version.is_done and self._version_by(name, self.robot).is_done)
+            for name in self.others
+        )
+
+    def due(self) -> float:
+        """When `tick` has something to do again."""
+        waits = [at for name, at in self._heard_at.items() if name not in self._silent]
+        silent = min(waits, default=self._beat_at) + self._silent_after
+        held = [self.holds_until] if self.holds_until > 0 else []
+        return min(self._beat_at, silent, *held)
+
+    def tick(self, now: float) -> None:
+        """Do what is due at this time."""
+        if not self._heard_at:
+            self._heard_at = dict.fromkeys(self.others, now)
+        if now >= self._beat_at:
+            self._beat_at = now + self._silent_after / _BEATS
+            self._to_tell |= {*self.others}
+        for name in self.others:
+            is_late = now - self._heard_at[name] >= self._silent_after
+            if name not in self._silent and is_late:
+                self._silent.add(name)
+                if not self._logs[name].version.is_done:
+                    self.lines.append({"silent": name, "time": now})
+        if 0 < self.holds_until <= now:
+            self.holds_until = 0.0
+        self._advance(now)
+
+    # ---- the driver
+
+    def reads(self, line: str, now: float) -> None:
+        """Take in a line of the driver: what is done, a wish, or that it will be late."""
+        try:
+            said = json.loads(line)
+            if not isinstance(said, dict):
+                raise ValueError("expected an object")
+            if "done" in said:
+                self._ended(said)
+            elif "wish" in said:
+                self._wishes.append(_wish(said["wish"]))
+            elif "late" in said:
+                self._late(said["late"])
+            else:
+                raise ValueError("expected done, wish or late")
+        except (ValueError, RecursionError) as error:
+            self._refuse(line[:_SHOWN], str(error))
+        self._advance(now)
+
+    def _ended(self, said: Mapping[str, Any]) -> None:
+        """The event under way has ended; `ValueError` for anything else."""
+        if self.underway is None:
+            raise ValueError("no event is under way")
+        number, subaction = self.underway
+        if said.get("event", number) != number:
+            raise ValueError(f"event {number} is under way")
+        if said["done"] is not True and " ".join(str(said["done"]).lower().split()) != subaction:
+            raise ValueError(f"event {number} is {subaction}")
+        self._own.advance(ended=number)
+        self._to_tell |= {*self.others}
+
+    def _late(self, seconds: object) -> None:
+        if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not seconds >= 0:
+            raise ValueError("late: expected a number of seconds")
+        self._late_by = float(seconds)
+        self._to_tell |= {*self.others}
+
+    _late_by: float | None = None
+
+    def _refuse(self, what: str, why: str, sender: str | None = None) -> None:
+        by = {} if sender is None else {"from": sender}
+        self.lines.append({"refused": what, **by, "why": why})
+
+    # ---- the other robots
+
+    def hears(self, data: bytes, now: float) -> None:
+        """Take in a message of another robot; what cannot be true is refused."""
+        try:
+            message = decoded(data, self._run, self.robot, self.others)
+            self._agreement.hears(message)
+            self._take_in(message, now)
+        except Contradiction as error:
+            if error.what not in self._refused and len(self._refused) < _REFUSED:
+                self._refused.add(error.what)  # it may come again and again
+                self._refuse(data[:_SHOWN].decode(errors="replace"), error.what)
+            return
+        self._advance(now)
+
+    def _take_in(self, message: Message, now: float) -> None:
+        name = message.by
+        changed = []
+        for of, part in message.logs.items():
+            if self._logs[of].join(part):
+                changed.append(of)
+        is_new = self._lives.get(name) != message.life
+        self._lives[name] = message.life
+        self._heard_us[name] = message.lives.get(self.robot) == self.life
+        self._their[name] = message.knows
+        self._heard_at[name] = now
+        if name in self._silent:
+            self._silent.discard(name)
+            if not self._logs[name].version.is_done:
+                self.lines.append({"heard": name, "time": now})
+        if message.late is not None:
+            waits = self._monitor is not None and name in self._monitor.late()
+            self.lines.append({"late": name, "seconds": message.late, "waiting": waits})
+        lacks = any(self._lacks(name, of) for of in self._logs)
+        if is_new or not self._heard_us[name] or name in changed or lacks:
+            self._to_tell.add(name)
+
+    def _version_by(self, name: str, of: str) -> Version:
+        """How far another robot knows a log."""
+        return self._their[name].get(of, Version())
+
+    def _lacks(self, name: str, of: str) -> bool:
+        """Whether another robot should be told of a log.
+
+        It is told this robot's own one, its own one if it was started again, and those of robots
+        that do not speak themselves.
+        """
+        speaks_itself = of not in {self.robot, name, *self._silent}
+        return not speaks_itself and self._version_by(name, of).lacks(self._logs[of].version)
+
+    def messages(self) -> Iterator[tuple[str, bytes]]:
+        """What is to be sent now: robots and messages; `unsent` tells what could not be sent."""
+        late, self._late_by = self._late_by, None
+        names, self._to_tell = sorted(self._to_tell), set()
+        knows = {of: log.version for of, log in self._logs.items()}
+        for name in names:
+            logs = {
+                of: log.part(self._version_by(name, of))
+                for of, log in self._logs.items()
+                if self._lacks(name, of)
+            }
+            who, said = (self._run, self.robot, self.life), self._agreement.said()
+            self.sent += 1
+            yield name, encoded(Message(*who, self._lives, knows, logs, late=late, **said))
+
+    def unsent(self, name: str) -> None:
+        """Tell that a message could not be sent: what it said is said again."""
+        self._to_tell.add(name)
+
+    # ---- its own events
+
+    @property
+    def _has_joined(self) -> bool:
+        """Whether all have heard of this process, and it knows of itself what they know."""
+        return all(
+            (self._heard_us[name] or self._logs[name].version.is_done)
+            and not self._own.version.lacks(self._version_by(name, self.robot))
+            for name in self.others
+        )
+
+    def _advance(self, now: float) -> None:
+        """Do what can be done now."""
+        if self._agreement.advance():
+            self._to_tell |= {*self.others}
+        if self._monitor is None:
+            if not self._has_joined or self._agreement.sentence is None:
+                return
+            self._monitor = self._monitor_of(self._agreement.sentence)
+            self.lines.append({"sentence": self._agreement.sentence, "time": now})
+            if self.underway is not None:  # before a restart; its end may be lost
+                number, subaction = self.underway
+                self.lines.append({"event": number, "underway": subaction, "time": now})
+        monitor = self._monitor
+        while (
+            self._heeds_wishes(monitor)
+            or self._counts(monitor)
+            or self._chooses(monitor)
+            or self._begins(monitor)
+        ):
+            pass
+        self._tells_driver(now)
+        if self.is_done and not self._has_finished:
+            self._has_finished = True
+            self.lines.append({"finished": True, "time": now})
+
+    def _heeds_wishes(self, monitor: EventMonitor) -> bool:
+        """Promise what is wished, if its choices allow it, and no meeting is arranged."""
+        if not self._wishes or self._started < len(self._own.events):
+            return False
+        wish = self._wishes.pop(0)
+        try:
+            answer = monitor.can(**wish)
+            if answer:
+                monitor.commit(**wish)
+        except MonitorError as error:
+            self._refuse(json.dumps({"wish": wish})[:_SHOWN], str(error))
+        else:
+            self.lines.append({"wish": wish, "granted": bool(answer), "subplans": answer.subplans})
+        return True
+
+    def _counts(self, monitor: EventMonitor) -> bool:
+        """Tell the monitor what has started and ended; whether anything was new."""
+        before = self._started, *self._counted.values()
+        reasons = {name: self._counts_those_of(name, monitor) for name in self.others}
+        own = self._own.version
+        if self._started < own.begun and self._is_free(monitor, self._started):
+            monitor.start(self._own.events[self._started].name)
+            self._started += 1
+        if (number := self._counted[self.robot]) < min(self._started, own.ended):
+            monitor.did(self._own.events[number].name)
+            self._counted[self.robot] += 1
+        if (self._started, *self._counted.values()) != before:
+            return True
+        if self._started == own.begun:  # after a restart events may wait for own ones
+            for name, reason in reasons.items():
+                if reason is not None and reason not in self._refused:
+                    self._refused.add(reason)
+                    self._refuse("an event that ended", reason, name)
+        return False
+
+    def _counts_those_of(self, name: str, monitor: EventMonitor) -> str | None:
+        """Tell the monitor what another robot has ended; why it takes no more, if so.
+
+        Robots that meet start together, so the end of a meeting counts after its start, in whatever
+        order messages come.
+        """
+        log = self._logs[name]
+        while (number := self._counted[name]) < log.version.ended:
+            event, met = log.events[number], len(self._own.meetings(name, self._started))
+            if len(log.meetings(self.robot, number + 1)) > met:
+                return None
+            try:
+                monitor.ended(name, event.subaction, number + 1)
+            except NotPossible as error:
+                return str(error)
+            self._counted[name] += 1
+        return None
+
+    def _is_free(self, monitor: EventMonitor, number: int) -> bool:
+        """Whether an own event (from 0) may start: nothing is missing, and its partners are ready.
+
+        The n-th meeting with a robot is that robot's n-th one with this one.
+        """
+        event = self._own.events[number]
+        for name in event.partners:
+            met = len(self._own.meetings(name, number + 1))
+            theirs = self._logs[name].meetings(self.robot)
+            if len(theirs) < met:
+                return False
+            monitor.ready(name, theirs[met - 1].subaction)
+        return not monitor.missing(event.name)
+
+    def _chooses(self, monitor: EventMonitor) -> bool:
+        """Choose the next event, or to do no more, when the last one has ended."""
+        events = self._own.events
+        if self.is_done or len(events) > self._counted[self.robot]:
+            return False
+        free = () if monitor.finished else monitor.free()
+        event = self._choice(monitor, free) if free else None
+        if event is not None:
+            events.append(Event(event, monitor.subaction(event), monitor.partners(event)))
+            self._own.advance()
+            if events[-1].partners:
+                self._to_tell |= {*self.others}
+        elif free or monitor.finished:
+            if free:
+                monitor.did(None)
+            self._own.advance(is_done=True)
+            self._to_tell |= {*self.others}
+        return event is not None or self.is_done
+
+    def _choice(self, monitor: EventMonitor, free: Sequence[str | None]) -> str | None:
+        if self.random is not None:
+            return drawn(monitor, self.random, free)
+        if None in free:
+            return None
+        return max(
+            (event for event in free if event is not None),
+            key=lambda event: (not monitor.partners(event), monitor.after(event).remaining),
+        )
+
+    def _begins(self, monitor: EventMonitor) -> bool:
+        """Begin the chosen event, if it may start now."""
+        version = self._own.version
+        is_chosen = self._started == version.begun < len(self._own.events)
+        if not is_chosen or self.holds_until > 0 or not self._is_free(monitor, version.begun):
+            return False
+        self._own.advance(begun=version.begun + 1)
+        self._to_tell |= {*self.others}
+        return True
+
+    def _tells_driver(self, now: float) -> None:
+        """Tell the driver what has begun, once another robot knows of it, if one is there."""
+        version = self._own.version
+        is_known = self._silent >= {*self.others} or any(
+            self._version_by(name, self.robot).begun == version.begun for name in self.others
+        )
+        if version.told == version.begun or version.begun > self._started or not is_known:
+            return
+        event = self._own.events[version.begun - 1]
+        line = {"event": version.begun, "start": event.subaction, "time": now}
+        self.lines.append({**line, "with": list(event.partners)} if event.partners else line)
+        self._own.advance(told=version.begun)
+
+
+def _wish(wish: object) -> dict[str, Any]:
+    """A wish as `EventMonitor.can` takes it; `ValueError` for anything else."""
+    if not isinstance(wish, dict) or not wish or wish.keys() - _DETOURS:
+        raise ValueError(f"a wish has some of {', '.join(sorted(_DETOURS))}")
+    for texts in wish.values():
+        several = texts if isinstance(texts, list) else [texts]
+        if not all(isinstance(text, str) for text in several):
+            raise ValueError("a wish holds texts such as (at r1 a)")
+    return wish

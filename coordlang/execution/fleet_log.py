@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What robots tell each other while they act: each robot's events so far, and what each knows.
+
+A `RobotLog` only grows, and logs of one robot are joined by taking the further one: messages may
+come late, twice or not at all, and a robot that was started again learns its own events from the
+others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, NamedTuple
+
+import msgspec
+from msgspec import Meta, Struct
+
+from planners.system.errors import CoordlangError
+
+#: Events in one message; a robot that lacks more gets them one message after another.
+_EVENTS_SENT = 64
+
+_Number = Annotated[int, Meta(ge=0)]
+
+
+class Contradiction(CoordlangError):
+    """Two accounts of what a robot did that cannot both be true."""
+
+
+class Version(NamedTuple):
+    """How far a robot's log goes: its events, how many have begun, were told to the driver, ended.
+
+    The last event may be chosen and not begun: then the robot is ready for a meeting.  ``is_done``
+    says that the robot does no more.
+    """
+
+    events: _Number = 0
+    begun: _Number = 0
+    told: _Number = 0
+    ended: _Number = 0
+    is_done: bool = False
+
+    def lacks(self, other: Version) -> bool:
+        """Whether the other one goes further in anything."""
+        return any(its > own for own, its in zip(self, other, strict=True))
+
+
+class Event(Struct, frozen=True, array_like=True):
+    """An event of a robot: how its choices name it, what is done, and the robots that it meets."""
+
+    name: str
+    subaction: str
+    partners: tuple[str, ...] = ()
+
+
+class LogPart(Struct, frozen=True):
+    """A part of a robot's log: its events from number ``first`` (from 0) on."""
+
+    version: Version
+    first: _Number = 0
+    events: tuple[Event, ...] = ()
+
+
+class RobotLog:
+    """All that is known of what one robot did: its events, and its `Version`."""
+
+    def __init__(self) -> None:
+        self.events: list[Event] = []
+        self.version = Version()
+
+    def advance(self, **changed: Any) -> None:
+        """Change the version."""
+        self.version = self.version._replace(events=len(self.events), **changed)
+
+    def part(self, known: Version) -> LogPart:
+        """What somebody lacks who knows so much."""
+        first = min(known.events, len(self.events))
+        return LogPart(self.version, first, tuple(self.events[first : first + _EVENTS_SENT]))
+
+    def join(self, part: LogPart) -> bool:
+        """Take in what is new; whether anything was.
+
+        Raises `Contradiction`, and is then as it was before.
+        """
+        known, told = self.events, part.version
+        is_possible = told.ended <= told.told <= told.begun <= told.events <= told.ended + 1
+        if not is_possible or part.first + len(part.events) > told.events:
+            raise Contradiction(f"no robot can be so far: {told}")
+        if part.first > len(known):
+            return False  # something before it is missing: it comes again
+        shared = known[part.first : part.first + len(part.events)]
+        if tuple(shared) != part.events[: len(shared)]:
+            raise Contradiction("its events are others than those that were told before")
+        events = [*known, *part.events[len(shared) :]]
+        if len(events) < told.events:  # as far as this part goes all events have ended
+            all_of = len(events)
+            told = Version(all_of, all_of, all_of, all_of)
+        joined = Version._make(map(max, self.version, told))
+        if joined == self.version:
+            return False
+        self.events, self.version = events, joined._replace(events=len(events))
+        return True
+
+    def meetings(self, robot: str, number: int | None = None) -> list[Event]:
+        """Of the first ``number`` events, by default of all, those that meet a robot, in order."""
+        return [event for event in self.events[:number] if robot in event.partners]
+
+
+class Answer(Struct, frozen=True):
+    """A robot's answer to a proposed sentence: it agrees, or has ``wishes`` that are not met."""
+
+    sentence: str
+    wishes: tuple[str, ...] = ()
+
+
+class Message(Struct, frozen=True, omit_defaults=True):
+    """A message of one robot to another; all of them have this form.
+
+    ``run`` names what all must agree on (domain, task, words), ``life`` the process that speaks;
+    ``lives`` says of which process of each robot it has heard, ``knows`` how far it knows each
+    robot's log, ``logs`` what the other one lacks.  ``sentence`` is what was agreed on; before that
+    a robot that has wishes ``speaks``, one ``proposes`` a sentence, the others ``answer``.
+    ``late``: its event takes so many seconds longer.
+    """
+
+    run: str
+    by: str
+    life: int
+    lives: dict[str, int] = {}
+    knows: dict[str, Version] = {}
+    logs: dict[str, LogPart] = {}
+    sentence: str | None = None
+    speaks: bool = False
+    proposes: str | None = None
+    answer: Answer | None = None
+    late: float | None = None
+
+
+_DECODER = msgspec.json.Decoder(Message)
+
+
+def encoded(message: Message) -> bytes:
+    """A message as it is sent: JSON."""
+    return msgspec.json.encode(message)
+
+
+def decoded(data: bytes, run: str, robot: str, others: Sequence[str]) -> Message:
+    """A message to a robot of one of the others in this run; `Contradiction` for anything else."""
+    try:
+        message = _DECODER.decode(data)
+    except (msgspec.DecodeError, RecursionError) as error:
+        raise Contradiction(f"this is no message of a robot: {error}") from None
+    if message.by not in others:
+        raise Contradiction("this robot is not one of ours")
+    if message.run != run:
+        raise Contradiction(f"{message.by} does another task, or with other words")
+    if strange := (message.logs.keys() | message.knows.keys()) - {robot, *others}:
+        raise Contradiction(f"{message.by} tells of a robot that there is not: {min(strange)}")
+    return message
