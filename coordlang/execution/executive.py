@@ -130,8 +130,8 @@ class Executive:
 
     def tick(self, now: float) -> None:
         """Do what is due at this time."""
-        if not self._heard_at:
-            self._heard_at = dict.fromkeys(self.others, now)
+        for name in self.others:  # from the first tick on
+            self._heard_at.setdefault(name, now)
         if now >= self._beat_at:
             self._beat_at = now + self._silent_after / _BEATS
             self._to_tell |= {*self.others}
