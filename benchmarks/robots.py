@@ -115,10 +115,20 @@ def has_arrived(did: Mapping[str, Sequence[Span]], loaded: PlanningInstance) -> 
 
 
 class Run:
-    """One run of forked processes; ``lines`` are what each robot's processes wrote."""
+    """One run of forked processes; ``lines`` are what each robot's processes wrote.
 
-    def __init__(self, team: Mapping[str, RobotInTask], folder: Path, seed: int) -> None:
+    ``bus`` is that of each robot; by default sockets in the folder.
+    """
+
+    def __init__(
+        self,
+        team: Mapping[str, RobotInTask],
+        folder: Path,
+        seed: int,
+        bus: Mapping[str, str] | None = None,
+    ) -> None:
         self.team, self.folder, self.random, self.seed = team, folder, Random(seed), seed
+        self.bus = bus or dict.fromkeys(team, f"unix:{folder}")
         self.pids = {name: self._fork(name) for name in team}
         self.killed = 0
 
@@ -133,7 +143,7 @@ class Run:
                 own = self.team[name]
                 options = RobotOptions(
                     robot=name,
-                    bus=f"unix:{self.folder}",
+                    bus=self.bus[name],
                     play=self.seed,
                     speed=SPEED,
                 )

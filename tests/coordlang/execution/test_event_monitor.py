@@ -204,7 +204,7 @@ def test_each_file_has_its_kind_of_monitor() -> None:
         EventMonitor(json.loads(data), "r1")
 
 
-def monitors_in(domain: str, problem: str) -> list[EventMonitor]:
+def choices_in(domain: str, problem: str) -> SentenceChoices:
     """Of robots that may follow any optimal plan."""
     read, read_problem = parsed(domain, problem)
     loaded = build(read, [read_problem], ModelOptions(asynchronous=True))
@@ -212,7 +212,7 @@ def monitors_in(domain: str, problem: str) -> list[EventMonitor]:
     one_word = Partition.of_states(space.rows, dict.fromkeys(range(len(space.rows)), 0))
     found = choices(in_words(None, one_word, space, 0), (0,))
     assert found.guaranteed
-    return monitors_of(found)
+    return found
 
 
 EITHER_WAY = """(define (domain either) (:types robot way) (:predicates (there ?r - robot))
@@ -223,7 +223,7 @@ EITHER_WAY = """(define (domain either) (:types robot way) (:predicates (there ?
 def test_while_an_event_is_under_way_it_is_all_that_may_end() -> None:
     problem = """(define (problem p) (:domain either) (:objects r1 r2 - robot a b - way)
      (:init) (:goal (there r1)))"""
-    r1, _ = monitors_in(EITHER_WAY, problem)
+    r1, _ = monitors_of(choices_in(EITHER_WAY, problem))
     one, other = r1.allowed()
     assert one is not None
     with pytest.raises(NotPossible, match="it has not started it"):
@@ -249,11 +249,13 @@ LIFT = """(define (domain lift) (:types robot)
   :effect (and (once ?r) (when (once ?r) (twice ?r)))))"""
 
 
+LIFT_TWICE = """(define (problem p) (:domain lift) (:objects r1 r2 r3 - robot) (:init (middle r2))
+ (:goal (and (twice r1) (twice r2) (twice r3))))"""
+
+
 def test_who_was_ready_for_a_meeting_is_not_ready_for_the_next_one() -> None:
     """r1 and r3 hold what r2 lifts: they do not interfere, and r1 waits for no end of r3."""
-    problem = """(define (problem p) (:domain lift) (:objects r1 r2 r3 - robot) (:init (middle r2))
-     (:goal (and (twice r1) (twice r2) (twice r3))))"""
-    r1, _, _ = monitors_in(LIFT, problem)
+    r1, _, _ = monitors_of(choices_in(LIFT, LIFT_TWICE))
     r1.ready("r2", "(lift r2)")
     r1.ready("r3", "(hold r3)")
     (event,) = r1.may_start()
@@ -280,7 +282,7 @@ JOINT = """(define (domain together) (:predicates (p) (q))
 def test_what_others_do_while_a_robot_idles_is_not_known_to_it() -> None:
     """Nobody tells it when that happens: idling is no event."""
     problem = "(define (problem p) (:domain together) (:init) (:goal (q)))"
-    r1, r2 = monitors_in(JOINT, problem)
+    r1, r2 = monitors_of(choices_in(JOINT, problem))
     assert (r1.known("(p)"), r1.known("(q)")) == (None, False)
     assert (r2.known("(p)"), r2.known("(q)")) == (False, None)
 

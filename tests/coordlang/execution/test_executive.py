@@ -8,11 +8,13 @@ all did together is an optimal plan, and all end.
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from heapq import heappop, heappush
 from itertools import count
 from random import Random
+from types import MappingProxyType
 from typing import Any
 
 import pytest
@@ -20,14 +22,31 @@ import pytest
 from coordlang.execution.agreement import Agreement
 from coordlang.execution.choices import SentenceChoices, choices, to_bytes
 from coordlang.execution.executive import Executive
-from coordlang.execution.fleet_log import Contradiction, Event, LogPart, RobotLog, Version
+from coordlang.execution.fleet_log import (
+    Contradiction,
+    Event,
+    LogPart,
+    Message,
+    RobotLog,
+    Version,
+    encoded,
+)
 from coordlang.execution.monitor import EventMonitor
 from coordlang.language.partition import Partition
-from tests.coordlang.execution.test_event_monitor import LIFT, turning_round
+from tests.coordlang.execution.test_event_monitor import (
+    EITHER_WAY,
+    LIFT,
+    LIFT_TWICE,
+    choices_in,
+    turning_round,
+)
 from tests.support.asynchronous import World, random_plans, texts
 from tests.support.task_languages import in_words
 
 SILENT_AFTER = 5.0
+EITHER_WAY_BOTH = """(define (problem p) (:domain either) (:objects r1 r2 - robot a b - way)
+ (:init) (:goal (and (there r1) (there r2))))"""
+ONLY_R1 = EITHER_WAY_BOTH.replace("(and (there r1) (there r2))", "(there r1)")
 
 
 class Fleet:
@@ -139,6 +158,7 @@ class Fleet:
             return
         if "start" not in line:
             return
+        self.seen["meets"] += "with" in line
         subaction = line["start"]
         if name in self.running:  # told again after a restart
             assert (line["event"], subaction) == (len(self.did[name]) + 1, self.running[name])
@@ -224,3 +244,259 @@ def test_all_arrive_whatever_the_network_does_and_whoever_is_killed(
             seen["runs"] += 1
     print(f"{robots} robots: {dict(seen)}")
     assert min(seen["runs"], seen["killed"], seen["lost"], seen["silent"], seen["heard"]) >= 5
+
+
+def test_robots_that_meet_start_together_and_more_than_once() -> None:
+    found = choices_in(LIFT, LIFT_TWICE)
+    world = World(found.task_language.model)
+    for seed in range(40):
+        fleet = Fleet(found, world, Random(seed), 0.2 * (seed % 2), seed % 3)
+        assert [len(did) for did in fleet.run()] == [2, 2, 2]
+        assert fleet.seen["meets"] >= 6
+
+
+class Pair:
+    """r1 and r2 turn round on the 2x2 grid, and hear each other at once; r1 has wishes."""
+
+    def __init__(self, found: SentenceChoices, *there: str) -> None:
+        self.data = json.loads(to_bytes(found))
+        self.at: dict[str, Executive] = {}
+        for name in there:
+            self.join(name, 1)
+
+    def join(self, name: str, life: int) -> None:
+        other = {"r1": "r2", "r2": "r1"}[name]
+        words = self.data["sentence"]
+        agreement = Agreement(name, [other], words, (), lambda _: words, lambda *_: True)
+        own = Executive(name, [other], "run", agreement, self.monitor(name), SILENT_AFTER)
+        own.life, self.at[name] = life, own
+
+    def monitor(self, name: str) -> Callable[[str], EventMonitor]:
+        return lambda _: EventMonitor(self.data, name)
+
+    def tick(self, now: float) -> None:
+        """All tick, and hear each other until nobody says anything."""
+        for own in self.at.values():
+            own.tick(now)
+        while sent := [(to, d) for own in self.at.values() for to, d in own.messages()]:
+            for to, data in sent:
+                if to in self.at:
+                    self.at[to].hears(data, now)
+
+    def lines(self, name: str, key: str) -> list[Any]:
+        """What its lines say under a key; they are taken away."""
+        own = self.at[name]
+        found = [line[key] for line in own.lines if key in line]
+        own.lines = [line for line in own.lines if key not in line]
+        return found
+
+    def does(self, name: str, now: float) -> None:
+        """The driver does what it was told last."""
+        own = self.at[name]
+        assert own.underway is not None
+        own.reads(json.dumps({"event": own.underway[0], "done": own.underway[1]}), now)
+        self.tick(now)
+
+
+def test_nobody_starts_alone_and_a_silent_robot_is_named() -> None:
+    pair = Pair(turning_round(), "r1")
+    pair.tick(0)
+    pair.tick(SILENT_AFTER)
+    assert (pair.lines("r1", "start"), pair.lines("r1", "silent")) == ([], ["r2"])
+    pair.join("r2", 1)
+    pair.tick(SILENT_AFTER + 1)
+    assert pair.lines("r1", "heard") == ["r2"]
+    (first,) = pair.lines("r1", "start")
+    pair.does("r1", 7)
+    # r2 is killed in its first event: r1 waits, however long, and does not move into its way.
+    (its,) = pair.lines("r2", "start")
+    del pair.at["r2"]
+    for now in range(8, 200, 2):
+        pair.tick(now)
+    assert (pair.lines("r1", "start"), pair.lines("r1", "silent")) == ([], ["r2"])
+    assert not pair.at["r1"].may_leave(200)
+    # It comes back, knows what is under way, and goes on with the next number.
+    pair.join("r2", 2)
+    pair.tick(201)
+    assert (pair.lines("r2", "start"), pair.lines("r2", "underway")) == ([], [its])
+    pair.does("r2", 202)
+    assert [line["event"] for line in pair.at["r1"].lines if "start" in line] == [2]
+    assert pair.lines("r1", "start") != [first]
+    for name in ("r1", "r2"):
+        pair.does(name, 203)
+    assert pair.lines("r1", "finished") == pair.lines("r2", "finished") == [True]
+    assert all(own.may_leave(203) for own in pair.at.values())
+
+
+def test_who_is_done_stays_for_a_robot_that_is_not_and_leaves_if_it_does_not_come_back() -> None:
+    pair = Pair(choices_in(EITHER_WAY, ONLY_R1), "r1", "r2")
+    pair.tick(0)
+    assert pair.at["r2"].is_done
+    assert not pair.at["r2"].may_leave(0)
+    del pair.at["r1"]
+    pair.tick(SILENT_AFTER)
+    assert pair.lines("r2", "silent") == ["r1"]
+    assert not pair.at["r2"].may_leave(5 * SILENT_AFTER)
+    assert pair.at["r2"].may_leave(6 * SILENT_AFTER)
+
+
+def test_what_a_driver_may_not_say_is_refused_and_changes_nothing() -> None:
+    pair = Pair(turning_round(), "r1", "r2")
+    pair.tick(0)
+    own = pair.at["r1"]
+    assert own.underway is not None
+    number, text = own.underway
+    cases = {
+        "{": "Expecting",
+        "[1]": "expected an object",
+        '{"event": 1}': "expected done, wish or late",
+        '{"event": 2, "done": true}': "event 1 is under way",
+        '{"done": "(move r1 c9 c9)"}': f"event 1 is {re.escape(text)}",
+        '{"late": "soon"}': "expected a number",
+        '{"wish": {"go": "(at r1 a)"}}': "a wish has some of avoid, do, never, visit",
+        '{"wish": {"visit": 3}}': "holds texts",
+        '{"wish": {"visit": "(at r1 c9)"}}': "is no atom that can change",
+        "[" * 100_000: "recursion|nested|Expecting",
+    }
+    for line, why in cases.items():
+        own.reads(line, 1)
+        (said,) = pair.lines("r1", "why")
+        assert re.search(why, said), (line, said)
+    assert own.underway == (number, text)
+    own.reads('{"event": 1, "done": true}', 1)
+    own.reads('{"event": 1, "done": true}', 1)  # it has ended
+    assert pair.lines("r1", "why") == ["no event is under way"]
+
+
+def test_a_wish_is_promised_and_being_late_is_told() -> None:
+    problem = EITHER_WAY_BOTH
+    pair = Pair(choices_in(EITHER_WAY, problem), "r1", "r2")
+    pair.at["r1"].reads('{"wish": {"do": "(go r1 b)"}}', 0)  # before anything is agreed
+    pair.tick(0)
+    assert pair.lines("r1", "granted") == [True]
+    assert pair.lines("r1", "start") == ["(go r1 b)"]
+    pair.at["r1"].reads('{"wish": {"do": "(go r1 a)"}}', 0)
+    assert pair.lines("r1", "granted") == [False]
+    pair.at["r1"].reads('{"late": 2.5}', 1)
+    pair.tick(1)
+    assert [
+        (line["late"], line["seconds"], line["waiting"])
+        for line in pair.at["r2"].lines
+        if "late" in line
+    ] == [("r1", 2.5, False)]
+
+
+GO = Event("(go r1 a)", "(go r1 a)")
+
+
+@pytest.mark.parametrize(
+    ("parts", "is_refused"),
+    [
+        ([LogPart(Version(1, 1, 1, 1), 0, (GO,)), LogPart(Version(1, 1, 1, 0), 0, (GO,))], False),
+        ([LogPart(Version(2, 1, 1, 1), 1, (GO,))], False),
+        (
+            [LogPart(Version(1, 1, 1, 1), 0, (GO,)), LogPart(Version(1), 0, (Event("x", "x"),))],
+            True,
+        ),
+        ([LogPart(Version(1, 0, 0, 1), 0, (GO,))], True),
+        ([LogPart(Version(2, 2, 2, 0), 0, (GO, GO))], True),
+        ([LogPart(Version(1, 1, 1, 1), 0, (GO, GO))], True),
+    ],
+)
+def test_logs_only_grow(parts: Sequence[LogPart], is_refused: bool) -> None:
+    log = RobotLog()
+    for part in parts[:-1]:
+        assert log.join(part)
+    before = log.version, list(log.events)
+    if is_refused:
+        with pytest.raises(Contradiction):
+            log.join(parts[-1])
+    else:
+        assert not log.join(parts[-1])
+    assert (log.version, log.events) == before
+
+
+def test_a_long_log_comes_in_parts() -> None:
+    whole, log = RobotLog(), RobotLog()
+    whole.events = [Event(f"(go r1 {n})", f"(go r1 {n})") for n in range(200)]
+    whole.advance(begun=200, told=200, ended=199)
+    rounds = 0
+    while log.version != whole.version:
+        assert log.join(whole.part(log.version))
+        assert log.version.ended <= len(log.events)
+        rounds += 1
+    assert (log.events, rounds) == (whole.events, 4)
+
+
+def test_messages_that_are_none_are_refused_once() -> None:
+    pair = Pair(turning_round(), "r1", "r2")
+    pair.tick(0)
+    own = pair.at["r1"]
+    good = encoded(Message("run", "r2", 1))
+    cases = {
+        b"\xff": "no message of a robot",
+        b'{"run": "run", "by": 3}': "no message of a robot",
+        b"[" * 100_000: "no message of a robot",
+        good.replace(b'"r2"', b'"r9"'): "not one of ours",
+        good.replace(b'"run":"run"', b'"run":"another"'): "another task, or with other words",
+        encoded(Message("run", "r2", 1, knows={"r9": Version()})): "a robot that there is not: r9",
+        encoded(Message("run", "r2", 1, sentence="w9")): 'r2 follows "w9", r1 "w',
+        encoded(Message("run", "r2", 1, logs={"r2": LogPart(Version(0, 1))})): "no robot can be",
+    }
+    for data, why in cases.items():
+        own.hears(data, 1)
+        own.hears(data, 1)
+        (said,) = pair.lines("r1", "why")
+        assert why in said
+    # An event that waits for an own one cannot have ended.
+    name = pair.data["choices"][1]["robot"]
+    events = tuple(
+        Event(text, event["subaction"])
+        for text, event in pair.data["choices"][1]["passings"]["events"].items()
+    )
+    assert name == "r2"
+    part = LogPart(Version(2, 2, 2, 2), 0, events)
+    own.hears(encoded(Message("run", "r2", 1, logs={"r2": part})), 2)
+    (said,) = pair.lines("r1", "why")
+    assert "it waits for r1" in said
+    assert pair.lines("r1", "from") == []
+
+
+# ---- agreeing
+
+
+def talk(
+    wishes: dict[str, tuple[str, ...]], given: Mapping[str, str] = MappingProxyType({})
+) -> dict[str, str | None]:
+    """What robots agree on; sentences are tuples of wishes, and grant those that they hold."""
+    agreements = {
+        name: Agreement(
+            name,
+            [other for other in wishes if other != name],
+            given.get(name),
+            own,
+            lambda wished: " ".join(wished) or "any",
+            lambda sentence, wished: {*wished} <= {*sentence.split()},
+        )
+        for name, own in wishes.items()
+    }
+    for _ in range(4):
+        said = {name: Message("run", name, 1, **own.said()) for name, own in agreements.items()}
+        for name, own in agreements.items():
+            for other, message in said.items():
+                if other != name:
+                    own.hears(message)
+            own.advance()
+    return {name: own.sentence for name, own in agreements.items()}
+
+
+def test_robots_agree_in_three_messages() -> None:
+    nobody: dict[str, tuple[str, ...]] = {"r1": (), "r2": (), "r3": ()}
+    assert {*talk(nobody).values()} == {"any"}
+    assert {*talk({**nobody, "r2": ("a",)}).values()} == {"a"}  # who has wishes speaks
+    both = {**nobody, "r3": ("a", "b"), "r2": ("a",)}  # the least name proposes
+    assert {*talk(both).values()} == {"a a b"}
+    assert {*talk({**nobody, "r2": ("a", "b"), "r3": ("b",)}).values()} == {"a b"}
+    assert {*talk(nobody, {"r3": "c"}).values()} == {"c"}  # from outside
+    with pytest.raises(Contradiction, match='r2 follows "d", r1 "c"'):
+        talk(nobody, {"r1": "c", "r2": "d"})
