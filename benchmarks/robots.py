@@ -21,7 +21,9 @@ import signal
 import sys
 import tempfile
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from functools import partial
 from itertools import combinations
 from pathlib import Path
 from random import Random
@@ -33,19 +35,23 @@ from benchmarks import frame
 from benchmarks.frame import SHARED, Figures, KeptRows, PrintedTable
 from coordlang.commands.records import RobotOptions
 from coordlang.commands.robot import RobotInTask, robot
+from coordlang.execution.best_sentence import best_sentence
+from coordlang.execution.choices import choices, monitor
 from coordlang.execution.monitor import EventMonitor, Monitor, drawn
 from planners.check.rules import validate
 from planners.joint.traces import Traces
 from planners.loading import PlanningInstance
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
-from planners.system.errors import CoordlangError, UsageError
+from planners.system.errors import CoordlangError
 from planners.system.limits import time_limit
 
 BUILDINGS = ("office", "hotel", "campus", "triple_H")
 ROWS = [f"{name}-{robots}" for name in BUILDINGS for robots in (2, 3, 4)]
-#: Tasks of a row, metres a second, seconds after which a run is stuck.
-TASKS, SPEED, STUCK = 5, 60.0, 60.0
+#: Tasks of a row, and how many are tried, each for so many seconds.
+TASKS, TRIES, LIMIT = 5, 10, 30
+#: Metres a second, and seconds after which a run is stuck.
+SPEED, STUCK = 60.0, 60.0
 COLUMNS = (
     ("row", -18),
     ("tasks", 5),
@@ -196,62 +202,54 @@ class Run:
 
 def tasks_of(
     name: str, robots: int
-) -> tuple[dict[str, tuple[float, float]], list[PlanningInstance]]:
-    """Where the places of a building lie, and tasks: each robot to another place that is drawn."""
+) -> Iterator[tuple[Mapping[str, RobotInTask], PlanningInstance]]:
+    """Teams in tasks in a building, each robot to another place that is drawn.
+
+    Tasks without a plan or a language within a limit are left out.
+    """
     random = Random(f"{name} {robots}")
     path = SHARED / "rmf" / f"{name}.building.yaml"
-    found: list[PlanningInstance] = []
     site = coordlang.import_site(path, robots=robots)
     read = json.loads(site.texts["coordinates.json"])["coordinates"]
     points = {place: (x, y) for place, (x, y) in read.items()}
-    for _ in range(4 * TASKS):
+    found = 0
+    for _ in range(TRIES):
         goals = random.sample(sorted(points), robots)
         pairs = [f"{own}:{place}" for own, place in zip(site.robots, goals, strict=True)]
-        try:
+        with suppress(CoordlangError), time_limit(LIMIT):
             texts = coordlang.import_site(path, robots=robots, task=pairs).texts
-        except UsageError:  # no lanes lead there
-            continue
-        domain = parse_domain(Source("domain.pddl", texts["domain.pddl"]))
-        problem = parse_problem(Source("problem.pddl", texts["problem.pddl"]), domain)
-        loaded = coordlang.load(domain, problem, asynchronous=True)
-        try:
-            with time_limit(30):
-                coordlang.plans(loaded, problem)
-        except CoordlangError:
-            continue
-        found.append(loaded)
-        if len(found) == TASKS:
-            break
-    return points, found
+            domain = parse_domain(Source("domain.pddl", texts["domain.pddl"]))
+            problem = parse_problem(Source("problem.pddl", texts["problem.pddl"]), domain)
+            loaded = coordlang.load(domain, problem, asynchronous=True)
+            language = coordlang.build(loaded, problem, method="greedy").language
+            of = partial(robot, language, loaded, problem, coordinates=points)
+            team = {own: of(robot=own) for own in loaded.model.robots}
+            found += 1
+            yield team, loaded
+        if found == TASKS:
+            return
 
 
 def measured(row: str, runs: int, is_killing: bool) -> Figures:
     """The figures of a row."""
     name, _, robots = row.rpartition("-")
-    points, tasks = tasks_of(name, int(robots))
+    tasks = [*tasks_of(name, int(robots))]
     figures: Figures = dict.fromkeys((head for head, _ in COLUMNS), 0)
     figures |= {"row": row, "tasks": len(tasks)}
     times: list[float] = []
-    for number, loaded in enumerate(tasks):
-        problem = loaded.problems[0]
-        language = coordlang.build(loaded, problem, method="greedy").language
-        team = {
-            own: robot(language, loaded, problem, robot=own, coordinates=points)
-            for own in loaded.model.robots
-        }
+    for number, (team, loaded) in enumerate(tasks):
         for seed in range(number, runs, len(tasks)):
             _count(figures, team, loaded, seed, is_killing)
-        words = coordlang.plan(language, loaded, problem, prefer="most-plans").sentence
-        found = coordlang.choices(language, loaded, problem, words)
-        for _ in range(20):
-            own = {name: found.monitor(name) for name in found.robots}
-            _run_here(own, Random(len(times)), times)
+        used = next(iter(team.values())).used
+        found = choices(used, best_sentence(used, ["most-plans"]).words)
+        for seed in range(20):
+            own = [monitor(found.fits, one, "") for one in found.robots]
+            _run_here(own, Random(seed), times)
     times.sort()
-    if figures["runs"]:
-        figures["events"] = round(figures["events"] / figures["runs"])
-        figures["messages"] = round(figures["messages"] / figures["runs"])
-    figures["us"] = round(1e6 * times[len(times) // 2], 1)
-    figures["99.9 %"] = round(1e6 * times[int(len(times) * 0.999)], 1)
+    for head in ("events", "messages") if figures["runs"] else ():
+        figures[head] = round(figures[head] / figures["runs"])
+    for head, share in (("us", 0.5), ("99.9 %", 0.999)) if times else ():
+        figures[head] = round(1e6 * times[int(len(times) * share)], 1)
     return figures
 
 
@@ -276,31 +274,26 @@ def _count(
     figures["messages"] += sum(line.get("messages", 0) for its in lines.values() for line in its)
 
 
-def _run_here(own: Mapping[str, Monitor], random: Random, times: list[float]) -> None:
+def _run_here(team: Sequence[Monitor], random: Random, times: list[float]) -> None:
     """Run all robots in this process; takes the seconds of each `EventMonitor.may_start`."""
-    done = dict.fromkeys(own, 0)
-    while waiting := [name for name in own if not own[name].finished]:
-        moved = False
-        for name in waiting:
-            at = own[name]
-            assert isinstance(at, EventMonitor)
+    own = [one for one in team if isinstance(one, EventMonitor)]
+    done, has_moved = dict.fromkeys(own, 0), True
+    while has_moved:  # until all are done, or some meet
+        has_moved = False
+        for at in own:
             begun = perf_counter()
             may = at.may_start()
             times.append(perf_counter() - begun)
-            if not may:
+            if at.finished or not may:
                 continue
-            event, moved = drawn(at, random, may), True
-            if event is None:
-                at.did(None)
-                continue
-            at.start(event)
+            event, has_moved = drawn(at, random, may), True
+            if event is not None:
+                at.start(event)
+                done[at] += 1
             at.did(event)
-            done[name] += 1
-            for other in own.values():
-                if other is not at and isinstance(other, EventMonitor):
-                    other.ended(name, at.subaction(event), done[name])
-        if not moved:
-            return  # a meeting
+            for other in own if event is not None else ():
+                if other is not at:
+                    other.ended(at.robot, at.subaction(event), done[at])
 
 
 def main() -> None:

@@ -113,11 +113,11 @@ class Executive:
         return version.told, self._own.events[version.ended].subaction
 
     def may_leave(self, now: float) -> bool:
-        """Whether nobody needs it any more: all are done and know that it is, or seem lost."""
+        """Whether nobody needs it any more: all are done and know that all are, or seem lost."""
         patience = _PATIENCE * self._silent_after
         return self.is_done and all(
             now - self._heard_at[name] >= patience
-            or (self._logs[name].version.is_done and self._version_by(name, self.robot).is_done)
+            or (self._logs[name].version.is_done and not self._lacks_any(name))
             for name in self.others
         )
 
@@ -206,10 +206,12 @@ class Executive:
 
     def _take_in(self, message: Message, now: float) -> None:
         name = message.by
-        changed = []
         for of, part in message.logs.items():
+            was_done = self._logs[of].version.is_done
             if self._logs[of].join(part):
-                changed.append(of)
+                # All must know that all know who is done, before they leave.
+                is_news = self._logs[of].version.is_done and not was_done
+                self._to_tell |= {*self.others} if is_news else {name}
         is_new = self._lives.get(name) != message.life
         self._lives[name] = message.life
         self._heard_us[name] = message.lives.get(self.robot) == self.life
@@ -222,8 +224,7 @@ class Executive:
         if message.late is not None:
             waits = self._monitor is not None and name in self._monitor.late()
             self.lines.append({"late": name, "seconds": message.late, "waiting": waits})
-        lacks = any(self._lacks(name, of) for of in self._logs)
-        if is_new or not self._heard_us[name] or name in changed or lacks:
+        if is_new or not self._heard_us[name] or self._lacks_any(name):
             self._to_tell.add(name)
 
     def _version_by(self, name: str, of: str) -> Version:
@@ -234,10 +235,14 @@ class Executive:
         """Whether another robot should be told of a log.
 
         It is told this robot's own one, its own one if it was started again, and those of robots
-        that do not speak themselves.
+        that may not speak themselves, as they are silent or have left.
         """
-        speaks_itself = of not in {self.robot, name, *self._silent}
+        is_done = self._logs[of].version.is_done
+        speaks_itself = of not in {self.robot, name, *self._silent} and not is_done
         return not speaks_itself and self._version_by(name, of).lacks(self._logs[of].version)
+
+    def _lacks_any(self, name: str) -> bool:
+        return any(self._lacks(name, of) for of in self._logs)
 
     def messages(self) -> Iterator[tuple[str, bytes]]:
         """What is to be sent now: robots and messages; `unsent` tells what could not be sent."""

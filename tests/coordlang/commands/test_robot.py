@@ -6,17 +6,20 @@ from __future__ import annotations
 import json
 import socket
 import subprocess
-from collections.abc import Mapping
-from contextlib import ExitStack
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, closing
 from pathlib import Path
 from random import Random
+from time import monotonic, sleep
 from typing import Any
 
 import pytest
+import trustme
 
 import coordlang as library
 from benchmarks.robots import Run, has_arrived, overlaps, spans
 from coordlang.commands.robot import Player, RobotInTask, robot
+from coordlang.execution.bus import opened
 from planners.loading import PlanningInstance
 from planners.system.errors import Refuted, UsageError
 from tests.coordlang.commands.conftest import FILES, Shell
@@ -244,3 +247,57 @@ def test_robots_hear_each_other_over_zenoh(
     did = {name: spans(run.lines(name)) for name in team}
     assert not overlaps(did, loaded)
     assert has_arrived(did, loaded)
+
+
+def secured(
+    folder: Path, authority: trustme.CA, name: str, allowed: Sequence[str]
+) -> dict[str, Any]:
+    """What docs/robots.md says: certificates of one authority, and who of these may speak."""
+    authority.cert_pem.write_to_path(folder / f"{name}-ca.pem")
+    issued = authority.issue_cert("127.0.0.1", common_name=name)
+    issued.private_key_pem.write_to_path(folder / f"{name}.key")
+    issued.cert_chain_pems[0].write_to_path(folder / f"{name}.pem")
+    tls = {"root_ca_certificate": f"{folder}/{name}-ca.pem", "enable_mtls": True}
+    for side in ("listen", "connect"):
+        tls |= {
+            f"{side}_private_key": f"{folder}/{name}.key",
+            f"{side}_certificate": f"{folder}/{name}.pem",
+        }
+    rule = {
+        "id": "messages",
+        "permission": "allow",
+        "flows": ["ingress", "egress"],
+        "messages": ["put", "declare_subscriber"],
+        "key_exprs": ["coordlang/**"],
+    }
+    control = {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": [rule],
+        "subjects": [{"id": "fleet", "cert_common_names": [*allowed]}],
+        "policies": [{"rules": ["messages"], "subjects": ["fleet"]}],
+    }
+    return {"transport": {"link": {"tls": tls}}, "access_control": control}
+
+
+def test_only_robots_with_a_certificate_that_is_named_are_heard(folder: Path) -> None:
+    pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed (coordlang[fleet])")
+    ours, theirs = trustme.CA(), trustme.CA()
+    names = ["r1", "r2", "r3", "r4"]
+    of = {name: theirs if name == "r4" else ours for name in names}
+    more = {name: secured(folder, of[name], name, ["r1", "r2"]) for name in names}
+    configs = zenoh_configs(folder, dict(zip(names, ports(4), strict=True)), **more)
+    with ExitStack() as stack:
+        buses = {}
+        for name in names:
+            buses[name] = stack.enter_context(closing(opened(configs[name], "run", name, names)))
+        heard: set[bytes] = set()
+        until = monotonic() + 10
+        while b"r2" not in heard and monotonic() < until:
+            for name in names[1:]:
+                buses[name].send("r1", name.encode())
+            sleep(0.05)
+            heard |= {*buses["r1"].receive()}
+        sleep(0.3)
+        heard |= {*buses["r1"].receive()}
+    assert heard == {b"r2"}
