@@ -4,13 +4,14 @@
     python -m benchmarks.robots [ROW ..] [--runs N] [--kill] [--kept FILE]
 
 A row is a building and a number of robots, ``office-2``, each of which drives to a place that is
-drawn; there are some tasks for each row.  Every robot is a process (forked when its choices are
-known), plays itself, and hears the others over ``--bus unix``.  With ``--kill`` one of them is
-killed at some moment and started again.  The lines that the processes wrote are checked by
-definition: no event overlaps one that it interferes with, and all events in the order of their
-starts are a plan that the independent checker accepts.  The columns: runs; runs in which something
-overlapped, in which somebody had not ended after a minute, and in which all arrived; robots killed;
-events and messages of a run; microseconds of `EventMonitor.may_start`, the median and 99.9 %.
+drawn; there are some tasks for each row. Every robot is a process (forked when its choices are
+known), plays itself, and hears the others over ``--bus unix``. With ``--kill`` one of them is
+killed at some moment before all are done, and started again. The lines that the processes wrote are
+checked by definition: no event overlaps one that it interferes with, and all events in the order of
+their starts are a plan that the independent checker accepts. The columns: runs; runs in which
+something overlapped, in which somebody had not ended after a minute, and in which all arrived;
+robots killed; events and messages of a run; microseconds of `EventMonitor.may_start`, the median
+and 99.9 %.
 """
 
 from __future__ import annotations
@@ -169,7 +170,8 @@ class Run:
             now = monotonic() - begun
             if now > STUCK:
                 return self._end()
-            if kill_at is not None and now > kill_at and len(self.pids) == len(self.team):
+            is_due = kill_at is not None and now > kill_at and len(self.pids) == len(self.team)
+            if is_due and not all(self._has_finished(name) for name in self.team):
                 name = self.random.choice(sorted(self.pids))
                 os.kill(self.pids[name], signal.SIGKILL)
                 os.waitpid(self.pids.pop(name), 0)
@@ -187,6 +189,10 @@ class Run:
             sleep(0.002)
         return True
 
+    def _has_finished(self, name: str) -> bool:
+        """Whether a robot's part is done: when all are, nobody stays for one that comes back."""
+        return any("finished" in line for line in self.lines(name))
+
     def _end(self) -> bool:
         """End what has not ended: the run has failed."""
         for pid in self.pids.values():
@@ -196,7 +202,8 @@ class Run:
 
     def lines(self, name: str) -> list[dict[str, Any]]:
         """What the processes of a robot wrote; a last line that was cut off is left out."""
-        text = (self.folder / f"{name}.lines").read_text()
+        path = self.folder / f"{name}.lines"
+        text = path.read_text() if path.exists() else ""
         return [json.loads(line) for line in text.split("\n") if line.endswith("}")]
 
 
@@ -287,11 +294,13 @@ def _run_here(team: Sequence[Monitor], random: Random, times: list[float]) -> No
             if at.finished or not may:
                 continue
             event, has_moved = drawn(at, random, may), True
-            if event is not None:
-                at.start(event)
-                done[at] += 1
+            if event is None:
+                at.did(None)
+                continue
+            at.start(event)
             at.did(event)
-            for other in own if event is not None else ():
+            done[at] += 1
+            for other in own:
                 if other is not at:
                     other.ended(at.robot, at.subaction(event), done[at])
 

@@ -55,6 +55,7 @@ def main() -> NoReturn:
         pass
     if interruptions.first is not None:
         code = 128 + interruptions.first
+    gc.freeze()  # the process ends: no look for garbage among all that it has
     sys.exit(code)
 
 

@@ -128,7 +128,7 @@ class ZenohBus:
                 settings = zenoh.Config.from_file(config)
             else:
                 settings = _local(zenoh, robots.index(robot), len(robots))
-            self._session = zenoh.open(settings)
+            self._session: Any = zenoh.open(settings)
         except zenoh.ZError as error:
             what = f"--bus zenoh cannot be opened: {error}"
             raise BadInput(what, remedy="See docs/robots.md, A bus.") from None

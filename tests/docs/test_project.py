@@ -14,6 +14,7 @@ from tests.support.domains import ROOT
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 #: Distributions whose packages have other names.
 PACKAGES: dict[str, set[str]] = {
+    "eclipse-zenoh": {"zenoh"},
     "imageio-ffmpeg": {"imageio_ffmpeg"},
     "ir-sim": {"irsim"},
     "pillow": {"PIL"},
@@ -53,7 +54,10 @@ def test_dependencies_are_those_that_are_imported() -> None:
     assert listed == sorted(listed)
     declared = {package for name in listed for package in PACKAGES.get(name, {name})}
     optional = PROJECT["optional-dependencies"]
-    named = [re.split(r"[^\w-]", line)[0] for line in (*optional["cluster"], *optional["sim"])]
+    named = [
+        re.split(r"[^\w-]", line)[0]
+        for line in (*optional["cluster"], *optional["fleet"], *optional["sim"])
+    ]
     extra = {package for name in named for package in PACKAGES.get(name, {name})}
     assert extra <= used  # imported where it is used only
     assert declared == used - extra - OWN - set(sys.stdlib_module_names)

@@ -11,19 +11,12 @@ from random import Random
 
 import pytest
 
-from benchmarks.paper.task_choices import languages_in_tasks
-from coordlang.commands.building import build_language
 from coordlang.execution.choices import SentenceChoices, choices, to_bytes
 from coordlang.execution.monitor import EventMonitor, MonitorError, NotAllowed, NotPossible
 from coordlang.language.partition import Partition
-from planners.loading import build
-from planners.pddl.model_options import ModelOptions
-from planners.search.asynchronous import as_executed
-from planners.search.optimal_plans import search
 from tests.support.asynchronous import World, random_plans, texts
-from tests.support.domains import own_task
-from tests.support.task_languages import in_words, sentence_of, shipped
-from tests.support.texts import parsed
+from tests.support.events import EITHER_WAY, LIFT, LIFT_TWICE, choices_in, turning_round
+from tests.support.task_languages import in_words, shipped
 
 RUNS = [(2, range(40)), (3, range(10))]
 THOROUGH = [(2, range(40, 900)), (3, range(10, 500)), (4, range(60))]
@@ -158,13 +151,6 @@ def test_robots_arrive_whatever_they_choose_and_whenever_they_start(
     assert min(seen["runs"], seen["no language"], seen["waits"], seen["several parts"]) >= 5
 
 
-def turning_round() -> SentenceChoices:
-    """r1 and r2 turn round on the 2x2 grid, each in two moves."""
-    made = own_task("grid", "gw1-2x2", ModelOptions(asynchronous=True))
-    used = next(languages_in_tasks(build_language(made, "minimal").language, made))
-    return choices(used, used.words_of(sentence_of(used)))
-
-
 def test_what_cannot_have_happened_is_refused() -> None:
     r1, r2 = monitors_of(turning_round())
     (first,), (second,) = r1.allowed(), r2.allowed()
@@ -204,22 +190,6 @@ def test_each_file_has_its_kind_of_monitor() -> None:
         EventMonitor(json.loads(data), "r1")
 
 
-def choices_in(domain: str, problem: str) -> SentenceChoices:
-    """Of robots that may follow any optimal plan."""
-    read, read_problem = parsed(domain, problem)
-    loaded = build(read, [read_problem], ModelOptions(asynchronous=True))
-    space = as_executed(search(loaded.model, loaded.tasks[0]))
-    one_word = Partition.of_states(space.rows, dict.fromkeys(range(len(space.rows)), 0))
-    found = choices(in_words(None, one_word, space, 0), (0,))
-    assert found.guaranteed
-    return found
-
-
-EITHER_WAY = """(define (domain either) (:types robot way) (:predicates (there ?r - robot))
- (:action go :agent ?r - robot :parameters (?w - way)
-  :precondition (not (there ?r)) :effect (there ?r)))"""
-
-
 def test_while_an_event_is_under_way_it_is_all_that_may_end() -> None:
     problem = """(define (problem p) (:domain either) (:objects r1 r2 - robot a b - way)
      (:init) (:goal (there r1)))"""
@@ -237,20 +207,6 @@ def test_while_an_event_is_under_way_it_is_all_that_may_end() -> None:
     assert (r1.remaining, r1.known("(there r1)")) == (1, None)
     r1.did(one)
     assert (r1.finished, r1.known("(there r1)")) == (True, True)
-
-
-LIFT = """(define (domain lift) (:types robot)
- (:predicates (middle ?r - robot) (once ?r - robot) (twice ?r - robot))
- (:action hold :agent ?r - robot :parameters ()
-  :precondition (and (not (middle ?r)) (not (twice ?r)) (exists (?o - robot) (lift ?o)))
-  :effect (and (once ?r) (when (once ?r) (twice ?r))))
- (:action lift :agent ?r - robot :parameters ()
-  :precondition (and (middle ?r) (not (twice ?r)) (forall (?o - robot) (or (middle ?o) (hold ?o))))
-  :effect (and (once ?r) (when (once ?r) (twice ?r)))))"""
-
-
-LIFT_TWICE = """(define (problem p) (:domain lift) (:objects r1 r2 r3 - robot) (:init (middle r2))
- (:goal (and (twice r1) (twice r2) (twice r3))))"""
 
 
 def test_who_was_ready_for_a_meeting_is_not_ready_for_the_next_one() -> None:

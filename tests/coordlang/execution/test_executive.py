@@ -33,14 +33,8 @@ from coordlang.execution.fleet_log import (
 )
 from coordlang.execution.monitor import EventMonitor
 from coordlang.language.partition import Partition
-from tests.coordlang.execution.test_event_monitor import (
-    EITHER_WAY,
-    LIFT,
-    LIFT_TWICE,
-    choices_in,
-    turning_round,
-)
 from tests.support.asynchronous import World, random_plans, texts
+from tests.support.events import EITHER_WAY, LIFT, LIFT_TWICE, choices_in, turning_round
 from tests.support.task_languages import in_words
 
 SILENT_AFTER = 5.0
