@@ -18,8 +18,8 @@ from tests.support.asynchronous import World, random_plans, texts
 from tests.support.events import EITHER_WAY, LIFT, LIFT_TWICE, choices_in, turning_round
 from tests.support.task_languages import in_words, shipped
 
-RUNS = [(2, range(40)), (3, range(10))]
-THOROUGH = [(2, range(40, 900)), (3, range(10, 500)), (4, range(60))]
+RUNS = [(2, range(24)), (3, range(7))]
+THOROUGH = [(2, range(24, 900)), (3, range(7, 500)), (4, range(60))]
 SEEDS = [*RUNS, *(pytest.param(*run, marks=pytest.mark.thorough) for run in THOROUGH)]
 
 

@@ -70,7 +70,7 @@ def goes(space: PlanSpace, node: int, found: Miscoordination) -> bool:
     )
 
 
-@pytest.mark.parametrize(("robots", "seeds"), runs(70, 35, 20))
+@pytest.mark.parametrize(("robots", "seeds"), runs(40, 20, 10))
 def test_breaks_equal_the_walk(robots: int | None, seeds: range) -> None:
     answers: Counter[tuple[str, bool]] = Counter()
     for candidates, space in random_spaces(seeds, robots):
@@ -106,7 +106,7 @@ def left_together(difference: Difference, word: Ints) -> bool:
     return all(len({*word[[*two]].tolist()} | common) < needed for two in combinations(states, 2))
 
 
-@pytest.mark.parametrize(("robots", "seeds"), runs(60, 30, 20))
+@pytest.mark.parametrize(("robots", "seeds"), runs(40, 20, 18))
 def test_the_demands_that_a_partition_breaks(robots: int | None, seeds: range) -> None:
     random = Random(seeds.start)
     answers: Counter[bool] = Counter()

@@ -26,8 +26,8 @@ from tests.support.texts import parsed
 
 #: (robots, plans of one task that the twin lists at most, models)
 SIZES = [
-    (2, 60, 40),
-    (3, 14, 40),
+    (2, 60, 20),
+    (3, 14, 16),
     (4, 7, 10),
     pytest.param(2, 60, 600, marks=pytest.mark.slow),
     pytest.param(3, 14, 600, marks=pytest.mark.slow),
@@ -120,7 +120,7 @@ def check_witness(candidates: Candidates, table: Partition, witness: Miscoordina
     raise AssertionError("no task has these plans with one sentence and a failing mixture")
 
 
-@pytest.mark.parametrize(("robots", "seeds"), runs(60, 30, 30))
+@pytest.mark.parametrize(("robots", "seeds"), runs(40, 20, 20))
 def test_nodes_at_which_plans_may_part(robots: int | None, seeds: range) -> None:
     """Where edges that do not enter different words differ in where they, or their mixture, lead."""
     met: Counter[bool] = Counter()

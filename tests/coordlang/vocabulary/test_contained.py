@@ -125,7 +125,7 @@ def states_under(space: PlanSpace, renaming: dict[str, str]) -> list[int]:
     return [number[frozenset(renamed(a, renaming) for a in atoms)] for atoms in number]
 
 
-@pytest.mark.parametrize("seeds", [8, pytest.param(16, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("seeds", [5, pytest.param(16, marks=pytest.mark.thorough)])
 def test_symmetries_of_a_part_are_the_renamings_that_keep_its_edges(seeds: int) -> None:
     """All renamings of the objects of random maps, on what is left without one of their cells."""
     more = fewer = 0
@@ -247,7 +247,7 @@ def ring(cells: int) -> list[tuple[int, int]]:
 def test_tasks_of_one_orbit_are_those_whose_plans_pass_through_images_of_one_state() -> None:
     """Random maps and rings, each plan listed; orbits by the texts of states."""
     random, found_any, left_out = Random(0), 0, 0
-    for number in range(24):
+    for number in range(15):
         cells = random.choice([4, 5, 6])
         edges = [e for e in combinations(range(cells), 2) if random.random() < 0.6]
         candidates = on_graph(cells, ring(cells) if number % 3 == 0 else edges)
@@ -277,7 +277,7 @@ def test_tasks_of_one_orbit_are_those_whose_plans_pass_through_images_of_one_sta
     assert left_out > 100
 
 
-@pytest.mark.parametrize("cells", [6, 8])
+@pytest.mark.parametrize("cells", [4, 6])
 def test_two_words_are_too_few_on_a_ring_and_states_of_one_distance_show_it(cells: int) -> None:
     """By hand: Proposition 29 of docs/concepts.md.  Each clause is checked in the whole."""
     candidates = on_graph(cells, ring(cells))

@@ -44,7 +44,7 @@ def test_one_fact_decides_who_goes_round() -> None:
 
 
 @pytest.mark.parametrize(
-    ("robots", "separable", "models"), [(2, True, 3), (2, False, 10), (3, False, 10)]
+    ("robots", "separable", "models"), [(2, True, 3), (2, False, 6), (3, False, 5)]
 )
 def test_each_class_a_word_is_a_language(robots: int, separable: bool, models: int) -> None:
     """Some facts suffice iff all facts do, and then each choice that is told is a language."""

@@ -47,7 +47,7 @@ def test_t_map_has_two_single_words() -> None:
 SEQUENCES = st.lists(st.integers(0, 4), min_size=1, max_size=6)
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=250, deadline=None)
 @given(SEQUENCES, SEQUENCES, st.lists(st.integers(0, 2), min_size=5, max_size=5))
 def test_same_sentence_iff_a_warping_path_exists(
     u: list[int], v: list[int], word: list[int]
@@ -104,7 +104,7 @@ GROUPS: tuple[list[list[int]], ...] = (
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(
     st.integers(1, 3),
     st.sampled_from(GROUPS),

@@ -74,8 +74,8 @@ def small_models(
 @pytest.mark.parametrize(
     ("robots", "most", "number"),
     [
-        (2, 40, 12),
-        (3, 14, 6),
+        (2, 40, 5),
+        (3, 14, 4),
         pytest.param(2, 40, 200, marks=pytest.mark.slow),
         pytest.param(3, 14, 100, marks=pytest.mark.slow),
     ],

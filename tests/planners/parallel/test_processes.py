@@ -8,7 +8,7 @@ import os
 import signal
 import subprocess
 import sys
-from multiprocessing import spawn
+from multiprocessing import resource_tracker, spawn
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
@@ -117,7 +117,12 @@ def test_one_worker_is_ended_and_its_job_done_by_another(
 
 def test_workers_that_cannot_start(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     given = batch(jobs.squares, 3, [range(2), range(3)])
-    monkeypatch.setattr(spawn, "_python_exe", b"/bin/false")
+    resource_tracker.ensure_running()  # it is started by the same program
+    # One that ended at once would close its pipes while the next one is given them.
+    program = tmp_path / "ends"
+    program.write_text("#!/bin/sh\nsleep 0.2\nexit 1\n")
+    program.chmod(0o755)
+    monkeypatch.setattr(spawn, "_python_exe", os.fsencode(program))
     with pytest.raises(OutOfMemory, match="lost its worker 2 times") as caught:
         list(TWO.tables(given))
     assert "--jobs 1" in str(caught.value)

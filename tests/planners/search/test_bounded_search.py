@@ -150,8 +150,8 @@ FAMILIES: dict[str, Callable[[int], PlanningInstance | None]] = {
 @pytest.mark.parametrize(
     ("family", "seeds"),
     [
-        ("any", range(40)),
-        ("threes", range(26)),
+        ("any", range(34)),
+        ("threes", range(18)),
         ("rooms", (*range(4, 17), 21, 20, 18, 30, 19, 34)),
         pytest.param("rooms", range(22), marks=pytest.mark.thorough),
         pytest.param("any", range(10_000, 12_000), marks=pytest.mark.slow),

@@ -67,7 +67,7 @@ def mutexes_of(loaded: PlanningInstance, space: Space) -> list[tuple[int, int]]:
 
 def test_random_models() -> None:
     seen: Counter[object] = Counter()
-    for seed in range(120):
+    for seed in range(96):
         loaded = random_instance(seed)
         if loaded is None or (space := explored(loaded)) is None or len(space) > 3_000:
             continue
