@@ -92,9 +92,10 @@ class World:
         key = tuple(self.names.items())
         if key not in _WRITTEN:
             self._write_all()
-            _WRITTEN[key] = self.words["SENTENCE"], {
-                word: path.read_bytes() for word, path in self.path.items()
-            }
+            _WRITTEN[key] = (
+                self.words["SENTENCE"],
+                {word: path.read_bytes() for word, path in self.path.items()},
+            )
         self.words["SENTENCE"], written = _WRITTEN[key]
         for word, content in written.items():
             self.path[word].write_bytes(content)
