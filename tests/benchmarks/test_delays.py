@@ -94,12 +94,13 @@ def test_a_delay_by_hand() -> None:
     assert steps(r2, False, 0.0, 1.0) is None  # r1 is late: r2 moves to a, where it still is
 
 
-@pytest.mark.parametrize("way", ["graph", "mixed", "free"])
-def test_robots_that_wait_for_passings_arrive(way: str) -> None:
+@pytest.mark.parametrize("world", ["GW1", "three-robots"])
+def test_robots_that_wait_for_passings_arrive(world: str) -> None:
     """Without delays in the fewest steps; of three robots, too."""
-    for world in ("GW1", "three-robots"):
-        candidates, language = language_for(WORLDS[world], "asynchronous", 0)
-        trials = EventTrials(list(languages_in_tasks(language, candidates)), way)
+    candidates, language = language_for(WORLDS[world], "asynchronous", 0)
+    tasks = list(languages_in_tasks(language, candidates))
+    for way in ("graph", "mixed", "free"):
+        trials = EventTrials(tasks, way)
         assert trials.sample(0.0, 20, Random(1))[:3] == (20, 20, 0)
         runs, well, late, *_ = trials.sample(0.5, 20, Random(1))
         assert runs == well

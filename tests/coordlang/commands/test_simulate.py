@@ -86,7 +86,7 @@ def test_usage(line: str, message: str, shell: Shell) -> None:
 
 def test_a_time_limit_keeps_the_runs_that_are_done(simulate: Shell) -> None:
     simulate("")  # everything is loaded
-    outcome = simulate("--runs 1000 --time-limit 2 --json", 3, "of 1000 done")
+    outcome = simulate("--runs 1000 --time-limit 1 --json", 3, "of 1000 done")
     assert 0 < len(json.loads(outcome.out)["runs"]) < 1000
 
 

@@ -114,7 +114,7 @@ def test_the_worst_task_may_want_other_words_than_the_mean() -> None:
 def test_annealing_finds_the_best_two_words(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_ALL", 1)
     candidates = all_tasks("grid", "gw1-2x2")
-    found, failures = few_words(job_for_few_words(Making(candidates), seed=1), 2)
+    found, failures = few_words(job_for_few_words(Making(candidates), seed=1), 2, work=10_000_000)
     assert not found.figures["least_of_all_partitions"]
     assert failures.mean == Fraction(5, 132)
     assert found.figures["partitions_measured"] > 400

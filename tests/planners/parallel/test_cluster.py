@@ -159,7 +159,7 @@ def test_there_is_no_cluster(
 
 def test_the_command_says_it_within_its_limit(silence: str) -> None:
     files = [DOMAINS / "grid" / f"{stem}.pddl" for stem in ("domain", "corners-3x3")]
-    limits = ["--scheduler", silence, "--time-limit", "4"]
+    limits = ["--scheduler", silence, "--time-limit", "3"]
     done = subprocess.run(
         [sys.executable, "-m", "coordlang", "coordination", *files, *limits],
         capture_output=True,

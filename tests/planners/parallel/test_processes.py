@@ -94,7 +94,7 @@ def test_no_worker_is_left(number: signal.Signals, tmp_path: Path) -> None:
 
 
 def test_no_worker_is_left_when_time_is_over(tmp_path: Path) -> None:
-    with pytest.raises(OutOfTime), time_limit(3):
+    with pytest.raises(OutOfTime), time_limit(1.5):
         list(TWO.tables(batch(jobs.waits, str(tmp_path), [0, 1])))
     assert not any(map(runs, workers(tmp_path)))
 
