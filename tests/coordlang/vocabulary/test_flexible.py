@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 
 from coordlang.commands.building import build_language
-from coordlang.language.candidates import Candidates, from_listed
+from coordlang.language.candidates import Candidates
 from coordlang.language.flexibility import flexibility
-from coordlang.language.listed import read_task_file
 from coordlang.required.divergences import required_nodes
 from coordlang.vocabulary.flexible import flexibility_bounds, flexible
 from coordlang.vocabulary.job import Assignment, Outcome
@@ -32,7 +31,7 @@ from tests.support.candidates import (
     small_candidates,
     some_tasks,
 )
-from tests.support.domains import DOMAINS, all_tasks, own_task, read
+from tests.support.domains import all_tasks, own_task
 
 
 def of_nodes(candidates: Candidates, word: list[int]) -> list[np.ndarray]:
@@ -174,16 +173,3 @@ def test_bounds_are_the_largest_sets_that_mix(robots: int) -> None:
             assert bound == pytest.approx(sum(map(min, zip(*each, strict=True))) / len(plans))
             coordinated += bool(requires[candidates.spaces.index(space)][space.starts[task]])
     assert coordinated >= 10
-
-
-@pytest.mark.thorough
-def test_flexible_reaches_its_bound_on_the_ring() -> None:
-    """GWB5: the language leaves as many plans open as any language could."""
-    domain, problem = read("grid", "gwb5-3x3")
-    tasks = read_task_file(DOMAINS / "grid" / "gwb5-3x3.tasks.json")
-    candidates = from_listed(domain, [problem], tasks)
-    built = build_language(candidates, "minimal", prefer="flexible")
-    assert built.verdict.holds
-    assert built.language.guarantee.proved_minimal
-    assert built.figures["flexibility"] == pytest.approx(built.figures["flexibility_bound"])
-    assert built.figures["flexibility"] > 1.3 * built.figures["flexibility_before"]

@@ -13,7 +13,6 @@ from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates
 from coordlang.required.composition_walk import DifferenceWalk
 from coordlang.vocabulary.exhaustive import partitions
-from coordlang.vocabulary.separating import constraints
 from tests.support import naive
 from tests.support.candidates import listed, requiring, small_candidates
 from tests.support.domains import all_tasks
@@ -133,30 +132,3 @@ def test_known_minima(folder: str, stem: str, both: int, alpha: int) -> None:
     for words, alpha_only in ((both, False), (alpha, True)):
         built = build_language(candidates, "separating", alpha_only=alpha_only)
         assert built.language.guarantee.size == words == built.figures["separating_lower_bound"]
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("asynchronous", [False, True])
-@pytest.mark.parametrize(
-    ("robots", "most", "number"),
-    [
-        (2, 40, 14),
-        (3, 14, 8),
-        pytest.param(2, 40, 100, marks=pytest.mark.slow),
-        pytest.param(3, 14, 50, marks=pytest.mark.slow),
-    ],
-)
-def test_every_constraint_and_no_other(
-    robots: int, most: int, number: int, asynchronous: bool
-) -> None:
-    """What is written down are the demands of the failing tuples, all listed."""
-    for _, candidates in small_models(robots, most, number, asynchronous):
-        found = [DifferenceWalk(space).every(10**6) for space in candidates.spaces]
-        every = {
-            frozenset(frozenset(frozenset(p) for p in pairs) for pairs in constraint)
-            for differences in found
-            if differences is not None
-            for constraint in constraints(differences)
-        }
-        assert None not in found
-        assert every == demands(candidates, most, beta=True)
