@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import re
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -12,13 +11,11 @@ import pytest
 from coordlang.commands.building import build_language
 from coordlang.required.miscoordination import Inseparable, miscoordination
 from coordlang.verification.by_definition import verify
-from planners.classical.fast_downward import optimal_cost
 from planners.loading import PlanningInstance, build
 from planners.pddl import read_domain
 from planners.pddl.model_options import Cost, ModelOptions
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
-from planners.system.limits import time_limit
 from tests.support.domains import DOMAINS, read, world_of
 from tests.support.pages import Row, blocks, candidates, commands, run_command, table
 
@@ -125,28 +122,6 @@ def test_the_commands_in_the_readme(
     assert {command.text.split()[1] for command in run} >= {"build", "verify"}
     for command in run:
         run_command(command, folder, monkeypatch)
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    ("folder", "row"),
-    [
-        pytest.param(
-            *(folder, row),
-            id=f"{folder}-{row['problem']}",
-            marks=[pytest.mark.slow] * (folder == before),
-        )
-        for (before, _), (folder, row) in pairwise([("", {}), *PROBLEMS])
-        if folder in WORLDS
-    ],
-)
-def test_fast_downward_agrees(folder: str, row: Row) -> None:
-    for cost, column in COSTS.items():
-        if column in row:
-            loaded = loaded_under(folder, row, cost)
-            ours = search(loaded.model, loaded.tasks[0]).cost_of(0)
-            with time_limit(60):
-                assert optimal_cost(loaded.model, loaded.tasks[0]).cost == ours
 
 
 def test_no_state_tells_who_holds_the_switch() -> None:

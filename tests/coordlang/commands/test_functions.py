@@ -1,25 +1,31 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The public functions answer as the commands do, from files and from parsed objects."""
+"""The public functions answer as the commands do, from files and from parsed objects; their names."""
 
 from __future__ import annotations
 
+import ast
 import inspect
 import json
+import os
 import shlex
+import subprocess
+import sys
 from dataclasses import replace
+from importlib.metadata import version
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+import coordlang
 import coordlang as door
 from coordlang.language.recorded import options_of
 from coordlang.verification.certificate_file import write_certificate
 from planners.pddl.model_options import ModelOptions
 from tests.coordlang.commands.conftest import FILES
 from tests.support.command import Command
-from tests.support.domains import DOMAINS
+from tests.support.domains import DOMAINS, ROOT
 from tests.support.hall import factored
 
 T_MAP, CELLS = FILES["T-MAP"], FILES["CELLS"]
@@ -185,34 +191,10 @@ def test_say_and_understand(language: Path, tmp_path: Path) -> None:
         door.say(language, *T_MAP, [(None, None), *plans[0]])
 
 
-def test_choices(tmp_path: Path) -> None:
-    built = door.build(*CELLS, method="greedy")
-    found = door.choices(built.language, *CELLS, "w1 w0")
-    assert (found.guaranteed, found.subplans) == (True, {"r1": 1, "r2": 2})
-    robot = found.monitor("R2")
-    assert robot.allowed() == (None, "(move r2 b a)")
-    path = tmp_path / "r2.json"
-    door.choices(built.language, *CELLS, "w1 w0", robot="r2", check=True).save(path)
-    assert door.Monitor.read(str(path)).remaining == 2
-    with pytest.raises(door.NotAllowed):
-        robot.did("(move r2 b c)")
-    with pytest.raises(door.UsageError, match="no such robot"):
-        found.monitor("r9")
-
-
-def test_explain_and_export(language: Path, tmp_path: Path) -> None:
+def test_formulas_and_demands(language: Path) -> None:
     found = door.explain(language, *T_MAP, task=True)
-    assert found.formulas["w1"] == "at(r1) = c1-0 and at(r2) = c1-1"
     assert found.words.pddl["w1"] == "(and (at r1 c1-0) (at r2 c1-1))"
-    assert [s.words for s in found.sentences] == [("w0",), tuple(SENTENCE.split())]
     assert [d.plans for d in found.demands()] == [1, 1]
-    exported = door.export(language, *T_MAP, SENTENCE)
-    exported.save(tmp_path / "new")
-    assert (tmp_path / "new" / "domain.pddl").read_text() == exported.domain
-    with pytest.raises(door.BadInput, match="none of the exported problem"):
-        exported.translate_plan(["fly"])
-    formula = door.export(language, *T_MAP, SENTENCE, to="ltlf")
-    assert str(formula) == formula.formula
 
 
 def test_parsed_objects_stand_for_files(language: Path) -> None:
@@ -304,3 +286,103 @@ def test_a_signature_names_what_python_takes() -> None:
     assert names[:2] == ["domain", "problems"]
     assert {"factored", "cost", "robots", "method", "slack"} <= {*names}
     assert "as_json" not in names
+
+
+# ---- what import coordlang gives, what it costs, and what hides it
+
+FUNCTIONS = [
+    "load",
+    "inspect",
+    "plans",
+    "check",
+    "coordination",
+    "build",
+    "verify",
+    "say",
+    "understand",
+    "plan",
+    "choices",
+    "explain",
+    "export",
+    "load_language",
+    "lift",
+    "ground",
+    "simulate",
+]
+
+
+def python(*arguments: str, cwd: Path = ROOT) -> tuple[int, str, str]:
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, *arguments], cwd=cwd, env=environment, capture_output=True, text=True
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_every_name_is_there() -> None:
+    assert set(coordlang.__all__) <= set(dir(coordlang))
+    assert set(coordlang.__all__) >= {*FUNCTIONS, "Language", "Monitor", "CoordlangError"}
+    for name in coordlang.__all__:
+        assert getattr(coordlang, name).__doc__, name
+    with pytest.raises(AttributeError, match="has no attribute 'teach'"):
+        coordlang.teach  # noqa: B018
+
+
+def test_types_are_those_of_the_lazy_names() -> None:
+    """What mypy reads under TYPE_CHECKING and what is imported at run time are the same."""
+    tree = ast.parse((ROOT / "coordlang" / "__init__.py").read_text())
+    typed = {
+        alias.asname: node.module
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+        if alias.asname
+    }
+    assert typed == coordlang._MODULE_OF
+    assert {*typed, "__version__"} == set(coordlang.__all__)
+
+
+def test_no_module_hides_a_function() -> None:
+    modules = {path.stem for path in (ROOT / "coordlang").iterdir()}
+    assert not modules & set(coordlang.__all__)
+
+
+@pytest.mark.parametrize("used", ["coordlang", "coordlang.Monitor"])
+def test_import_loads_the_standard_library_only(used: str) -> None:
+    """A robot's monitor needs no more."""
+    code = (
+        f"import sys; before = set(sys.modules); import coordlang; {used}; "
+        "print(*sorted({m.split('.')[0] for m in set(sys.modules) - before}))"
+    )
+    exit_code, out, _ = python("-c", code)
+    assert exit_code == 0
+    assert set(out.split()) <= {*sys.stdlib_module_names, "coordlang"}
+
+
+def test_python_m_runs_the_command_line() -> None:
+    assert coordlang.__version__ == version("coordlang")
+    assert python("-m", "coordlang", "--version")[1].strip().endswith(coordlang.__version__)
+    files = ["domains/t-map/domain.pddl", "domains/t-map/problem.pddl"]
+    assert python("-m", "coordlang", "plans", *files, "--count")[:2] == (0, "2\n")
+    assert python("-m", "coordlang", "plans", files[0])[0] == 2
+
+
+@pytest.mark.parametrize("foreign", ["planners/__init__.py", "planners.py"])
+def test_a_foreign_planners_is_named(foreign: str, tmp_path: Path) -> None:
+    file = tmp_path / foreign
+    file.parent.mkdir(exist_ok=True)
+    file.write_text("mine = 1\n")
+    assert python("-m", "coordlang", "--version", cwd=tmp_path)[0] == 1
+    exit_code, _, err = python("-c", "import coordlang", cwd=tmp_path)
+    assert exit_code == 1
+    place = file.parent if file.name == "__init__.py" else file
+    last = err[err.rindex("ImportError") :]
+    assert str(place) in last
+    assert "Rename that file or folder" in last
+
+
+def test_a_folder_named_planners_without_a_package_does_no_harm(tmp_path: Path) -> None:
+    (tmp_path / "planners").mkdir()
+    exit_code, out, _ = python("-m", "coordlang", "--version", cwd=tmp_path)
+    assert exit_code == 0
+    assert coordlang.__version__ in out
