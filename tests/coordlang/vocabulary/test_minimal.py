@@ -1,23 +1,38 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The exact method: known minima, agreement with brute force, and what it rests on."""
+"""The fewest words, against brute force; and merging, until no merge is left."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from itertools import combinations, islice, permutations, product
+from itertools import combinations, islice, pairwise, permutations, product
+from pathlib import Path
+from random import Random
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coordlang.commands.building import build_language
+from coordlang.language.candidates import Candidates
+from coordlang.language.partition import Partition
 from coordlang.language.sentences import sentence
 from coordlang.language.warping import Pair, pair, short_clauses
+from coordlang.symmetry.group import SymmetryGroup, symmetry_group
+from coordlang.verification.by_definition import verify
+from coordlang.vocabulary.failing_tuples import FailingTuples
+from coordlang.vocabulary.job import Assignment
+from coordlang.vocabulary.merging import merged
+from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import PartitionProblem
+from planners.joint.tables import Ints
+from planners.parallel.batch import Store
+from planners.parallel.workers import Workers
 from tests.support.candidates import small_candidates
 from tests.support.domains import all_tasks
 from tests.support.naive import separation_clause, warping_clause
+from tests.support.random_spaces import random_spaces
 
 
 @pytest.mark.parametrize(
@@ -158,3 +173,122 @@ def test_minimal_equals_exhaustive(robots: int, most: int, examples: int) -> Non
         sizes[brute.size] += 1
     # Worth something only if more than one word is needed now and then.
     assert examples - sizes[1] >= examples // (12 if robots == 2 else 18), sizes
+
+
+# ---- merging
+
+
+def is_language(word: Assignment, candidates: Candidates) -> bool:
+    return verify(Partition.of_states(candidates.rows, word), candidates.spaces).holds
+
+
+def merges(word: Assignment) -> Iterator[dict[int, int]]:
+    """All partitions with two words made one."""
+    for one, other in combinations(sorted(set(word.values())), 2):
+        yield {state: one if own == other else own for state, own in word.items()}
+
+
+def states_of(candidates: Candidates) -> list[int]:
+    return sorted({s for space in candidates.spaces for s in space.state.tolist()})
+
+
+def languages(candidates: Candidates, group: SymmetryGroup) -> list[dict[int, int]]:
+    """Those that merging goes through, from all states apart."""
+    states = states_of(candidates)
+    refuter = Refuter(candidates.spaces, group, len(candidates.rows), 0)
+    start = {state: 2 * number for number, state in enumerate(states)}
+    found = [start]
+    for language in merged(start, states, refuter):
+        if len(set(language.values())) < len(set(found[-1].values())):
+            found.append(language)
+    return found
+
+
+def check(found: list[dict[int, int]], candidates: Candidates) -> int:
+    """Each is a language and merges words of the one before, and the last can merge none."""
+    for before, after in pairwise(found):
+        assert len(set(after.values())) < len(set(before.values()))
+        joined = {(before[state], after[state]) for state in before}
+        assert len(joined) == len(set(before.values())), "whole words are merged"
+    for word in found:
+        assert is_language(word, candidates)
+    last = found[-1]
+    assert not any(is_language(coarser, candidates) for coarser in merges(last))
+    assert set(last.values()) == set(range(len(set(last.values())))) or len(found) == 1
+    return len(set(last.values()))
+
+
+@pytest.mark.parametrize(
+    ("robots", "seeds"),
+    [
+        (2, range(30)),
+        *(pytest.param(robots, range(80), marks=pytest.mark.thorough) for robots in (2, 3, None)),
+    ],
+)
+def test_random_models_merge_until_no_merge_is_left(robots: int | None, seeds: range) -> None:
+    sizes: Counter[int] = Counter()
+    for candidates, _ in random_spaces(seeds, robots):
+        if len(candidates.spaces) == 1 and 2 <= len(states_of(candidates)) <= 16:
+            start = {state: state for state in states_of(candidates)}
+            if is_language(start, candidates):
+                found = languages(candidates, SymmetryGroup(()))
+                sizes[check(found, candidates)] += 1
+    assert sum(count for size, count in sizes.items() if size > 1) >= 2, sizes
+
+
+@pytest.mark.parametrize(
+    ("folder", "stem", "most"),
+    [("three-cells", "problem", 4), ("t-map", "problem", 5), ("grid", "gw1-2x2", 5)],
+)
+def test_shipped_worlds_merge_until_no_merge_is_left(folder: str, stem: str, most: int) -> None:
+    candidates = all_tasks(folder, stem)
+    assert 3 <= check(languages(candidates, symmetry_group(candidates)), candidates) <= most
+
+
+@pytest.mark.parametrize(("folder", "stem"), [("grid", "gw1-2x2"), ("t-map", "problem")])
+def test_walks_of_goals_up_to_symmetry_refute_what_is_no_language(folder: str, stem: str) -> None:
+    """Nearly all states have words of their own: what little fails is at goals of any orbit."""
+    candidates = all_tasks(folder, stem)
+    group = symmetry_group(candidates)
+    assert group.symmetries
+    states = range(len(candidates.rows))
+    refuter = Refuter(candidates.spaces, group, len(states), 0)
+    random, answers = Random(1), Counter[bool]()
+    for _ in range(60):
+        word = list(states)
+        for _ in range(random.randint(1, 3)):
+            one, other = random.sample(states, 2)
+            word = [word[other] if w == word[one] else w for w in word]
+        partition = Partition.of_states(candidates.rows, dict(enumerate(word)))
+        holds = verify(partition, candidates.spaces).holds
+        refuter.pool = FailingTuples(group, len(states))  # it knows nothing, and has to walk
+        assert (not refuter.violated(np.array(word))) == holds
+        answers[holds] += 1
+    assert min(answers.values()) >= 5, answers
+
+
+def test_first_walks_find_the_same_in_other_processes_and_from_kept_jobs(tmp_path: Path) -> None:
+    """The same plans in the same order, so the same clauses for the same reasons."""
+    candidates = all_tasks("grid", "gw2-2x3")
+    group, states = symmetry_group(candidates), len(candidates.rows)
+    halves = np.arange(states) % 2
+
+    def refuter(workers: Workers | None, first: Ints | None = None) -> Refuter:
+        return Refuter(candidates.spaces, group, states, 0, first=first, workers=workers)
+
+    kept = Workers(kept=Store(tmp_path, say=pytest.fail))
+    here = refuter(None)
+    others = [refuter(workers) for workers in (Workers(2, worth=0), kept, kept)]
+    jobs = len(list(tmp_path.iterdir()))
+    assert jobs == len(here._parts)
+    for other in others:
+        assert other.walks == here.walks == jobs
+        assert len(other.pool) == len(here.pool) > 20
+    violated = [
+        [(clause, evidence.example) for clause, evidence in found.violated(halves).items()]
+        for found in (here, *others)
+    ]
+    assert violated[0]
+    assert all(found == violated[0] for found in violated[1:])
+    refuter(kept, first=halves)
+    assert len(list(tmp_path.iterdir())) == 2 * jobs, "other words, other jobs"

@@ -104,19 +104,88 @@ THREE = p(
 LONG = "9" * 400
 HUGE = f"{9 * 10**18}"
 
+#: The domain said in another way, each text with what stands in its place: there are 2 plans.
+SAME_DOMAIN: dict[str, tuple[str, ...]] = {
+    # who acts
+    "agent inside the parameters": (AGENT, ":parameters (:agent ?r - robot ?x ?y - room)"),
+    "agent again in them": (AGENT, ":agent ?r :parameters (?r - robot ?x ?y - room)"),
+    "agent behind them": (AGENT, ":parameters (?x ?y - room) :agent ?r - robot"),
+    "untyped agent before typed parameters": (":agent ?r - robot", ":agent ?r"),
+    # types and objects
+    "supertypes forward and undeclared": (
+        "(:types robot room)",
+        "(:types robot - mobile mobile - thing room - place)",
+    ),
+    "two parents": ("robot room)", "robot - m robot - n room m n - object)"),
+    "object among the types": ("robot room)", "object - thing robot room - object)"),
+    "either in a parameter": (AGENT, ":agent ?r - robot :parameters (?x ?y - (either room robot))"),
+    "a parameter of type object": (AGENT, ":agent ?r - robot :parameters (?x ?y - object)"),
+    "no space before variables": (
+        "(at ?r - robot ?x",
+        "(at?r - robot?x",
+        "(door ?x ?y))",
+        "(door?x?y))",
+    ),
+    "private predicates": (
+        "(:predicates (at",
+        "(:predicates (:private ?r - robot (at",
+        "?x - room)",
+        "?x - room))",
+    ),
+    # sections and effects
+    "requirements of others": (":typing", ":typing :foo :durative-actions :numeric-fluents"),
+    "effects under forall and when": (
+        EFFECT,
+        "(and (at ?r ?y) (forall (?x - room) "
+        "(when (and (at ?r ?x) (not (= ?x ?y))) (not (at ?r ?x)))))",
+    ),
+    "when inside when": (
+        EFFECT,
+        "(forall (?p - room) (and (when (= ?p ?y) (at ?r ?p)) "
+        "(when (at ?r ?p) (when (not (= ?p ?y)) (not (at ?r ?p))))))",
+    ),
+    "forall shadowing forall in effects": (
+        EFFECT,
+        "(and (at ?r ?y) (forall (?p - room) "
+        "(forall (?p - room) (when (= ?p ?x) (not (at ?r ?p))))))",
+    ),
+    "an atom both deleted and added": (
+        EFFECT,
+        "(and (not (at ?r ?y)) (at ?r ?y) (not (at ?r ?x)))",
+    ),
+    "a comment about subactions": (":precondition", "; subactions of one robot\n :precondition"),
+}
+#: The problem said in another way.
+SAME_PROBLEM: dict[str, tuple[str, ...]] = {
+    "private objects": (OBJECTS, "r2 - robot a b c - room (:private r1 - robot)"),
+    "all sections of a problem": (
+        "(:objects",
+        "(:requirements :typing) (:metric minimize (total-cost)) (:length (:serial 5)) (:objects",
+    ),
+    "two object sections": (OBJECTS, "r1 r2 - robot) (:objects a b c - room"),
+    "init with and, not": (
+        "(:init (at r1 a) (at r2 b)",
+        "(:init (and (at r1 a) (at r2 b)) (not (at r1 b)) (at r1 a)",
+    ),
+    "objects named like predicates and actions": (
+        *("a b c", "at go door", "r1 a)", "r1 at)", "r2 b)", "r2 go)"),
+        *(DOORS, "(door at go) (door go at) (door go door) (door door go)"),
+        *("(at r1 c) (at r2 a)", "(at r1 door) (at r2 at)"),
+    ),
+    "names with all kinds of signs": ("r1", "1r.1_+@x,'"),
+    "numbers as names": ("r1 r2 - robot", "1 2 - robot", "(at r1", "(at 1", "(at r2", "(at 2"),
+    "a superscript as a name": ("r1", "\u00b2"),
+    "a name of 5000 digits": ("r1", "9" * 5000),
+}
 CASES: dict[str, Case] = {
+    **{name: case(2, d(*words)) for name, words in SAME_DOMAIN.items()},
+    **{name: case(2, DOMAIN, p(*words)) for name, words in SAME_PROBLEM.items()},
     "as it is": case(2),
     # who acts
     "no agent": case(2, PLAIN),
-    "agent inside the parameters": case(
-        2, d(AGENT, ":parameters (:agent ?r - robot ?x ?y - room)")
-    ),
-    "agent again in them": case(2, d(AGENT, ":agent ?r :parameters (?r - robot ?x ?y - room)")),
-    "agent behind them": case(2, d(AGENT, ":parameters (?x ?y - room) :agent ?r - robot")),
     "untyped agent": case(
         2, UNTYPED, p(OBJECTS, "r1 r2 a b c", "(:init", "(:init (robot r1) (robot r2)")
     ),
-    "untyped agent before typed parameters": case(2, d(":agent ?r - robot", ":agent ?r")),
     "two variables behind :agent": case(
         (31, "d.pddl:5"), d(":agent ?r - robot", ":agent ?r ?q - robot")
     ),
@@ -139,18 +208,7 @@ CASES: dict[str, Case] = {
         change(PLAIN, "robot room)", "robot room agent)"),
         p("a b c - room", "a b c - room x - agent"),
     ),
-    # types and objects
-    "supertypes forward and undeclared": case(
-        2, d("(:types robot room)", "(:types robot - mobile mobile - thing room - place)")
-    ),
-    "two parents": case(2, d("robot room)", "robot - m robot - n room m n - object)")),
-    "object among the types": case(2, d("robot room)", "object - thing robot room - object)")),
-    "either in a parameter": case(
-        2, d(AGENT, ":agent ?r - robot :parameters (?x ?y - (either room robot))")
-    ),
-    "a parameter of type object": case(
-        2, d(AGENT, ":agent ?r - robot :parameters (?x ?y - object)")
-    ),
+    # types, objects and sections
     "a cycle": case(
         (31, "d.pddl:3:11: the types form a cycle"), d("robot room)", "robot - room room - robot)")
     ),
@@ -163,39 +221,10 @@ CASES: dict[str, Case] = {
     "constants only": case(
         2, d("(:pred", f"(:constants {OBJECTS}) (:pred"), p(f"(:objects {OBJECTS})", "")
     ),
-    "no space before variables": case(
-        2, d("(at ?r - robot ?x", "(at?r - robot?x", "(door ?x ?y))", "(door?x?y))")
-    ),
-    "private predicates": case(
-        2,
-        d("(:predicates (at", "(:predicates (:private ?r - robot (at", "?x - room)", "?x - room))"),
-    ),
-    "private objects": case(2, DOMAIN, p(OBJECTS, "r2 - robot a b c - room (:private r1 - robot)")),
-    # sections
-    "requirements of others": case(
-        2, d(":typing", ":typing :foo :durative-actions :numeric-fluents")
-    ),
-    "all sections of a problem": case(
-        2,
-        DOMAIN,
-        p(
-            "(:objects",
-            "(:requirements :typing) (:metric minimize (total-cost)) (:length (:serial 5)) (:objects",
-        ),
-    ),
-    "two object sections": case(2, DOMAIN, p(OBJECTS, "r1 r2 - robot) (:objects a b c - room")),
     "no initial state": case(
         (11, "task two: the goal cannot be reached"),
         DOMAIN,
         p(f"(:init (at r1 a) (at r2 b) {DOORS})", ""),
-    ),
-    "init with and, not": case(
-        2,
-        DOMAIN,
-        p(
-            "(:init (at r1 a) (at r2 b)",
-            "(:init (and (at r1 a) (at r2 b)) (not (at r1 b)) (at r1 a)",
-        ),
     ),
     # preconditions and effects that are not there
     "an empty action": case(2, with_action("wait :agent ?r - robot")),
@@ -233,45 +262,9 @@ CASES: dict[str, Case] = {
         (11, ""), where("(exists (?g - ghost) (and))", "robot room)", "robot room ghost)")
     ),
     "an empty or": case((11, ""), where("(or)")),
-    "effects under forall and when": case(
-        2,
-        d(
-            EFFECT,
-            "(and (at ?r ?y) (forall (?x - room) "
-            "(when (and (at ?r ?x) (not (= ?x ?y))) (not (at ?r ?x)))))",
-        ),
-    ),
-    "when inside when": case(
-        2,
-        d(
-            EFFECT,
-            "(forall (?p - room) (and (when (= ?p ?y) (at ?r ?p)) "
-            "(when (at ?r ?p) (when (not (= ?p ?y)) (not (at ?r ?p))))))",
-        ),
-    ),
-    "forall shadowing forall in effects": case(
-        2,
-        d(
-            EFFECT,
-            "(and (at ?r ?y) (forall (?p - room) "
-            "(forall (?p - room) (when (= ?p ?x) (not (at ?r ?p))))))",
-        ),
-    ),
-    "an atom both deleted and added": case(
-        2, d(EFFECT, "(and (not (at ?r ?y)) (at ?r ?y) (not (at ?r ?x)))")
-    ),
     # names
     "a predicate named like the action": case(
         (11, ""), where("(go ?r ?x ?y)", PREDICATE, f"{PREDICATE} (go ?r ?x ?y)")
-    ),
-    "objects named like predicates and actions": case(
-        2,
-        DOMAIN,
-        p(
-            *("a b c", "at go door", "r1 a)", "r1 at)", "r2 b)", "r2 go)"),
-            *(DOORS, "(door at go) (door go at) (door go door) (door door go)"),
-            *("(at r1 c) (at r2 a)", "(at r1 door) (at r2 at)"),
-        ),
     ),
     "a predicate named like a type": case(2, d("(door", "(room"), p("(door", "(room")),
     "a predicate called last": case(
@@ -280,12 +273,6 @@ CASES: dict[str, Case] = {
         p("(at ", "(last "),
         "--remember-actions",
     ),
-    "names with all kinds of signs": case(2, DOMAIN, p("r1", "1r.1_+@x,'")),
-    "numbers as names": case(
-        2, DOMAIN, p("r1 r2 - robot", "1 2 - robot", "(at r1", "(at 1", "(at r2", "(at 2")
-    ),
-    "a superscript as a name": case(2, DOMAIN, p("r1", "\u00b2")),
-    "a name of 5000 digits": case(2, DOMAIN, p("r1", "9" * 5000)),
     "upper case": case(2, DOMAIN.upper(), PROBLEM.upper()),
     # layout
     "CRLF": case(2, d("\n", "\r\n"), p("\n", "\r\n")),
@@ -293,9 +280,6 @@ CASES: dict[str, Case] = {
     "tabs": case(2, d(" ", "\t"), p(" ", "\t")),
     "byte order mark": case(2, "\ufeff" + DOMAIN, "\ufeff" + PROBLEM),
     "comments everywhere": case(2, d(" ", ";x)(\n"), p(" ", ";x)(\n")),
-    "a comment about subactions": case(
-        2, d(":precondition", "; subactions of one robot\n :precondition")
-    ),
     "a comment about the subaction of one action": case(
         (31, "action 'go' has no '; subaction' comment"),
         with_action("wait :agent ?r - robot ; subaction r1 (wait)\n", where("(not (wait ?r))")),
