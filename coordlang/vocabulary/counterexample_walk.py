@@ -54,7 +54,7 @@ class _OpenMoves:
 class _Layer:
     """Nodes of the walk with equally many steps to go.
 
-    A node is ``(x_1 .. x_n, y or failed, leads)``, failed as the number of nodes of the plan space.
+    A node is ``(x_1, x_2, y or failed, lead)``, failed as the number of nodes of the plan space.
     Each move has the row of its node in ``source``, the plans' ``edges``, and in ``child`` the row
     of the node that it leads to, one layer below.  Each node has in ``best`` the fewest steps at
     which the plans are in different states on a way to a violation, in ``choice`` the move that
@@ -101,7 +101,7 @@ class _Walk:
 
     def layers(self) -> list[_Layer]:
         """The nodes: ``layers[k]`` has k joint steps to go."""
-        space, robots = self._space, self._space.robots
+        space = self._space
         starts = np.unique(space.starts)
         layers: list[_Layer] = []
 
@@ -111,21 +111,20 @@ class _Walk:
             return arriving
 
         begin = starts[self._choices.requires[starts]]
-        tables = list(layered(space, begin, 2 * robots, expand))
+        tables = list(layered(space, begin, 4, expand))
         for layer, (_, child) in zip(layers, tables[1:], strict=True):
             layer.child = child
         none = np.zeros(0, np.int64)
-        layers.append(_layer(tables[-1][0], none, np.zeros((0, robots), np.int64)))
+        layers.append(_layer(tables[-1][0], none, np.zeros((0, 2), np.int64)))
         layers.reverse()
         return layers
 
     def _expand(self, nodes: Ints) -> tuple[_Layer, Ints]:
         """A layer with the moves out of its nodes, and the nodes that they lead to."""
-        robots = self._space.robots
         sources: list[Ints] = [np.zeros(0, np.int64)]
-        edges: list[Ints] = [np.zeros((0, robots), np.int64)]
-        children: list[Ints] = [np.zeros((0, 2 * robots), np.int64)]
-        for every in moves(self._space, self._index, nodes[:, : robots + 1]):
+        edges: list[Ints] = [np.zeros((0, 2), np.int64)]
+        children: list[Ints] = [np.zeros((0, 4), np.int64)]
+        for every in moves(self._space, self._index, nodes[:, :3]):
             move, leads = self._in_agreement(nodes, every)
             targets = move.targets(self._space)
             fails = can_fail(self._choices, targets)
@@ -137,18 +136,10 @@ class _Walk:
 
     def _in_agreement(self, nodes: Ints, move: Moves) -> tuple[Moves, Ints]:
         """The moves after which the sentences can agree, and the leads then."""
-        robots = self._space.robots
-        kept = np.arange(len(move.source))
-        first = self._entered[move.edges[:, 0]]
-        leads: list[Ints] = []
-        for other in range(1, robots):
-            before = nodes[move.source[kept], robots + other]
-            lead = self._leads.after(before, first, self._entered[move.edges[kept, other]])
-            agree = lead != _PARTED
-            kept, first = kept[agree], first[agree]
-            leads = [known[agree] for known in (*leads, lead)]
-        agreeing = Moves(move.source[kept], move.edges[kept], move.mixed[kept])
-        return agreeing, np.column_stack(leads)
+        leads = self._leads.after(nodes[move.source, 3], *self._entered[move.edges].T)
+        agree = leads != _PARTED
+        agreeing = Moves(move.source[agree], move.edges[agree], move.mixed[agree])
+        return agreeing, leads[agree]
 
 
 def _layer(nodes: Ints, source: Ints, edges: Ints) -> _Layer:
@@ -159,15 +150,11 @@ def _layer(nodes: Ints, source: Ints, edges: Ints) -> _Layer:
 
 def _backward(space: PlanSpace, layers: list[_Layer]) -> None:
     """Set ``best`` and ``choice`` of each node, goals first."""
-    robots = space.robots
     goal = layers[0]
-    bad = (goal.nodes[:, robots] == len(space)) & (goal.nodes[:, robots + 1 :] == _NO_LEAD).all(
-        axis=1
-    )
+    bad = (goal.nodes[:, 2] == len(space)) & (goal.nodes[:, 3] == _NO_LEAD)
     goal.best = np.where(bad, 0, _FAR)
     for below, layer in pairwise(layers):
-        x = layer.nodes[:, :robots]
-        differs = (x[:, 1:] != x[:, :1]).sum(axis=1)
+        differs = layer.nodes[:, 0] != layer.nodes[:, 1]
         value = below.best[layer.child] if len(layer.child) else np.zeros(0, np.int64)
         best = np.full(len(layer.nodes), _FAR)
         np.minimum.at(best, layer.source, value)
@@ -183,14 +170,11 @@ def _retrace(
     space: PlanSpace, layers: list[_Layer], most: int, ways: int = _RANDOM_WAYS
 ) -> list[Counterexamples]:
     """Ways from the nodes at which the plans and their mixture are one, and no sentence leads."""
-    robots = space.robots
     # Columns: fewest steps at which the plans differ, layer, row of the layer.
     starts = [np.zeros((0, 3), np.int64)]
     for number, layer in enumerate(layers[1:], 1):
-        x = layer.nodes[:, : robots + 1]
-        diagonal = (x == x[:, :1]).all(axis=1) & (layer.nodes[:, robots + 1 :] == _NO_LEAD).all(
-            axis=1
-        )
+        x = layer.nodes[:, :3]
+        diagonal = (x == x[:, :1]).all(axis=1) & (layer.nodes[:, 3] == _NO_LEAD)
         hit = np.flatnonzero(diagonal & (layer.best < _FAR))
         starts.append(np.column_stack((layer.best[hit], np.full(len(hit), number), hit)))
     table = np.concatenate(starts)

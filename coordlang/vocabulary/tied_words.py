@@ -3,10 +3,11 @@
 
 States share a word that an abstraction takes for one (`coordlang.vocabulary.abstractions`), or that
 a symmetry takes to each other; in one task those of which a few facts say the same
-(`coordlang.vocabulary.deciding_facts`), or words are stutter-free.  One of these partitions often
-is a language where the loop finds none.  **What is not found here proves nothing
-about numbers of words**: that no partition of a kind is a language says nothing of the others
-(Proposition 18 of docs/concepts.md).
+(`coordlang.vocabulary.deciding_facts`), or words are *stutter-free*: every step of every optimal
+plan enters another word, so that one clause rules a failing tuple out, the one of the warping path
+that goes step by step (Proposition 27 of docs/concepts.md).  One of these partitions often is a
+language where the loop finds none.  **What is not found here proves nothing about numbers of
+words**: that no partition of a kind is a language says nothing of the others (Proposition 18).
 """
 
 from __future__ import annotations
@@ -14,17 +15,18 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import islice
+from itertools import islice, pairwise
 
 import numpy as np
 
+from coordlang.language.warping import Pair, pair
 from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
 from coordlang.vocabulary.deciding_facts import classes_by_facts
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.loop import Budget, Languages, find
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
-from coordlang.vocabulary.stutter_free import StutterFree
 from planners.joint.tables import Ints
+from planners.search.plan_space import PlanSpace
 
 #: Clauses that are taken of a refuted partition, before their images; and failing tuples after
 #: which longer ones are not looked for.
@@ -32,6 +34,9 @@ _AT_ONCE, _ENOUGH = 100, 300
 #: What may be spent on each kind of one task, and of many, at first; then twice as much each time.
 _OF_ONE, _OF_MANY = Budget(rounds=25, conflicts=2_000), Budget(rounds=50, conflicts=2_000)
 _STUTTER_FREE = Budget(rounds=8, conflicts=2_000)
+#: In the order of words for a state: to be in the word of a state before costs more than any number
+#: of states beside it.
+_FORBIDDEN = 1 << 30
 #: Refuted partitions of all kinds for each of the budget, so many conflicts counted as one.
 _TOGETHER, _CONFLICTS = 8, 250
 
@@ -45,14 +50,14 @@ class _Ties:
     classes
         (states) the class of each state: those of one class share a word.
     stutter_free
-        What makes the words stutter-free, None if they need not be.
+        The plans of the one task whose steps all enter other words, None if they need not.
     clauses
         Those of refuted partitions, of one task whatever the number of words: (clauses, pairs)
         codes ``a * states + b``, -1 for no pair.
     """
 
     classes: Ints
-    stutter_free: StutterFree | None = None
+    stutter_free: PlanSpace | None = None
     clauses: list[Ints] = field(default_factory=list)
 
 
@@ -94,8 +99,7 @@ class TiedWords:
         """
         if self._is_one_task:
             found = classes_by_facts(job.candidates, self._refuter)
-            stutter_free = StutterFree(job.candidates.spaces[0])
-            yield _Ties(np.arange(len(self._images[0])), stutter_free)
+            yield _Ties(np.arange(len(self._images[0])), job.candidates.spaces[0])
         else:
             tied = [*abstractions(job.candidates, job.states), *map(_orbits, self._images[1:])]
             tied.sort(key=lambda classes: len(np.unique(classes[self._states])))
@@ -217,9 +221,9 @@ class _Kind:
         # A solver that is quick on many easy problems with many solutions.
         self.problem = PartitionProblem(free, size, "minisat22", named=False)
         if ties.stutter_free is not None:
-            for states_of_step in ties.stutter_free.pairs:
+            for states_of_step in _joined(ties.stutter_free):
                 self.problem.separate_one([states_of_step])
-            self.problem.prefer(ties.stutter_free.preferred(size))
+            self.problem.prefer(_preferred(ties.stutter_free, size))
         self.effort, self.rounds, self._required = effort, 0, 0
 
     def require_clauses(self) -> None:
@@ -251,3 +255,34 @@ def _orbits(to: Ints) -> Ints:
         least = np.minimum(least, image)
         image = to[image]
     return least
+
+
+def _joined(space: PlanSpace) -> list[Pair]:
+    """The pairs of states that some step joins: each lies in different stutter-free words."""
+    before, after = space.state[space.sources], space.state[space.targets()]
+    joined = np.unique(np.column_stack((before, after))[before != after], axis=0)
+    return sorted({pair(a, b) for a, b in joined.tolist()})
+
+
+def _preferred(space: PlanSpace, size: int) -> dict[int, int]:
+    """For each state the word, of ``size``, that tells it apart best from those beside it.
+
+    Beside a state are those that a step leads to from a state before it.  From the start on,
+    each state gets the word that fewest of them have, and of these the one that was used least.
+    """
+    targets = space.targets()
+    below = [targets[a:b].tolist() for a, b in pairwise(space.first.tolist())]
+    above: list[list[int]] = [[] for _ in below]
+    for node, following in enumerate(below):
+        for target in following:
+            above[target].append(node)
+    word = np.full(len(space), size)
+    beside = np.zeros((len(space), size + 1), np.int64)  # by node the words of what follows it
+    used = np.zeros(size, np.int64)
+    for node in np.argsort(-space.layer, kind="stable").tolist():
+        taken = beside[above[node]].sum(axis=0)
+        np.add.at(taken, word[above[node]], _FORBIDDEN)
+        word[node] = np.lexsort((used, taken[:size]))[0]
+        used[word[node]] += 1
+        np.add.at(beside, (above[node], word[node]), 1)
+    return dict(zip(space.state.tolist(), word.tolist(), strict=True))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.joint.tables import Bools, Ints, Rows
+from planners.joint.tables import Bools, Ints, Rows, unpacked
 from planners.pddl.formula_tree import label
 from planners.pddl.lifted import Atom
 from planners.system.errors import BadInput
@@ -141,9 +141,7 @@ class StateCodec:
 
     def truth(self, rows: Rows) -> Bools:
         """A table of states as truth values, (states, facts); remembered actions are left out."""
-        blocks = np.ascontiguousarray(rows[:, : self.fact_blocks], "<u8")
-        true = np.unpackbits(blocks.view(np.uint8), axis=1, bitorder="little")
-        return true[:, : len(self.facts)].astype(np.bool_)
+        return unpacked(rows[:, : self.fact_blocks], len(self.facts))
 
     def column(self, rows: Rows, fact: int) -> Bools:
         """In which states of a table a fact is true."""

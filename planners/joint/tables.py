@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables of numbers: runs of a CSR table, duplicate rows out, rows found.
+"""Tables of numbers: runs of a CSR table, truth values in blocks, duplicate rows out, rows found.
 
 A table has one row for each item (a state, a node of a walk) and is sorted where it is looked up
 in.
@@ -52,6 +52,21 @@ def spans(sizes: NDArray[np.float64], most: int) -> Iterator[slice]:
         end = max(start + 1, int(np.searchsorted(ends, before + most, side="right")))
         yield slice(start, end)
         start = end
+
+
+def packed(table: Bools) -> Rows:
+    """Truth values as rows of blocks: (rows, columns) to (rows, blocks of 64 columns)."""
+    blocks = np.zeros((len(table), -(-table.shape[1] // 64) * 8), np.uint8)
+    bits = np.packbits(table, axis=1, bitorder="little")
+    blocks[:, : bits.shape[1]] = bits
+    return blocks.view("<u8").astype(np.uint64, copy=False)
+
+
+def unpacked(rows: Rows, columns: int) -> Bools:
+    """The truth values of rows of blocks, (rows, columns)."""
+    blocks = np.ascontiguousarray(rows, "<u8")
+    true = np.unpackbits(blocks.view(np.uint8), axis=1, bitorder="little")
+    return true[:, :columns].astype(np.bool_)
 
 
 def unique_rows(rows: Rows) -> tuple[Rows, NDArray[np.int64]]:

@@ -16,7 +16,7 @@ import numpy as np
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import Goal, JointModel, Options, PlanningTask
 from planners.joint.states import TrueFacts
-from planners.joint.tables import Bools, Ints, Rows, kept_runs
+from planners.joint.tables import Bools, Ints, Rows, kept_runs, packed, unpacked
 from planners.search import SearchHeuristic
 from planners.search.goals import FAR, Values, goal_facts, ways_to_facts
 from planners.search.state_variables import StateVariable, state_variables
@@ -172,7 +172,7 @@ class _RelaxedReach:
 
     def steps(self, rows: Rows) -> Ints:
         """For each state the steps until the wanted facts have been true, `FAR` if never."""
-        bits = _transposed(self.model.codec.truth(rows))
+        bits = packed(self.model.codec.truth(rows).T)  # (facts, blocks of 64 states)
         result = np.full(len(rows), FAR)
         result[self._there(bits, len(rows))] = 0
         free = np.diff(self.first_need) == 0
@@ -195,16 +195,8 @@ class _RelaxedReach:
         """In which states all wanted facts have been true."""
         if not len(self.wanted):
             return np.ones(count, np.bool_)
-        whole = np.ascontiguousarray(np.bitwise_and.reduce(bits[self.wanted], axis=0), "<u8")
-        return np.unpackbits(whole.view(np.uint8), count=count, bitorder="little").astype(np.bool_)
-
-
-def _transposed(true: Bools) -> Rows:
-    """Truth values (states, facts) as blocks of 64 states, (facts, blocks)."""
-    packed = np.packbits(true, axis=0, bitorder="little").T
-    bits = np.zeros((true.shape[1], -(-true.shape[0] // 64) * 8), np.uint8)
-    bits[:, : packed.shape[1]] = packed
-    return bits.view("<u8").astype(np.uint64, copy=False)
+        there: Bools = unpacked(np.bitwise_and.reduce(bits[self.wanted])[None], count)[0]
+        return there
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from planners.joint.model import Goal, JointModel, PlanningTask
-from planners.joint.tables import Bools, Ints, Rows, unique_rows
+from planners.joint.tables import Bools, Ints, Rows, packed, unique_rows, unpacked
 from planners.search.bounded_search import BoundedSearch
 from planners.search.exact_bound import SMALLER
 from planners.search.goals import searched
@@ -176,14 +176,13 @@ def distances(space: Space, reached: Bools) -> Ints:
     once, backward, with a bit for each goal: O(joint steps x goals / 64) for a layer.
     """
     result = np.where(reached, 0, -1)
-    new = _as_bits(reached.T)
+    new = packed(reached.T)
     seen = new.copy()
     leading = np.flatnonzero(np.diff(space.first))
     steps = 0
     while len(leading) and len(changed := np.flatnonzero(new.any(axis=1))):
         if steps:
-            bits = np.unpackbits(new[changed].view(np.uint8), axis=1, count=len(reached))
-            which, goal = np.nonzero(bits)
+            which, goal = np.nonzero(unpacked(new[changed], len(reached)))
             result[goal, changed[which]] = steps
         before = np.zeros_like(new)
         before[leading] = np.bitwise_or.reduceat(new[space.target], space.first[leading])
@@ -191,15 +190,6 @@ def distances(space: Space, reached: Bools) -> Ints:
         seen |= new
         steps += 1
     return result
-
-
-def _as_bits(table: Bools) -> Rows:
-    """A table of truth values as 64-bit blocks, row by row."""
-    size = -(-table.shape[1] // 64) * 8
-    packed = np.zeros((len(table), size), np.uint8)
-    bits = np.packbits(table, axis=1)
-    packed[:, : bits.shape[1]] = bits
-    return packed.view(np.uint64)
 
 
 def _shortest_ways(space: Space, distance: Ints) -> PlanSpace:
