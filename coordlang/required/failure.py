@@ -69,10 +69,6 @@ class WeightedSets:
         self._number: dict[tuple[tuple[int, int, int], ...], int] = {}
         self._sums: dict[tuple[Multiple, ...], Multiple] = {}
 
-    def __len__(self) -> int:
-        """Count the different weighted sets."""
-        return len(self.moves)
-
     def of_moves(self, moves: dict[int, list[Multiple]]) -> Multiple:
         """The weighted set in which each first label is followed by the sum of some multiples."""
         added = {label: self.sum(moves[label]) for label in sorted(moves)}

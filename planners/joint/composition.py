@@ -72,22 +72,6 @@ class ComposingStepper(Stepper):
         ]
         return Steps(*map(np.concatenate, zip(*parts, strict=True)))
 
-    def chosen(self, rows: Rows, options: Options | None = None) -> tuple[Ints, Labels]:
-        """The joint steps as `steps` gives them, without what they lead to: sources and labels."""
-        sources, labels = zip(*self._pieces(rows, options), strict=True)
-        return np.concatenate(sources), np.concatenate(labels)
-
-    @property
-    def effects(self) -> list[tuple[Rows, Rows]] | None:
-        """For each robot what its labels add and what they delete, both (labels, fact blocks).
-
-        None where the effects of some label depend on the state or the step.
-        """
-        every = [robot.operators for robot in self._robot]
-        if any(own.conditional for own in every):
-            return None
-        return [(own.adds, own.deletes) for own in every]
-
     def _pieces(self, rows: Rows, options: Options | None) -> Iterator[tuple[Ints, Labels]]:
         """At least one piece."""
         chosen = self.choices(rows) if options is None else options
