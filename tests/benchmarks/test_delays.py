@@ -106,7 +106,7 @@ def test_a_delay_by_hand() -> None:
     assert steps(r2, False, 0.0, 1.0) is None  # r1 is late: r2 moves to a, where it still is
 
 
-@pytest.mark.parametrize("world", ["GW1", "three-robots"])
+@pytest.mark.parametrize("world", ["GW1", pytest.param("three-robots", marks=pytest.mark.thorough)])
 def test_robots_that_wait_for_passings_arrive(world: str) -> None:
     """Without delays in the fewest steps; of three robots, too."""
     candidates, language = language_for(WORLDS[world], "asynchronous", 0)

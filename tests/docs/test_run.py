@@ -40,7 +40,7 @@ def test_matches(shown: str, real: str, same: bool) -> None:
 
 
 #: Pages of many commands, which take a while.
-LONG = ("cli", "library", "lifted", "simulation")
+LONG = ("asynchronous", "cli", "library", "lifted", "simulation")
 
 
 @pytest.mark.parametrize(

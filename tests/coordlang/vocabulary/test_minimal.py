@@ -43,7 +43,7 @@ from tests.support.random_spaces import random_spaces
         ("grid", "gw1-2x2", 3),
         ("grid-joint", "gw1-2x2", 3),
         ("grid", "gw2-2x3", 5),
-        ("grid", "gwb2-3x3", 3),
+        pytest.param("grid", "gwb2-3x3", 3, marks=pytest.mark.thorough),
     ],
 )
 def test_known_minima(folder: str, stem: str, words: int) -> None:

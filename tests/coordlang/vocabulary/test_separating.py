@@ -123,7 +123,7 @@ def test_against_the_theorem(
         ("three-cells", "problem", 3, 6),
         ("grid", "gw1-2x2", 6, 8),
         ("grid", "gw2-2x3", 7, 13),
-        ("grid", "gwb2-3x3", 6, 8),
+        pytest.param("grid", "gwb2-3x3", 6, 8, marks=pytest.mark.thorough),
     ],
 )
 def test_known_minima(folder: str, stem: str, both: int, alpha: int) -> None:
