@@ -10,7 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations, permutations
+from itertools import combinations
 from pathlib import Path
 from statistics import fmean
 
@@ -78,14 +78,17 @@ class Building:
 
     def coordinates(self) -> dict[str, Point]:
         """Where places are drawn, in metres: the levels side by side."""
+        of_level: dict[str, list[Place]] = {level: [] for level in self.levels}
+        for place in self.places.values():
+            of_level[place.level].append(place)
         drawn: dict[str, Point] = {}
-        shift = 0.0
-        for level in self.levels:
-            points = {p.name: p.point for p in self.places.values() if p.level == level}
-            if drawn and points:
-                right = max(x for x, _ in drawn.values())
-                shift = right + _BETWEEN - min(x for x, _ in points.values())
-            drawn |= {name: (round(x + shift, 3), round(y, 3)) for name, (x, y) in points.items()}
+        shift = right = 0.0
+        for places in filter(None, of_level.values()):
+            if drawn:
+                shift = right + _BETWEEN - min(place.point[0] for place in places)
+            own = {p.name: (round(p.point[0] + shift, 3), round(p.point[1], 3)) for p in places}
+            right = max(x for x, _ in own.values())
+            drawn |= own
         return drawn
 
 
@@ -157,7 +160,7 @@ class _Level:
         self.vertices = [self._vertex(*each, at) for each in enumerate(self._list("vertices"))]
         self.lanes = [self._edge(each) for each in self._list("lanes")]
 
-    def _list(self, key: str) -> list[Value]:
+    def _list(self, key: str) -> Sequence[Value]:
         return self.content[key].list() if key in self.content else []
 
     def _vertex(self, number: int, value: Value, at: dict[Point, _Vertex]) -> _Vertex:
@@ -295,12 +298,14 @@ def _degrees(vertices: Sequence[_Vertex]) -> tuple[float, float, Point]:
 def _spawning(vertices: Iterable[_Vertex]) -> dict[str, _Vertex]:
     """The robots that start in the building, and where."""
     found: dict[str, _Vertex] = {}
+    taken = {""}
     for vertex in vertices:
         if robot := _text(vertex.params, "spawn_robot_name"):
             require_seen(robot, vertex.value.position, "robot")
-            if not pddl_name(robot) or pddl_name(robot) in map(pddl_name, found):
+            if pddl_name(robot) in taken:
                 remedy = "Give each robot a name of its own, of letters; PDDL has no upper case."
                 raise vertex.value.wrong(f"no name for a robot here: {echoed(robot)}", remedy)
+            taken.add(pddl_name(robot))
             found[robot] = vertex
     return found
 
@@ -323,11 +328,21 @@ def _rides(places: Mapping[str, Place], lanes: Sequence[Lane]) -> Iterator[Lane]
 
     The places of a cabin are one group, so that one robot is in it.
     """
-    for one, other in permutations([p for p in places.values() if p.groups], 2):
-        lifts = [group for group in one.groups & other.groups if group.startswith(_LIFT)]
-        if lifts and one.level != other.level:
-            graphs = [
-                {n.graph for n in lanes if p in (n.start, n.end)} for p in (one.name, other.name)
-            ]
-            for graph in sorted(graphs[0] & graphs[1]):
-                yield Lane(graph, one.name, other.name, frozenset(lifts))
+    graphs: dict[str, set[int]] = {name: set() for name in places}
+    for lane in lanes:
+        graphs[lane.start].add(lane.graph)
+        graphs[lane.end].add(lane.graph)
+    inside: dict[str, list[Place]] = {}
+    for place in places.values():
+        for lift in _lifts(place):
+            inside.setdefault(lift, []).append(place)
+    for one in places.values():
+        for lift in _lifts(one):
+            for other in inside[lift]:
+                if one.level != other.level:
+                    for graph in sorted(graphs[one.name] & graphs[other.name]):
+                        yield Lane(graph, one.name, other.name, frozenset({lift}))
+
+
+def _lifts(place: Place) -> list[str]:
+    return [group for group in place.groups if group.startswith(_LIFT)]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,32 +16,40 @@ from planners.system.messages import echoed
 
 #: What a file may hold at most: bytes, values, and lists and mappings in one another.
 _MOST_BYTES = 2**25
-_MOST_VALUES = 1_000_000
+_MOST_VALUES = 4_000_000
 _DEEPEST = 32
 #: libyaml's parser where PyYAML has it: the same events, some ten times sooner.
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 #: Decimal numbers; `float` also reads other ones, which YAML reads in another way (``010``).
 _NUMBER = re.compile(r"[-+]?(0|[1-9]\d*|(?=\.))(\.\d*)?(e[-+]?\d+)?", re.ASCII | re.IGNORECASE)
 _FLAGS = {"true": True, "false": False}
-_NULL = "tag:yaml.org,2002:null"
+_EMPTY = {"", "~", "null", "Null", "NULL"}
 
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """A value of a YAML file, and where it stands."""
+    """A value of a YAML file, and where it stands.
+
+    ``content`` is a text, or the values of a list, or a mapping's keys and values by turns.
+    ``is_plain``: a text that is not quoted.
+    """
 
     path: str
-    node: yaml.Node
+    content: str | list[Value]
+    is_plain: bool
+    is_list: bool
+    line: int
+    column: int
 
     @property
     def position(self) -> Position:
         """Where it begins."""
-        return _position(self.path, self.node.start_mark)
+        return Position(self.path, self.line, self.column)
 
     @property
-    def is_list(self) -> bool:
-        """Whether it is a list."""
-        return isinstance(self.node, yaml.SequenceNode)
+    def is_empty(self) -> bool:
+        """Whether nothing is written for it."""
+        return self.is_plain and self.content in _EMPTY
 
     def wrong(self, what: str, remedy: str) -> BadInput:
         """The error of this value, with file, line and column (the caller raises it)."""
@@ -48,32 +57,31 @@ class Value:
 
     def mapping(self) -> dict[str, Value]:
         """The values of a mapping by their keys; none for an empty value."""
-        if self.node.tag == _NULL:
+        if self.is_empty:
             return {}
-        if not isinstance(self.node, yaml.MappingNode):
+        if self.is_list or isinstance(self.content, str):
             raise self._not("a mapping")
         found: dict[str, Value] = {}
-        for key, value in self.node.value:
-            name = Value(self.path, key).text()
-            if name in found:
+        for key, value in zip(self.content[::2], self.content[1::2], strict=True):
+            if (name := key.text()) in found:
                 remedy = "Remove one of them, or give it another name."
-                raise Value(self.path, key).wrong(f"the key {echoed(name)} occurs twice", remedy)
-            found[name] = Value(self.path, value)
+                raise key.wrong(f"the key {echoed(name)} occurs twice", remedy)
+            found[name] = value
         return found
 
-    def list(self, least: int = 0) -> list[Value]:
+    def list(self, least: int = 0) -> Sequence[Value]:
         """The values of a list of at least so many; none for an empty value."""
-        if self.node.tag == _NULL and not least:
-            return []
-        if not isinstance(self.node, yaml.SequenceNode) or len(self.node.value) < least:
+        if self.is_empty and not least:
+            return ()
+        if not self.is_list or isinstance(self.content, str) or len(self.content) < least:
             raise self._not(f"a list of {least} or more" if least else "a list")
-        return [Value(self.path, each) for each in self.node.value]
+        return self.content
 
     def text(self) -> str:
         """A text; a number or a flag as it is written, and nothing for an empty value."""
-        if not isinstance(self.node, yaml.ScalarNode):
+        if not isinstance(self.content, str):
             raise self._not("a text")
-        return "" if self.node.tag == _NULL else str(self.node.value)
+        return "" if self.is_empty else self.content
 
     def number(self) -> float:
         """A finite decimal number."""
@@ -100,13 +108,13 @@ class Value:
 
     def _scalar(self) -> str:
         """What is written for one value, and nothing for a list, a mapping or a quoted text."""
-        is_plain = isinstance(self.node, yaml.ScalarNode) and not self.node.style
-        return self.node.value if is_plain else ""
+        return self.content if self.is_plain and isinstance(self.content, str) else ""
 
     def _not(self, expected: str) -> BadInput:
-        found = "a mapping" if self.node.id == "mapping" else echoed(self.node.value)
-        if self.is_list:
-            found = f"a list of {len(self.node.value):,}"
+        if isinstance(self.content, str):
+            found = echoed(self.content)
+        else:
+            found = f"a list of {len(self.content):,}" if self.is_list else "a mapping"
         return self.wrong(f"expected {expected}, found {found}", "Is it the right file?")
 
 
@@ -118,43 +126,60 @@ def read_yaml(path: Path) -> Value:
     """
     data, file = read_bytes(path, most=_MOST_BYTES), str(path)
     check_utf8(data, Position(file))
-    text = data.decode("utf-8-sig")
     try:
-        _check(text, file)
-        root = yaml.compose(text, _LOADER)
+        root = _read(data.decode("utf-8-sig"), file)
     except yaml.YAMLError as error:
-        said = getattr(error, "problem", None) or getattr(error, "reason", "")
+        said = str(getattr(error, "problem", None) or getattr(error, "reason", ""))
         mark = getattr(error, "problem_mark", None)
-        remedy = "Write it with traffic editor, or correct it in a text editor."
-        raise BadInput(
-            f"this is no YAML: {said}", position=_position(file, mark), remedy=remedy
-        ) from None
-    if root is None:
+        raise _no_yaml(said, file, mark) from None
+    if not root:
         raise BadInput("the file is empty", position=Position(file), remedy="Is it the right file?")
-    return Value(file, root)
+    return root[0]
 
 
-def _check(text: str, file: str) -> None:
-    """Raise `BadInput` for what no plain data has, one event after another."""
-    depth = 0
-    for number, event in enumerate(yaml.parse(text, _LOADER)):
-        what = ""
-        if isinstance(event, yaml.CollectionStartEvent):
-            depth += 1
-        elif isinstance(event, yaml.CollectionEndEvent):
-            depth -= 1
-        if isinstance(event, yaml.NodeEvent) and event.anchor is not None:
-            what = "anchors and aliases are not read"
-        elif getattr(event, "tag", None) is not None:
-            what = f"tags are not read: {echoed(event.tag)}"
-        elif depth > _DEEPEST:
-            what = f"more than {_DEEPEST} lists and mappings in one another"
-        elif number > _MOST_VALUES:
-            what = f"more than {_MOST_VALUES:,} values"
-        if what:
-            remedy = "A building is plain data: write out what it stands for."
-            raise BadInput(what, position=_position(file, event.start_mark), remedy=remedy)
+def _no_yaml(said: str, file: str, mark: yaml.Mark | None) -> BadInput:
+    remedy = "Write it with traffic editor, or correct it in a text editor."
+    where = Position(file) if mark is None else Position(file, mark.line + 1, mark.column + 1)
+    return BadInput(f"this is no YAML: {said}", position=where, remedy=remedy)
 
 
-def _position(file: str, mark: yaml.Mark | None) -> Position:
-    return Position(file) if mark is None else Position(file, mark.line + 1, mark.column + 1)
+def _read(text: str, file: str) -> list[Value]:
+    """The value of a text's document, if it has one, read one event after another.
+
+    Raises `BadInput` for what no plain data has.
+    """
+    found: list[Value] = []
+    within, number = [found], 0
+    for event in yaml.parse(text, _LOADER):
+        if isinstance(event, yaml.CollectionEndEvent):
+            within.pop()
+        if isinstance(event, yaml.DocumentStartEvent) and found:
+            raise _no_yaml("but found another document", file, event.start_mark)
+        if not isinstance(event, yaml.NodeEvent):
+            continue
+        number += 1
+        value = Value(
+            file,
+            getattr(event, "value", []),
+            isinstance(event, yaml.ScalarEvent) and not event.style,
+            isinstance(event, yaml.SequenceStartEvent),
+            event.start_mark.line + 1,
+            event.start_mark.column + 1,
+        )
+        if what := _refused(event, len(within), number):
+            raise value.wrong(what, "A building is plain data: write out what it stands for.")
+        within[-1].append(value)
+        if isinstance(value.content, list):
+            within.append(value.content)
+    return found
+
+
+def _refused(event: yaml.NodeEvent, depth: int, number: int) -> str:
+    """What of a value no plain data has, empty if it is plain."""
+    if event.anchor is not None:
+        return "anchors and aliases are not read"
+    if event.tag is not None:
+        return f"tags are not read: {echoed(event.tag)}"
+    if depth > _DEEPEST:
+        return f"more than {_DEEPEST} lists and mappings in one another"
+    return f"more than {_MOST_VALUES:,} values" if number > _MOST_VALUES else ""
