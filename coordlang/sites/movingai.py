@@ -10,7 +10,7 @@ from pathlib import Path
 
 from coordlang.sites.shipped import shipped_domains
 from planners.pddl.pddl_text import named_like
-from planners.system.errors import BadInput, Position, UsageError
+from planners.system.errors import BadInput, Position
 from planners.system.files import read_bytes
 from planners.system.messages import echoed
 
@@ -132,12 +132,8 @@ def planning_files(map_file: Path, scenario: Path, agents: int) -> dict[str, str
 
     ``domain.pddl`` is the shipped grid domain, the problem has the scenario's name and the number
     of robots, and ``coordinates.json`` says where the report draws the cells (x: column, y: row).
-    Raises `BadInput` (see `read_map`, `read_agents`), and `UsageError` for fewer than one robot.
+    Raises `BadInput`, see `read_map` and `read_agents`.
     """
-    if agents < 1:
-        raise UsageError(
-            f"{agents} robots: at least one is needed", remedy="Say --robots 2 or more."
-        )
     grid = read_map(map_file)
     found = read_agents(scenario, grid, agents)
     stem = scenario.name.removesuffix(".scen")

@@ -3,13 +3,15 @@
 class Atlas {
   constructor(root) {
     this.root = root;
-    this.pair = pairOfThings();
+    this.pair = DATA.pair && DATA.pair.things;
     this.views = [];
-    if (this.pair) this.views.push(['Maps in a map', () => this.nested()]);
+    this.plan = root.querySelector('.plan');
+    if (this.plan) this.preparePlan();
+    if (this.pair) this.views.push(this.plan ? ['Floor plan', () => this.floorPlan()] : ['Maps in a map', () => this.nested()]);
     if (DATA.state_graph) this.views.push(['State graph', () => this.graph()]);
     if (!this.views.length) return;
     root.hidden = false;
-    const columns = this.pair ? mapGeometry().size[0] / CELL : 0;
+    const columns = this.plan ? 8 : this.pair ? mapGeometry().size[0] / CELL : 0;
     document.getElementById('words').classList.toggle('stacked', DATA.words.length > 8 || columns > 7);
     const tabs = root.querySelector('.tabs');
     if (this.views.length > 1) {
@@ -22,11 +24,12 @@ class Atlas {
     [...this.root.querySelectorAll('.tabs button')].forEach((b, k) => b.setAttribute('aria-pressed', k === view));
     this.groups = new Map();
     const [svg, caption] = this.views[view][1]();
+    if (this.plan) this.root.querySelector('#plan-choice').hidden = svg !== this.plan;
     svg.setAttribute('tabindex', 0);
-    svg.addEventListener('keydown', event => this.key(event));
+    svg.onkeydown = event => (svg === this.plan ? this.walk(event) : this.key(event));
     this.root.querySelector('#atlas-picture').replaceChildren(svg);
     this.root.querySelector('#atlas-caption').textContent = caption;
-    this.pick(null);
+    if (svg !== this.plan) this.pick(null);
     this.only(this.word ?? null);
     this.now(this.current ?? null);
   }
@@ -57,6 +60,60 @@ class Atlas {
     svg.style.setProperty('--ring', `${Math.max(1.2, w / 9)}px`);
     return [svg, `Each box is a place of ${DATA.things[one]}; the cells in it are the places of ${DATA.things[two]}, coloured by the `
       + 'word of that state. Empty cells are no states of the language. Click one, or use the arrow keys, to see its state.'];
+  }
+
+  // One large map: the first thing's place is chosen, each other place shows the word when the second thing is there.
+  preparePlan() {
+    const [one, two] = this.pair;
+    this.states = new Map();
+    for (let state = 0; state < DATA.mapped; state++) {
+      const { at } = whereIs(state);
+      this.states.set(`${at.get(one)},${at.get(two)}`, state);
+    }
+    this.chosen = DATA.pair.start;
+    this.spots = [...this.plan.querySelectorAll('.spot')];
+    this.spots.forEach((spot, place) => spot.addEventListener('click', () => this.choose(place)));
+    this.select = this.root.querySelector('#plan-place');
+    this.select.replaceChildren(...DATA.places.map((place, number) => make('option', { value: number }, place.name)));
+    this.select.addEventListener('change', () => this.choose(+this.select.value));
+  }
+
+  floorPlan() {
+    this.choose(this.chosen);
+    return [this.plan, `Click a place, use the arrow keys or choose it above: ${DATA.things[this.pair[0]]} is then there. Places without a colour are no states of the language.`];
+  }
+
+  choose(chosen) {
+    this.chosen = chosen; this.select.value = chosen;
+    this.groups = new Map();
+    this.spots.forEach((spot, place) => {
+      const state = this.states.get(`${chosen},${place}`), word = state === undefined ? null : DATA.state_words[state];
+      const [title, circle, hatch, text] = spot.children, pattern = Math.floor(word / 9) % 4, small = circle.r.baseVal.value < 7;
+      const who = place === chosen ? `${DATA.things[this.pair[0]]} at ${DATA.places[place].name}` : DATA.places[place].name;
+      title.textContent = word === null ? who : `${DATA.words[word].name}: ${told(state)}`;
+      circle.setAttribute('class', word !== null ? `w ${wordClass(word)}` : place === chosen ? 'here' : 'unmapped');
+      hatch.setAttribute('fill', word !== null && pattern ? `url(#hatch${pattern})` : 'none');
+      text.textContent = word === null || small ? '' : wordShort(word);
+      spot.classList.toggle('chosen', place === chosen);
+      if (word !== null) this.groups.set(state, spot);
+    });
+    const words = new Set([...this.groups.keys()].map(state => DATA.state_words[state]));
+    this.root.querySelector('.readout').textContent = `${DATA.things[this.pair[0]]} at ${DATA.places[chosen].name}: ${counted(words.size, 'word')}`;
+    this.only(this.word ?? null);
+    this.now(this.current ?? null);
+  }
+
+  // An arrow key goes to the nearest place in its direction.
+  walk(event) {
+    const way = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowDown: [0, 1], ArrowUp: [0, -1] }[event.key];
+    if (!way) return;
+    event.preventDefault(); event.stopPropagation();
+    const here = DATA.places[this.chosen], far = DATA.places.map(({ x, y }) => {
+      const along = (x - here.x) * way[0] + (y - here.y) * way[1], aside = Math.abs((x - here.x) * way[1] + (y - here.y) * way[0]);
+      return along > 0 ? along + 2 * aside : Infinity;
+    });
+    const next = far.indexOf(Math.min(...far));
+    if (far[next] < Infinity) this.choose(next);
   }
 
   graph() {
@@ -103,27 +160,13 @@ class Atlas {
   only(word) {
     this.word = word;
     if (!this.groups) return;
+    if (this.spots) this.spots.forEach(spot => spot.classList.remove('off'));
     this.groups.forEach((group, state) => group.classList.toggle('off', word !== null && DATA.state_words[state] !== word));
   }
 
   now(state) {
     this.current = state;
+    if (this.spots) this.spots.forEach(spot => spot.classList.remove('now'));
     if (this.groups) this.groups.forEach((group, other) => group.classList.toggle('now', other === state));
   }
-}
-
-// Two things whose places alone tell the language's states apart, or null.
-function pairOfThings() {
-  if (!DATA.mapped || DATA.places.length < 2 || DATA.places.length > 40) return null;
-  const seen = new Set();
-  let pair = null;
-  for (let state = 0; state < DATA.mapped; state++) {
-    const { at } = whereIs(state), things = [...at.keys()].sort((a, b) => a - b);
-    if (things.length !== 2 || (pair && (pair[0] !== things[0] || pair[1] !== things[1]))) return null;
-    pair = things;
-    const code = `${at.get(things[0])},${at.get(things[1])}`;
-    if (seen.has(code)) return null;
-    seen.add(code);
-  }
-  return pair;
 }

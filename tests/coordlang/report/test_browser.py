@@ -334,6 +334,45 @@ def test_odd_names_stay_text(open_page: Opener) -> None:
     assert "</script>" in opened.page.inner_text("#now-word")
 
 
+def test_a_place_is_chosen_on_the_floor_plan(
+    open_page: Opener, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the list, by a click, by an arrow key: each other place shows the word of its state."""
+    monkeypatch.setattr("coordlang.report.page._MOST_CELLS", 0)
+    language, domain, problem = make_language("t-map", "problem")
+    html = make_report(language, domain, [problem], tasks_shown=1).html
+    page = open_page(html).page
+    words: dict[str, dict[str, str]] = {}
+    for key, word in language.states.items():
+        where = at(key)
+        words.setdefault(where["r1"], {})[where["r2"]] = word.removeprefix("w")
+    script = """() => Object.fromEntries([...document.querySelectorAll('#atlas .spot')]
+      .map(e => [DATA.places[+e.dataset.place].name, e.querySelector('text').textContent]).filter(e => e[1]))"""
+    start = max(words)
+    plain = open_page(html, java_script_enabled=False).page
+    shown = plain.eval_on_selector_all("#atlas .spot text", "all => all.map(e => e.textContent)")
+    here = next(a.args[1] for a in problem.init if (a.predicate, a.args[0]) == ("at", "r1"))
+    assert sorted(filter(None, shown)) == sorted(f"w{word}" for word in words[here].values())
+    for number, place in enumerate(sorted(words)):
+        page.select_option("#plan-place", label=place)
+        assert page.evaluate(script) == words[place]
+        page.select_option("#plan-place", label=start)
+        page.dispatch_event(f"#atlas .spot[data-place='{number}']", "click")
+        assert page.evaluate(script) == words[place]
+    page.select_option("#plan-place", label="c1-0")
+    page.focus("#atlas svg.plan")
+    page.keyboard.press("ArrowRight")
+    assert page.evaluate(script) == words["c1-1"]
+    page.keyboard.press("ArrowUp")
+    assert page.evaluate(script) == words["c0-1"]
+    page.click(".word-row[data-word='1']")
+    on = page.evaluate(
+        "document.querySelectorAll('#atlas .spot:not(.off) text:not(:empty)').length"
+    )
+    assert on == list(words["c0-1"].values()).count("1")
+    assert page.is_visible("#heat svg.plan")
+
+
 @pytest.mark.thorough
 def test_odd_languages_and_tasks(open_page: Opener) -> None:
     """No map; no state mapped; a task that is done before it begins."""

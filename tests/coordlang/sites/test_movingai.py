@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from coordlang import import_site
 from coordlang.sites.coordinates import read_coordinates
 from coordlang.sites.movingai import Agent, planning_files, read_agents, read_map
 from planners.loading import PlanningInstance, load
@@ -113,7 +114,7 @@ def test_what_is_wrong_with_a_scenario_and_where(
 
 def test_no_robots(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="at least one is needed"):
-        planning_files(*files(tmp_path, ["0 0 1 1"]), 0)
+        import_site(*files(tmp_path, ["0 0 1 1"]), robots=0)
 
 
 def test_command(coordlang: Command, tmp_path: Path) -> None:

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A floor plan with many places: where they are drawn, and which names have room."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+from coordlang.sites.coordinates import Point
+
+#: Width and greatest height of a plan, and the room around its places, in units of the drawing.
+WIDTH, _HEIGHT, _AROUND = 1000.0, 700.0, 60.0
+#: Radius of the least and the largest place.
+_RADII = (4.0, 13.0)
+#: Width of a letter, and height of a line.
+_LETTER, _LINE = 6.4, 13.0
+#: What names have that nobody gave: a number at the end.
+_NUMBERED = re.compile(r".*-\d+")
+
+#: Left, top, right, bottom.
+_Box = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """The name of a place beside it, with its ``anchor`` (start, middle or end) at a point."""
+
+    text: str
+    x: float
+    y: float
+    anchor: str
+
+
+@dataclass(frozen=True, slots=True)
+class FloorPlan:
+    """Where the places of a map are drawn, by number, with a common radius.
+
+    ``links`` join places; ``labels`` are the names for which there is room.
+    """
+
+    width: float
+    height: float
+    radius: float
+    points: tuple[Point, ...]
+    links: tuple[tuple[int, int], ...]
+    labels: tuple[Label, ...]
+
+
+def floor_plan(
+    names: Sequence[str], places: Sequence[Point], links: Sequence[tuple[int, int]]
+) -> FloorPlan:
+    """Draw places at their coordinates; names that nobody gave give way to others.
+
+    O(places^2 + places x links).
+    """
+    left, top, right, bottom = (
+        pick(point[axis] for point in places) for pick in (min, max) for axis in (0, 1)
+    )
+    inner = WIDTH - 2 * _AROUND
+    scale = min(inner / max(right - left, 1e-9), (_HEIGHT - 2 * _AROUND) / max(bottom - top, 1e-9))
+    aside = (WIDTH - scale * (right - left)) / 2
+    points = [
+        (round(aside + scale * (x - left), 1), round(_AROUND + scale * (y - top), 1))
+        for x, y in places
+    ]
+    nearest = min((math.dist(a, b) for a, b in combinations(points, 2)), default=math.inf)
+    radius = round(min(max(0.42 * nearest, _RADII[0]), _RADII[1]), 1)
+    height = round(2 * _AROUND + scale * (bottom - top), 1)
+    labels = tuple(_labels(names, points, radius, height, links))
+    return FloorPlan(WIDTH, height, radius, tuple(points), tuple(links), labels)
+
+
+def _labels(
+    names: Sequence[str],
+    points: Sequence[Point],
+    radius: float,
+    height: float,
+    links: Sequence[tuple[int, int]],
+) -> Iterable[Label]:
+    """Each name where it crosses the fewest links, on nothing else that is drawn."""
+    taken: list[_Box] = [(x - radius, y - radius, x + radius, y + radius) for x, y in points]
+    for place in sorted(range(len(names)), key=lambda p: bool(_NUMBERED.fullmatch(names[p]))):
+        (x, y), wide = points[place], _LETTER * len(names[place])
+        gap = radius + 4
+        ways = [
+            (x + gap, y + 4, "start", x + gap),
+            (x - gap, y + 4, "end", x - gap - wide),
+            (x, y - gap, "middle", x - wide / 2),
+            (x, y + gap + 9, "middle", x - wide / 2),
+        ]
+        free = []
+        for order, (at, base, anchor, left) in enumerate(ways):
+            box = left, base - _LINE + 3, left + wide, base + 3
+            inside = box[0] >= 0 and box[2] <= WIDTH and box[1] >= 0 and box[3] <= height
+            if inside and not any(_overlap(box, other) for other in taken):
+                crossed = sum(_crosses(box, points[a], points[b]) for a, b in links)
+                free.append((crossed, order, box, Label(names[place], at, base, anchor)))
+        if free:
+            *_, box, label = min(free, key=lambda found: found[:2])
+            taken.append(box)
+            yield label
+
+
+def _overlap(one: _Box, other: _Box) -> bool:
+    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
+
+
+def _crosses(box: _Box, start: Point, end: Point) -> bool:
+    """Whether a link passes through a box, looked at every few units."""
+    steps = max(1, round(math.dist(start, end) / 4))
+    along = ((start[k] + (end[k] - start[k]) * n / steps for k in (0, 1)) for n in range(steps + 1))
+    return any(box[0] < x < box[2] and box[1] < y < box[3] for x, y in along)
