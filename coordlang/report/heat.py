@@ -8,10 +8,13 @@ states, in either direction, and a place those at whose last shared state a torn
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 from coordlang.language.recorded import recorded_candidates
 from coordlang.language.words import Language
@@ -26,13 +29,17 @@ from planners.parallel.workers import Workers
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import BadInput, Position, ProvedImpossible
+from planners.system.notebook import counted, named
 
 #: Pairs of states, times robots, up to which all pairs are looked at: some seconds of work.
 _MOST_PAIRS = 2_000_000
 #: Ways to mix next steps that are looked at in a portion of their goals, or in a shown task.
 _MIXTURES = 1_000_000
 
-#: The place of each thing in a last shared state, and in each of the different next states.
+#: Classes beside "none", and places and lanes that are named.
+_CLASSES, _TOP = 4, 3
+
+#: The place of each robot in a last shared state, and in each of the different next states.
 Divergence = tuple[Mapping[str, str], Sequence[Mapping[str, str]]]
 
 
@@ -92,7 +99,7 @@ def heat_of(
 
 
 def _located(model: JointModel, listed: Iterable[tuple[Rows, Ints]]) -> list[Divergence]:
-    """Divergences, each once, as rows of numbers into tables of states, by where things are."""
+    """Divergences, each once, as rows of numbers into tables of states, by where robots are."""
     texts: dict[bytes, tuple[str, ...]] = {}
     once: dict[tuple[bytes, ...], None] = {}
     for states, found in listed:
@@ -101,7 +108,11 @@ def _located(model: JointModel, listed: Iterable[tuple[Rows, Ints]]) -> list[Div
         for last, *after in found.tolist():
             once[keys[last], *sorted(keys[number] for number in after if number >= 0)] = None
     world = find_world(model, list(texts.values()))
-    at = {key: world.located(text) for key, text in texts.items()}
+    robots = {*model.robots}
+    at = {
+        key: {thing: place for thing, place in world.located(text).items() if thing in robots}
+        for key, text in texts.items()
+    }
     return [(at[last], [at[key] for key in after]) for last, *after in once]
 
 
@@ -109,8 +120,37 @@ def counted_heat(known: Sequence[Divergence], tasks: int, *, every: bool) -> Hea
     """Count the divergences that each place and lane is behind."""
     places, lanes = Counter[str](), Counter[tuple[str, str]]()
     for last, after in known:
-        torn = [thing for thing in last if len({at.get(thing) for at in after}) > 1]
-        places.update({last[thing] for thing in torn})
-        driven = {(last[thing], at[thing]) for thing in torn for at in after if thing in at}
+        torn = [robot for robot in last if len({at.get(robot) for at in after}) > 1]
+        places.update({last[robot] for robot in torn})
+        driven = {(last[robot], at[robot]) for robot in torn for at in after if robot in at}
         lanes.update({(min(ends), max(ends)) for ends in driven if ends[0] != ends[1]})
     return Heat(places, lanes, len(known), tasks, every)
+
+
+def heat_map(heat: Heat, names: Sequence[str], links: Sequence[tuple[int, int]]) -> dict[str, Any]:
+    """What a page shows of a heat: looks (h0: none) of places and links, in classes of one width.
+
+    ``links`` are pairs of places, as in `coordlang.sites.world.World`.
+    """
+    bounds = [0, *sorted({-(-heat.most * k // _CLASSES) for k in range(1, _CLASSES + 1)})]
+    ends = [(names[a], names[b]) for a, b in links]
+    lanes = [(" – ".join(pair), heat.lanes.get(pair, 0)) for pair in ends]
+    places = [(name, heat.places.get(name, 0)) for name in names]
+    top = sorted([*places, *lanes], key=lambda known: -known[1])[:_TOP]
+    scale = [("h0", "0")]
+    for number, (below, high) in enumerate(pairwise(bounds), 1):
+        span = f"{high:,}" if below + 1 == high else f"{below + 1:,} to {high:,}"
+        scale.append((f"h{number}", span))
+
+    def shown(name: str, number: int) -> dict[str, str]:
+        look = f"h{bisect_left(bounds, number)}"
+        return {"look": look, "title": f"{name}: {number:,}", "text": ""}
+
+    return {
+        "found": heat.found,
+        "of": f"of {'all ' if heat.every and heat.tasks > 1 else ''}{counted(heat.tasks, 'task')}",
+        "top": named([f"{name} ({number:,})" for name, number in top if number]),
+        "scale": scale,
+        "lanes": [shown(*lane) for lane in lanes],
+        "spots": [shown(*place) for place in places],
+    }

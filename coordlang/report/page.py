@@ -4,12 +4,11 @@
 from __future__ import annotations
 
 import json
-from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from importlib.resources import files
-from itertools import chain, islice, pairwise
+from itertools import chain, islice
 from typing import Any
 
 import numpy as np
@@ -26,9 +25,9 @@ from coordlang.explanation.words import (
 from coordlang.language.provenance import domain_sha256, percent
 from coordlang.language.recorded import options_of
 from coordlang.language.words import Language
-from coordlang.report.heat import Heat, heat_of
+from coordlang.report.heat import heat_of
 from coordlang.report.layout import graph_layout, place_layout, spread
-from coordlang.report.plan import FloorPlan, floor_plan
+from coordlang.report.plan import drawn_plan
 from coordlang.report.shown import Selection, select_tasks
 from coordlang.report.simulated import simulated_data
 from coordlang.report.task import Tables, task_data, task_summary
@@ -54,10 +53,6 @@ _STATES_EXPLAINED = 3_000
 _TERMS = 40
 #: States of a word that are listed where no formula was sought.
 _EXAMPLES = 3
-#: Places, cells of a grid or others, up to which the words are shown as a map in each place.
-_MOST_CELLS, _MOST_BOXES = 40, 14
-#: Classes of a heat map beside "none", and places and lanes that are named beside it.
-_CLASSES, _TOP = 4, 3
 #: Places beyond which no map is drawn.
 MOST_PLACES = 600
 
@@ -358,90 +353,6 @@ def _render(shown: Mapping[str, Any], data: Mapping[str, Any]) -> bytes:
         data=Markup(_json(data)),
         **shown,
     ).encode()
-
-
-def drawn_plan(data: Mapping[str, Any], heat: Heat | None) -> dict[str, Any]:
-    """The floor plan of a page, and what it shows: ``spoken``, the words, and ``heat``.
-
-    None for words that are shown as small maps or on no map, and for a heat that there is not.
-    """
-    names = [place["name"] for place in data["places"]]
-    plan = None
-    if names:
-        points = [(place["x"], place["y"]) for place in data["places"]]
-        plan = floor_plan(names, points, [(a, b) for a, b, *_ in data["links"]])
-    return {
-        "plan": plan,
-        "names": names,
-        "spoken": plan and _spoken(data, names, plan),
-        "heat": plan and heat and heat.found and _heat_map(heat, names, plan),
-    }
-
-
-def _spoken(data: Mapping[str, Any], names: Sequence[str], plan: FloorPlan) -> Any:
-    """The words on a floor plan while the first thing is where it starts."""
-    if data["pair"] is None or small_maps(len(names), is_grid=data["grid"]):
-        return None
-    (one, two), start = data["pair"]["things"], data["pair"]["start"]
-    spots = [{"look": "unmapped", "title": name, "text": ""} for name in names]
-    for facts, word in zip(data["states"][: data["mapped"]], data["state_words"], strict=False):
-        roles = (data["facts"][fact]["role"] for fact in facts)
-        at = {thing: place for kind, thing, place in (r for r in roles if r[0] == "at")}
-        if at[one] == start:
-            name = data["words"][word]["name"]
-            look = f"w c{word % 9}"
-            spots[at[two]] |= {"look": look, "title": f"{names[at[two]]}: {name}", "text": name}
-    spots[start]["look"] = "here"
-    lanes = [{"look": "passage", "title": f"{names[a]} – {names[b]}"} for a, b in plan.links]
-    things = data["things"]
-    return {
-        "one": things[one],
-        "two": things[two],
-        "start": start,
-        "spots": spots,
-        "lanes": lanes,
-    }
-
-
-def _heat_map(heat: Heat, names: Sequence[str], plan: FloorPlan) -> dict[str, Any]:
-    """The numbers of places and lanes on a floor plan, in classes of equal width."""
-    bounds = sorted({-(-heat.most * k // _CLASSES) for k in range(1, _CLASSES + 1)})
-    known = {
-        **{
-            names[a] + " – " + names[b]: heat.lanes.get(
-                (min(names[a], names[b]), max(names[a], names[b])), 0
-            )
-            for a, b in plan.links
-        },
-        **{name: heat.places.get(name, 0) for name in names},
-    }
-
-    def shown(name: str) -> dict[str, str]:
-        number = known[name]
-        look = bisect_left([0, *bounds], number)
-        return {"look": f"h{look}", "title": f"{name}: {number:,}", "text": ""}
-
-    top = sorted(known, key=lambda name: -known[name])[:_TOP]
-    below = [0, *bounds]
-    return {
-        "found": heat.found,
-        "of": f"of {'all ' if heat.every else ''}{counted(heat.tasks, 'task')}",
-        "top": named([f"{name} ({known[name]:,})" for name in top if known[name]]),
-        "scale": [
-            ("h0", "0"),
-            *(
-                (f"h{k}", f"{low + 1:,} to {high:,}" if low + 1 < high else f"{high:,}")
-                for k, (low, high) in enumerate(pairwise(below), 1)
-            ),
-        ],
-        "lanes": [shown(f"{names[a]} – {names[b]}") for a, b in plan.links],
-        "spots": list(map(shown, names)),
-    }
-
-
-def small_maps(places: int, *, is_grid: bool) -> bool:
-    """Whether the words are shown as small maps, one in each place: as far as one can read them."""
-    return places <= (_MOST_CELLS if is_grid else _MOST_BOXES)
 
 
 def _script() -> str:

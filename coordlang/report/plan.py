@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A floor plan with many places: where they are drawn, and which names have room."""
+"""A floor plan with many places: where they are drawn, which names have room, what it shows."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
+from coordlang.report.heat import Heat, heat_map
 from coordlang.sites.coordinates import Point
 
 #: Width and greatest height of a plan, and the room around its places, in units of the drawing.
@@ -17,6 +19,8 @@ WIDTH, _HEIGHT, _AROUND = 1000.0, 700.0, 60.0
 _RADII = (4.0, 13.0)
 #: Width of a letter, and height of a line.
 _LETTER, _LINE = 6.4, 13.0
+#: Places, cells of a grid or others, up to which the words are shown as a map in each place.
+_MOST_CELLS, _MOST_BOXES = 40, 14
 #: What names have that nobody gave: a number at the end.
 _NUMBERED = re.compile(r".*-\d+")
 
@@ -113,3 +117,45 @@ def _crosses(box: _Box, start: Point, end: Point) -> bool:
     steps = max(1, round(math.dist(start, end) / 4))
     along = ((start[k] + (end[k] - start[k]) * n / steps for k in (0, 1)) for n in range(steps + 1))
     return any(box[0] < x < box[2] and box[1] < y < box[3] for x, y in along)
+
+
+def drawn_plan(data: Mapping[str, Any], heat: Heat | None) -> dict[str, Any]:
+    """The floor plan of a page, and what it shows: ``spoken``, the words, and ``heat``.
+
+    None for words that are shown as small maps or on no map, and for a heat that there is not.
+    """
+    names = [place["name"] for place in data["places"]]
+    plan = None
+    if names:
+        points = [(place["x"], place["y"]) for place in data["places"]]
+        plan = floor_plan(names, points, [(a, b) for a, b, *_ in data["links"]])
+    return {
+        "plan": plan,
+        "names": names,
+        "spoken": plan and _spoken(data, names, plan),
+        "heat": plan and heat and heat.found and heat_map(heat, names, plan.links),
+    }
+
+
+def _spoken(data: Mapping[str, Any], names: Sequence[str], plan: FloorPlan) -> Any:
+    """The words on a floor plan while the first thing is where it starts."""
+    if data["pair"] is None or _small_maps(len(names), is_grid=data["grid"]):
+        return None
+    (one, two), start = data["pair"]["things"], data["pair"]["start"]
+    spots = [{"look": "unmapped", "title": name, "text": ""} for name in names]
+    for facts, word in zip(data["states"][: data["mapped"]], data["state_words"], strict=False):
+        roles = (data["facts"][fact]["role"] for fact in facts)
+        at = {thing: place for kind, thing, place in (r for r in roles if r[0] == "at")}
+        if at[one] == start:
+            name = data["words"][word]["name"]
+            look = f"w c{word % 9}"
+            spots[at[two]] |= {"look": look, "title": f"{names[at[two]]}: {name}", "text": name}
+    spots[start]["look"] = "here"
+    lanes = [{"look": "passage", "title": f"{names[a]} – {names[b]}"} for a, b in plan.links]
+    who = {"one": data["things"][one], "two": data["things"][two], "start": start}
+    return {**who, "spots": spots, "lanes": lanes}
+
+
+def _small_maps(places: int, *, is_grid: bool) -> bool:
+    """Whether the words are shown as small maps, one in each place: as far as one can read them."""
+    return places <= (_MOST_CELLS if is_grid else _MOST_BOXES)

@@ -338,7 +338,7 @@ def test_a_place_is_chosen_on_the_floor_plan(
     open_page: Opener, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By the list, by a click, by an arrow key: each other place shows the word of its state."""
-    monkeypatch.setattr("coordlang.report.page._MOST_CELLS", 0)
+    monkeypatch.setattr("coordlang.report.plan._MOST_CELLS", 0)
     language, domain, problem = make_language("t-map", "problem")
     html = make_report(language, domain, [problem], tasks_shown=1).html
     page = open_page(html).page
