@@ -36,22 +36,15 @@ from time import process_time
 from typing import TYPE_CHECKING
 
 from benchmarks import frame
-from benchmarks.frame import SHARED, Figures, KeptRows, PrintedTable, asked_for, run_python
+from benchmarks.frame import SHARED, Figures, KeptRows, PrintedTable, asked_for, columns, run_python
 from benchmarks.scale import Grid
 
 if TYPE_CHECKING:
     from planners.loading import PlanningInstance
 
-COLUMNS = (
-    ("row", -38),
-    ("CPU s", 7),
-    ("optimal cost", 12),
-    ("optimal plans", 16),
-    ("nodes", 10),
-    ("states", 11),
-    ("joint steps", 12),
-    ("bound", -17),
-    ("MB", 5),
+COLUMNS = columns(
+    "row -38, CPU s 7, optimal cost 12, optimal plans 16, nodes 10, states 11, "
+    "joint steps 12, bound -17, MB 5"
 )
 CORNERS = (
     *((side, 2) for side in (5, 8, 10, 16, 24, 32)),

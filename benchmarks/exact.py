@@ -29,7 +29,7 @@ from gridmap import open_grid, ring
 
 from benchmarks import frame
 from benchmarks.coverage import codmap, load
-from benchmarks.frame import Figures, KeptRows, PrintedTable, on_grid
+from benchmarks.frame import Figures, KeptRows, PrintedTable, columns, on_grid
 from benchmarks.paper.suite import ROWS
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
@@ -42,19 +42,9 @@ FURTHER = ("open-2x6", "open-3x4", "open-3x5", "open-4x4", "ring-4x5")
 FIGURES = ("rounds", "counterexamples", "walks", "clauses")
 #: Seconds of the first look.
 EARLY = 10
-COLUMNS = (
-    ("row", -34),
-    ("seed", 4),
-    ("greedy", 6),
-    ("10 s", 7),
-    ("words", 7),
-    ("rounds", 7),
-    ("tuples", 8),
-    ("walks", 6),
-    ("clauses", 8),
-    ("s", 7),
-    ("CPU s", 7),
-    ("load", 5),
+COLUMNS = columns(
+    "row -34, seed 4, greedy 6, 10 s 7, words 7, rounds 7, tuples 8, walks 6, clauses 8, "
+    "s 7, CPU s 7, load 5"
 )
 
 

@@ -63,6 +63,12 @@ class PrintedTable:
         print(line.rstrip(), flush=True)
 
 
+def columns(text: str) -> tuple[tuple[str, int], ...]:
+    """The columns of a table, as "row -12, CPU s 7"."""
+    heads = (column.rpartition(" ") for column in text.split(", "))
+    return tuple((head, int(width)) for head, _, width in heads)
+
+
 def markdown(
     head: Sequence[str], rows: Iterable[Sequence[object]], left: Iterable[int] = ()
 ) -> str:

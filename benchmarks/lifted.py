@@ -26,7 +26,7 @@ from generate import problem_text, scenario
 from gridmap import GridMap, open_grid, path, ring, rooms_and_corridors, two_rooms
 
 from benchmarks import frame
-from benchmarks.frame import DOMAINS, Figures, KeptRows, PrintedTable, asked_for
+from benchmarks.frame import DOMAINS, Figures, KeptRows, PrintedTable, asked_for, columns
 from coordlang.language.candidates import all_pairs
 from coordlang.lifted.language import LiftedLanguage
 from coordlang.lifted.learning import Instance, Learned, learn
@@ -36,19 +36,9 @@ from planners.pddl.sexpr import Source
 from planners.system.errors import CoordlangError
 from planners.system.limits import time_limit
 
-COLUMNS = (
-    ("row", -12),
-    ("learned", 8),
-    ("tried", 7),
-    ("diff.", 6),
-    ("used", 4),
-    ("refuted", 7),
-    ("CPU s", 7),
-    ("classes", 7),
-    ("words", 6),
-    ("CPU s", 7),
-    ("unseen", 7),
-    ("classes", 7),
+COLUMNS = columns(
+    "row -12, learned 8, tried 7, diff. 6, used 4, refuted 7, CPU s 7, classes 7, words 6, "
+    "CPU s 7, unseen 7, classes 7"
 )
 #: The seed of random maps.
 _SEED = 15

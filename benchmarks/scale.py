@@ -27,6 +27,7 @@ from benchmarks.frame import (
     KeptRows,
     PrintedTable,
     asked_for,
+    columns,
     on_grid,
     run_python,
 )
@@ -36,20 +37,9 @@ if TYPE_CHECKING:
 
 PHASES = ("plans", "coordination", "greedy", "verify")
 COUNTED = ("nodes", "edges", "sets", "mixtures", "words")
-COLUMNS = (
-    ("row", -22),
-    ("tasks", 11),
-    ("plans", 6),
-    ("RC", 7),
-    ("greedy", 6),
-    ("verify", 7),
-    ("sum", 9),
-    ("MB", 6),
-    ("nodes", 11),
-    ("edges", 12),
-    ("sets", 9),
-    ("mixtures", 8),
-    ("words", 5),
+COLUMNS = columns(
+    "row -22, tasks 11, plans 6, RC 7, greedy 6, verify 7, sum 9, MB 6, nodes 11, edges 12, "
+    "sets 9, mixtures 8, words 5"
 )
 
 

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING
 
 from benchmarks import frame
 from benchmarks.exact import text_of
-from benchmarks.frame import Figures, KeptRows, PrintedTable, asked_for, run_python
+from benchmarks.frame import Figures, KeptRows, PrintedTable, asked_for, columns, run_python
 from benchmarks.paper.silence import sentence_bits
 
 if TYPE_CHECKING:
@@ -39,27 +39,17 @@ if TYPE_CHECKING:
 #: Tasks of named places that are drawn, by robots, and goals whose sentences are measured.
 MOST_TASKS, MOST_GOALS = {2: 400, 3: 100, 4: 40}, 50
 KINDS = ("all 2", "named 2", "named 3", "named 4")
-COLUMNS = {
-    "row": -34,
-    "tasks": 8,
-    "requiring": 9,
-    "share": 7,
-    "divergences": 11,
-    "greedy": 6,
-    "words": 6,
-    "bits": 5,
-    "CPU s": 7,
-    "best s": 7,
-    "MB": 6,
-    "early": -50,
-}
+COLUMNS = columns(
+    "row -34, tasks 8, requiring 9, share 7, divergences 11, greedy 6, words 6, bits 5, "
+    "CPU s 7, best s 7, MB 6, early -50"
+)
 
 
 def rows(folder: Path) -> list[str]:
     """The names of all rows."""
     names = [path.name.removesuffix(".building.yaml") for path in sorted(folder.glob("*.yaml"))]
-    modes = ("", " asynchronous")
-    return [f"{name} {kind}{mode}" for name in names for kind in KINDS for mode in modes]
+    kinds = [kind + mode for kind in KINDS for mode in ("", " asynchronous")]
+    return [f"{name} {kind}" for name in names for kind in kinds]
 
 
 def candidates_of(folder: Path, row: str) -> Candidates:
@@ -103,8 +93,7 @@ def build(folder: Path, row: str, limit: float) -> Figures:
     from planners.system.errors import CoordlangError
     from planners.system.limits import time_limit
 
-    figures: Figures = {}
-    part = "tasks"
+    figures, part = Figures(), "tasks"
     try:
         with time_limit(limit):
             candidates = candidates_of(folder, row)
@@ -118,25 +107,20 @@ def build(folder: Path, row: str, limit: float) -> Figures:
         part = "best"
         with time_limit(limit):
             built = build_language(candidates, "best")
-        if built.stopped is not None:
-            figures["early"] = ended(part, built.stopped)
+        if built.stopped is not None or not built.guarantee.proved_minimal:
+            figures["early"] = f"{part}: {built.stopped or 'its usual effort'}"
     except (CoordlangError, MemoryError) as error:
-        figures["early"] = ended(part, error)
+        figures["early"] = f"{part}: {error or 'no memory'}"
     if "greedy" in figures:
-        guarantee = built.language.guarantee
+        guarantee = built.guarantee
         figures["words"] = text_of(guarantee.lower_bound, guarantee.size)
         figures["best s"] = round(process_time() - figures["CPU s"], 1)
-        figures["bits"] = bits(candidates, built, limit)
+        figures |= bits(candidates, built, limit)
     return figures
 
 
-def ended(part: str, error: BaseException) -> str:
-    """What ended a part early, in few words."""
-    return f"{part}: {(str(error) or 'no memory').splitlines()[0][:60]}"
-
-
-def bits(candidates: Candidates, built: Built, limit: float) -> float | None:
-    """The mean entropy of the sentences of tasks, None where that takes too long."""
+def bits(candidates: Candidates, built: Built, limit: float) -> Figures:
+    """The mean entropy of the sentences of tasks, many where there are too many."""
     from planners.system.errors import CoordlangError
     from planners.system.limits import time_limit
 
@@ -146,24 +130,25 @@ def bits(candidates: Candidates, built: Built, limit: float) -> float | None:
     with suppress(CoordlangError, MemoryError), time_limit(limit):
         spaces = [source.portion(range(goal, goal + 1)) for goal in sorted(drawn)]
         words = [partition.word_of(space.rows)[space.state] for space in spaces]
-        return fmean(sentence_bits(spaces, words))
-    return None
+        return {"bits": fmean(sentence_bits(spaces, words))}
+    return {"bits": "many"}
 
 
 def measured(folder: Path, row: str, limit: int) -> Figures:
     """The figures of a row from a process of its own."""
     arguments = ("-m", "benchmarks.sites", folder, "--one", row, "--limit", limit)
     done = run_python(arguments, most=4 * limit, cpu=4 * limit)
-    failed = {} if done.code == 0 else {"early": done.why}
+    failed = {} if done.code == 0 else {"early": f"all: {done.why}"}
     return {"row": row, "version": frame.project(), "MB": done.memory, **done.data, **failed}
 
 
 def cells(figures: Figures) -> list[object]:
     """The line of a row."""
+    figures["early"] = figures.get("early", "").split("\n")[0][:70] or None
     tasks, requiring, said = (figures.get(name) for name in ("tasks", "requiring", "bits"))
-    shown = {**figures, "bits": said if said is None else f"{said:.2f}"}
+    shown = {**figures, "bits": f"{said:.2f}" if isinstance(said, float) else said}
     shown["share"] = f"{100 * requiring / tasks:.1f} %" if requiring is not None else None
-    return [shown.get(column) for column in COLUMNS]
+    return [shown.get(head) for head, _ in COLUMNS]
 
 
 def main() -> None:
@@ -175,7 +160,7 @@ def main() -> None:
     if given.one:
         print(json.dumps(build(folder, given.one, given.limit)))
         return
-    known, table = KeptRows(given.kept), PrintedTable(*COLUMNS.items())
+    known, table = KeptRows(given.kept), PrintedTable(*COLUMNS)
     for row in asked_for(rows(folder), given.rows):
         table.print(*cells(known.get(row, partial(measured, folder, row, given.limit))))
 
