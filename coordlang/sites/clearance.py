@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import product
+from statistics import fmean
 
 from coordlang.sites.building import Lane, Place
 from coordlang.sites.coordinates import Point
@@ -68,24 +69,59 @@ def excluded(
     What the rules for every pair of robots forbid is left out: sharing a place, and swapping.
     """
     driving = list(driving)
-    if clearance <= 0 and not any(motion.groups for motion in driving):
+    if not driving or (clearance <= 0 and not any(motion.groups for motion in driving)):
         return [], []
-    standing = [staying(place) for place in places]
+    near = _Near(driving, clearance)
+    standing = {place.name: staying(place) for place in places}
+    at = [(number, still) for still in standing.values() for number in near.of(still)]
     blocked = [
-        (still.start, motion)
-        for motion in driving
-        for still in standing
-        if still.start not in (motion.start, motion.end) and clash(still, motion, clearance)
+        (still.start, driving[number])
+        for number, still in sorted(at, key=lambda pair: pair[0])
+        if still.start not in (driving[number].start, driving[number].end)
+        and clash(still, driving[number], clearance)
     ]
-    return blocked, list(_pairs(driving, clearance))
+    return blocked, list(_pairs(driving, near, clearance))
 
 
-def _pairs(driving: Iterable[Motion], clearance: float) -> Iterator[tuple[Motion, Motion]]:
-    for one, other in combinations(driving, 2):
-        is_swap = (one.start, one.end) == (other.end, other.start)
-        is_known = is_swap or one.start == other.start or one.end == other.end
-        if not is_known and clash(one, other, clearance):
-            yield one, other
+def _pairs(
+    driving: Sequence[Motion], near: _Near, clearance: float
+) -> Iterator[tuple[Motion, Motion]]:
+    for number, one in enumerate(driving):
+        for other in (driving[k] for k in near.of(one) if k > number):
+            is_swap = (one.start, one.end) == (other.end, other.start)
+            is_known = is_swap or one.start == other.start or one.end == other.end
+            if not is_known and clash(one, other, clearance):
+                yield one, other
+
+
+class _Near:
+    """Motions by groups, and by the squares of the floor that they may be near to.
+
+    Two motions that clash have one of them in common.
+    """
+
+    def __init__(self, motions: Sequence[Motion], clearance: float) -> None:
+        lengths = [math.dist(*line) for motion in motions for line in motion.on.values()]
+        self._around = clearance / 2 + _ROUNDING
+        self._side = clearance + max(fmean(lengths), max(lengths) / 100) if clearance > 0 else 0.0
+        self._there: dict[object, list[int]] = {}
+        for number, motion in enumerate(motions):
+            for key in self._keys(motion):
+                self._there.setdefault(key, []).append(number)
+
+    def of(self, motion: Motion) -> list[int]:
+        """The numbers of the motions that may clash with one, sorted."""
+        keys = self._keys(motion)
+        return sorted({number for key in keys for number in self._there.get(key, ())})
+
+    def _keys(self, motion: Motion) -> Iterator[object]:
+        yield from motion.groups
+        for level, line in motion.on.items() if self._side else ():
+            spans = []
+            for ends in zip(*line, strict=True):
+                low, high = min(ends) - self._around, max(ends) + self._around
+                spans.append(range(int(low // self._side), int(high // self._side) + 1))
+            yield from product((level,), *spans)
 
 
 def _distance(one: _Segment, other: _Segment) -> float:
