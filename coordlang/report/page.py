@@ -309,10 +309,12 @@ def make_report(
         "seed": seed,
         "simulated": simulated,
     }
-    known = options or options_of(language)
-    heat = heat_of(language, domain, problems, known, selection, position)
+    heat = None
     while True:
         data = page_data(language, selection, seed, coordinates, most_places)
+        if heat is None and data["places"]:
+            known = options or options_of(language)
+            heat = heat_of(language, domain, problems, known, selection, position)
         if simulated is not None:
             data["simulated"] = simulated_data(simulated)
         html = _render({**shown, **drawn_plan(data, heat)}, data)
