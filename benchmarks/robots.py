@@ -10,8 +10,7 @@ killed at some moment before all are done, and started again. The lines that the
 checked by definition: no event overlaps one that it interferes with, and all events in the order of
 their starts are a plan that the independent checker accepts. The columns: runs; runs in which
 something overlapped, in which somebody had not ended after a minute, and in which all arrived;
-robots killed; events and messages of a run; microseconds of `EventMonitor.may_start`, the median
-and 99.9 %.
+robots killed; events and messages of a run.
 """
 
 from __future__ import annotations
@@ -28,17 +27,14 @@ from functools import partial
 from itertools import combinations
 from pathlib import Path
 from random import Random
-from time import monotonic, perf_counter, sleep
+from time import monotonic, sleep
 from typing import Any
 
 import coordlang
 from benchmarks import frame
-from benchmarks.frame import SHARED, Figures, KeptRows, PrintedTable
+from benchmarks.frame import SHARED, Figures, KeptRows, PrintedTable, columns
 from coordlang.commands.records import RobotOptions
 from coordlang.commands.robot import RobotInTask, robot
-from coordlang.execution.best_sentence import best_sentence
-from coordlang.execution.choices import choices, monitor
-from coordlang.execution.monitor import EventMonitor, Monitor, drawn
 from planners.check.rules import validate
 from planners.joint.traces import Traces
 from planners.loading import PlanningInstance
@@ -53,18 +49,8 @@ ROWS = [f"{name}-{robots}" for name in BUILDINGS for robots in (2, 3, 4)]
 TASKS, TRIES, LIMIT = 5, 10, 30
 #: Metres a second, and seconds after which a run is stuck.
 SPEED, STUCK = 60.0, 60.0
-COLUMNS = (
-    ("row", -18),
-    ("tasks", 5),
-    ("runs", 5),
-    ("overlaps", 8),
-    ("stuck", 5),
-    ("arrived", 7),
-    ("killed", 6),
-    ("events", 6),
-    ("messages", 8),
-    ("us", 6),
-    ("99.9 %", 6),
+COLUMNS = columns(
+    "row -18, tasks 5, runs 5, overlaps 8, stuck 5, arrived 7, killed 6, events 6, messages 8"
 )
 
 #: What one robot did: the start, the end, what is done, and with whom it meets.
@@ -105,19 +91,15 @@ def overlaps(did: Mapping[str, Sequence[Span]], loaded: PlanningInstance) -> lis
 
 def has_arrived(did: Mapping[str, Sequence[Span]], loaded: PlanningInstance) -> bool:
     """Whether all events in the order of their starts, those that meet at once, are a plan."""
-    model, order = loaded.model, []
-    for robot_ in model.robots:
-        order += [(span, robot_) for span in did[robot_]]
-    steps: list[dict[str, str]] = []
-    waiting = sorted(order)
+    robots, plan = loaded.model.robots, []
+    waiting = sorted((span, name) for name in robots for span in did[name])
     while waiting:
         (_, _, text, met), own = waiting.pop(0)
         step = {own: text}
         for other in met:
             at = next(n for n, (_, name) in enumerate(waiting) if name == other)
             step[other] = waiting.pop(at)[0][2]
-        steps.append(step)
-    plan = [tuple(step.get(name) for name in model.robots) for step in steps]
+        plan.append(tuple(map(step.get, robots)))
     return validate(loaded.domain, loaded.problems[0], loaded.team, plan).valid
 
 
@@ -148,12 +130,8 @@ class Run:
             with open(self.folder / f"{name}.lines", "a", buffering=1) as file:
                 sys.stdin = None
                 own = self.team[name]
-                options = RobotOptions(
-                    robot=name,
-                    bus=self.bus[name],
-                    play=self.seed,
-                    speed=SPEED,
-                )
+                bus = self.bus[name]
+                options = RobotOptions(robot=name, bus=bus, play=self.seed, speed=SPEED)
                 own.act(options, lambda line: print(json.dumps(line), file=file))
                 file.write(json.dumps({"messages": own.executive.sent}) + "\n")
             code = 0
@@ -242,67 +220,25 @@ def measured(row: str, runs: int, is_killing: bool) -> Figures:
     name, _, robots = row.rpartition("-")
     tasks = [*tasks_of(name, int(robots))]
     figures: Figures = dict.fromkeys((head for head, _ in COLUMNS), 0)
-    figures |= {"row": row, "tasks": len(tasks)}
-    times: list[float] = []
-    for number, (team, loaded) in enumerate(tasks):
-        for seed in range(number, runs, len(tasks)):
-            _count(figures, team, loaded, seed, is_killing)
-        used = next(iter(team.values())).used
-        found = choices(used, best_sentence(used, ["most-plans"]).words)
-        for seed in range(20):
-            own = [monitor(found.fits, one, "") for one in found.robots]
-            _run_here(own, Random(seed), times)
-    times.sort()
-    for head in ("events", "messages") if figures["runs"] else ():
-        figures[head] = round(figures[head] / figures["runs"])
-    for head, share in (("us", 0.5), ("99.9 %", 0.999)) if times else ():
-        figures[head] = round(1e6 * times[int(len(times) * share)], 1)
+    figures |= {"row": row, "tasks": len(tasks), "runs": runs if tasks else 0}
+    for seed in range(figures["runs"]):
+        team, loaded = tasks[seed % len(tasks)]
+        with tempfile.TemporaryDirectory() as folder:
+            run = Run(team, Path(folder), seed)
+            has_ended = run.wait(run.random.uniform(0, 0.6) if is_killing else None)
+            lines = {own: run.lines(own) for own in team}
+        did = {own: spans(its) for own, its in lines.items()}
+        figures["stuck"] += not has_ended
+        figures["killed"] += run.killed
+        figures["overlaps"] += bool(overlaps(did, loaded))
+        figures["arrived"] += has_ended and has_arrived(did, loaded)
+        figures["events"] += sum(map(len, did.values()))
+        figures["messages"] += sum(
+            line.get("messages", 0) for its in lines.values() for line in its
+        )
+    for head in ("events", "messages"):
+        figures[head] = round(figures[head] / max(1, runs))
     return figures
-
-
-def _count(
-    figures: Figures,
-    team: Mapping[str, RobotInTask],
-    loaded: PlanningInstance,
-    seed: int,
-    is_killing: bool,
-) -> None:
-    with tempfile.TemporaryDirectory() as folder:
-        run = Run(team, Path(folder), seed)
-        has_ended = run.wait(run.random.uniform(0, 0.6) if is_killing else None)
-        lines = {name: run.lines(name) for name in team}
-    did = {name: spans(its) for name, its in lines.items()}
-    figures["runs"] += 1
-    figures["stuck"] += not has_ended
-    figures["killed"] += run.killed
-    figures["overlaps"] += bool(overlaps(did, loaded))
-    figures["arrived"] += has_ended and has_arrived(did, loaded)
-    figures["events"] += sum(map(len, did.values()))
-    figures["messages"] += sum(line.get("messages", 0) for its in lines.values() for line in its)
-
-
-def _run_here(team: Sequence[Monitor], random: Random, times: list[float]) -> None:
-    """Run all robots in this process; takes the seconds of each `EventMonitor.may_start`."""
-    own = [one for one in team if isinstance(one, EventMonitor)]
-    done, has_moved = dict.fromkeys(own, 0), True
-    while has_moved:  # until all are done, or some meet
-        has_moved = False
-        for at in own:
-            begun = perf_counter()
-            may = at.may_start()
-            times.append(perf_counter() - begun)
-            if at.finished or not may:
-                continue
-            event, has_moved = drawn(at, random, may), True
-            if event is None:
-                at.did(None)
-                continue
-            at.start(event)
-            at.did(event)
-            done[at] += 1
-            for other in own:
-                if other is not at:
-                    other.ended(at.robot, at.subaction(event), done[at])
 
 
 def main() -> None:

@@ -12,9 +12,7 @@ from collections import Counter
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import partial
-from math import comb, sqrt
-from random import Random
-from statistics import fmean, stdev
+from math import comb
 from typing import Any
 
 from benchmarks.frame import markdown
@@ -33,32 +31,21 @@ LIKED = (1, 2, 3, 4, 5)
 def units(settings: Settings) -> list[Unit]:
     """List a unit for each method and world."""
     worlds = (ROW, *(world.name for world in OTHERS[: 1 if settings.quick else None]))
-    runs = settings.samples
     return [
-        Unit("game", f"{name}/{method}", {"world": name, "method": method, "runs": runs})
+        Unit("game", f"{name}/{method}", {"world": name, "method": method})
         for name in worlds
         for method in METHODS
     ]
 
 
 def run(unit: Unit, settings: Settings) -> Result:
-    """Play the games of one language and world, and compute their expectations."""
+    """Compute the expectations of one language in one world."""
     world = WORLDS[unit.parameters["world"]]
     candidates, language = language_for(world, unit.parameters["method"], settings.seed)
     # A task's game depends on its numbers of plans alone; a language makes few different ones.
     tasks = [
         tuple(sorted(task.plans.values(), reverse=True))
         for task in candidate_statistics(candidates, language)
-    ]
-    # The same games for every language.
-    randoms = {
-        liked: [
-            Random(f"{settings.seed} {world.name} {liked} {n}") for n in range(settings.samples)
-        ]
-        for liked in LIKED
-    }
-    games = [
-        [play(random.choice(tasks), liked, random) for random in randoms[liked]] for liked in LIKED
     ]
     exact = [_expectations(Counter(tasks), liked) for liked in LIKED]
     return {
@@ -67,10 +54,6 @@ def run(unit: Unit, settings: Settings) -> Result:
         "liked": list(LIKED),
         "exact": {
             name: [values[n] for values in exact] for n, name in enumerate(("plan", "sentence"))
-        },
-        "played": {
-            name: [[game[n] for game in one] for one in games]
-            for n, name in enumerate(("plan", "sentence"))
         },
     }
 
@@ -83,21 +66,6 @@ def _expectations(tasks: Counter[tuple[int, ...]], liked: int) -> list[float]:
         values = expected_for_plans(sum(sizes), k), expected_for_sentences(sizes, k)
         sums = [total + number * value for total, value in zip(sums, values, strict=True)]
     return [round(float(total / tasks.total()), 6) for total in sums]
-
-
-def play(sizes: Sequence[int], liked: int, random: Random) -> tuple[int, int]:
-    """Play one game with plans and one with sentences; the numbers of proposals.
-
-    ``sizes`` are the numbers of plans of the sentences, ``liked`` the number of liked plans.
-    """
-    owner = [sentence for sentence, number in enumerate(sizes) for _ in range(number)]
-    likes = set(random.sample(range(len(owner)), min(liked, len(owner))))
-    plans = random.sample(range(len(owner)), len(owner))
-    sentences = random.sample(range(len(sizes)), len(sizes))
-    accepted = {owner[plan] for plan in likes}
-    by_plan = next(turn for turn, plan in enumerate(plans, 1) if plan in likes)
-    by_sentence = next(turn for turn, sentence in enumerate(sentences, 1) if sentence in accepted)
-    return by_plan, by_sentence
 
 
 def expected_for_plans(plans: int, liked: int) -> Fraction:
@@ -143,17 +111,17 @@ def section(records: Sequence[Record]) -> Section:
     found = elsewhere(columns, others)
     if not mine:
         return Section([_DEFINITION], elsewhere=found)
-    runs, tasks = mine[0].parameters["runs"], mine[0].result["tasks"]
+    tasks = mine[0].result["tasks"]
     alt = f"Proposals until accepted on {ROW}, by liked plans"
     figure = Figure("game", alt, partial(_figure, mine))
-    text = f"{ROW}, {tasks:,} tasks, {runs} games each:"
+    text = f"{ROW}, {tasks:,} tasks:"
     return Section([_DEFINITION, text, _table(mine), figure], _DIFFERENCES, elsewhere=found)
 
 
 _DEFINITION = """\
 The listener likes k of the task's optimal plans, drawn at random. The speaker proposes plans in
 random order until the listener likes one, or sentences until a liked plan has the sentence. Cells:
-the mean of the games, and in brackets the exact expectation, (N + 1) / (k + 1) for N plans."""
+the mean of the expectations, exactly; for N plans it is (N + 1) / (k + 1)."""
 
 
 _DIFFERENCES = (
@@ -168,25 +136,19 @@ def _table(records: Sequence[Record]) -> str:
     kinds += [(f"sentence, {method_of(r)}", r.result, "sentence") for r in records]
     rows = []
     for label, result, what in kinds:
-        both = zip(result["played"][what], result["exact"][what], strict=True)
-        rows.append([label, *(f"{fmean(games):.2f} ({exact:.2f})" for games, exact in both)])
+        rows.append([label, *(f"{mean:.2f}" for mean in result["exact"][what])])
     return markdown(("proposals of", *(f"k = {k}" for k in plan["liked"])), rows)
 
 
 def _figure(records: Sequence[Record]) -> Any:
-    def series(kind: str, label: str, result: Result, what: str) -> Series:
-        games = result["played"][what]
-        ends = [1.959963984540054 * stdev(one) / sqrt(len(one)) if one[1:] else 0 for one in games]
-        means = [fmean(one) for one in games]
-        low, high = ([m + s * e for m, e in zip(means, ends, strict=True)] for s in (-1, 1))
-        return Series(kind, label, means, low, high, result["exact"][what])
-
-    runs, first = records[0].parameters["runs"], records[0].result
-    shown = [series("plan", f"plan ({runs} games, 95 %)", first, "plan")]
+    first = records[0].result
+    shown = [Series("plan", "plan", first["exact"]["plan"])]
     for record in records:
         method = record.parameters["method"]
-        shown.append(series(method, f"sentence, {TITLES[method]}", record.result, "sentence"))
-    panel = Lines("", "proposals until accepted", shown)
+        shown.append(
+            Series(method, f"sentence, {TITLES[method]}", record.result["exact"]["sentence"])
+        )
+    panel = Lines("", "expected proposals until accepted", shown)
     return lines([panel], first["liked"], "plans that the listener likes (k)")
 
 

@@ -10,16 +10,13 @@ robot selects among its own choices.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from random import Random
-from typing import Any
 
 from benchmarks.frame import markdown
 from benchmarks.paper.disruptions import subaction_trials, warehouse_trials
-from benchmarks.paper.plots import Series, by_category
-from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
-from benchmarks.paper.suite import METHODS, OTHERS, TITLES, WORLDS, language_for, method_of
-from benchmarks.paper.tables import Columns, elsewhere, in_percent, rate, share_of_runs
+from benchmarks.paper.recipe import Recipe, Record, Result, Section, Settings, Unit
+from benchmarks.paper.suite import METHODS, OTHERS, WORLDS, language_for, method_of
+from benchmarks.paper.tables import Columns, elsewhere, in_percent, share_of_runs
 from benchmarks.paper.warehouse import LAYOUTS, WAREHOUSES, deliveries, listed_tasks
 
 #: Languages that take more than minutes to build: an unfinished one would depend on the machine.
@@ -69,7 +66,6 @@ def run(unit: Unit, settings: Settings) -> Result:
         "words": len(language.words),
         "trials": len(trials.trials),
         "exact": trials.exact(),
-        "few": trials.sample(settings.samples, random),
         "many": trials.sample(100 * settings.samples, random),
     }
 
@@ -78,14 +74,10 @@ def section(records: Sequence[Record]) -> Section:
     """Render the success rates by map and method."""
     mine = [record for record in records if "warehouse" in record.parameters]
     others = [record for record in records if "world" in record.parameters]
-    blocks: list[str | Figure] = [_DEFINITION]
+    blocks = [_DEFINITION]
     by_layout = {n: [r for r in mine if r.parameters["layout"] == n] for n in LAYOUTS}
     if mine:
         blocks.append(_table(by_layout))
-    for layout, here in by_layout.items():
-        if here:
-            alt = f"Success rates of deliveries {layout} the warehouse, by map"
-            blocks.append(Figure(f"navigation-{layout}", alt, partial(_figure, layout, here)))
     columns: Columns = {
         "robust": lambda r: f"{_exact('plan', r)}, {_exact('sentence', r)}",
     }
@@ -125,28 +117,6 @@ def _exact(what: str, record: Record) -> str | None:
     if known:
         return in_percent(known[what])
     return share_of_runs(many[what], many["runs"]) if what in many else None
-
-
-def _figure(layout: str, records: Sequence[Record]) -> Any:
-    maps = list(dict.fromkeys(r.parameters["warehouse"] for r in records))
-    of = {(r.parameters["warehouse"], r.parameters["method"]): r.result for r in records}
-
-    def series(kind: str, label: str, method: str, what: str) -> Series:
-        points = [_point(of.get((name, method)), what) for name in maps]
-        return Series(kind, label, *zip(*points, strict=True))
-
-    shown = [series("plan", "plan", "greedy", "plan")]
-    shown += [series(m, f"sentence, {TITLES[m]}", m, "sentence") for m in METHODS]
-    few = records[0].result["few"]["runs"]
-    return by_category(maps, shown, f"{layout}: success rate (%), {few} runs; line: 95 %")
-
-
-def _point(result: Result | None, what: str) -> tuple[float | None, ...]:
-    """A success rate in per cent, the ends of its interval, and the exact rate."""
-    if result is None:
-        return None, None, None, None
-    few, exact = result["few"], result["exact"]
-    return *rate(few[what], few["runs"]), 100 * exact[what] if exact else None
 
 
 def _rate(result: Result, what: str) -> float:

@@ -80,8 +80,7 @@ class Series:
 
     ``kind``: chooses colour and marker.  ``label``: the text of the legend.  ``values``: one value
     for each category or number.  ``low`` and ``high``: intervals around the values, if any.
-    ``exact``: what the values estimate, if it is known.  ``x``: the numbers that the values belong
-    to, if they have others than the series beside it.
+    ``x``: the numbers that the values belong to, if they have others than the series beside it.
     """
 
     kind: str
@@ -89,7 +88,6 @@ class Series:
     values: Sequence[float | None]
     low: Sequence[float | None] = ()
     high: Sequence[float | None] = ()
-    exact: Sequence[float | None] = ()
     x: Sequence[float] = ()
 
 
@@ -100,18 +98,8 @@ def by_category(categories: Sequence[str], series: Sequence[Series], unit: str) 
             shift = (number - (len(series) - 1) / 2) * 0.72 / len(series)
             x = [n + shift for n in range(len(categories))]
             _draw_intervals(axes, one, x)
-            if one.exact:
-                axes.plot(x, _numbers(one.exact), "_", color="#222222", markersize=10, zorder=4)
             _draw_markers(axes, one, x)
-        if any(one.exact for one in series):
-            axes.plot([], [], "_", color="#222222", markersize=10, label="exact")
-        slanted = sum(map(len, categories)) > 36
-        axes.set_xticks(
-            range(len(categories)),
-            categories,
-            rotation=35 if slanted else 0,
-            ha="right" if slanted else "center",
-        )
+        axes.set_xticks(range(len(categories)), categories, rotation=35, ha="right")
         axes.set_xlim(-0.6, len(categories) - 0.4)
         for n in range(1, len(categories)):
             axes.axvline(n - 0.5, color="#eeeeee", linewidth=0.8, zorder=0)
@@ -163,7 +151,7 @@ class Lines:
 
 
 def lines(panels: Sequence[Lines], x: Sequence[float], x_label: str, across: int = 1) -> Figure:
-    """Draw panels, ``across`` in a row; what a series estimates is drawn as a dashed line.
+    """Draw panels, ``across`` in a row.
 
     ``x`` are the numbers of series that have none of their own, and marked on the axis.
     """
@@ -174,12 +162,8 @@ def lines(panels: Sequence[Lines], x: Sequence[float], x_label: str, across: int
             for one in panel.series:
                 hue, marker = MARKERS[one.kind]
                 own, values = one.x or x, _numbers(one.values)
-                form = marker if one.exact else f"{marker}-"
-                axes.plot(own, values, form, color=hue, label=one.label, clip_on=False)
+                axes.plot(own, values, f"{marker}-", color=hue, label=one.label, clip_on=False)
                 _draw_intervals(axes, one, own)
-                if one.exact:
-                    label = f"{one.label}, exact"
-                    axes.plot(own, _numbers(one.exact), "--", color=hue, label=label)
             axes.set_title(panel.title, fontsize=10)
             if number % across == 0:
                 axes.set_ylabel(panel.unit)

@@ -4,7 +4,7 @@
 Counterexamples to the old words give clauses that every language satisfies.  A state with a word of
 its own is separated from all others, so the states that change must meet every clause that the old
 words violate, and any states that do suffice: the fewest are a least hitting set
-(Proposition 30 of docs/concepts.md).  Of the languages with so few changes one with the fewest new
+(Proposition 29 of docs/concepts.md).  Of the languages with so few changes one with the fewest new
 words is then looked for, as `minimal` does.
 """
 

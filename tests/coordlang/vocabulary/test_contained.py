@@ -279,7 +279,7 @@ def test_tasks_of_one_orbit_are_those_whose_plans_pass_through_images_of_one_sta
 
 @pytest.mark.parametrize("cells", [4, 6])
 def test_two_words_are_too_few_on_a_ring_and_states_of_one_distance_show_it(cells: int) -> None:
-    """By hand: Proposition 29 of docs/concepts.md.  Each clause is checked in the whole."""
+    """As a proof by hand says of every ring. Each clause is checked in the whole."""
     candidates = on_graph(cells, ring(cells))
     found = tasks_of_one_orbit(candidates, symmetry_group(candidates))
     instance = ContainedInstance(found[0], 0)
