@@ -16,14 +16,15 @@ and those that write the files that they read.
 from __future__ import annotations
 
 import argparse
+import gzip
 import json
 import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from time import perf_counter
 
@@ -322,19 +323,10 @@ def settle(path: Path, folder: Path) -> None:
     elif path.suffix == ".html":
         path.write_text(without_times(path.read_text(), folder))
     elif path.suffix == ".gz":
-        text = subprocess.run(["gzip", "-dc", path], capture_output=True, text=True, check=True)
         plain = path.with_suffix("")
-        plain.write_text(text.stdout)
+        plain.write_bytes(gzip.decompress(path.read_bytes()))
         path.unlink()
         settle(plain, folder)
-
-
-def worlds(listed: list[Command]) -> Iterator[list[Command]]:
-    """The commands of one world after the other."""
-    for world in PROBLEMS:
-        here = [command for command in listed if command.world == world]
-        if here:
-            yield here
 
 
 def run_world(program: str, listed: list[Command], folder: Path) -> None:
@@ -359,11 +351,9 @@ def main() -> int:
     listed = selected(commands(), options.only)
     shutil.rmtree(folder, ignore_errors=True)
     begin = perf_counter()
+    worlds = [[*own] for _, own in groupby(listed, key=lambda command: command.world)]
     with ThreadPoolExecutor(options.jobs) as pool:
-        for done in [
-            pool.submit(run_world, options.program, here, folder) for here in worlds(listed)
-        ]:
-            done.result()
+        list(pool.map(lambda here: run_world(options.program, here, folder), worlds))
     print(f"{len(listed)} commands in {perf_counter() - begin:.0f} s: {folder}", file=sys.stderr)
     return 0
 

@@ -51,8 +51,6 @@ search = f"symq_bd(simple=false,{plans},quality=1.0)"
 subprocess.run([sys.executable, driver, "domain.pddl", "problem.pddl", "--search", search])
 """
 PLANNERS = {"K*": KSTAR, "SymK": SYMK}
-
-
 WHOLE = tuple(f"whole {size}" for size in ("4x4", "5x5", "6x6", "8x8"))
 
 

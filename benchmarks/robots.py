@@ -53,6 +53,8 @@ COLUMNS = columns(
     "row -18, tasks 5, runs 5, overlaps 8, stuck 5, arrived 7, killed 6, events 6, messages 8"
 )
 
+#: A team in a task, and the task's model.
+Task = tuple[Mapping[str, RobotInTask], PlanningInstance]
 #: What one robot did: the start, the end, what is done, and with whom it meets.
 Span = tuple[float, float, str, tuple[str, ...]]
 
@@ -149,7 +151,8 @@ class Run:
             if now > STUCK:
                 return self._end()
             is_due = kill_at is not None and now > kill_at and len(self.pids) == len(self.team)
-            if is_due and not all(self._has_finished(name) for name in self.team):
+            # When all parts are done, nobody stays for one that comes back.
+            if is_due and not all(map(self._has_finished, self.team)):
                 name = self.random.choice(sorted(self.pids))
                 os.kill(self.pids[name], signal.SIGKILL)
                 os.waitpid(self.pids.pop(name), 0)
@@ -168,7 +171,6 @@ class Run:
         return True
 
     def _has_finished(self, name: str) -> bool:
-        """Whether a robot's part is done: when all are, nobody stays for one that comes back."""
         return any("finished" in line for line in self.lines(name))
 
     def _end(self) -> bool:
@@ -185,9 +187,7 @@ class Run:
         return [json.loads(line) for line in text.split("\n") if line.endswith("}")]
 
 
-def tasks_of(
-    name: str, robots: int
-) -> Iterator[tuple[Mapping[str, RobotInTask], PlanningInstance]]:
+def tasks_of(name: str, robots: int) -> Iterator[Task]:
     """Teams in tasks in a building, each robot to another place that is drawn.
 
     Tasks without a plan or a language within a limit are left out.
@@ -219,7 +219,7 @@ def measured(row: str, runs: int, is_killing: bool) -> Figures:
     """The figures of a row."""
     name, _, robots = row.rpartition("-")
     tasks = [*tasks_of(name, int(robots))]
-    figures: Figures = dict.fromkeys((head for head, _ in COLUMNS), 0)
+    figures: Figures = dict.fromkeys(dict(COLUMNS), 0)
     figures |= {"row": row, "tasks": len(tasks), "runs": runs if tasks else 0}
     for seed in range(figures["runs"]):
         team, loaded = tasks[seed % len(tasks)]

@@ -27,8 +27,6 @@ SAID = ("plan", "minimal", "slack", "few", "silence", "graph", "mixed", "free")
 _PASSINGS = ("graph", "mixed", "free")
 #: Probabilities with which a robot is delayed in a step.
 DELAYS = (0.0, 0.05, 0.1, 0.2, 0.3)
-#: The one that the table shows.
-_SHOWN = 0.1
 _WORLDS = ("GW1", "GWB5", *(world.name for world in OTHERS if world.name != "push-box"))
 #: Whether robots wait for each other where they cannot all do their steps.
 _YIELDING = {"as they come": False, "yielding": True}
@@ -117,7 +115,7 @@ def _arrived(records: Sequence[Record]) -> str:
 
 def _cell(record: Record) -> str:
     """The share of runs that end well, as they come and yielding, and how late the latter are."""
-    shown = DELAYS.index(_SHOWN)
+    shown = DELAYS.index(0.1)
     if "passings" in record.result:
         runs, well, late, waits, squares = record.result["passings"][shown]
         mean = waits / well

@@ -10,13 +10,7 @@ from typing import Any
 from benchmarks.paper.plots import Histogram, histograms
 from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
 from benchmarks.paper.reported import OPEN_ALL, OPEN_SEVERAL, SEVERAL
-from benchmarks.paper.sentences import (
-    MOST_LISTED,
-    Comparison,
-    SentenceStatistics,
-    compare,
-    comparison_units,
-)
+from benchmarks.paper.sentences import MOST_LISTED, Comparison, compare, comparison_units
 from benchmarks.paper.suite import ROW, TITLES, method_of
 from benchmarks.paper.tables import elsewhere, rounded_mean, table
 from coordlang.language.flexibility import Flexibility
@@ -31,22 +25,21 @@ def _of_order(found: Flexibility) -> list[float]:
     return [round(float(values.mean()), 3) for values in (found.first, found.expected)]
 
 
-def measures(tasks: Sequence[SentenceStatistics]) -> Result:
-    """Return the mean numbers of open plans: after first plans, last plans, and in expectation.
+def measures(found: Flexibility) -> Result:
+    """Return the mean numbers of open plans: after first plans, and in expectation.
 
     ``several``: tasks in which the first plan's sentence leaves more than one plan open.
     """
-    first = [task.plans[task.first] for task in tasks]
-    several = [number for number in first if number > 1]
+    first = found.first.round().astype(int)
+    several = first[first > 1]
     return {
-        "tasks": len(tasks),
-        "plans": rounded_mean([task.count for task in tasks], 4),
+        "tasks": len(first),
+        "plans": rounded_mean(found.plans, 4),
         "open": rounded_mean(first, 4),
         "several": len(several),
         "open_several": rounded_mean(several, 4),
-        "open_last": rounded_mean([task.plans[task.last] for task in tasks], 4),
-        "expected": rounded_mean([float(task.expected_open) for task in tasks], 4),
-        "first": first[:MOST_LISTED],
+        "expected": rounded_mean(found.expected, 4),
+        "first": first.tolist()[:MOST_LISTED],
     }
 
 
@@ -54,7 +47,7 @@ def section(records: Sequence[Record]) -> Section:
     """Render the open plans by method, and their distribution."""
     found = Comparison.of(records)
     row = found.row
-    paper = ["paper", 4, OPEN_ALL, f"{SEVERAL} of 956", OPEN_SEVERAL, None, None, None]
+    paper = ["paper", 4, OPEN_ALL, f"{SEVERAL} of 956", OPEN_SEVERAL, None, None]
     above = [paper] if found.of_paper else []
     blocks: list[str | Figure] = [
         _DEFINITION.format(row=row),
@@ -73,7 +66,6 @@ _COLUMNS = {
     "open": lambda r: f"{r.result['open']:.1f}",
     "several": lambda r: f"{r.result['several']:,} of {r.result['tasks']:,}",
     "open there": lambda r: f"{r.result['open_several']:.1f}" if r.result["several"] else None,
-    "last plan": lambda r: f"{r.result['open_last']:.1f}",
     "any plan": lambda r: f"{r.result['expected']:.1f}",
     "optimal plans": lambda r: f"{r.result['plans']:.1f}",
 }

@@ -18,9 +18,9 @@ from typing import Any
 from benchmarks.frame import markdown
 from benchmarks.paper.plots import Lines, Series, lines
 from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
-from benchmarks.paper.sentences import candidate_statistics
 from benchmarks.paper.suite import METHODS, OTHERS, TITLES, WORLDS, language_for, method_of
 from benchmarks.paper.tables import Columns, elsewhere
+from coordlang.language.sentences import sentence_counts
 
 #: The row of Table 1 that the paper plays on.
 ROW = "GWB5"
@@ -43,10 +43,10 @@ def run(unit: Unit, settings: Settings) -> Result:
     world = WORLDS[unit.parameters["world"]]
     candidates, language = language_for(world, unit.parameters["method"], settings.seed)
     # A task's game depends on its numbers of plans alone; a language makes few different ones.
-    tasks = [
-        tuple(sorted(task.plans.values(), reverse=True))
-        for task in candidate_statistics(candidates, language)
-    ]
+    partition, tasks = language.partition(candidates.model), []
+    for space in candidates.spaces:
+        said = sentence_counts(space, partition.word_of(space.rows)[space.state])
+        tasks += [tuple(sorted(said[node].values(), reverse=True)) for node in space.starts]
     exact = [_expectations(Counter(tasks), liked) for liked in LIKED]
     return {
         "words": len(language.words),

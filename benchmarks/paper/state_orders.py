@@ -14,8 +14,6 @@ from planners.joint.tables import Ints, find_rows
 
 #: Random orders of the states that experiments try.
 RANDOM_ORDERS = 100
-#: The names of the orders that are not random.
-SYSTEMATIC = ("by number", "by number, reversed", "by name", "breadth first", "depth first")
 
 
 def greedy_partitions(

@@ -16,10 +16,6 @@ from benchmarks.paper.suite import METHODS as COMPARED
 from benchmarks.paper.suite import OTHERS, ROWS, WORLDS, World
 from benchmarks.paper.tables import by_world
 from coordlang.commands.building import build_language
-from coordlang.language.candidates import Candidates
-from planners.search.plans import counts
-from planners.system.errors import OutOfTime
-from planners.system.limits import time_limit
 
 #: A column, the method, and whether only first differences count (alpha).
 METHODS = {
@@ -27,13 +23,10 @@ METHODS = {
     "least alpha": ("separating", True),
     "separating": ("separating", False),
     "minimal": ("minimal", False),
-    "exhaustive": ("exhaustive", False),
 }
 #: The columns with lower bounds.
 PROVED = ("least alpha", "separating", "minimal")
 QUICK = ("GW1", "GW2", "GWB5", "tray")
-#: Seconds after which brute force is stopped, and pairs of plans up to which it is started.
-BRUTE_SECONDS, MOST_PAIRS = 10.0, 500_000
 
 
 def units(settings: Settings) -> list[Unit]:
@@ -41,8 +34,7 @@ def units(settings: Settings) -> list[Unit]:
     found = []
     for world in (*ROWS, *OTHERS):
         if not settings.quick or world.name in QUICK:
-            columns = [name for name in METHODS if name != "exhaustive" or world in ROWS]
-            found += [_unit(world, column, settings) for column in (*columns, "orders")]
+            found += [_unit(world, column, settings) for column in (*METHODS, "orders")]
     return found
 
 
@@ -53,8 +45,6 @@ def _unit(world: World, column: str, settings: Settings) -> Unit:
     else:
         method, alpha_only = METHODS[column]
         parameters |= {"method": method, "alpha_only": alpha_only}
-    if column == "exhaustive":
-        parameters["seconds"] = min(BRUTE_SECONDS, settings.limit)
     return Unit("table1", f"{world.name}/{column}", parameters)
 
 
@@ -65,8 +55,6 @@ def run(unit: Unit, settings: Settings) -> Result:
     if asked["column"] == "orders":
         orders = greedy_partitions(candidates, asked["orders"], unit.random(settings.seed))
         return {"words": {name: int(words.max()) + 1 for name, words in orders}}
-    if asked["method"] == "exhaustive":
-        return find_by_brute_force(candidates, asked["seconds"], settings.seed)
     built = build_language(
         candidates,
         asked["method"],
@@ -86,30 +74,6 @@ def run(unit: Unit, settings: Settings) -> Result:
         "stopped": built.stopped is not None,
         "work": {name: int(value) for name, value in sorted(built.figures.items())},
     }
-
-
-def find_by_brute_force(candidates: Candidates, seconds: float, seed: int) -> Result:
-    """Run the paper's exhaustive method; its number of words, or why there is none."""
-    pairs = pairs_of_plans(candidates)
-    found: Result = {"pairs": pairs, "words": None}
-    if pairs > MOST_PAIRS:
-        return found | {"why": "too many pairs of plans"}
-    try:
-        with time_limit(seconds):
-            built = build_language(candidates, "exhaustive", seed=seed)
-    except OutOfTime:
-        return found | {"why": "out of time"}
-    if built.stopped is not None:
-        late = isinstance(built.stopped, OutOfTime)
-        return found | {"why": "out of time" if late else "out of memory"}
-    words, partitions = built.language.guarantee.size, int(built.figures["partitions"])
-    return found | {"words": words, "partitions": partitions}
-
-
-def pairs_of_plans(candidates: Candidates) -> int:
-    """Return the number of pairs of optimal plans of all tasks: what brute force mixes."""
-    counted = [(space.starts, counts(space)) for space in candidates.spaces]
-    return sum(number[start] ** 2 for starts, number in counted for start in starts)
 
 
 #: The records of a row or world by column.
@@ -222,7 +186,6 @@ def _figure(rows: Mapping[str, _Columns]) -> Any:
 
 
 def _differences(rows: Mapping[str, _Columns]) -> Iterator[str]:
-    yield from _about_sizes(rows)
     yield from _about_orders(rows)
     yield from _about_alpha(rows)
     ratios = [
@@ -237,24 +200,6 @@ def _differences(rows: Mapping[str, _Columns]) -> Iterator[str]:
             f"smaller than the paper's (median {median(ratios):.1f}), which is exact for {exact} "
             "only."
         )
-    brute = {name: c["exhaustive"].result["words"] for name, c in rows.items() if "exhaustive" in c}
-    ended = [f"{name}: {words} words" for name, words in brute.items() if words is not None]
-    if len(ended) < len(brute):
-        yield (
-            f"**Brute force** ends within {BRUTE_SECONDS:g} s on {len(ended)} of {len(brute)} rows "
-            f"({', '.join(ended)}). Beyond {MOST_PAIRS:,} pairs of optimal plans it is not started."
-        )
-
-
-def _about_sizes(rows: Mapping[str, _Columns]) -> Iterator[str]:
-    sizes = {name: columns["greedy"].result for name, columns in rows.items()}
-    wrong = [
-        name
-        for name, found in sizes.items()
-        if (found["tasks"], found["states"]) != (TABLE_1[name].tasks, TABLE_1[name].states)
-    ]
-    if wrong:
-        yield f"**Tasks or states** differ from the paper's on {', '.join(wrong)}."
 
 
 def _about_orders(rows: Mapping[str, _Columns]) -> Iterator[str]:

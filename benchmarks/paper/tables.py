@@ -4,12 +4,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from statistics import fmean
+
+import numpy as np
 
 from benchmarks.frame import markdown
 from benchmarks.paper.recipe import Record
 from benchmarks.paper.suite import METHODS, world_and_method
+from coordlang.language.flexibility import Floats
 from coordlang.required.failure import wilson
+from planners.joint.tables import Ints
 
 #: Columns of a table: their heads, and what they show of a record.
 Columns = Mapping[str, Callable[[Record], object]]
@@ -66,6 +69,6 @@ def rate(successes: int, runs: int) -> tuple[float, float, float]:
     return 100 * successes / runs, 100 * low, 100 * high
 
 
-def rounded_mean(values: Sequence[float], digits: int) -> float:
+def rounded_mean(values: Sequence[float] | Ints | Floats, digits: int) -> float:
     """Return the mean as it is written into results; 0 of no values."""
-    return round(fmean(values), digits) if values else 0.0
+    return round(float(np.mean(values)), digits) if np.size(values) else 0.0
