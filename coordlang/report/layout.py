@@ -21,8 +21,6 @@ Floats = NDArray[np.float64]
 _SWEEPS = 12
 #: From this ratio of the extents along the two main axes on neither of them counts as longer.
 _ROUND = 0.95
-#: Rounds in which points that are too near are pushed apart.
-_PUSHES = 80
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,30 +113,6 @@ def _along_links(points: Floats, links: Sequence[tuple[int, int]]) -> Floats:
     rotation = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
     turned: Floats = points @ rotation
     return turned
-
-
-def spread(points: Floats, least: float) -> Floats:
-    """Move points apart where two are nearer than ``least``, in a few rounds of pushing.
-
-    No library that is used here removes overlaps and leaves the other points alone.
-    """
-    points = points.copy()
-    number = np.arange(len(points))
-    for _ in range(_PUSHES):
-        apart = points[:, None, :] - points[None, :, :]
-        distance = np.linalg.norm(apart, axis=2)
-        missing = np.maximum(least - distance, 0.0)
-        np.fill_diagonal(missing, 0.0)
-        if not missing.any():
-            break
-        # Of two points in one place the first goes one way and the second the other.
-        same = distance < 1e-9
-        apart[same] = 0.0
-        apart[..., 0] += np.where(same, np.sign(number[None, :] - number[:, None]), 0)
-        unit = apart / np.maximum(np.where(same, 1.0, distance), 1e-9)[..., None]
-        points += 0.8 * (unit * (missing / 2)[..., None]).sum(axis=1)
-    points -= points.min(axis=0)
-    return points
 
 
 def layer_orders(sizes: Sequence[int], edges: Sequence[tuple[int, int]]) -> list[int]:

@@ -26,7 +26,7 @@ from coordlang.language.provenance import domain_sha256, percent
 from coordlang.language.recorded import options_of
 from coordlang.language.words import Language
 from coordlang.report.heat import heat_of
-from coordlang.report.layout import graph_layout, place_layout, spread
+from coordlang.report.layout import graph_layout, place_layout
 from coordlang.report.plan import drawn_plan
 from coordlang.report.shown import Selection, select_tasks
 from coordlang.report.simulated import simulated_data
@@ -241,8 +241,9 @@ def _state_graph(language: TaskLanguage) -> dict[str, Any]:
     ends = np.sort(rank[np.column_stack((steps.source, target))[inside]], axis=1)
     links = [(a, b) for a, b in np.unique(ends, axis=0).tolist()]
     points = graph_layout(len(keys), links)
-    radius = max(9.0, min(26.0, 270 / len(keys) ** 0.5))
-    points = spread(points * (1000 / max(float(points.max(initial=0.0)), 1e-9)), 2.1 * radius)
+    points *= 1000 / max(float(points.max(initial=0.0)), 1e-9)
+    apart = np.linalg.norm(points[:, None] - points[None, :], axis=2)[np.triu_indices(len(keys), 1)]
+    radius = max(2.0, min(26.0, 270 / len(keys) ** 0.5, float(apart.min()) / 2.1))
     drawn = links if len(links) <= _STATE_LINES else []
     return {
         "points": [[round(x), round(y)] for x, y in points.tolist()],

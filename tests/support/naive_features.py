@@ -9,28 +9,7 @@ from itertools import product
 
 import networkx as nx
 
-from coordlang.lifted.features import (
-    UNDEFINED,
-    Attribute,
-    Both,
-    Concept,
-    Count,
-    Distance,
-    Everything,
-    Feature,
-    Gap,
-    Named,
-    Number,
-    One,
-    Residue,
-    Role,
-    Same,
-    Sign,
-    Size,
-    Some,
-    Term,
-    Without,
-)
+from coordlang.lifted import features as f
 
 #: The argument tuples of the atoms that are true, by predicate.
 State = Mapping[str, Sequence[tuple[str, ...]]]
@@ -40,74 +19,74 @@ State = Mapping[str, Sequence[tuple[str, ...]]]
 Objects = Mapping[str, frozenset[str]]
 
 
-def value(feature: Feature, objects: Objects, statics: State, state: State) -> int:
+def value(feature: f.Feature, objects: Objects, statics: State, state: State) -> int:
     """What a feature is in a state."""
 
-    def number(asked: Number) -> int | None:
+    def number(asked: f.Number) -> int | None:
         return _number(asked, objects, statics, state)
 
     match feature:
-        case Same(one, other):
+        case f.Same(one, other):
             here, there = _object(one, state), _object(other, state)
-            return UNDEFINED if here is None or there is None else here == there
-        case Sign(one, other):
+            return f.UNDEFINED if here is None or there is None else here == there
+        case f.Sign(one, other):
             left, right = number(one), number(other)
             if left is None or right is None:
-                return UNDEFINED
+                return f.UNDEFINED
             return (left > right) - (left < right)
     found = number(feature.number)
     if found is None:
-        return UNDEFINED
-    return found % feature.modulus if isinstance(feature, Residue) else min(found, feature.most)
+        return f.UNDEFINED
+    return found % feature.modulus if isinstance(feature, f.Residue) else min(found, feature.most)
 
 
-def _number(number: Number, objects: Objects, statics: State, state: State) -> int | None:
+def _number(number: f.Number, objects: Objects, statics: State, state: State) -> int | None:
     match number:
-        case Size():
+        case f.Size():
             return len(members(number.concept, objects, statics, state))
-        case Gap():
+        case f.Gap():
             linked = _linked(number.relation, statics)
             ends = (members(c, objects, statics, state) for c in (number.one, number.other))
             found = [_steps(a, b, linked) for a, b in product(*ends)]
             return min((steps for steps in found if steps is not None), default=None)
-        case Count():
+        case f.Count():
             return sum(
                 len(args) == len(number.args)
                 and all(wanted in ("_", own) for wanted, own in zip(number.args, args, strict=True))
                 for args in state.get(number.predicate, ())
             )
-        case Distance():
+        case f.Distance():
             here, there = _object(number.one, state), _object(number.other, state)
             if here is None or there is None:
                 return None
             return _steps(here, there, _linked(number.relation, statics))
-        case Attribute():
+        case f.Attribute():
             place = _object(number.term, state)
             return None if place is None else _attribute(number, place, statics)
 
 
-def members(concept: Concept, objects: Objects, statics: State, state: State) -> set[str]:
+def members(concept: f.Concept, objects: Objects, statics: State, state: State) -> set[str]:
     """The objects in a concept."""
     match concept:
-        case Everything():
+        case f.Everything():
             return set(objects)
-        case Named(name):
+        case f.Named(name):
             atoms = [*statics.get(name, ()), *state.get(name, ())]
             own = {args[0] for args in atoms if len(args) == 1}
             return own | {o for o, types in objects.items() if name in types}
-        case One(name):
+        case f.One(name):
             return {name} & set(objects)
-        case Without(inner):
+        case f.Without(inner):
             return set(objects) - members(inner, objects, statics, state)
-        case Both(one, other):
+        case f.Both(one, other):
             left, right = (members(c, objects, statics, state) for c in (one, other))
             return left & right
-        case Some(role, inner):
+        case f.Some(role, inner):
             ends = members(inner, objects, statics, state)
             return {a for a, b in related(role, statics, state) if b in ends}
 
 
-def related(role: Role, statics: State, state: State) -> set[tuple[str, str]]:
+def related(role: f.Role, statics: State, state: State) -> set[tuple[str, str]]:
     """The pairs in a role."""
     atoms = [*statics.get(role.predicate, ()), *state.get(role.predicate, ())]
     pairs = {(args[0], args[1]) for args in atoms if len(args) == 2}
@@ -121,7 +100,7 @@ def related(role: Role, statics: State, state: State) -> set[tuple[str, str]]:
     return pairs
 
 
-def _object(term: Term, state: State) -> str | None:
+def _object(term: f.Term, state: State) -> str | None:
     atoms = [args for args in state.get(term.predicate, ()) if len(args) == 2]
     found = [a for a, b in atoms if b == term.named] if term.inverse else []
     if not term.inverse:
@@ -129,7 +108,7 @@ def _object(term: Term, state: State) -> str | None:
     return min(found, default=None)
 
 
-def _attribute(number: Attribute, place: str, statics: State) -> int | None:
+def _attribute(number: f.Attribute, place: str, statics: State) -> int | None:
     if not number.relation:
         cell = re.fullmatch(r"[a-z_]*(\d+)[-_](\d+)", place)
         return int(cell[1 if number.name == "row" else 2]) if cell else None

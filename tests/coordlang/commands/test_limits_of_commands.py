@@ -138,14 +138,7 @@ def test_who_does_the_pieces_changes_nothing(
 
 HANDOVER = DOMAINS / "handover"
 #: Three words are found soon; whether two suffice is open after minutes.
-HARD = [
-    str(HANDOVER / "domain.pddl"),
-    str(HANDOVER / "exchange.pddl"),
-    "--tasks",
-    "all",
-    "--method",
-    "minimal",
-]
+HARD = [HANDOVER / "domain.pddl", HANDOVER / "exchange.pddl"]
 
 
 def stopped(number: signal.Signals, *arguments: str) -> Outcome:
@@ -157,7 +150,9 @@ def stopped(number: signal.Signals, *arguments: str) -> Outcome:
             process.send_signal(number)
             sent.append(number)
 
-    return on_a_terminal(own_process("build", *HARD, *arguments), heard)
+    return on_a_terminal(
+        own_process("build", *HARD, "--tasks", "all", "--method", "minimal", *arguments), heard
+    )
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.report.layout import graph_layout, layer_orders, place_layout, spread
+from coordlang.report.layout import graph_layout, layer_orders, place_layout
 from coordlang.sites.coordinates import from_names, read_coordinates
 from planners.system.errors import BadInput
 
@@ -48,16 +48,6 @@ def test_a_path_is_laid_out_straight_and_a_ring_round() -> None:
     parts = graph_layout(40, [(k, k + 1) for k in range(0, 38, 3)])
     assert (parts == graph_layout(40, [(k, k + 1) for k in range(0, 38, 3)])).all()
     assert np.isfinite(parts).all()
-
-
-def test_spread_moves_apart_what_is_too_near_and_nothing_else() -> None:
-    random = Random(1)
-    crowd = np.array([[random.random(), random.random()] for _ in range(30)] + [[0.5, 0.5]] * 3)
-    moved = spread(crowd, 0.3)
-    apart = np.linalg.norm(moved[:, None] - moved[None, :], axis=2) + 9 * np.eye(len(moved))
-    assert apart.min() > 0.24
-    far = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    assert (spread(far, 0.3) == far).all()
 
 
 def crossings(orders: list[int], sizes: list[int], edges: list[tuple[int, int]]) -> int:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import ast
-import dataclasses
 import gc
 import math
 import sys
@@ -15,7 +14,6 @@ from itertools import combinations
 from pathlib import Path
 from random import Random
 from threading import Thread
-from typing import get_args, get_type_hints
 
 import imageio.v3
 import msgspec
@@ -28,7 +26,6 @@ from coordlang.execution.best_sentence import best_sentence
 from coordlang.execution.monitor import drawn
 from coordlang.execution.task_language import language_in_task
 from coordlang.language.candidates import from_problems
-from coordlang.simulation.pace import Kind, Message
 from coordlang.simulation.record import (
     EventRecord,
     RunRecord,
@@ -39,7 +36,6 @@ from coordlang.simulation.record import (
     to_bytes,
 )
 from coordlang.simulation.recording import ROBOTS, Scene, frames, new_figure, recorded
-from coordlang.simulation.robot import Sensed
 from coordlang.simulation.run import record_of, runs_of
 from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Mission
@@ -378,25 +374,6 @@ def test_the_logic_needs_the_standard_library_and_the_monitor_only() -> None:
             if name not in met:
                 waiting.append(name)
     assert met == OWN
-
-
-def test_numbers_and_texts_are_all_that_a_robot_is_told() -> None:
-    """No object of the simulator, of another robot or of a plan: times, poses, counted messages."""
-    assert get_type_hints(Sensed) == {
-        "time": float,
-        "pose": tuple[float, float, float],
-        "ahead": float | None,
-        "heard": tuple[Message, ...],
-        "wanted": tuple[str, ...],
-    }
-    assert get_type_hints(Message) == {
-        "sender": str,
-        "kind": Kind,
-        "number": int,
-        "subaction": str,
-    }
-    assert get_args(Kind) == ("step", "word", "ended", "ready")
-    assert all(dataclasses.fields(kind) for kind in (Sensed, Message))
 
 
 def test_each_own_subplan_is_drawn_equally_often() -> None:
