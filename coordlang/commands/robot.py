@@ -181,8 +181,17 @@ class _Loop:
             ready = {key.fd for key, _ in self._selector.select(wait if is_sent else _AGAIN)}
             if self._stdin in ready:
                 self._hears_driver()
-            for data in self._bus.receive():
-                self._own.hears(data, self._now)
+            if self._stdin is None and self._player is None and not self._own.is_done:
+                raise BadInput(
+                    "stdin ended before the robot's part was done",
+                    remedy='It says what is done: {"event": 1, "done": true}; or use --play.',
+                )
+            try:
+                for data in self._bus.receive():
+                    self._own.hears(data, self._now)
+            except Refuted:
+                self._tells()  # so that others end, too
+                raise
             self._own.tick(self._now)
             if self._player is not None:
                 self._player.act(self._own, self._now)
@@ -194,9 +203,7 @@ class _Loop:
         for line in lines:
             self._write(line)
         unsent = [to for to, data in self._own.messages() if not self._bus.send(to, data)]
-        for to in unsent:
-            self._own.unsent(to)
-        return not unsent
+        return not [to for to in unsent if self._own.unsent(to)]
 
     def _hears_driver(self) -> None:
         assert self._stdin is not None
@@ -204,12 +211,9 @@ class _Loop:
         if not read:
             self._selector.unregister(self._stdin)
             self._stdin = None
-            if self._player is None and not self._own.is_done:
-                raise BadInput(
-                    "stdin ended before the robot's part was done",
-                    remedy='It says what is done: {"event": 1, "done": true}; or use --play.',
-                )
-        *lines, self._read = (self._read + read).split(b"\n")
+            read = b"\n"  # that its last line may lack
+        *lines, rest = (self._read + read).split(b"\n")
+        self._read = rest[:_CHUNK]  # nothing so long can be true
         for line in lines:
             if line.strip():
                 self._own.reads(line.decode(errors="replace"), self._now)

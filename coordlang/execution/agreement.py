@@ -13,7 +13,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from coordlang.execution.fleet_log import Answer, Contradiction, Message
+from coordlang.execution.fleet_log import Answer, Message
+from planners.system.errors import Refuted
 
 
 class Agreement:
@@ -39,11 +40,10 @@ class Agreement:
         self._heard: dict[str, Message | None] = dict.fromkeys(others)
 
     def hears(self, message: Message) -> None:
-        """Take in what another robot says; `Contradiction` if it follows another sentence."""
+        """Take in what another robot says; `Refuted` if it follows another sentence."""
         if message.sentence is not None and self.sentence not in (None, message.sentence):
-            raise Contradiction(
-                f'{message.by} follows "{message.sentence}", {self.robot} "{self.sentence}"'
-            )
+            what = f'{message.by} follows "{message.sentence}", {self.robot} "{self.sentence}"'
+            raise Refuted(what, remedy="Give all robots one SENTENCE, or none.")
         self._heard[message.by] = message
 
     def advance(self) -> bool:

@@ -22,7 +22,7 @@ from urllib.parse import quote
 from planners.system.errors import BadInput, UsageError
 
 #: A message is not longer, in bytes.
-_MOST = 1 << 16
+_MOST = 1 << 17
 #: Where Zenoh listens without a configuration: the first robot here, the next one at the next port.
 _PORT = 7460
 
@@ -50,38 +50,48 @@ def opened(text: str, run: str, robot: str, robots: Sequence[str]) -> Bus:
     """
     kind, _, where = text.partition(":")
     if kind == "unix":
-        own = f"coordlang-{os.getuid()}"
-        return UnixBus(Path(where) if where else Path(tempfile.gettempdir(), own, run), robot)
+        own = Path(tempfile.gettempdir(), f"coordlang-{os.getuid()}-{run}")
+        return UnixBus(Path(where) if where else own, robot)
     if kind == "zenoh":
         return ZenohBus(where, run, robot, robots)
     raise UsageError(f"--bus {text}: there is no such bus", remedy="Say unix:FOLDER or zenoh.")
 
 
+def _quoted(robot: str) -> str:
+    """A robot's name as part of a key, and as that of a file: without dots."""
+    return quote(robot, safe="").replace(".", "%2E")
+
+
 class UnixBus:
     """Unix datagram sockets in a folder, one for each robot.
 
-    Whoever comes first makes the folder; only the user who made it may enter.  Who holds the lock
-    of a robot is this robot: a process that is killed loses it.
+    Whoever comes first makes the folder, or sees that it was removed; only the user who made it may
+    enter.  Who holds the lock of a robot is this robot: a process that is killed loses it.
     """
 
     def __init__(self, folder: Path, robot: str) -> None:
-        self._folder, self._own = folder, folder / quote(robot, safe="")
+        self._folder, self._robot, self._own = folder, robot, folder / _quoted(robot)
+        self._lock, self._socket = self._entered()
+
+    def _entered(self) -> tuple[int, socket.socket]:
+        """The robot's lock and its socket in the folder."""
+        own = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        own.setblocking(False)
         try:
-            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            if folder.stat().st_uid != os.getuid():
+            self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if self._folder.stat().st_uid != os.getuid():
                 raise PermissionError(errno.EPERM, "the folder is another user's")
-            self._lock = os.open(f"{self._own}.lock", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock = os.open(f"{self._own}.lock", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             self._own.unlink(missing_ok=True)
-            self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-            self._socket.bind(str(self._own))
+            own.bind(str(self._own))
         except BlockingIOError:
             remedy = "End that process, or name another folder with --bus unix:FOLDER."
-            raise UsageError(f"{robot} is on this bus already", remedy=remedy) from None
+            raise UsageError(f"{self._robot} is on this bus already", remedy=remedy) from None
         except OSError as error:  # of a path that is too long for a socket, too
-            what = f"--bus unix:{folder} cannot be opened: {error.strerror or error}"
+            what = f"--bus unix:{self._folder} cannot be opened: {error.strerror or error}"
             raise UsageError(what, remedy="Name a short path to a folder of yours.") from None
-        self._socket.setblocking(False)
+        return lock, own
 
     def fileno(self) -> int:
         """The file number that is ready to be read when there are messages."""
@@ -89,8 +99,14 @@ class UnixBus:
 
     def send(self, robot: str, data: bytes) -> bool:
         """Send a message; False where its reader has too many unread ones."""
+        if not self._own.exists():
+            lock, own = self._entered()
+            os.dup2(lock, self._lock, inheritable=False)
+            os.dup2(own.fileno(), self._socket.fileno(), inheritable=False)
+            os.close(lock)
+            own.close()
         try:
-            self._socket.sendto(data, str(self._folder / quote(robot, safe="")))
+            self._socket.sendto(data, str(self._folder / _quoted(robot)))
         except OSError as error:
             # Nobody is there: it will ask when it comes.
             return error.errno in (errno.ENOENT, errno.ECONNREFUSED)
@@ -130,9 +146,10 @@ class ZenohBus:
                 settings = _local(zenoh, robots.index(robot), len(robots))
             self._session: Any = zenoh.open(settings)
         except zenoh.ZError as error:
-            what = f"--bus zenoh cannot be opened: {error}"
+            # Zenoh's messages end with a line of its source.
+            what = f"--bus zenoh:{config} cannot be opened: {str(error).partition(' at /')[0]}"
             raise BadInput(what, remedy="See docs/robots.md, A bus.") from None
-        self._session.declare_subscriber(f"{self._prefix}/{quote(robot, safe='')}", self._comes)
+        self._session.declare_subscriber(f"{self._prefix}/{_quoted(robot)}", self._comes)
 
     def _comes(self, sample: Any) -> None:
         """Take a message from a thread of Zenoh's."""
@@ -146,7 +163,7 @@ class ZenohBus:
 
     def send(self, robot: str, data: bytes) -> bool:
         """Send a message."""
-        self._session.put(f"{self._prefix}/{quote(robot, safe='')}", data)
+        self._session.put(f"{self._prefix}/{_quoted(robot)}", data)
         return True
 
     def receive(self) -> Iterator[bytes]:

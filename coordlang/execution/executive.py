@@ -30,12 +30,15 @@ from coordlang.execution.fleet_log import (
     encoded,
 )
 from coordlang.execution.monitor import EventMonitor, MonitorError, NotPossible, drawn
+from planners.system.errors import Refuted
 
 #: In the time after which a robot counts as silent each one is heard so often, if it has nothing
 #: else to tell.
 _BEATS = 4
 #: Who is done waits so many times that long for a silent robot to come back.
 _PATIENCE = 6
+#: Seconds that a robot may be late.
+_LATEST = 1e9
 #: Parts of a wish, as `Monitor.can` names them.
 _DETOURS = frozenset({"visit", "avoid", "do", "never"})
 #: Characters of a refused line that are shown, and different messages that are refused with a line.
@@ -74,6 +77,7 @@ class Executive:
     ) -> None:
         self.robot, self.others, self.lines = robot, tuple(others), list[dict[str, Any]]()
         self.life = self.sent = 0
+        self._late_by: float | None = None
         self.random: Random | None = None
         #: Nothing begins before this time.
         self.holds_until = 0.0
@@ -177,13 +181,11 @@ class Executive:
         self._own.advance(ended=number)
         self._to_tell |= {*self.others}
 
-    def _late(self, seconds: object) -> None:
-        if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not seconds >= 0:
+    def _late(self, seconds: Any) -> None:
+        if type(seconds) not in {int, float} or not 0 <= seconds < _LATEST:
             raise ValueError("late: expected a number of seconds")
         self._late_by = float(seconds)
         self._to_tell |= {*self.others}
-
-    _late_by: float | None = None
 
     def _refuse(self, what: str, why: str, sender: str | None = None) -> None:
         by = {} if sender is None else {"from": sender}
@@ -192,12 +194,18 @@ class Executive:
     # ---- the other robots
 
     def hears(self, data: bytes, now: float) -> None:
-        """Take in a message of another robot; what cannot be true is refused."""
+        """Take in a message of another robot; what cannot be true is refused.
+
+        Raises `Refuted` if nothing has begun and the other one follows another sentence.
+        """
         try:
             message = decoded(data, self._run, self.robot, self.others)
             self._agreement.hears(message)
             self._take_in(message, now)
-        except Contradiction as error:
+        except (Contradiction, Refuted) as error:
+            if self._monitor is None and isinstance(error, Refuted):
+                self._to_tell |= {*self.others}
+                raise
             if error.what not in self._refused and len(self._refused) < _REFUSED:
                 self._refused.add(error.what)  # it may come again and again
                 self._refuse(data[:_SHOWN].decode(errors="replace"), error.what)
@@ -259,17 +267,26 @@ class Executive:
             self.sent += 1
             yield name, encoded(Message(*who, self._lives, knows, logs, late=late, **said))
 
-    def unsent(self, name: str) -> None:
-        """Tell that a message could not be sent: what it said is said again."""
+    def unsent(self, name: str) -> bool:
+        """Tell that a message could not be sent; whether it should be tried again at once.
+
+        A silent robot, which may have stopped for ever, gets the next beat.
+        """
+        if name in self._silent:
+            return False
         self._to_tell.add(name)
+        return True
 
     # ---- its own events
 
     @property
     def _has_joined(self) -> bool:
-        """Whether all have heard of this process, and it knows of itself what they know."""
+        """Whether all have heard of this process, and it knows of itself what they know.
+
+        But for those that were done, and have left as this one seemed lost.
+        """
         return all(
-            (self._heard_us[name] or self._logs[name].version.is_done)
+            (self._heard_us[name] or (name in self._silent and self._logs[name].version.is_done))
             and not self._own.version.lacks(self._version_by(name, self.robot))
             for name in self.others
         )

@@ -17,7 +17,7 @@ from msgspec import Meta, Struct
 from planners.system.errors import CoordlangError
 
 #: Events in one message; a robot that lacks more gets them one message after another.
-_EVENTS_SENT = 64
+_EVENTS_SENT = 16
 
 _Number = Annotated[int, Meta(ge=0)]
 

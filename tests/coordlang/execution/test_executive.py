@@ -33,6 +33,7 @@ from coordlang.execution.fleet_log import (
 )
 from coordlang.execution.monitor import EventMonitor
 from coordlang.language.partition import Partition
+from planners.system.errors import Refuted
 from tests.support.asynchronous import World, random_plans, texts
 from tests.support.events import EITHER_WAY, LIFT, LIFT_TWICE, choices_in, turning_round
 from tests.support.task_languages import in_words
@@ -211,8 +212,8 @@ class Fleet:
         return tuple(self.logs[name] for name in self.names)
 
 
-RUNS = [(2, range(40)), (3, range(10))]
-THOROUGH = [(2, range(40, 400)), (3, range(10, 200)), (4, range(40))]
+RUNS = [(2, range(40)), (3, range(20))]
+THOROUGH = [(2, range(40, 400)), (3, range(20, 200)), (4, range(40))]
 SEEDS = [*RUNS, *(pytest.param(*run, marks=pytest.mark.thorough) for run in THOROUGH)]
 
 
@@ -250,19 +251,20 @@ def test_robots_that_meet_start_together_and_more_than_once() -> None:
 
 
 class Pair:
-    """r1 and r2 turn round on the 2x2 grid, and hear each other at once; r1 has wishes."""
+    """Robots, two if nothing else is said, that hear each other at once, but for those ``apart``."""
 
     def __init__(self, found: SentenceChoices, *there: str) -> None:
         self.data = json.loads(to_bytes(found))
         self.at: dict[str, Executive] = {}
+        self.apart: set[str] = set()
         for name in there:
             self.join(name, 1)
 
     def join(self, name: str, life: int) -> None:
-        other = {"r1": "r2", "r2": "r1"}[name]
+        others = [one["robot"] for one in self.data["choices"] if one["robot"] != name]
         words = self.data["sentence"]
-        agreement = Agreement(name, [other], words, (), lambda _: words, lambda *_: True)
-        own = Executive(name, [other], "run", agreement, self.monitor(name), SILENT_AFTER)
+        agreement = Agreement(name, others, words, (), lambda _: words, lambda *_: True)
+        own = Executive(name, others, "run", agreement, self.monitor(name), SILENT_AFTER)
         own.life, self.at[name] = life, own
 
     def monitor(self, name: str) -> Callable[[str], EventMonitor]:
@@ -272,9 +274,9 @@ class Pair:
         """All tick, and hear each other until nobody says anything."""
         for own in self.at.values():
             own.tick(now)
-        while sent := [(to, d) for own in self.at.values() for to, d in own.messages()]:
-            for to, data in sent:
-                if to in self.at:
+        while sent := [(by, *sent) for by, own in self.at.items() for sent in own.messages()]:
+            for by, to, data in sent:
+                if to in self.at and {by, to} != self.apart:
                     self.at[to].hears(data, now)
 
     def lines(self, name: str, key: str) -> list[Any]:
@@ -330,8 +332,34 @@ def test_who_is_done_stays_for_a_robot_that_is_not_and_leaves_if_it_does_not_com
     del pair.at["r1"]
     pair.tick(SILENT_AFTER)
     assert pair.lines("r2", "silent") == ["r1"]
+    assert not pair.at["r2"].unsent("r1")  # one that has stopped for ever holds nobody back
     assert not pair.at["r2"].may_leave(5 * SILENT_AFTER)
     assert pair.at["r2"].may_leave(6 * SILENT_AFTER)
+
+
+def test_a_robot_that_comes_back_asks_who_is_done_too() -> None:
+    """Perhaps nobody else knows what it has begun."""
+    three = EITHER_WAY_BOTH.replace("r1 r2", "r1 r2 r3").replace("(there r2)", "(there r3)")
+    fleet = Pair(choices_in(EITHER_WAY, three), "r1", "r2", "r3")
+    fleet.at["r1"].holds_until = 1
+    fleet.tick(0)
+    fleet.apart = {"r1", "r3"}
+    fleet.tick(1)
+    assert fleet.lines("r1", "event") == [1]
+    fleet.join("r1", 2)
+    fleet.apart = {"r1", "r2"}
+    fleet.tick(2)
+    assert fleet.at["r1"]._logs["r2"].version.is_done
+    assert fleet.lines("r1", "sentence") == []
+    fleet.apart = set()
+    fleet.tick(4)
+    assert fleet.lines("r1", "event") == [1]
+    # Who was done and has left is not waited for.
+    fleet.join("r1", 3)
+    fleet.apart = {"r1", "r2"}
+    fleet.tick(5)
+    fleet.tick(5 + SILENT_AFTER)
+    assert fleet.lines("r1", "event") == [1]
 
 
 def test_what_a_driver_may_not_say_is_refused_and_changes_nothing() -> None:
@@ -347,6 +375,8 @@ def test_what_a_driver_may_not_say_is_refused_and_changes_nothing() -> None:
         '{"event": 2, "done": true}': "event 1 is under way",
         '{"done": "(move r1 c9 c9)"}': f"event 1 is {re.escape(text)}",
         '{"late": "soon"}': "expected a number",
+        '{"late": 1' + "0" * 400 + "}": "expected a number",
+        '{"late": Infinity}': "expected a number",
         '{"wish": {"go": "(at r1 a)"}}': "a wish has some of avoid, do, never, visit",
         '{"wish": {"visit": 3}}': "holds texts",
         '{"wish": {"visit": "(at r1 c9)"}}': "is no atom that can change",
@@ -419,7 +449,7 @@ def test_a_long_log_comes_in_parts() -> None:
         assert log.join(whole.part(log.version))
         assert log.version.ended <= len(log.events)
         rounds += 1
-    assert (log.events, rounds) == (whole.events, 4)
+    assert (log.events, rounds) == (whole.events, 13)
 
 
 def test_messages_that_are_none_are_refused_once() -> None:
@@ -492,5 +522,5 @@ def test_robots_agree_in_three_messages() -> None:
     assert {*talk(both).values()} == {"a a b"}
     assert {*talk({**nobody, "r2": ("a", "b"), "r3": ("b",)}).values()} == {"a b"}
     assert {*talk(nobody, {"r3": "c"}).values()} == {"c"}  # from outside
-    with pytest.raises(Contradiction, match='r2 follows "d", r1 "c"'):
+    with pytest.raises(Refuted, match='r2 follows "d", r1 "c"'):
         talk(nobody, {"r1": "c", "r2": "d"})
