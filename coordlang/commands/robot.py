@@ -6,13 +6,13 @@ from __future__ import annotations
 import json
 import math
 import os
-import selectors
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from hashlib import sha256
 from random import Random
+from select import select  # which takes files, too
 from time import monotonic, time
 from typing import Any
 
@@ -159,11 +159,9 @@ class _Loop:
         self._own, self._bus, self._player, self._write = own, bus, player, write
         self._read = b""
         self._since = time() - monotonic()
-        self._selector = selectors.SelectSelector()  # which takes files, too
-        self._selector.register(bus.fileno(), selectors.EVENT_READ)
-        self._stdin = None if sys.stdin is None or sys.stdin.closed else sys.stdin.fileno()
-        if self._stdin is not None:
-            self._selector.register(self._stdin, selectors.EVENT_READ)
+        is_closed = sys.stdin is None or sys.stdin.closed
+        #: The file numbers of stdin, if it has not ended.
+        self._stdin = [] if is_closed else [sys.stdin.fileno()]
 
     @property
     def _now(self) -> float:
@@ -174,18 +172,12 @@ class _Loop:
         """Until nobody needs the robot any more, and all that it had to say is sent."""
         is_sent = False
         while not (is_sent and self._own.may_leave(self._now)):
-            due = (
-                self._own.due() if self._player is None else min(self._own.due(), self._player.due)
-            )
+            due = min(self._own.due(), math.inf if self._player is None else self._player.due)
             wait = max(0.0, due - self._now)
-            ready = {key.fd for key, _ in self._selector.select(wait if is_sent else _AGAIN)}
-            if self._stdin in ready:
-                self._hears_driver()
-            if self._stdin is None and self._player is None and not self._own.is_done:
-                raise BadInput(
-                    "stdin ended before the robot's part was done",
-                    remedy='It says what is done: {"event": 1, "done": true}; or use --play.',
-                )
+            files = [self._bus.fileno(), *self._stdin]
+            ready, _, _ = select(files, [], [], wait if is_sent else _AGAIN)
+            for file in {*ready} & {*self._stdin}:
+                self._hears_driver(file)
             try:
                 for data in self._bus.receive():
                     self._own.hears(data, self._now)
@@ -196,6 +188,11 @@ class _Loop:
             if self._player is not None:
                 self._player.act(self._own, self._now)
             is_sent = self._tells()
+            if not self._stdin and self._player is None and not self._own.is_done:
+                raise BadInput(
+                    "stdin ended before the robot's part was done",
+                    remedy='It says what is done: {"event": 1, "done": true}; or use --play.',
+                )
 
     def _tells(self) -> bool:
         """Write lines, then messages: what others know of was told to the driver before."""
@@ -205,12 +202,10 @@ class _Loop:
         unsent = [to for to, data in self._own.messages() if not self._bus.send(to, data)]
         return not [to for to in unsent if self._own.unsent(to)]
 
-    def _hears_driver(self) -> None:
-        assert self._stdin is not None
-        read = os.read(self._stdin, _CHUNK)
+    def _hears_driver(self, file: int) -> None:
+        read = os.read(file, _CHUNK)
         if not read:
-            self._selector.unregister(self._stdin)
-            self._stdin = None
+            self._stdin = []
             read = b"\n"  # that its last line may lack
         *lines, rest = (self._read + read).split(b"\n")
         self._read = rest[:_CHUNK]  # nothing so long can be true

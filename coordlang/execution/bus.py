@@ -99,12 +99,9 @@ class UnixBus:
 
     def send(self, robot: str, data: bytes) -> bool:
         """Send a message; False where its reader has too many unread ones."""
-        if not self._own.exists():
-            lock, own = self._entered()
-            os.dup2(lock, self._lock, inheritable=False)
-            os.dup2(own.fileno(), self._socket.fileno(), inheritable=False)
-            os.close(lock)
-            own.close()
+        if not self._own.exists():  # the folder was removed
+            self.close()
+            self._lock, self._socket = self._entered()
         try:
             self._socket.sendto(data, str(self._folder / _quoted(robot)))
         except OSError as error:

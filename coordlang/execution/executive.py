@@ -89,10 +89,8 @@ class Executive:
         #: What the monitor was told: own events that started and ended, and those of the others.
         self._started = 0
         self._counted = dict.fromkeys(self._logs, 0)
-        #: Of each other robot its process, whether it has heard of this one, and what it knows.
-        self._lives: dict[str, int] = {}
-        self._heard_us: dict[str, bool] = dict.fromkeys(others, False)
-        self._their: dict[str, Mapping[str, Version]] = {name: {} for name in others}
+        #: The last message of each other robot: its process, what it has heard of and knows.
+        self._last = {name: Message(run, name, 0) for name in others}
         self._heard_at: dict[str, float] = {}
         self._silent: set[str] = set()
         self._refused: set[str] = set()
@@ -134,14 +132,12 @@ class Executive:
 
     def tick(self, now: float) -> None:
         """Do what is due at this time."""
-        for name in self.others:  # from the first tick on
-            self._heard_at.setdefault(name, now)
         if now >= self._beat_at:
             self._beat_at = now + self._silent_after / _BEATS
             self._to_tell |= {*self.others}
         for name in self.others:
-            is_late = now - self._heard_at[name] >= self._silent_after
-            if name not in self._silent and is_late:
+            self._heard_at.setdefault(name, now)  # from the first tick on
+            if name not in self._silent and now - self._heard_at[name] >= self._silent_after:
                 self._silent.add(name)
                 if not self._logs[name].version.is_done:
                     self.lines.append({"silent": name, "time": now})
@@ -166,7 +162,7 @@ class Executive:
             else:
                 raise ValueError("expected done, wish or late")
         except (ValueError, RecursionError) as error:
-            self._refuse(line[:_SHOWN], str(error))
+            self._refuse(line, str(error))
         self._advance(now)
 
     def _ended(self, said: Mapping[str, Any]) -> None:
@@ -187,9 +183,13 @@ class Executive:
         self._late_by = float(seconds)
         self._to_tell |= {*self.others}
 
-    def _refuse(self, what: str, why: str, sender: str | None = None) -> None:
-        by = {} if sender is None else {"from": sender}
-        self.lines.append({"refused": what, **by, "why": why})
+    def _refuse(self, what: str, why: str, by: Mapping[str, str] | None = None) -> None:
+        """Refuse what its driver says; or a robot, but once, as it may come again and again."""
+        if by is not None:
+            if why in self._refused or len(self._refused) == _REFUSED:
+                return
+            self._refused.add(why)
+        self.lines.append({"refused": what[:_SHOWN], **(by or {}), "why": why})
 
     # ---- the other robots
 
@@ -206,9 +206,7 @@ class Executive:
             if self._monitor is None and isinstance(error, Refuted):
                 self._to_tell |= {*self.others}
                 raise
-            if error.what not in self._refused and len(self._refused) < _REFUSED:
-                self._refused.add(error.what)  # it may come again and again
-                self._refuse(data[:_SHOWN].decode(errors="replace"), error.what)
+            self._refuse(data.decode(errors="replace"), error.what, {})
             return
         self._advance(now)
 
@@ -220,11 +218,8 @@ class Executive:
                 # All must know that all know who is done, before they leave.
                 is_news = self._logs[of].version.is_done and not was_done
                 self._to_tell |= {*self.others} if is_news else {name}
-        is_new = self._lives.get(name) != message.life
-        self._lives[name] = message.life
-        self._heard_us[name] = message.lives.get(self.robot) == self.life
-        self._their[name] = message.knows
-        self._heard_at[name] = now
+        is_new = self._last[name].life != message.life
+        self._last[name], self._heard_at[name] = message, now
         if name in self._silent:
             self._silent.discard(name)
             if not self._logs[name].version.is_done:
@@ -232,12 +227,16 @@ class Executive:
         if message.late is not None:
             waits = self._monitor is not None and name in self._monitor.late()
             self.lines.append({"late": name, "seconds": message.late, "waiting": waits})
-        if is_new or not self._heard_us[name] or self._lacks_any(name):
+        if is_new or not self._has_heard_us(name) or self._lacks_any(name):
             self._to_tell.add(name)
+
+    def _has_heard_us(self, name: str) -> bool:
+        """Whether another robot has heard of this process."""
+        return self._last[name].lives.get(self.robot) == self.life
 
     def _version_by(self, name: str, of: str) -> Version:
         """How far another robot knows a log."""
-        return self._their[name].get(of, Version())
+        return self._last[name].knows.get(of, Version())
 
     def _lacks(self, name: str, of: str) -> bool:
         """Whether another robot should be told of a log.
@@ -256,6 +255,7 @@ class Executive:
         """What is to be sent now: robots and messages; `unsent` tells what could not be sent."""
         late, self._late_by = self._late_by, None
         names, self._to_tell = sorted(self._to_tell), set()
+        lives = {name: message.life for name, message in self._last.items()}
         knows = {of: log.version for of, log in self._logs.items()}
         for name in names:
             logs = {
@@ -265,7 +265,7 @@ class Executive:
             }
             who, said = (self._run, self.robot, self.life), self._agreement.said()
             self.sent += 1
-            yield name, encoded(Message(*who, self._lives, knows, logs, late=late, **said))
+            yield name, encoded(Message(*who, lives, knows, logs, late=late, **said))
 
     def unsent(self, name: str) -> bool:
         """Tell that a message could not be sent; whether it should be tried again at once.
@@ -286,7 +286,10 @@ class Executive:
         But for those that were done, and have left as this one seemed lost.
         """
         return all(
-            (self._heard_us[name] or (name in self._silent and self._logs[name].version.is_done))
+            (
+                self._has_heard_us(name)
+                or (name in self._silent and self._logs[name].version.is_done)
+            )
             and not self._own.version.lacks(self._version_by(name, self.robot))
             for name in self.others
         )
@@ -326,7 +329,7 @@ class Executive:
             if answer:
                 monitor.commit(**wish)
         except MonitorError as error:
-            self._refuse(json.dumps({"wish": wish})[:_SHOWN], str(error))
+            self._refuse(json.dumps({"wish": wish}), str(error))
         else:
             self.lines.append({"wish": wish, "granted": bool(answer), "subplans": answer.subplans})
         return True
@@ -346,9 +349,8 @@ class Executive:
             return True
         if self._started == own.begun:  # after a restart events may wait for own ones
             for name, reason in reasons.items():
-                if reason is not None and reason not in self._refused:
-                    self._refused.add(reason)
-                    self._refuse("an event that ended", reason, name)
+                if reason is not None:
+                    self._refuse("an event that ended", reason, {"from": name})
         return False
 
     def _counts_those_of(self, name: str, monitor: EventMonitor) -> str | None:
