@@ -206,7 +206,8 @@ class Executive:
             if self._monitor is None and isinstance(error, Refuted):
                 self._to_tell |= {*self.others}
                 raise
-            self._refuse(data.decode(errors="replace"), error.what, {})
+            why = error.what if isinstance(error, Refuted) else str(error)
+            self._refuse(data.decode(errors="replace"), why, {})
             return
         self._advance(now)
 

@@ -14,16 +14,14 @@ from typing import Annotated, Any, NamedTuple
 import msgspec
 from msgspec import Meta, Struct
 
-from planners.system.errors import CoordlangError
-
 #: Events in one message; a robot that lacks more gets them one message after another.
 _EVENTS_SENT = 16
 
 _Number = Annotated[int, Meta(ge=0)]
 
 
-class Contradiction(CoordlangError):
-    """Two accounts of what a robot did that cannot both be true."""
+class Contradiction(ValueError):
+    """A message that cannot be true beside what is known; it is refused, and ends nothing."""
 
 
 class Version(NamedTuple):
