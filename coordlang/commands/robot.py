@@ -158,7 +158,8 @@ class _Loop:
     ) -> None:
         self._own, self._bus, self._player, self._write = own, bus, player, write
         self._read = b""
-        self._since = time() - monotonic()
+        # The greatest: between the two calls this process may have had to wait for milliseconds.
+        self._since = max(time() - monotonic() for _ in range(5))
         is_closed = sys.stdin is None or sys.stdin.closed
         #: The file numbers of stdin, if it has not ended.
         self._stdin = [] if is_closed else [sys.stdin.fileno()]
