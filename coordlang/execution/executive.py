@@ -269,14 +269,13 @@ class Executive:
             yield name, encoded(Message(*who, lives, knows, logs, late=late, **said))
 
     def unsent(self, name: str) -> bool:
-        """Tell that a message could not be sent; whether it should be tried again at once.
+        """Tell that a message could not be sent; whether to send it again at once.
 
         A silent robot, which may have stopped for ever, gets the next beat.
         """
-        if name in self._silent:
-            return False
-        self._to_tell.add(name)
-        return True
+        if name not in self._silent:
+            self._to_tell.add(name)
+        return name not in self._silent
 
     # ---- its own events
 
