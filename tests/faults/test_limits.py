@@ -53,6 +53,7 @@ say LANGUAGE DOMAIN HUGE PLAN
 understand LANGUAGE DOMAIN HUGE w0
 plan LANGUAGE DOMAIN HUGE w0 --heuristic blind
 choices LANGUAGE DOMAIN HUGE w0
+robot LANGUAGE DOMAIN HUGE --robot r1 --play 0
 simulate LANGUAGE DOMAIN HUGE
 export LANGUAGE DOMAIN HUGE w0 -o exported
 explain LANGUAGE DOMAIN HUGE --task

@@ -122,9 +122,10 @@ def test_every_command(loader: tuple[Path, Path, str, Path], shell: Shell) -> No
         **{name: f"{name} {language}" for name in ("verify", "explain")},
         **{name: name for name in ("inspect", "plans", "check", "coordination")},
     }
-    assert {*lines} == {*COMMANDS} - NO_TASK
+    assert {*lines} == {*COMMANDS} - NO_TASK - {"robot"}
     for line in lines.values():
         shell(f"{line} --factored {folder}")
+    shell(f"robot {language} --robot robot1 --factored {folder}", 2, "for joint steps")
 
 
 @pytest.mark.parametrize("name", ["say", "understand", "choices", "export"])
