@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
 from random import Random
+from threading import Timer
 from time import monotonic, sleep
 from typing import Any
 
@@ -84,6 +85,9 @@ class Process:
             stdout=subprocess.PIPE,
             text=True,
         )
+        self.watch = Timer(60, self.process.kill)  # a robot that waits for ever is an error
+        self.watch.daemon = True
+        self.watch.start()
 
     def says(self, **line: object) -> None:
         assert self.process.stdin is not None
@@ -100,6 +104,7 @@ class Process:
         raise AssertionError(f"it ended without {key}")
 
     def end(self) -> None:
+        self.watch.cancel()
         self.process.kill()
         self.process.communicate()
 
