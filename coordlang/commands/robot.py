@@ -14,7 +14,7 @@ from hashlib import sha256
 from random import Random
 from select import select  # which takes files, too
 from time import monotonic, time
-from typing import Any
+from typing import Any, NoReturn
 
 from coordlang.commands.inputs import Arguments, InTask, public, read_coordinates_of
 from coordlang.commands.records import RobotOptions
@@ -135,15 +135,16 @@ def robot(files: Arguments, options: RobotOptions) -> RobotInTask:
     return RobotInTask(used, executive, run, points)
 
 
-def show_robot(found: RobotInTask, options: RobotOptions) -> int:
-    """Act, and print each line at once."""
+def show_robot(found: RobotInTask, options: RobotOptions) -> NoReturn:
+    """Act, and print each line at once; then end the process."""
 
     def write(line: Mapping[str, Any]) -> None:
         echo(json.dumps(line))
         sys.stdout.flush()
 
     found.act(options, write)
-    return 0
+    # At once: nobody is left to ask for one that is killed while Python tidies up.
+    os._exit(0)
 
 
 class _Loop:
