@@ -14,7 +14,7 @@ from typing import Any
 import click
 import msgspec
 
-from coordlang.commands.inputs import Arguments, InTask, public
+from coordlang.commands.inputs import Arguments, InTask, public, robot_number
 from coordlang.commands.layout import alike, columns, fitted
 from coordlang.commands.records import ChoicesOptions, File
 from coordlang.commands.terminal import REFUTED, covered_code, echo, line_width, write
@@ -128,13 +128,7 @@ def choices(files: Arguments, options: ChoicesOptions) -> RobotsChoices:
 
 
 def _numbers(known: tuple[str, ...], whose: str | Sequence[str]) -> tuple[int, ...]:
-    for name in (names := names_in("--robot", whose)):
-        if name not in known:
-            raise UsageError(
-                f"--robot {name}: there is no such robot",
-                remedy=f"The robots are {', '.join(known)}.",
-            )
-    return tuple(dict.fromkeys(known.index(name) for name in names))
+    return tuple(dict.fromkeys(robot_number(known, name) for name in names_in("--robot", whose)))
 
 
 def show_choices(found: RobotsChoices, options: ChoicesOptions) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from os import PathLike, fspath
 from pathlib import Path
@@ -233,6 +233,16 @@ class InTask(Presented):
     def tolerance(self) -> Tolerance | None:
         """What may go wrong, or be longer, under the language; None: nothing."""
         return self.used.tolerance
+
+
+def robot_number(robots: Sequence[str], name: str) -> int:
+    """The number of a robot that ``--robot`` names; `UsageError` if there is none of this name."""
+    if name not in robots:
+        raise UsageError(
+            f"--robot {name}: there is no such robot",
+            remedy=f"The robots are {', '.join(robots)}.",
+        )
+    return robots.index(name)
 
 
 def extended(kind: type[Result], found: Any, *more: object, **named: object) -> Result:

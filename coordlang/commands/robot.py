@@ -16,11 +16,18 @@ from select import select  # which takes files, too
 from time import monotonic, time
 from typing import Any, NoReturn
 
-from coordlang.commands.inputs import Arguments, InTask, public, read_coordinates_of
+from coordlang.commands.inputs import (
+    Arguments,
+    InTask,
+    ReadTask,
+    public,
+    read_coordinates_of,
+    robot_number,
+)
 from coordlang.commands.records import RobotOptions
 from coordlang.commands.terminal import echo
 from coordlang.execution.agreement import Agreement
-from coordlang.execution.best_sentence import best_sentence, grants, read_preference
+from coordlang.execution.best_sentence import Preference, best_sentence, grants, read_preference
 from coordlang.execution.bus import Bus, opened
 from coordlang.execution.choices import choices, monitor
 from coordlang.execution.executive import Executive
@@ -85,11 +92,7 @@ def robot(files: Arguments, options: RobotOptions) -> RobotInTask:
         raise UsageError("--prefer: the sentence is given", remedy="Leave out one of the two.")
     read = files.task(options.coordinates)
     used, robots = read.used, read.used.model.robots
-    if options.robot not in robots:
-        raise UsageError(
-            f"--robot {options.robot}: there is no such robot",
-            remedy=f"The robots are {', '.join(robots)}.",
-        )
+    number, others = robot_number(robots, options.robot), [r for r in robots if r != options.robot]
     if not used.model.is_asynchronous:
         raise UsageError(
             "the words are for joint steps, and a process keeps no common step",
@@ -101,18 +104,16 @@ def robot(files: Arguments, options: RobotOptions) -> RobotInTask:
         words = used.words_of(sentence)
         used.plans_with(words)
         sentence = used.text(words)
-    number, others = robots.index(options.robot), [r for r in robots if r != options.robot]
     wishes = (options.prefer,) if isinstance(options.prefer, str) else tuple(options.prefer)
-    for wish in wishes:
-        read_preference(used, wish)
+
+    def wanted(wished: Sequence[str]) -> list[Preference]:
+        return [read_preference(used, wish) for wish in wished]
 
     def best(wished: Sequence[str]) -> str:
-        wanted = [read_preference(used, wish) for wish in wished or _WISHES]
-        return used.text(best_sentence(used, wanted).words)
+        return used.text(best_sentence(used, wanted(wished or _WISHES)).words)
 
     def accepts(proposed: str, wished: Sequence[str]) -> bool:
-        wanted = [read_preference(used, wish) for wish in wished]
-        return grants(used, used.words_of(proposed), wanted)
+        return grants(used, used.words_of(proposed), wanted(wished))
 
     def monitor_of(agreed: str) -> EventMonitor:
         found = choices(used, used.words_of(agreed))
@@ -120,9 +121,8 @@ def robot(files: Arguments, options: RobotOptions) -> RobotInTask:
         assert isinstance(own, EventMonitor)
         return own
 
-    data = {key: value for key, value in to_data(used.language).items() if key != "producer"}
-    same = [domain_sha256(read.files.domain), read.files.problems[0].source.sha256, data]
-    run = sha256(json.dumps(same, sort_keys=True).encode()).hexdigest()[:16]
+    wanted(wishes)  # what is wrong with them is said now
+    run = _run_of(read)
     executive = Executive(
         options.robot,
         others,
@@ -133,6 +133,13 @@ def robot(files: Arguments, options: RobotOptions) -> RobotInTask:
     )
     points = read_coordinates_of(options.coordinates, read.files.problems[0])
     return RobotInTask(used, executive, run, points)
+
+
+def _run_of(read: ReadTask) -> str:
+    """A name of what all robots must have alike: domain, problem and language."""
+    data = {key: value for key, value in to_data(read.used.language).items() if key != "producer"}
+    same = [domain_sha256(read.files.domain), read.files.problems[0].source.sha256, data]
+    return sha256(json.dumps(same, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def show_robot(found: RobotInTask, options: RobotOptions) -> NoReturn:

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from random import Random
+
 from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.commands.building import build_language
 from coordlang.execution.choices import SentenceChoices, choices
@@ -11,6 +14,7 @@ from planners.loading import build
 from planners.pddl.model_options import ModelOptions
 from planners.search.asynchronous import as_executed
 from planners.search.optimal_plans import search
+from tests.support.asynchronous import Parts, Plans, World, random_plans
 from tests.support.domains import own_task
 from tests.support.task_languages import in_words, sentence_of
 from tests.support.texts import parsed
@@ -48,3 +52,19 @@ def choices_in(domain: str, problem: str) -> SentenceChoices:
     found = choices(in_words(None, one_word, space, 0), (0,))
     assert found.guaranteed
     return found
+
+
+def random_choices(
+    robots: int, seeds: range
+) -> Iterator[tuple[World, Plans, list[Parts], SentenceChoices, Random]]:
+    """Sentences of random models whose states have one of two words at random.
+
+    Each with all plans of its task, its own plans, and the robots' choices.
+    """
+    for world, space, plans, made, random in random_plans(robots, seeds, 40):
+        word = {state: random.randrange(2) for state in range(len(space.rows))}
+        table = Partition.of_states(space.rows, word)
+        word = dict(enumerate(table.word_of(space.rows).tolist()))
+        own = in_words(None, table, made, 0)
+        for words, group in plans.by_sentence(word).items():
+            yield world, plans, group, choices(own, words), random

@@ -13,10 +13,16 @@ import pytest
 
 from coordlang.execution.choices import SentenceChoices, choices, to_bytes
 from coordlang.execution.monitor import EventMonitor, MonitorError, NotAllowed, NotPossible
-from coordlang.language.partition import Partition
-from tests.support.asynchronous import World, random_plans, texts
-from tests.support.events import EITHER_WAY, LIFT, LIFT_TWICE, choices_in, turning_round
-from tests.support.task_languages import in_words, shipped
+from tests.support.asynchronous import World, texts
+from tests.support.events import (
+    EITHER_WAY,
+    LIFT,
+    LIFT_TWICE,
+    choices_in,
+    random_choices,
+    turning_round,
+)
+from tests.support.task_languages import shipped
 
 RUNS = [(2, range(24)), (3, range(7))]
 THOROUGH = [(2, range(24, 900)), (3, range(7, 500)), (4, range(60))]
@@ -123,30 +129,24 @@ def test_robots_arrive_whatever_they_choose_and_whenever_they_start(
 ) -> None:
     """What all did together is an optimal plan, and what each may do are its parts of plans."""
     seen: Counter[str] = Counter()
-    for world, space, plans, made, random in random_plans(robots, seeds, 40):
-        word = {state: random.randrange(2) for state in range(len(space.rows))}
-        table = Partition.of_states(space.rows, word)
-        word = dict(enumerate(table.word_of(space.rows).tolist()))
-        own = in_words(None, table, made, 0)
+    for world, plans, group, found, random in random_choices(robots, seeds):
         optimal = {texts(world.model, parts) for parts in plans.states}
-        for words, group in plans.by_sentence(word).items():
-            found = choices(own, words)
-            parts = [{*own} for own in zip(*(texts(world.model, p) for p in group), strict=True)]
-            for at, mine in zip(monitors_of(found), parts, strict=True):
-                assert at.remaining == len(mine)
-            mixed = {mix for mix, _ in plans.mixtures_of(group)}
-            assert found.guaranteed == (mixed <= plans.states.keys())
-            if not found.guaranteed:
-                seen["no language"] += 1
-                continue
-            for _ in range(min(len(mixed), 4)):
-                team = Robots(found, world, random)
-                did = team.run()
-                assert did in optimal
-                assert all(own in mine for own, mine in zip(did, parts, strict=True))
-                seen += team.seen
-                seen["runs"] += 1
-                seen["several parts"] += max(map(len, parts)) > 1
+        parts = [{*own} for own in zip(*(texts(world.model, p) for p in group), strict=True)]
+        for at, mine in zip(monitors_of(found), parts, strict=True):
+            assert at.remaining == len(mine)
+        mixed = {mix for mix, _ in plans.mixtures_of(group)}
+        assert found.guaranteed == (mixed <= plans.states.keys())
+        if not found.guaranteed:
+            seen["no language"] += 1
+            continue
+        for _ in range(min(len(mixed), 4)):
+            team = Robots(found, world, random)
+            did = team.run()
+            assert did in optimal
+            assert all(own in mine for own, mine in zip(did, parts, strict=True))
+            seen += team.seen
+            seen["runs"] += 1
+            seen["several parts"] += max(map(len, parts)) > 1
     print(f"{robots} robots: {dict(seen)}")
     assert min(seen["runs"], seen["no language"], seen["waits"], seen["several parts"]) >= 5
 

@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 
 from coordlang.execution.agreement import Agreement
-from coordlang.execution.choices import SentenceChoices, choices, to_bytes
+from coordlang.execution.choices import SentenceChoices, to_bytes
 from coordlang.execution.executive import Executive
 from coordlang.execution.fleet_log import (
     Contradiction,
@@ -32,11 +32,16 @@ from coordlang.execution.fleet_log import (
     encoded,
 )
 from coordlang.execution.monitor import EventMonitor
-from coordlang.language.partition import Partition
 from planners.system.errors import Refuted
-from tests.support.asynchronous import World, random_plans, texts
-from tests.support.events import EITHER_WAY, LIFT, LIFT_TWICE, choices_in, turning_round
-from tests.support.task_languages import in_words
+from tests.support.asynchronous import World, texts
+from tests.support.events import (
+    EITHER_WAY,
+    LIFT,
+    LIFT_TWICE,
+    choices_in,
+    random_choices,
+    turning_round,
+)
 
 SILENT_AFTER = 5.0
 EITHER_WAY_BOTH = """(define (problem p) (:domain either) (:objects r1 r2 - robot a b - way)
@@ -222,21 +227,15 @@ def test_all_arrive_whatever_the_network_does_and_whoever_is_killed(
     robots: int, seeds: range
 ) -> None:
     seen: Counter[str] = Counter()
-    for world, space, plans, made, random in random_plans(robots, seeds, 40):
-        word = {state: random.randrange(2) for state in range(len(space.rows))}
-        table = Partition.of_states(space.rows, word)
-        word = dict(enumerate(table.word_of(space.rows).tolist()))
-        own = in_words(None, table, made, 0)
+    for world, plans, _, found, random in random_choices(robots, seeds):
         optimal = {texts(world.model, parts) for parts in plans.states}
-        for words in plans.by_sentence(word):
-            found = choices(own, words)
-            if not found.guaranteed:
-                continue
-            faults, kills = random.choice([0.0, 0.2]), random.randrange(5)
-            fleet = Fleet(found, world, random, faults, kills)
-            assert fleet.run() in optimal
-            seen += fleet.seen
-            seen["runs"] += 1
+        if not found.guaranteed:
+            continue
+        faults, kills = random.choice([0.0, 0.2]), random.randrange(5)
+        fleet = Fleet(found, world, random, faults, kills)
+        assert fleet.run() in optimal
+        seen += fleet.seen
+        seen["runs"] += 1
     print(f"{robots} robots: {dict(seen)}")
     assert min(seen["runs"], seen["killed"], seen["lost"], seen["silent"], seen["heard"]) >= 5
 
