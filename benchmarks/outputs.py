@@ -93,7 +93,6 @@ COMMANDS = {
         explain @one.json D problem.pddl
         explain @one.json D problem.pddl --task
         explain @one.json D problem.pddl --task --json
-        explain @minimal.json D problem.pddl --formula-per-word
         understand @one.json D problem.pddl "w1 w2 w0" --json -o @plans.json
         understand @one.json D problem.pddl "w1 w2 w0"
         understand @one.json D problem.pddl "w1 w2 w0" --count
@@ -107,11 +106,9 @@ COMMANDS = {
         choices @one.json D problem.pddl "w1 w0" --check
         choices @one.json D problem.pddl "w1 w0" --format json -o @choices.json
         choices @one.json D problem.pddl "w1 w0" --format dot
-        choices @one.json D problem.pddl "w1 w0" --robot r2 --visit "(at r2 c)" --json
-        choices @one.json D problem.pddl "w1 w0" --robot r2 --history idle --visit "(at r2 a)"
+        choices @one.json D problem.pddl "w1 w0" --robot r2 --json
         export @one.json D problem.pddl "w1 w0"
         export @one.json D problem.pddl "w1 w0" --json
-        export @one.json D problem.pddl "w1 w0" --max-actions 0
         export @one.json D problem.pddl "w1 w0" --to ltlf
         export @one.json D problem.pddl "w1 w0" --to ltlf --json
         schema
@@ -183,7 +180,7 @@ COMMANDS = {
         explain @gwb5.json D gwb5-3x3.pddl --task --json
         plan @few-actions.json D corners-4x4.pddl --prefer shortest
         plan @three.json D three-robots-3x3.pddl --prefer first:r3 --json
-        report @gwb5.json D gwb5-3x3.pddl --tasks-shown 5 --seed 3 -o @gwb5.html
+        report @gwb5.json D gwb5-3x3.pddl --seed 3 -o @gwb5.html
         """,
     "grid-joint": """
         coordination D t-map.pddl

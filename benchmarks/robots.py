@@ -133,8 +133,8 @@ class Run:
                 sys.stdin = None
                 own = self.team[name]
                 bus = self.bus[name]
-                options = RobotOptions(robot=name, bus=bus, play=self.seed, speed=SPEED)
-                own.act(options, lambda line: print(json.dumps(line), file=file))
+                options = RobotOptions(robot=name, bus=bus, play=self.seed)
+                own.act(options, lambda line: print(json.dumps(line), file=file), SPEED)
                 file.write(json.dumps({"messages": own.executive.sent}) + "\n")
             code = 0
         except BaseException:

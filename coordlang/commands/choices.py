@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -11,7 +10,6 @@ from math import prod
 from os import fspath
 from typing import Any
 
-import click
 import msgspec
 
 from coordlang.commands.inputs import Arguments, InTask, public, robot_number
@@ -22,16 +20,15 @@ from coordlang.commands.witness import witness_text
 from coordlang.execution import choices as execution
 from coordlang.execution.choices import RobotChoices, SentenceChoices, to_bytes
 from coordlang.execution.drawing import choices_dot, distinguishing
-from coordlang.execution.monitor import Answer, Monitor, MonitorError, NotAllowed
+from coordlang.execution.monitor import Monitor
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import describe
 from coordlang.language.provenance import percent
 from coordlang.required.failure import TooManyToCount, failure_of_sentence
 from coordlang.required.miscoordination import Miscoordination
 from planners.pddl.model_options import names_in
-from planners.search.plan_file import json_count
 from planners.search.plans import Plans
-from planners.system.errors import Refuted, UsageError, note
+from planners.system.errors import note
 from planners.system.notebook import counted, named
 from planners.system.writing import write_atomically
 
@@ -132,26 +129,15 @@ def _numbers(known: tuple[str, ...], whose: str | Sequence[str]) -> tuple[int, .
 
 
 def show_choices(found: RobotsChoices, options: ChoicesOptions) -> int:
-    """Print or write the choices, or what one robot may do next."""
-    form, code = options.form, 0
-    detours = {name: getattr(options, name) for name in ("visit", "avoid", "do", "never")}
-    if options.history or any(detours.values()):
-        if len(found.robots) != 1 or form == "dot":
-            raise click.UsageError(
-                "--history, --visit, --avoid, --do and --never ask about one --robot, "
-                "as text or JSON"
-            )
-        at, answer = _followed(found, options.history, detours)
-        text = _monitor_text(at, answer) if form == "text" else _monitor_json(at, answer)
-        code = REFUTED if answer is not None and not answer else 0
-    elif form == "text":
+    """Print or write the choices."""
+    if options.form == "text":
         text = _text(found, line_width(), is_checked=options.check)
-    elif form == "dot":
+    elif options.form == "dot":
         text = choices_dot(found.found, found.chosen)
     else:
         text = to_bytes(found.found, found.chosen).decode()
     write(text, options.output)
-    return max(code, _guarantee_code(found, options.check))
+    return _guarantee_code(found, options.check)
 
 
 def _guarantee_code(found: RobotsChoices, check: bool) -> int:
@@ -175,56 +161,6 @@ def _guarantee_code(found: RobotsChoices, check: bool) -> int:
         note("the language does not cover this task; --check proved this sentence")
         return 0
     return covered_code(found)
-
-
-def _followed(
-    found: RobotsChoices, history: tuple[str, ...], detours: dict[str, tuple[str, ...]]
-) -> tuple[Monitor, Answer | None]:
-    """A monitor that followed what the robot did, and its answer to the detours, if any."""
-    try:
-        at = found.monitor(found.robots[0])
-        for subaction in history:
-            at = at.after(subaction)
-        return at, at.can(**detours) if any(detours.values()) else None
-    except NotAllowed as error:
-        raise Refuted(str(error), remedy="After that nothing is guaranteed any more.") from None
-    except MonitorError as error:
-        raise UsageError(
-            str(error), remedy="Write actions and atoms as --robot and --json show them."
-        ) from None
-
-
-def _monitor_text(at: Monitor, answer: Answer | None) -> str:
-    unit, nothing = at.unit, _IDLING[at.unit]
-    may = " or ".join(text or nothing for text in at.allowed())
-    lines = [
-        f"{unit} {at.step + 1}: {at.robot} may do {may}; {counted(at.remaining, 'subplan')} left"
-    ]
-    if at.finished:
-        lines = [f"{at.robot} has done all its {counted(at.step, unit)}"]
-    if answer is not None and not answer:
-        lines.append("the detour is not possible any more, whatever it does")
-    elif answer is not None:
-        subplans = counted(answer.subplans, "subplan")
-        lines.append(f"the detour is possible in {subplans}, the first of them:")
-        steps = enumerate(answer.subplan or (), at.step + 1)
-        lines += [f"  {step:>4}  {text or nothing}" for step, text in steps]
-    return "\n".join(lines) + "\n"
-
-
-def _monitor_json(at: Monitor, answer: Answer | None) -> str:
-    data: dict[str, Any] = {
-        "robot": at.robot,
-        "step": at.step,
-        "allowed": list(at.allowed()),
-        "left": json_count(at.remaining),
-        "atoms": at.atoms,
-    }
-    if answer is not None:
-        data["possible"] = bool(answer)
-        data["subplans"] = json_count(answer.subplans)
-        data["subplan"] = list(answer.subplan) if answer.subplan is not None else None
-    return json.dumps(data) + "\n"
 
 
 def _text(found: RobotsChoices, width: int, *, is_checked: bool) -> str:

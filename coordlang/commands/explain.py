@@ -227,7 +227,7 @@ def explain(files: Arguments, options: ExplainOptions) -> Explanation:
         used.plans_with(only)
     mapped = mapped_states(used.language, used.model)
     covers = all_covers(mapped)
-    descriptions = describe_words(mapped, covers, options.formula_per_word)
+    descriptions = describe_words(mapped, covers)
     points = read_coordinates_of(None, first)
     lifted = lifted_words(
         used.language, task.files.domain, first, used.model, points, task.position

@@ -34,10 +34,8 @@ class ExportedTask(InTask, PddlExport):
 
     shown = ("form", "actions", "cost")
 
-    def __init__(
-        self, used: TaskLanguage, words: Sequence[int], limit: int, *, strips_only: bool
-    ) -> None:
-        PddlExport.__init__(self, used, words, limit, strips_only=strips_only)
+    def __init__(self, used: TaskLanguage, words: Sequence[int], *, strips_only: bool) -> None:
+        PddlExport.__init__(self, used, words, strips_only=strips_only)
         self.used = used
         self.open_plans = SentencePlans(used, words)
 
@@ -160,8 +158,7 @@ def export(files: Arguments, options: ExportOptions) -> Any:
             remedy="Use --to bt: trees in which robots wait for each other's events.",
         )
     if options.to == "pddl":
-        strips_only = options.for_planner == "pyperplan"
-        return ExportedTask(used, words, options.max_actions, strips_only=strips_only)
+        return ExportedTask(used, words, strips_only=options.for_planner == "pyperplan")
     if options.to == "bt":
         found = choices_under(used, words)
         counts = {used.model.robots[own.robot]: own.automaton.count for own in found.robots}

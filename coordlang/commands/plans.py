@@ -13,7 +13,6 @@ from coordlang.commands.records import DEFAULT_MAX, PlansOptions, UnderstandOpti
 from coordlang.commands.terminal import echo, note_single_robot, write
 from planners.search.asynchronous import as_executed
 from planners.search.kept_plans import search
-from planners.search.optimal_plans import search as bounded_search
 from planners.search.plan_file import Texts, texts, to_ipc, to_json, to_plansys2
 from planners.search.plans import Plan, Plans
 from planners.system.notebook import Presented
@@ -119,15 +118,11 @@ class OptimalPlans(Presented):
 def plans(files: Arguments, options: PlansOptions) -> OptimalPlans:
     """Find all optimal plans of a task.
 
-    With another heuristic than ``auto`` plans that are kept are not used.  Raises
-    `ProvedImpossible` if there is no plan, and `OutOfMemory` before the reachable part of the joint
-    model uses up the memory.
+    Raises `ProvedImpossible` if there is no plan, and `OutOfMemory` before the reachable part of
+    the joint model uses up the memory.
     """
     loaded = files.instance()
-    model, task = loaded.model, loaded.tasks[0]
-    if options.heuristic == "auto":
-        return OptimalPlans(Plans.of(search(model, task)))
-    return OptimalPlans(Plans.of(bounded_search(model, task, heuristic=options.heuristic)))
+    return OptimalPlans(Plans.of(search(loaded.model, loaded.tasks[0])))
 
 
 def show_plans(found: OptimalPlans, options: PlansOptions) -> None:

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Union, dat
 import click
 
 from planners.pddl.model_options import ModelOptions
-from planners.search import HeuristicName, SearchHeuristic
 from planners.system.errors import UsageError, note
 from planners.system.options import cli_option, group, option
 
@@ -46,9 +45,6 @@ DEFAULT_MAX = 10
 
 #: The files of a domain and a problem that are written.
 WRITTEN = ("domain.pddl", "problem.pddl")
-#: Beyond this many joint actions robots choose one after another in the exported PDDL.
-MAX_ACTIONS = 2000
-
 #: What `export` writes.
 Target = Literal["pddl", "ltlf", "bt"]
 
@@ -267,9 +263,6 @@ class PlansOptions(AnswerOptions, takes="DOMAIN PROBLEM"):
     With --slack B those that take at most B steps more, too.
     """
 
-    heuristic: SearchHeuristic = option(
-        "auto", "What the search is bounded by; the plans are the same."
-    )
     form: Literal["ipc", "json"] = form_option("ipc", "How plans are written.")
     listing: Listing = group(Listing)
     source: Source = group(Source, without="words_see_slack")
@@ -439,7 +432,6 @@ class PlanOptions(
     prefer: str | Sequence[str] = option(
         (), 'shortest, most-plans, first:ROBOT or avoid:"(ATOM)".', "PREFERENCE"
     )
-    heuristic: HeuristicName = option("relaxed", "The lower bound of A*.")
     form: Literal["ipc", "json", "plansys2"] = form_option("ipc", "How the plan is written.")
 
 
@@ -448,16 +440,11 @@ class ChoicesOptions(
 ):
     """Show what each robot may do under SENTENCE ("w1 w0"), whatever the others choose.
 
-    With --history and detours: what one robot may do next, and whether it may make them all.
+    A robot asks its monitor what it may do next, and which detours are left (docs/use.md).
     """
 
     robot: str | Sequence[str] = option((), "Whose choices; may be repeated (default: all).", "R")
     check: bool = option(False, "Walk every combination: is each an optimal plan?")
-    history: tuple[str, ...] = cli_option((), "A step that it did; or idle.", "SUBACTION")
-    visit: tuple[str, ...] = cli_option((), "Detour: this becomes true.", "ATOM")
-    avoid: tuple[str, ...] = cli_option((), "Detour: this is false from now on.", "ATOM")
-    do: tuple[str, ...] = cli_option((), "Detour: it does this; * is any text.", "PATTERN")
-    never: tuple[str, ...] = cli_option((), "Detour: it never does this.", "PATTERN")
     form: Literal["text", "json", "dot"] = form_option("text", "How they are shown.")
     output: str | None = output_option("Write to this file instead of stdout.")
 
@@ -480,13 +467,13 @@ class RobotOptions(
     )
     silent_after: float = option(10.0, "Name a robot that says nothing so long.", "SECONDS")
     play: int | None = option(None, "Play the robot, too, with times drawn by this seed.", "SEED")
-    speed: float = option(10.0, "How fast it is played, a second.", "METRES", needs="play")
     coordinates: CoordinatesSource | None = coordinates_option()
 
     def __post_init__(self) -> None:
-        for name, value in (("silent-after", self.silent_after), ("speed", self.speed)):
-            if not 0 < value < 1e6:
-                raise UsageError(f"--{name} {value}: expected a number above 0", remedy="Say 1.5.")
+        if not 0 < self.silent_after < 1e6:
+            raise UsageError(
+                f"--silent-after {self.silent_after}: expected a number above 0", remedy="Say 1.5."
+            )
 
 
 class SimulateOptions(
@@ -500,20 +487,18 @@ class SimulateOptions(
     without: bool = option(False, "Each follows an optimal plan of its own.", without="plan")
     plan: bool = option(False, "All follow one whole plan.")
     runs: int = option(1, "How many runs.", "N", least=1)
-    seed: int = option(0, "Of the first run; the next ones follow.", least=0)
+    seed: int | None = option(None, "Of the first run, or of that which -o shows.", "N", least=0)
     step: Literal["clock", "barrier", "word", "passings"] | None = option(
         None, "How robots keep step (default: a clock; passings, if the language is asynchronous)."
     )
-    cell: float = option(1.0, "How far apart neighbouring cells are.", "METRES")
-    radius: float | None = option(None, "Of a robot (default: a fifth of --cell).", "METRES")
     noise: float = option(0.1, "The standard deviation of what wheels do.", "SHARE")
-    lidar: bool = option(True, "Robots do not look ahead.", names="--no-lidar")
-    visit: Sequence[str] = option((), "After STEP it wants to visit PLACE.", "ROBOT:STEP:PLACE")
+    prefer: str | Sequence[str] = option(
+        (), "As for plan, or a wish on the way: visit:ROBOT:STEP:PLACE.", "PREFERENCE"
+    )
     coordinates: CoordinatesSource | None = coordinates_option()
     output: tuple[str, ...] = output_option(
         "The record (.json), or one run (.gif, .mp4, .png).", default=()
     )
-    shown: int | None = cli_option(None, "Of the run that -o shows.", "SEED")
     replay: str | None = cli_option(None, "Only read and show this record.", "RECORD")
 
     def __post_init__(self) -> None:
@@ -533,13 +518,6 @@ class ExportOptions(
 
     to: Target = option("pddl", "A problem, a temporal formula, or behaviour trees.")
     output: str | None = output_option("pddl: a folder; else a file.", "PATH", files=WRITTEN)
-    max_actions: int = option(
-        MAX_ACTIONS,
-        "Beyond N joint actions robots choose one by one.",
-        "N",
-        least=0,
-        needs="to pddl",
-    )
     for_planner: Literal["fd", "kstar", "pyperplan"] = option(
         "fd", "Who reads the PDDL.", names="--for", needs="to pddl"
     )
@@ -563,24 +541,14 @@ class ExplainOptions(
     sentence: SentenceSource | None = option(
         None, "With --task: this sentence only.", "WORDS", needs="task"
     )
-    formula_per_word: bool = option(False, "A formula of its own for every word.")
 
 
 class ReportOptions(PlanningOptions, takes="LANGUAGE DOMAIN PROBLEMS...", doing="drawing the page"):
     """Write a page that shows a language: words, sentences, plans played."""
 
     output: str = result_option("The HTML file", "PAGE")
-    tasks_shown: int = option(30, "Show at most this many tasks.", "N", least=1)
     coordinates: str | None = coordinates_option()
-    run: str | None = option(None, "Also play these runs of simulate.", "RUN.json")
     seed: int = option(0, "Draws the tasks.")
-
-    def __post_init__(self) -> None:
-        if self.tasks_shown > 500:
-            raise UsageError(
-                f"--tasks-shown {self.tasks_shown}: a page shows at most 500 tasks",
-                remedy="Make a page for each of several problems.",
-            )
 
 
 class DomainsOptions(CommandOptions, doing="copying", keeps_plans=False):

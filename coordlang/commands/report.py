@@ -9,9 +9,6 @@ from coordlang.commands.terminal import warn_of_failures, write
 from coordlang.language.provenance import Tolerance
 from coordlang.language.recorded import check_source
 from coordlang.report.page import Report, make_report
-from coordlang.report.simulated import require_of
-from coordlang.simulation.record import read_simulation
-from planners.system.errors import Position
 from planners.system.messages import visible
 from planners.system.notebook import counted
 
@@ -26,20 +23,14 @@ def report(arguments: Arguments, options: ReportOptions) -> Page:
     points = read_coordinates_of(options.coordinates, files.problems[0])
     read, position = language_for(arguments.needed("LANGUAGE"), files, coordinates=points)
     check_source(read, files.domain, files.problems, position)
-    simulated = None
-    if options.run is not None:
-        simulated = read_simulation(options.run)
-        require_of(simulated, files.domain, Position(options.run))
     page = make_report(
         read,
         files.domain,
         files.problems,
-        tasks_shown=options.tasks_shown,
         seed=options.seed,
         options=files.options_of(read),
         coordinates=points,
         position=position,
-        simulated=simulated,
     )
     return page, read.tolerance
 

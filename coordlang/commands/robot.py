@@ -42,6 +42,8 @@ from planners.system.errors import BadInput, Refuted, UsageError
 _WISHES = ("most-plans",)
 #: Seconds until what could not be sent is sent again.
 _AGAIN = 0.005
+#: How fast a robot is played, in metres a second.
+SPEED = 10.0
 #: Bytes that are read of the driver at once.
 _CHUNK = 1 << 16
 #: A played event takes up to this part less or more than its way needs, and now and then so many
@@ -63,18 +65,23 @@ class RobotInTask(InTask):
     points: Mapping[str, Point]
     shown = ("run",)
 
-    def act(self, options: RobotOptions, write: Callable[[Mapping[str, Any]], None]) -> None:
+    def act(
+        self,
+        options: RobotOptions,
+        write: Callable[[Mapping[str, Any]], None],
+        speed: float = SPEED,
+    ) -> None:
         """Act until its part is done and nobody needs it; ``write`` is given each line.
 
-        Raises `UsageError` if the bus cannot be opened, and `BadInput` if stdin, which says what
-        is done, ends too early.
+        One that is played moves with ``speed``, in metres a second.  Raises `UsageError` if the bus
+        cannot be opened, and `BadInput` if stdin, which says what is done, ends too early.
         """
         own, robots = self.executive, self.used.model.robots
         own.life = int.from_bytes(os.urandom(6))
         player = None
         if options.play is not None:
             own.random = Random(f"{options.play} {own.robot}")
-            player = Player(own.random, self.points, options.speed)
+            player = Player(own.random, self.points, speed)
         with closing(opened(options.bus, self.run, own.robot, robots)) as bus:
             _Loop(own, bus, player, write).run()
 

@@ -25,12 +25,14 @@ from coordlang.execution.open_plans import PlanDag, open_plans_data, plan_dag
 from coordlang.execution.plan_sentence import read_plan_file, sentence_of_plan
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.provenance import tolerance_data
-from planners.search import HeuristicName
 from planners.search.heuristics import HEURISTICS
 from planners.search.plan_file import Texts, json_count
 from planners.search.plans import Plans
 from planners.system.errors import CoordlangError, UsageError
 from planners.system.notebook import counted
+
+#: The lower bound of A*.
+_BOUND = "relaxed"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -186,7 +188,6 @@ class PlanUnderSentence(InTask):
     used: TaskLanguage
     sentence: str
     steps: PlanSteps
-    heuristic: HeuristicName
     search: GuidedPlan
     without_sentence: GuidedPlan
     fulfilled: tuple[Fulfilled, ...]
@@ -213,7 +214,7 @@ class PlanUnderSentence(InTask):
             {"expanded": own.expanded, "generated": own.generated, "states": own.states}
             for own in (self.search, self.without_sentence)
         ]
-        data["search"] = {"heuristic": self.heuristic, **work[0], "without_sentence": work[1]}
+        data["search"] = {"heuristic": _BOUND, **work[0], "without_sentence": work[1]}
         if self.fulfilled:
             data["wishes"] = [entry.data() for entry in self.fulfilled]
         return data
@@ -238,13 +239,12 @@ def plan(files: Arguments, options: PlanOptions) -> PlanUnderSentence:
     best = best_sentence(used, preferences) if preferences else None
     words = best.words if best else used.words_of(sentence or ())
     expanded = ExpandedStates(used.model, used.partition)
-    bound = HEURISTICS[options.heuristic]
+    bound = HEURISTICS[_BOUND]
     found = plan_under_sentence(used, words, bound, expanded)
     return PlanUnderSentence(
         used,
         used.text(words),
         tuple(used.model.in_step.texts(step) for step in found.plan),
-        options.heuristic,
         found,
         plan_under_sentence(used, None, bound, expanded),
         tuple(_fulfilled(preferences, best)) if best else (),
@@ -279,5 +279,5 @@ def show_plan(found: PlanUnderSentence, options: PlanOptions) -> int:
         return covered_code(found)  # it is read off the plans
     expanded = counted(found.expanded, "node")
     without = f"without the sentence {found.without_sentence.expanded:,}"
-    echo(f"A* ({found.heuristic}) expanded {expanded}; {without}", err=True)
+    echo(f"A* ({_BOUND}) expanded {expanded}; {without}", err=True)
     return covered_code(found)

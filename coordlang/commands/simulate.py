@@ -15,10 +15,10 @@ import msgspec
 from coordlang.commands.inputs import Arguments, public, read_coordinates_of
 from coordlang.commands.records import File, SimulateOptions
 from coordlang.commands.terminal import covered_code, echo, ended_early, working
-from coordlang.execution.best_sentence import best_sentence
+from coordlang.execution.best_sentence import best_sentence, read_preference
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.provenance import Tolerance
-from coordlang.simulation.floor import Floor
+from coordlang.simulation.floor import MOST_RADIUS, Floor
 from coordlang.simulation.record import (
     RunRecord,
     SimulationRecord,
@@ -35,6 +35,9 @@ from planners.system.limits import reaching, run_until_stopped
 from planners.system.messages import echoed
 from planners.system.notebook import Presented, counted
 from planners.system.writing import write_atomically
+
+#: What a wish for a place on the way begins with.
+_VISIT = "visit:"
 
 
 @dataclass(frozen=True, repr=False)
@@ -121,21 +124,26 @@ def simulate(files: Arguments, options: SimulateOptions) -> Simulated:
     if options.replay is not None:
         return Simulated(read_simulation(options.replay))
     files.needed("LANGUAGE")
-    given = {name: getattr(options, name) for name in ("cell", "noise", "lidar")}
-    radius = options.cell / 5 if options.radius is None else options.radius
-    settings, runs = Settings(radius=radius, **given), options.runs
+    settings, runs = Settings(noise=options.noise), options.runs
     require_simulator()
     task = files.task(options.coordinates)
-    settings = replace(settings, step=_step(task.used, options.step))
-    prepared = _prepared(task.used, options)
+    wished = (options.prefer,) if isinstance(options.prefer, str) else options.prefer
+    on_the_way = [text for text in wished if text.startswith(_VISIT)]
+    preferred = [text for text in wished if text not in on_the_way]
+    prepared = _prepared(task.used, options, preferred)
     points = read_coordinates_of(options.coordinates, task.files.problems[0])
-    floor = Floor(prepared.world, points, options.cell)
-    wishes = [_wish(prepared, text) for text in options.visit]
+    floor = Floor(prepared.world, points, settings.cell)
+    settings = replace(
+        settings,
+        step=_step(task.used, options.step),
+        radius=min(settings.radius, MOST_RADIUS * floor.shortest),
+    )
+    wishes = [_wish(prepared, text) for text in on_the_way]
     done: list[RunRecord] = []
 
     def work() -> None:
         with reaching(lambda: f"{len(done)} of {counted(runs, 'run')}", "fewer runs"):
-            for finished in runs_of(prepared, floor, settings, runs, options.seed, wishes):
+            for finished in runs_of(prepared, floor, settings, runs, options.seed or 0, wishes):
                 done.append(finished)  # noqa: PERF402 - one after the other: it may be stopped
 
     stopped = run_until_stopped(work)
@@ -160,23 +168,29 @@ def _step(used: TaskLanguage, step: str | None) -> str:
 
 
 def _wish(prepared: Mission, text: str) -> WishRecord:
-    robot, _, rest = text.partition(":")
+    robot, _, rest = text.removeprefix(_VISIT).partition(":")
     step, _, place = rest.partition(":")
     if robot not in prepared.robots or not step.isdecimal() or not place:
         raise UsageError(
-            f"--visit {echoed(text)}: expected ROBOT:STEP:PLACE",
-            remedy=f"As in {prepared.robots[0]}:0:{min(prepared.world.places)}.",
+            f"--prefer {echoed(text)}: expected visit:ROBOT:STEP:PLACE",
+            remedy=f"As in visit:{prepared.robots[0]}:0:{min(prepared.world.places)}.",
         )
     return WishRecord(robot, int(step), prepared.atom_at(robot, place))
 
 
-def _prepared(used: TaskLanguage, options: SimulateOptions) -> Mission:
+def _prepared(used: TaskLanguage, options: SimulateOptions, preferred: Sequence[str]) -> Mission:
     words: Sequence[int] = ()
     agreement: Agreement = "nothing" if options.without else "plan" if options.plan else "sentence"
+    if preferred and (options.sentence is not None or agreement != "sentence"):
+        raise UsageError(
+            f"--prefer {echoed(preferred[0])} chooses a sentence, and none is to be chosen",
+            remedy="Leave it out, or --sentence, --without and --plan.",
+        )
     if options.sentence is not None:
         words = used.words_of(options.sentence)
     elif agreement == "sentence":
-        words = best_sentence(used, ["most-plans"]).words
+        wanted = [read_preference(used, text) for text in preferred or ("most-plans",)]
+        words = best_sentence(used, wanted).words
     return Mission(used, agreement, words)
 
 
@@ -185,7 +199,7 @@ def show_simulate(found: Simulated, options: SimulateOptions) -> int:
     with working("drawing") as say:
         for path in options.output:
             say(f"writing {path}")
-            found.save(path, options.shown)
+            found.save(path, options.seed)
     if options.as_json:
         echo(to_bytes(found.record).decode(), nl=False)
     else:

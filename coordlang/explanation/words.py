@@ -219,15 +219,10 @@ class WordDescriptions:
         return sum(formula.length if formula else 1 for _, formula in self.rules)
 
 
-def describe_words(
-    mapped: MappedStates, formulas: dict[str, Cover], each: bool = False
-) -> WordDescriptions:
-    """The shorter way to describe the words.
-
-    With ``each`` every one by a formula of its own, exact by itself.
-    """
+def describe_words(mapped: MappedStates, formulas: dict[str, Cover]) -> WordDescriptions:
+    """The shorter way to describe the words."""
     apart = WordDescriptions(tuple(formulas.items()), False)
-    if each or len(formulas) < 2:
+    if len(formulas) < 2:
         return apart
     # The longest formula, if it mentions more than one value, is "every other state".
     longest = max(formulas, key=lambda word: (formulas[word].length, formulas[word].states))

@@ -45,6 +45,9 @@ from planners.system.messages import echoed
 #: A robot's label in a joint step, by the numbers of both.
 RobotLabel = tuple[int, int]
 
+#: Beyond this many joint actions robots choose one after another.
+MAX_ACTIONS = 2000
+
 
 class PddlExport:
     """A task under a sentence as PDDL; its optimal plans are exactly those of the sentence.
@@ -55,10 +58,10 @@ class PddlExport:
     labels that robots take in it: all robots (explicit form), one, or none (bookkeeping).  So many
     ``terms`` tell which word a state belongs to.
 
-    Up to ``limit`` plain actions every joint action is written as one; beyond, robots choose one
-    after another (see `planners.classical.compile_classical`).  With ``strips_only`` there are
-    neither negative conditions nor costs: then the plans with the fewest actions are those of the
-    sentence.
+    Up to ``limit`` plain actions (None: `MAX_ACTIONS`) every joint action is written as one;
+    beyond, robots choose one after another (see `planners.classical.compile_classical`).  With
+    ``strips_only`` there are neither negative conditions nor costs: then the plans with the fewest
+    actions are those of the sentence.
 
     Raises `NoPlanFits`, and `UsageError` under ``strips_only`` where actions without costs do not
     count joint steps; with slack, for words that see it, and where more than joint steps counts.
@@ -68,7 +71,7 @@ class PddlExport:
         self,
         task_language: TaskLanguage,
         words: Sequence[int],
-        limit: int = 2000,
+        limit: int | None = None,
         *,
         strips_only: bool = False,
     ) -> None:
@@ -81,7 +84,8 @@ class PddlExport:
             makespan, second = plan_under_sentence(task_language, words).cost
         start = space.starts[0]
         task = PlanningTask("task", space.rows[space.state[start]], space.goals[space.goal[start]])
-        plain = compile_classical(model, task, limit, longest=max(1, steps or makespan))
+        most = MAX_ACTIONS if limit is None else limit
+        plain = compile_classical(model, task, most, longest=max(1, steps or makespan))
         labels = [_labels(model, plain, action) for action in plain.actions]
         tests = exclusive_terms(task_language)
         named = _Naming(task_language, words, plain, tests, steps).task(labels)
@@ -149,7 +153,7 @@ def _require_steps_counted(plain: ClassicalTask, model: JointModel) -> None:
     if plain.form != "explicit":
         raise UsageError(
             "without costs every joint action must be one action, and there are too many",
-            remedy="Use a greater --max-actions, or leave out --for pyperplan.",
+            remedy="Leave out --for pyperplan.",
         )
     if model.cost != "makespan":
         raise UsageError(

@@ -29,9 +29,7 @@ from coordlang.report.heat import heat_of
 from coordlang.report.layout import graph_layout, place_layout
 from coordlang.report.plan import drawn_plan
 from coordlang.report.shown import Selection, select_tasks
-from coordlang.report.simulated import simulated_data
 from coordlang.report.task import Tables, task_data, task_summary
-from coordlang.simulation.record import SimulationRecord
 from coordlang.sites.coordinates import Point
 from coordlang.sites.world import World, find_world
 from planners.joint.model import JointModel, own_text
@@ -282,7 +280,6 @@ def make_report(
     position: Position | None = None,
     largest: int = LARGEST,
     most_places: int = MOST_PLACES,
-    simulated: SimulationRecord | None = None,
 ) -> Report:
     """Render the report of a language; the same arguments give the same bytes.
 
@@ -290,8 +287,8 @@ def make_report(
     fewer if the page would have more than ``largest`` bytes.  ``options`` say how the model is
     built (default: as the language file says), ``coordinates`` where places are; with more than
     ``most_places`` no map is drawn.  ``position`` is what messages name as the place of the
-    language, ``simulated`` are runs to be played.  Raises `OutOfMemory` if the page of a single
-    task would be too large, and what `coordlang.report.shown.select_tasks` raises.
+    language.  Raises `OutOfMemory` if the page of a single task would be too large, and what
+    `coordlang.report.shown.select_tasks` raises.
     """
     position = position or Position("the language file")
     selection = select_tasks(language, domain, problems, tasks_shown, seed, options, position)
@@ -308,7 +305,6 @@ def make_report(
         "in_order": in_order,
         "features": lifted.data()["features"] if lifted else (),
         "seed": seed,
-        "simulated": simulated,
     }
     heat = None
     while True:
@@ -316,8 +312,6 @@ def make_report(
         if heat is None and data["places"]:
             known = options or options_of(language)
             heat = heat_of(language, domain, problems, known, selection, position)
-        if simulated is not None:
-            data["simulated"] = simulated_data(simulated)
         html = _render({**shown, **drawn_plan(data, heat)}, data)
         if len(html) <= largest:
             candidates = int(language.provenance.tasks.get("count", 0))
@@ -351,7 +345,6 @@ def _render(shown: Mapping[str, Any], data: Mapping[str, Any]) -> bytes:
         css=Markup((here / "page.css").read_text("utf-8")),
         js=Markup(_script()),
         kept=data["kept"],
-        runs_shown=len(data["simulated"]["runs"]) if "simulated" in data else 0,
         checked=[task["verified"] for task in data["tasks"]],
         data=Markup(_json(data)),
         **shown,

@@ -77,7 +77,7 @@ def select_tasks(
     if len(problems) > number:
         raise UsageError(
             f"{len(problems)} problems are given and {number} tasks are to be shown",
-            remedy="Give fewer problems, or a larger --tasks-shown.",
+            remedy="Give fewer problems.",
         )
     given = [
         _examined(p.name, language_in_task(language, domain, p, options, position))

@@ -22,7 +22,7 @@ Wall = tuple[float, float, float, float]
 #: The greatest radius of a robot, as a share of the shortest link.  Robots that move at once come
 #: as near as 0.707 of a link to each other: one leaves a place at a right angle to the one that
 #: comes, which has the other one's flank before it meanwhile, and must neither touch it nor stop.
-_MOST_RADIUS = 0.25
+MOST_RADIUS = 0.25
 
 
 class Floor:
@@ -51,12 +51,12 @@ class Floor:
 
 def require_room(floor: Floor, radius: float) -> None:
     """Raise `UsageError` if robots of this radius, in metres, are too large for the floor."""
-    most = _MOST_RADIUS * floor.shortest
+    most = MOST_RADIUS * floor.shortest
     if radius > most:
         raise UsageError(
             f"robots with a radius of {radius:g} m are too large for places {floor.shortest:g} m "
             "apart: they touch where one leaves a place at a right angle to the one that comes",
-            remedy=f"Use a --radius of at most {most:g}, or a larger --cell.",
+            remedy=f"Their radius may be {most:g} at most.",
         )
 
 

@@ -65,7 +65,7 @@ class Settings:
             raise UsageError(
                 f"robots with a radius of {self.radius:g} m are too small: in a tick they drive "
                 f"{SPEED * TICK:g} m, so that two could pass through each other unseen",
-                remedy="Use a larger --radius, and a larger --cell where it does not fit.",
+                remedy="Write coordinates with places further apart, in metres.",
             )
         if not 0 <= self.noise <= 1:
             raise UsageError(

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import get_args
 
 import numpy as np
 
@@ -17,12 +16,9 @@ from planners.joint.composition import ComposingStepper
 from planners.joint.model import Goal, JointModel, Options, PlanningTask
 from planners.joint.states import TrueFacts
 from planners.joint.tables import Bools, Ints, Rows, kept_runs, packed, unpacked
-from planners.search import SearchHeuristic
 from planners.search.goals import FAR, Values, goal_facts, ways_to_facts
 from planners.search.state_variables import StateVariable, state_variables
 from planners.system.errors import UsageError
-
-CHOICES: tuple[str, ...] = get_args(SearchHeuristic)
 
 #: Joint steps that are composed to compare heuristics, at most.
 _STEPS = 200_000
@@ -36,6 +32,8 @@ HEURISTICS: dict[str, Bound] = {
     "projections": lambda *all_of: Projections(*all_of).value,
     "blind": lambda *_: lambda rows: np.zeros(len(rows), np.int64),
 }
+#: What a search for all optimal plans takes: ``auto`` chooses a heuristic.
+CHOICES = ("auto", *HEURISTICS)
 
 
 def heuristic(bound: Bound, model: JointModel, goal: Goal, init: Rows) -> Values:

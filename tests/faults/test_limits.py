@@ -51,7 +51,7 @@ lift GRID SMALL TWO -o lifted.json
 ground LIFTED GRID TWO -o out.json
 say LANGUAGE DOMAIN HUGE PLAN
 understand LANGUAGE DOMAIN HUGE w0
-plan LANGUAGE DOMAIN HUGE w0 --heuristic blind
+plan LANGUAGE DOMAIN HUGE w0
 choices LANGUAGE DOMAIN HUGE w0
 robot LANGUAGE DOMAIN HUGE --robot r1 --play 0
 simulate LANGUAGE DOMAIN HUGE

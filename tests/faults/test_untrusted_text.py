@@ -168,7 +168,7 @@ plan SPOKEN SENTENCE --json
 choices SPOKEN SENTENCE --format text
 choices SPOKEN SENTENCE --format json
 choices SPOKEN SENTENCE --format dot
-choices SPOKEN SENTENCE --robot R1 --history idle --never '(* *)'
+choices SPOKEN SENTENCE --robot R1
 choices SPOKEN SENTENCE --check
 export SPOKEN SENTENCE
 export SPOKEN SENTENCE --json
@@ -236,10 +236,13 @@ def fast_downward(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["markup", "words"])
-def test_exported_names_are_read_by_fast_downward(bare: Make, kind: str, tmp_path: Path) -> None:
+def test_exported_names_are_read_by_fast_downward(
+    bare: Make, kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     world = bare(NAMES[kind]).written()
-    for n, form in enumerate(("--max-actions 2000", "--max-actions 0", "--for pyperplan")):
-        out, line = tmp_path / f"out{n}", f"export SPOKEN SENTENCE {form}"
+    for n, (most, form) in enumerate(((2000, "fd"), (0, "fd"), (2000, "pyperplan"))):
+        monkeypatch.setattr("coordlang.exports.pddl.MAX_ACTIONS", most)
+        out, line = tmp_path / f"out{n}", f"export SPOKEN SENTENCE --for {form}"
         assert world.run(f"{line} -o {out}").code == 0
         fast_downward(out)
         back = world.run(f"{line} --translate-plan {out}/sas_plan")
@@ -308,8 +311,6 @@ plans BAD BAD
 understand SPOKEN BAD
 understand SPOKEN SENTENCE --max 0 -o /none/BAD
 choices SPOKEN SENTENCE --robot BAD
-choices SPOKEN SENTENCE --robot r1 --history '(move r1 BAD)'
-choices SPOKEN SENTENCE --robot r1 --visit BAD
 plan SPOKEN --prefer BAD
 plan SPOKEN --prefer 'avoid:(at r1 BAD)'
 plan SPOKEN --prefer 'first:BAD'

@@ -28,7 +28,6 @@ function openTask(number) {
   withoutView.open(DATA.tasks[number]);
 }
 
-if (DATA.simulated) new FloorView(DATA.simulated);
 fillTasks(select);
 document.getElementById('tasks-note').textContent = tasksNote();
 select.addEventListener('change', () => openTask(+select.value));

@@ -155,12 +155,10 @@ def test_a_sentence_is_understood_planned_and_explained(made: Path, shell: Shell
 def test_choices_are_events(made: Path, shell: Shell) -> None:
     said = shell(f"choices {made} SQUARE 'w1 w2'", 0).out
     assert "event  state" in said
-    after = "--robot r1 --history '(move r1 c0-0 c0-1)'"
-    said = shell(f"choices {made} SQUARE 'w1 w2' {after}", 0).out
-    assert said == "event 2: r1 may do (move r1 c0-1 c1-1) (after-1 r2); 1 subplan left\n"
-    shell(f"choices {made} SQUARE 'w1 w2' {after} --do '(move * c1-1)' --visit '(at r1 c1-1)'", 0)
     shell(f"choices {made} SQUARE 'w1 w2' --format json -o c.json", 0)
-    assert library.EventMonitor.read("c.json", "r1").remaining == 1
+    at = library.EventMonitor.read("c.json", "r1").after("(move r1 c0-0 c0-1)")
+    assert (at.allowed(), at.remaining) == (("(move r1 c0-1 c1-1) (after-1 r2)",), 1)
+    assert at.can(do="(move * c1-1)", visit="(at r1 c1-1)")
     with pytest.raises(library.MonitorError, match="are for an EventMonitor"):
         library.Monitor.read("c.json", "r1")
     trees = shell(f"export {made} SQUARE 'w1 w2' --to bt", 0).out

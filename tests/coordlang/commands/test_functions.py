@@ -72,7 +72,6 @@ SAME: list[tuple[str, dict[str, Any], str]] = [
     ("choices", {"sentence": SENTENCE, "robot": "r2"}, f"'{SENTENCE}' --robot r2"),
     ("explain", {}, ""),
     ("explain", {"task": True, "sentence": "w0"}, "--task --sentence w0"),
-    ("explain", {"formula_per_word": True}, "--formula-per-word"),
     *(("export", {"sentence": SENTENCE, "to": to}, f"'{SENTENCE}' --to {to}")
       for to in ("pddl", "ltlf", "bt")),
 ]  # fmt: skip
@@ -234,7 +233,6 @@ BUILD = [
 USES = [
     ("plan", {}, "expected a SENTENCE or --prefer"),
     ("plan", {"sentence": "w0", "prefer": "shortest"}, ""),
-    ("plan", {"sentence": "w0", "heuristic": "best"}, "--heuristic"),
     ("plan", {"prefer": "best"}, ""),
     ("explain", {"sentence": "w0"}, "--sentence"),
     ("export", {"sentence": "w0", "to": "sas"}, "--to sas"),

@@ -121,7 +121,7 @@ def test_processes_of_the_command_line_one_is_driven_killed_and_started_again(
             stack.callback(found.end)
             return found
 
-        other = started("r2", "--play", 1, "--speed", 100)
+        other = started("r2", "--play", 1)
         own = started("r1")
         first = own.hears("start")
         assert (first["event"], {*first}) == (1, {"event", "start", "time"})
@@ -179,7 +179,6 @@ def test_what_cannot_be_is_refused(language: Path, folder: Path, shell: Shell) -
     shell(
         f"{start} --robot r1 --silent-after 0", 2, "--silent-after 0.0: expected a number above 0"
     )
-    shell(f"{start} --robot r1 --speed 2", 2, "--play")
     shell(f'{start} "w0 w9" --robot r1', 31, "w9")
     shell(f"{start}", 2, "--robot")
     shell("build CORNERS --method greedy -o step.json", 0)

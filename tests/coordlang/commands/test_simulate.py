@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+import coordlang
 from coordlang.simulation.record import read_simulation
 from coordlang.simulation.simulator import Simulator
 from tests.coordlang.commands.conftest import FILES, Shell
@@ -20,8 +21,6 @@ from tests.support.command import Outcome
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    import coordlang
-
     path = tmp_path_factory.mktemp("simulate") / "language.json"
     coordlang.build(*FILES["T-MAP"], method="minimal").language.save(path)
     return path
@@ -56,12 +55,11 @@ def test_json_has_what_is_promised(simulate: Shell) -> None:
     [
         ("--without --plan", 2, "exclude each other"),
         ("--sentence w9", 31, "is no word of this language"),
-        ("--radius 0.4", 2, "too large"),
-        ("--radius 0.05", 2, "pass through each other unseen"),
-        ("--cell 0.3", 2, "too small"),
-        ("--cell -1", 2, "above 0"),
-        ("--visit r1", 2, "expected ROBOT:STEP:PLACE"),
-        ("--visit r1:0:nowhere", 2, "no atom says"),
+        ("--prefer visit:r1", 2, "expected visit:ROBOT:STEP:PLACE"),
+        ("--prefer visit:r1:0:nowhere", 2, "no atom says"),
+        ("--prefer nothing", 2, "there is no such preference"),
+        ("--prefer shortest --sentence w0", 2, "chooses a sentence"),
+        ("--prefer first:r1 --plan", 2, "chooses a sentence"),
         ("--noise nan", 2, "expected a share"),
         ("--time-limit 0.01", 23, "time limit"),
     ],
@@ -126,13 +124,31 @@ def test_an_interrupt_keeps_the_runs_that_are_done(
 
 
 def test_a_record_is_drawn_again(simulate: Shell, shell: Shell) -> None:
-    simulate("--runs 2 --shown 1 -o runs.json -o sheet.png")
-    out = shell("simulate --replay runs.json --shown 1 -o again.png --json").out
+    simulate("--runs 2 -o runs.json")
+    simulate("--seed 1 -o sheet.png")
+    out = shell("simulate --replay runs.json --seed 1 -o again.png --json").out
     assert json.loads(out) == json.loads(Path("runs.json").read_text())
     sheet = Path("sheet.png").read_bytes()
     assert Path("again.png").read_bytes() == sheet
-    shell("simulate --replay runs.json --shown 5 -o again.png", 2)
+    shell("simulate --replay runs.json --seed 5 -o again.png", 2, "there is no run with seed 5")
     assert Path("again.png").read_bytes() == sheet
+
+
+def test_wishes_choose_the_sentence(simulate: Shell, made: Path) -> None:
+    best = coordlang.plan(made, *FILES["T-MAP"], prefer="first:r2").sentence
+    data = json.loads(simulate("--prefer first:r2 --json").out)
+    assert data["sentence"] == best != json.loads(simulate("--json").out)["sentence"]
+
+
+def test_robots_are_as_large_as_the_places_allow(shell: Shell) -> None:
+    shell("build CELLS --method greedy -o language.json")
+    for apart, radius in ((0.8, 0.2), (0.5, 0.125)):
+        places = {"a": [0, 0], "b": [apart, 0], "c": [apart / 2, apart]}
+        Path("points.json").write_text(json.dumps({"coordinates": places}))
+        shell("simulate language.json CELLS --coordinates points.json -o run.json")
+        assert read_simulation("run.json").radius == pytest.approx(radius)
+    Path("points.json").write_text(Path("points.json").read_text().replace("0.5", "0.2"))
+    shell("simulate language.json CELLS --coordinates points.json", 2, "too small")
 
 
 def test_places_need_coordinates(shell: Shell) -> None:

@@ -76,18 +76,10 @@ def changed(path: Path, file: Path, old: str, new: str) -> Path:
         ("understand", "t w0 --count --max 3", 2, ""),
         ("plan", "t", 2, ""),
         ("plan", "t w0 --prefer shortest", 2, ""),
-        ("plan", "t w0 --heuristic best", 2, ""),
         ("choices", "cells 'w0 w1'", 1, "no optimal plan has the sentence"),
         ("choices", "cells 'w1 w9'", 31, "'w9', is no word of this language"),
         ("choices", "cells ''", 31, "the sentence is empty"),
         ("choices", "cells 'w1 w0' --robot r3", 2, "no such robot\n  The robots are r1, r2."),
-        ("choices", "cells 'w1 w0' --history idle", 2, "ask about one --robot"),
-        (
-            *("choices", "cells 'w1 w0' --robot r1 --visit '(at r1 z)'", 2),
-            "(at r1 z) is no atom that can change",
-        ),
-        ("choices", "cells 'w1 w0' --robot r1 --history jump", 2, "'jump' is no PDDL text"),
-        ("choices", "cells 'w1 w0' --robot=r1 --history=idle --format=dot", 2, "as text or JSON"),
     ],
 )
 def test_wrong_arguments(commands: str, line: str, code: int, message: str, ask: Ask) -> None:
@@ -238,14 +230,13 @@ def test_samples_are_seeded(ask: Ask) -> None:
 # Plan.
 
 
-@pytest.mark.parametrize("heuristic", ["relaxed", "projections", "blind"])
-def test_prints_a_plan_with_its_sentence(heuristic: str, ask: Ask, tmp_path: Path) -> None:
+def test_prints_a_plan_with_its_sentence(ask: Ask, tmp_path: Path) -> None:
     path = tmp_path / "plan.txt"
     for sentence in ("w0 w1 w3 w2 w0", "w0 w2 w3 w1 w0"):
-        outcome = ask("plan", "t", sentence, "--heuristic", heuristic)
+        outcome = ask("plan", "t", sentence)
         assert outcome.code == 0
         assert outcome.out.endswith(f"; makespan = 4\n; sentence = {sentence}\n")
-        assert f"A* ({heuristic}) expanded" in outcome.err
+        assert "A* (relaxed) expanded" in outcome.err
         path.write_text(outcome.out)
         assert ask("say", "t", path).out == sentence + "\n"
 
@@ -332,27 +323,6 @@ def test_choices_as_a_file(ask: Ask, tmp_path: Path) -> None:
     drawn = ask("choices", "cells", "w1 w0", "--format", "dot").out
     assert drawn.count("subgraph") == 2
     assert 'r1s0 -> r1s2 [label="(move r2 b a)"];' in drawn
-
-
-def test_detours(ask: Ask) -> None:
-    asked = "choices", "cells", "w1 w0", "--robot", "r2"
-    yes = ask(*asked, "--history", "idle", "--visit", "(at r2 a)")
-    assert yes.code == 0
-    assert yes.out.splitlines() == [
-        "step 2: r2 may do (move r2 b a); 1 subplan left",
-        "the detour is possible in 1 subplan, the first of them:",
-        "     2  (move r2 b a)",
-    ]
-    no = ask(*asked, "--avoid", "(at r1 c)", "--json")
-    assert no.code == 1
-    here = {"robot": "r2", "step": 0, "allowed": [None, "(move r2 b a)"], "left": 2}
-    answer = {"atoms": "exact", "possible": False, "subplans": 0, "subplan": None}
-    assert json.loads(no.out) == here | answer
-    done = ask(*asked, "--history", "(move r2 b a)", "--history", "idle")
-    assert done.out == "r2 has done all its 2 steps\n"
-    wrong = ask(*asked, "--history", "idle", "--history", "idle")
-    assert wrong.code == 1
-    assert "step 2: r2 may not do idle; it may do (move r2 b a)" in wrong.err
 
 
 # A task that the language does not cover.

@@ -66,10 +66,12 @@ def test_out_to_a_planner_and_back(
     coordlang: Command,
     languages: tuple[Path, Path],
     tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr("coordlang.exports.pddl.MAX_ACTIONS", limit)
     folder, plan = tmp_path / "out", tmp_path / "sas_plan"
-    exported = door.export(languages[0], *T_MAP, SENTENCE, max_actions=limit)
-    done = ask(SENTENCE, "-o", folder, "--max-actions", limit)
+    exported = door.export(languages[0], *T_MAP, SENTENCE)
+    done = ask(SENTENCE, "-o", folder)
     assert (done.code, done.err) == (0, "")
     assert form in done.out
     assert (folder / "domain.pddl").read_text() == exported.domain
@@ -77,7 +79,7 @@ def test_out_to_a_planner_and_back(
     classical = exported.classical
     names = [action_names(classical)[n] for n in next(iter(optimal_plans(classical)))]
     plan.write_text("".join(f"({name} )\n" for name in names) + "; cost = 4 (general cost)\n")
-    back = ask(SENTENCE, "--max-actions", limit, "--translate-plan", plan)
+    back = ask(SENTENCE, "--translate-plan", plan)
     first = coordlang("plans", *T_MAP, "--max", 1).out.split("\n", 1)[1]
     assert (back.code, back.out) == (0, first.rstrip("\n") + "\n")
 
@@ -124,7 +126,6 @@ def test_names_that_xml_would_misread(
         ((SENTENCE, "--translate-plan", "two"), 31, "two:3:1: this file holds several plans"),
         ((SENTENCE, "--to", "ltlf", "--translate-plan", "empty"), 2, "belongs to --to pddl"),
         ((SENTENCE, "--to", "bt", "--translate-plan", "empty"), 2, "or --to bt"),
-        ((SENTENCE, "--to", "bt", "--max-actions", "3"), 2, "--max-actions"),
         ((SENTENCE, "--to", "ltlf", "--for", "fd"), 2, "--for fd belongs to --to pddl"),
         ((SENTENCE, "-o", "other"), 2, "the folder other cannot be made"),
         ((SENTENCE, "-o", "missing/x", "--to", "ltlf"), 2, "cannot be written"),
@@ -219,13 +220,18 @@ def test_what_each_planner_reads(name: str) -> None:
             {"cost": "makespan+actions", "for_planner": "pyperplan"},
             "--for pyperplan writes no costs",
         ),
-        ({"for_planner": "pyperplan", "max_actions": 0}, "every joint action must be one action"),
         ({"for_planner": "metric-ff"}, "--for metric-ff"),
     ],
 )
 def test_what_strips_cannot_say(options: dict[str, Any], message: str) -> None:
     with pytest.raises(UsageError, match=message):
         export("grid/corners-3x3", **options)
+
+
+def test_strips_needs_an_action_for_each_joint_action(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("coordlang.exports.pddl.MAX_ACTIONS", 0)
+    with pytest.raises(UsageError, match="every joint action must be one action"):
+        export("grid/corners-3x3", for_planner="pyperplan")
 
 
 @EACH

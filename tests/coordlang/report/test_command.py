@@ -16,12 +16,12 @@ FILES = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
 
 def test_a_page_is_written(coordlang: Command, language: Path, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
-    outcome = coordlang("report", language, *FILES, "-o", page, "--tasks-shown", "4")
+    outcome = coordlang("report", language, *FILES, "-o", page)
     assert outcome.code == 0
-    assert outcome.out == f"4 tasks of 132, {page.stat().st_size:,} bytes, written to {page}\n"
+    assert outcome.out == f"30 tasks of 132, {page.stat().st_size:,} bytes, written to {page}\n"
     assert page.read_text().startswith("<!DOCTYPE html>")
-    assert len(data_of(page.read_bytes())["tasks"]) == 4
-    to_stdout = coordlang("report", language, *FILES, "-o", "-", "--tasks-shown", "4")
+    assert len(data_of(page.read_bytes())["tasks"]) == 30
+    to_stdout = coordlang("report", language, *FILES, "-o", "-")
     assert to_stdout.out == page.read_text()
     assert "written to stdout" in to_stdout.err
 
@@ -32,7 +32,7 @@ def test_coordinates(coordlang: Command, language: Path, tmp_path: Path) -> None
         '{"coordinates": {"c0-1": [9, 0], "c1-0": [0, 5], "c1-1": [9, 5], "c1-2": [20, 5]}}'
     )
     page = tmp_path / "report.html"
-    one = ("-o", page, "--tasks-shown", "1")
+    one = ("-o", page)
     assert coordlang("report", language, *FILES, *one, "--coordinates", sidecar).code == 0
     assert data_of(page.read_bytes())["places"][0] == {"name": "c0-1", "x": 9, "y": 0}
     # Beside the problem it needs no option.
@@ -49,7 +49,6 @@ def test_coordinates(coordlang: Command, language: Path, tmp_path: Path) -> None
     ("arguments", "code"),
     [
         (("-o", "{folder}"), 2),
-        (("--tasks-shown", "0", "-o", "-"), 2),
         ((), 2),
         (("--coordinates", "{folder}/none.json", "-o", "-"), 31),
         (("--cost", "makespan+actions", "-o", "-"), 2),

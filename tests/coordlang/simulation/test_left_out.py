@@ -139,5 +139,5 @@ def test_outlines_draw_every_wall_and_nothing_else(folder: str) -> None:
 def test_robots_that_are_too_large_are_an_error() -> None:
     floor = floor_for(mission_of("t-map"))
     require_room(floor, 0.25)
-    with pytest.raises(UsageError, match=r"--radius of at most 0\.25"):
+    with pytest.raises(UsageError, match=r"radius may be 0\.25 at most"):
         require_room(floor, 0.26)
