@@ -15,7 +15,7 @@ from typing import Any, get_args, get_origin
 
 import click
 
-from coordlang.commands.records import CommandOptions, Limits, OutputFile
+from coordlang.commands.records import CommandOptions, Jobs, Limits, OutputFile, Source
 from coordlang.commands.terminal import SAYING, echo, working
 from planners.system.errors import CoordlangError, OutOfTime, UsageError, note
 from planners.system.limits import default_memory_limit, limited_memory, require_memory, time_limit
@@ -24,7 +24,36 @@ from planners.system.options import Option, options_of, record_from
 #: Arguments that --factored stands for.
 _PDDL = ("DOMAIN", "PROBLEM", "PROBLEMS...")
 #: Options whose metavar has one of these name a file that is read or written.
-_FILES = ("FILE", "LANGUAGE", "PROBLEM", "RECORD", "RUN.json")
+_FILES = ("FILE", "LANGUAGE", "PROBLEM", "RECORD")
+#: Command -> the options that are used most, and an example; words in capitals are `_EXAMPLES`.
+_HELP = {
+    "inspect": ("states write as_json", "MAP"),
+    "plans": ("only_count most sample", "MAP --count"),
+    "check": ("as_json", "MAP"),
+    "coordination": ("asynchronous jobs as_json", "MAP"),
+    "tasks": ("start goal output", 'MAP --start "(at r1 ?)" -o tasks.json'),
+    "build": ("tasks method output", "MAP --tasks all --method minimal -o t-map.json"),
+    "verify": ("tasks certificate as_json", "t-map.json MAP"),
+    "lift": ("tasks check output", "GRID --tasks all -o lifted.json"),
+    "ground": ("tasks verified output", "lifted.json GRID -o 2x2.json"),
+    "say": ("as_json", "t-map.json MAP plan.txt"),
+    "understand": ("only_count most output", 't-map.json MAP "w0 w2 w1 w0" -o plan.txt'),
+    "plan": ("prefer form as_json", "t-map.json MAP --prefer first:r2"),
+    "choices": ("robot form output", 't-map.json MAP "w0 w2 w1 w0" --robot r1'),
+    "robot": ("robot prefer play", "events.json MAP --robot r1 --play 1"),
+    "simulate": ("sentence step output", "t-map.json MAP --runs 3"),
+    "export": ("to for_planner output", 't-map.json MAP "w0 w2 w1 w0" --to bt'),
+    "explain": ("task sentence as_json", "t-map.json MAP --task"),
+    "report": ("output coordinates seed", "t-map.json MAP -o t-map.html"),
+    "domains": ("copy as_json", "--copy all domains"),
+    "import": ("robots task output", "SITE --robots 2 -o mine"),
+}
+#: Files that examples have.
+_EXAMPLES = {
+    "MAP": "domains/t-map/domain.pddl domains/t-map/problem.pddl",
+    "GRID": "domains/grid/domain.pddl domains/grid/gw1-2x2.pddl",
+    "SITE": "domains/t-map/t-map.map domains/t-map/t-map.scen",
+}
 #: The name of a file: shells complete it, and nothing is checked yet.
 FILE = click.Path(readable=False)
 
@@ -61,7 +90,34 @@ def command_of(name: str, record: type[CommandOptions]) -> click.Command:
 
     argument = click.Argument(["arguments"], nargs=-1, type=FILE, metavar=record.takes)
     params = [*([argument] if record.takes else []), *map(_click_option, on_cli.values())]
-    return click.Command(name, params=params, callback=called, help=record.__doc__)
+    used, example = _HELP[name]
+    for word, files in _EXAMPLES.items():
+        example = example.replace(word, files)
+    example = f"\b\nExample:\n  coordlang {name} {example}"
+    made = _Command(name, params=params, callback=called, help=record.__doc__, epilog=example)
+    made.used = tuple(used.split())
+    return made
+
+
+class _Command(click.Command):
+    """A command whose help has the options that are ``used`` most first, the others by kind."""
+
+    used: tuple[str, ...] = ()
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        model = {each.name for each in options_of(Source)}
+        work = {"no_cache", *(each.name for kind in (Jobs, Limits) for each in options_of(kind))}
+        kinds = {"Most used": self.used, "Model": model - {*self.used}, "Work and limits": work}
+        sections: dict[str, list[tuple[str, str]]] = {"Most used": [], "Options": []}
+        for param in self.get_params(ctx):
+            kind = next((each for each, names in kinds.items() if param.name in names), "Options")
+            row = param.get_help_record(ctx)
+            if row is not None and isinstance(param, click.Option):
+                sections.setdefault(kind, []).append(row)
+        for title, rows in sections.items():
+            if rows:
+                with formatter.section(title):
+                    formatter.write_dl(rows)
 
 
 def _json_form(form: object) -> object:
@@ -185,6 +241,9 @@ def check_outputs(outputs: Iterable[OutputFile], inputs: Iterable[str]) -> None:
 
     Before the work, not after it.  Raises `UsageError`.
     """
+    outputs = list(outputs)
+    if not outputs:
+        return
     from planners.system.writing import is_device, why_unwritable
 
     read = [path for path in inputs if path != "-" and os.path.isfile(path)]

@@ -13,10 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from coordlang.commands import records as given
 from coordlang.commands.records import Source, TasksSource
-from coordlang.sites.coordinates import Point, checked, read_coordinates
 from planners.loading import PlanningInstance, build
 from planners.pddl import read_domain, read_problem
-from planners.pddl.factored import read_factored
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import Position, UsageError, note
@@ -31,6 +29,7 @@ if TYPE_CHECKING:
     from coordlang.language.provenance import Tolerance
     from coordlang.language.words import Language
     from coordlang.lifted.language import LiftedLanguage
+    from coordlang.sites.coordinates import Point
 
 Result = TypeVar("Result")
 
@@ -48,6 +47,7 @@ def public(
     Its parameters are those that the record ``takes``, then, by keyword, the options of the record.
     ``with_record`` of the result gets the record, and arguments by the names in ``takes``.
     """
+    given.ready(record)
     words = [word.strip("[]") for word in (record.takes if takes is None else takes).split()]
     word_of = {word.strip(".").lower(): word for word in words}
     parameters, of = [], inspect.Parameter
@@ -127,6 +127,8 @@ class Arguments:
                 raise UsageError(
                     "--factored names all files", remedy="Leave out domain and problem."
                 )
+            from planners.pddl.factored import read_factored
+
             factored, problem = read_factored(fspath(self.source.factored))
             return PlanningInput(factored, [problem], self.source)
         is_single = "PROBLEMS..." not in self.takes
@@ -339,6 +341,8 @@ def read_coordinates_of(
     given: given.CoordinatesSource | None, problem: Problem
 ) -> Mapping[str, Point]:
     """Coordinates of places: those given, else those of a file beside the problem, else none."""
+    from coordlang.sites.coordinates import checked, read_coordinates
+
     if isinstance(given, str | PathLike):
         return read_coordinates(fspath(given))
     if given is not None:

@@ -10,7 +10,6 @@ import errno
 import os
 import signal
 import sys
-import traceback
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -31,38 +30,47 @@ from planners.system.signals import Interruptions
 _UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO, errno.EBADF)
 
 
-#: Command -> one line about it, so that ``--help`` need not import them all.  The options
-#: of a command are the record of its name in `coordlang.commands.records`.
-COMMANDS = {
-    "inspect": "Show what was understood of a domain: robots, subactions, constraints.",
-    "plans": "Count, list or sample all optimal plans of a task.",
-    "check": "Compare our optimal cost with Fast Downward's.",
-    "coordination": "Decide which tasks require coordination, with a miscoordination shown.",
-    "import": "Write a map or a building as domain, problem and coordinates.",
-    "tasks": "Write a task file: a problem with other starts and goals.",
-    "build": "Build a coordination language and verify it.",
-    "verify": "Check by definition that a file holds a coordination language.",
-    "lift": "Learn words as functions of features, for all problems of a domain.",
-    "ground": "Write the language file of one problem from a lifted language.",
-    "say": "Print the sentence of an optimal plan.",
-    "understand": "Count, list, sample or draw the plans that a sentence leaves open.",
-    "plan": "Find one optimal plan under a sentence, or under the best sentence.",
-    "choices": "Show what each robot may do under a sentence, whatever the others choose.",
-    "robot": "Execute one robot's part, beside the processes of the other robots.",
-    "simulate": "Let robots with wheels do a task in a simulator.",
-    "export": "Write a task under a sentence as PDDL, LTLf or behaviour trees.",
-    "explain": "Show a language: words as formulas, sentences of a task.",
-    "report": "Write a page that shows a language: words, sentences, plans played.",
-    "domains": "List or copy the domains that come with coordlang.",
-    "schema": "Print the JSON Schema of a file format.",
+#: Commands by what they are for, each with one line, so that ``--help`` need not import them all.
+#: The options of a command are the record of its name in `coordlang.commands.records`.
+GROUPS = {
+    "Start here": {
+        "domains": "List or copy the domains that come with coordlang.",
+        "inspect": "Show what was understood of a domain: robots, subactions, constraints.",
+        "plans": "Count, list or sample all optimal plans of a task.",
+        "coordination": "Decide which tasks require coordination, with a miscoordination shown.",
+        "build": "Build a coordination language and verify it.",
+        "explain": "Show a language: words as formulas, sentences of a task.",
+    },
+    "Use a language": {
+        "understand": "Count, list, sample or draw the plans that a sentence leaves open.",
+        "say": "Print the sentence of an optimal plan.",
+        "plan": "Find one optimal plan under a sentence, or under the best sentence.",
+        "choices": "Show what each robot may do under a sentence, whatever the others choose.",
+        "robot": "Execute one robot's part, beside the processes of the other robots.",
+        "simulate": "Let robots with wheels do a task in a simulator.",
+        "export": "Write a task under a sentence as PDDL, LTLf or behaviour trees.",
+        "report": "Write a page that shows a language: words, sentences, plans played.",
+    },
+    "Beyond one map": {
+        "import": "Write a map or a building as domain, problem and coordinates.",
+        "tasks": "Write a task file: a problem with other starts and goals.",
+        "lift": "Learn words as functions of features, for all problems of a domain.",
+        "ground": "Write the language file of one problem from a lifted language.",
+    },
+    "Files and checks": {
+        "verify": "Check by definition that a file holds a coordination language.",
+        "check": "Compare our optimal cost with Fast Downward's.",
+        "schema": "Print the JSON Schema of a file format.",
+    },
 }
+COMMANDS = [name for group in GROUPS.values() for name in group]
 
 
 class _LazyGroup(click.Group):
     """Makes a command from its record; its module is imported when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(COMMANDS)
+        return COMMANDS
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
@@ -77,8 +85,9 @@ class _LazyGroup(click.Group):
         return command_of(cmd_name, record_of(cmd_name))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+        for title, group in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl(list(group.items()))
 
 
 @click.group(
@@ -105,6 +114,8 @@ def run(arguments: list[str], interruptions: Interruptions | None = None) -> int
         text, known = _failure(error, None if interruptions is None else interruptions.first)
         with suppress(OSError):  # the terminal may be gone
             if "--debug" in arguments and not isinstance(error, click.ClickException):
+                import traceback
+
                 _show("".join(traceback.format_exception(error)))
             _show(text)
             if wants_json(arguments) and not output:

@@ -11,13 +11,12 @@ from typing import Any, ClassVar
 from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.records import DEFAULT_MAX, PlansOptions, UnderstandOptions
 from coordlang.commands.terminal import echo, note_single_robot, write
-from planners.search.asynchronous import as_executed
 from planners.search.kept_plans import search
-from planners.search.plan_file import Texts, texts, to_ipc, to_json, to_plansys2
 from planners.search.plans import Plan, Plans
 from planners.system.notebook import Presented
 
-#: One plan: for each joint step, each robot's subaction as text, None where it idles.
+#: Each robot's subaction as text, None where it idles; and one plan: these for each joint step.
+Texts = tuple[str | None, ...]
 PlanSteps = tuple[Texts, ...]
 
 
@@ -34,8 +33,11 @@ class OptimalPlans(Presented):
 
     def __init__(self, plans: Plans) -> None:
         """Take the plans of one task; where its model says so they are listed up to timing."""
-        space = as_executed(plans.space)
-        self._plans = plans if space is plans.space else Plans.of(space)
+        self._plans = plans
+        if plans.space.model.is_asynchronous:
+            from planners.search.asynchronous import as_executed
+
+            self._plans = Plans.of(as_executed(plans.space))
 
     @property
     def count(self) -> int:
@@ -88,18 +90,24 @@ class OptimalPlans(Presented):
 
         Raises `ValueError` if it is no optimal plan of the task.
         """
+        from planners.search.plan_file import to_ipc
+
         return to_ipc(self._plans, self._known(plan))
 
     def plansys2(self, plan: Sequence[Texts]) -> str:
         """Return a plan as PlanSys2 reads it (docs/formats.md); raises as `ipc`."""
+        from planners.search.plan_file import to_plansys2
+
         return to_plansys2(self._plans, self._known(plan))
 
     def data(self, listed: Sequence[Sequence[Texts]]) -> dict[str, Any]:
         """Return the data of a JSON plan file with these plans in it (docs/formats.md)."""
+        from planners.search.plan_file import to_json
+
         return to_json(self._plans, [self._known(plan) for plan in listed])
 
     def _texts(self, plan: Plan) -> PlanSteps:
-        return texts(self._plans.space.model.in_step, self._plans.steps(plan))
+        return tuple(map(self._plans.space.model.in_step.texts, self._plans.steps(plan)))
 
     def _numbers(self, plan: Sequence[Texts]) -> Plan | None:
         model = self._plans.space.model.in_step

@@ -11,7 +11,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Union, dataclass_transform
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    ClassVar,
+    Literal,
+    NamedTuple,
+    TypeVar,
+    Union,
+    dataclass_transform,
+)
 
 import click
 
@@ -27,6 +36,7 @@ if TYPE_CHECKING:
     from planners.parallel.workers import Workers
     from planners.pddl.lifted import Problem
 
+Record = TypeVar("Record")
 File = str | PathLike[str]
 ProblemSource = Union[File, "Problem"]
 #: ``"all"``, a task file, its data, or tasks: each with ``init`` and ``goal``, lists of PDDL texts.
@@ -89,14 +99,14 @@ class Limits:
 
 
 @dataclass_transform(frozen_default=True)
-@dataclass(frozen=True)
 class CommandOptions:
     """What a command can be asked for; the docstring of each record is the command's ``--help``.
 
-    Each record that is made of this one is a frozen dataclass.  The command ``takes`` arguments as
-    the usage line shows them, and none where the option ``alone`` is given.  A terminal shows what
-    it is ``doing``.  Its ``function`` has its name and is in the ``module`` of its name, unless
-    others are named, and searches no task again that was searched before if it ``keeps_plans``.
+    Each record that is made of this one is a frozen dataclass, once it is `ready`.  The command
+    ``takes`` arguments as the usage line shows them, and none where the option ``alone`` is given.
+    A terminal shows what it is ``doing``.  Its ``function`` has its name and is in the ``module``
+    of its name, unless others are named, and searches no task again that was searched before if it
+    ``keeps_plans``.
     """
 
     takes: ClassVar[str] = ""
@@ -112,7 +122,14 @@ class CommandOptions:
     def __init_subclass__(cls, **said: str | bool) -> None:
         for name, value in said.items():
             setattr(cls, name, value)
-        dataclass(frozen=True)(cls)
+
+
+def ready(record: type[Record]) -> type[Record]:
+    """Make a record the dataclass that it is: a process asks for one, and all take long to make."""
+    for each in reversed(record.__mro__):
+        if issubclass(each, CommandOptions) and "__dataclass_fields__" not in vars(each):
+            dataclass(frozen=True)(each)
+    return record
 
 
 def json_option() -> Any:
@@ -598,4 +615,4 @@ class ImportOptions(
 
 def record_of(command: str) -> Any:
     """The record of a command, by its name."""
-    return globals()[f"{command.capitalize()}Options"]
+    return ready(globals()[f"{command.capitalize()}Options"])

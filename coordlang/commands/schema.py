@@ -71,7 +71,7 @@ def error_json(error: CoordlangError) -> str:
     return msgspec.json.format(msgspec.json.encode(ErrorObject(entry)), indent=0).decode()
 
 
-@click.command(name="schema")
+@click.command(name="schema", epilog="\b\nExample:\n  coordlang schema language")
 @click.argument("name", type=click.Choice(list(SCHEMAS)), default="language")
 def command(name: str) -> None:
     """Print the JSON Schema of a file format: language files unless NAME is another one."""

@@ -6,7 +6,6 @@ from __future__ import annotations
 import io
 import json
 import os
-import shutil
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -72,11 +71,11 @@ def write(data: str | bytes, output: str | None, said: str | None = None) -> Non
 
     What is ``said`` of it goes to the other stream: to stderr where the data go to stdout.
     """
-    from planners.system.writing import write_compressed
-
     if output is None or output == "-":
         echo(data if isinstance(data, str) else data.decode(), nl=False)
     else:
+        from planners.system.writing import write_compressed
+
         write_compressed(output, data.encode() if isinstance(data, str) else data, level=6)
     if said is not None:
         echo(said, err=output in (None, "-"))
@@ -136,6 +135,8 @@ def line_width(*, err: bool = False) -> int:
     stream = sys.stderr if err else sys.stdout
     if stream is None or not stream.isatty():
         return WIDTH
+    import shutil
+
     return max(_LEAST_WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
 
 

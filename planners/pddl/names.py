@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 
 from planners.pddl.lifted import Atom, Domain, Signatures, Variable, have_common
 from planners.pddl.sexpr import SECTIONS, UNSUPPORTED, Expression, Group, Token
@@ -35,6 +34,8 @@ _SHOWN = 60
 
 def known(names: Iterable[str], wrong: str, what: str) -> str:
     """A remedy: the close match among ``names`` if there is one, else the first ten of them."""
+    from difflib import get_close_matches
+
     names = sorted(names)
     close = get_close_matches(wrong[:_LONGEST_COMPARED], names, n=1)
     if close:

@@ -9,17 +9,20 @@ all optimal plans are in the layers (Proposition 16 of docs/concepts.md).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planners.joint.model import JointModel, Options, PlanningTask
 from planners.joint.tables import Ints, Rows
-from planners.search.exact_bound import ExactBound, exact_bound
 from planners.search.goals import FAR, searched
 from planners.search.heuristics import Heuristic
 from planners.search.reachable import Edges, Exploration, PieceSizes, Space, grown, joined_edges
 from planners.search.state_variables import StateVariable
 from planners.system.errors import ProvedImpossible
+
+if TYPE_CHECKING:
+    from planners.search.exact_bound import ExactBound
 
 #: The layer of a state that was not met in this round.
 _NEVER = np.iinfo(np.int32).max
@@ -124,6 +127,8 @@ class BoundedSearch(Exploration):
         is_makespan = self._model.cost == "makespan"
         if is_makespan and at_least and self._mostly_lead(at_least - self.depth, most):
             return at_least
+        from planners.search.exact_bound import exact_bound
+
         self.exact = exact_bound(self._model, self._task, self._variables, at_least, self._pieces)
         return self.bound if self.exact is None else self.exact.makespan
 

@@ -21,7 +21,7 @@ from planners.joint.composition import ComposingStepper
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, PlanningTask
 from planners.joint.tables import Bools, Ints, kept_runs
-from planners.search.goals import goal_facts
+from planners.search.goals import SMALLER, goal_facts
 from planners.search.plan_formula import PlanFormula, TooManyClauses
 from planners.search.questions import FixedPlans, Literals, OutOfEffort, Plan
 from planners.search.reachable import Edges, PieceSizes, grown
@@ -38,8 +38,6 @@ _LEAST_COST = 300_000
 _SAMPLE, _MOSTLY = 64, 0.9
 #: The same share, of so many that were asked for last and that no earlier answer refuted.
 _RECENT, _NEARLY_ALL = 200, 0.95
-#: What to try besides a larger limit.
-SMALLER = "a task with a shorter plan, fewer objects or fewer robots"
 
 
 class ExactBound:

@@ -13,6 +13,8 @@ from planners.joint.tables import Ints, Rows
 from planners.pddl.formula_tree import required_atoms
 from planners.pddl.lifted import TRUE, Formula
 
+#: What to try besides a larger limit.
+SMALLER = "a task with a shorter plan, fewer objects or fewer robots"
 #: The value of a state from which the goal is proved unreachable.
 FAR = 2**30
 #: A table of states -> a lower bound for each, or `FAR`.

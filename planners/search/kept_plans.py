@@ -9,16 +9,19 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planners.grounding.actions import GroundAction
 from planners.joint.model import FullState, JointModel, PlanningTask
-from planners.parallel.batch import Store, Table, code_hash, digest
 from planners.pddl.formula_tree import formula_text, label
 from planners.search import optimal_plans
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import CoordlangError, note
+
+if TYPE_CHECKING:
+    from planners.parallel.batch import Store, Table
 
 #: The version of the tables: those of another one are never looked at, and go in time.
 _FORM = 4
@@ -49,6 +52,8 @@ _USED: ContextVar[_Cache | None] = ContextVar("plans that are kept", default=Non
 
 def plan_store(folder: Path) -> Store:
     """The store of plans in a folder, bounded."""
+    from planners.parallel.batch import Store
+
     return Store(folder / f"plans-{_FORM}", _MOST_BYTES)
 
 
@@ -122,6 +127,8 @@ def _plan_space(table: Table, model: JointModel, task: PlanningTask) -> PlanSpac
 
 def model_digest(model: JointModel) -> str:
     """A hash of all that a search reads of a joint model, whatever files it was made from."""
+    from planners.parallel.batch import digest
+
     return digest(
         tuple(_texts(model.actions)),
         model.robots,
@@ -139,6 +146,8 @@ def key_of(model: str, task: PlanningTask) -> str:
 
     That is the model (its `model_digest`), the task, the code of this package and numpy.
     """
+    from planners.parallel.batch import code_hash, digest
+
     goal = task.goal
     wanted = goal.facts if isinstance(goal, FullState) else formula_text(goal)
     return digest(code_hash("planners"), np.version.version, model, task.init, wanted)

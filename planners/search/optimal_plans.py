@@ -16,8 +16,7 @@ import numpy as np
 from planners.joint.model import Goal, JointModel, PlanningTask
 from planners.joint.tables import Bools, Ints, Rows, packed, unique_rows, unpacked
 from planners.search.bounded_search import BoundedSearch
-from planners.search.exact_bound import SMALLER
-from planners.search.goals import searched
+from planners.search.goals import SMALLER, searched
 from planners.search.heuristics import search_heuristic
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, PieceSizes, Space

@@ -9,12 +9,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
 from random import Random
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planners.search.asynchronous import Timing
 from planners.search.plan_space import PlanSpace
 from planners.search.slack import rests
+
+if TYPE_CHECKING:
+    from planners.search.asynchronous import Timing
 
 #: A plan: the label numbers of all robots, step by step.
 Plan = tuple[tuple[int, ...], ...]
@@ -62,7 +65,11 @@ class Plans:
 
     @cached_property
     def _timing(self) -> Timing | None:
-        return Timing(self.space) if self.space.model.events else None
+        if not self.space.model.events:
+            return None
+        from planners.search.asynchronous import Timing
+
+        return Timing(self.space)
 
     def steps(self, plan: Plan) -> Plan:
         """The joint steps of a plan.

@@ -4,18 +4,16 @@
 from __future__ import annotations
 
 import errno
-import gzip
 import sys
 import zlib
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from inspect import cleandoc
 from io import BytesIO
 from pathlib import Path
-from typing import IO, Any, Generic, TypeVar
-
-import msgspec
+from typing import IO, Any, Generic, TypeVar, cast
 
 from planners.system.errors import BadInput, OutOfMemory, Position
 from planners.system.limits import memory_left, more_memory
@@ -32,11 +30,6 @@ _READING = 4
 #: Reading less text than this asks nothing of the memory that is left, in bytes.
 _SMALL = 2**16
 _CHUNK = 2**20
-
-
-class _Head(msgspec.Struct):
-    format: Any = None
-    version: Any = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,11 +54,13 @@ class FileFormat(Generic[T]):
         Raises `BadInput` for a text that is no JSON, of another format or version (it need not fit
         the record), or that does not fit the record.
         """
+        import msgspec
+
         check_utf8(data, position)
         data = data.removeprefix(_BYTE_ORDER_MARK)
         see = f"`coordlang schema {self.name}` prints what a {self.title} holds."
         try:
-            head = msgspec.json.decode(data, type=_Head)
+            head = msgspec.json.decode(data, type=_head())
             if self.format is not None and head.format != self.format:
                 what = f"format {echoed(head.format)}, expected {self.format!r}"
                 raise BadInput(what, position=position, remedy=see)
@@ -91,6 +86,8 @@ class FileFormat(Generic[T]):
 
     def json_schema(self) -> dict[str, Any]:
         """The JSON Schema (draft 2020-12) of such files."""
+        import msgspec
+
         schema: dict[str, Any] = msgspec.json.schema(self.record)
         for entry in schema["$defs"].values():
             if "description" in entry:  # a docstring: before Python 3.13 it keeps its indentation
@@ -108,6 +105,14 @@ class FileFormat(Generic[T]):
         }
 
 
+@cache
+def _head() -> type[Any]:
+    """What every format has: its name and its version."""
+    import msgspec
+
+    return msgspec.defstruct("Head", [("format", Any, None), ("version", Any, None)])
+
+
 def read_bytes(path: str | Path, *, most: int = MAX_TEXT) -> bytes:
     """Read a file, or standard input for ``-``; what gzip compressed is decompressed.
 
@@ -121,7 +126,7 @@ def read_bytes(path: str | Path, *, most: int = MAX_TEXT) -> bytes:
     try:
         size = _decompressed_size(data, most)
         _require_size(size, most, position)
-        return gzip.GzipFile(fileobj=BytesIO(data)).read(size)
+        return _unzipped(data).read(size)
     except (OSError, EOFError, zlib.error) as error:
         raise BadInput(
             f"cannot be read: {error}",
@@ -159,9 +164,12 @@ def read_stored_bytes(path: str | Path, *, most: int = MAX_TEXT) -> bytes:
 
 def names_format(data: bytes, name: str) -> bool:
     """Whether a JSON text says that it is of a format; what is no JSON says nothing."""
+    import msgspec
+
     with suppress(msgspec.DecodeError, UnicodeDecodeError, RecursionError):
         text = data.removeprefix(_BYTE_ORDER_MARK)
-        return name.encode() in data and bool(msgspec.json.decode(text, type=_Head).format == name)
+        if name.encode() in data:
+            return bool(msgspec.json.decode(text, type=_head()).format == name)
     return False
 
 
@@ -211,10 +219,16 @@ def require_seen(name: str, position: Position, what: str = "name") -> None:
 
 def _decompressed_size(data: bytes, most: int) -> int:
     """The size of what gzip compressed, counted to a little more than ``most``; nothing is kept."""
-    return sum(len(piece) for piece in _pieces(gzip.GzipFile(fileobj=BytesIO(data)), most))
+    return sum(len(piece) for piece in _pieces(_unzipped(data), most))
 
 
-def _pieces(file: IO[bytes] | gzip.GzipFile, most: int) -> Iterator[bytes]:
+def _unzipped(data: bytes) -> IO[bytes]:
+    from gzip import GzipFile
+
+    return cast(IO[bytes], GzipFile(fileobj=BytesIO(data)))
+
+
+def _pieces(file: IO[bytes], most: int) -> Iterator[bytes]:
     """The bytes of a file, until there are more than ``most``."""
     size = 0
     while size <= most and (piece := file.read(_CHUNK)):

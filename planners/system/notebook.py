@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from html import escape
 from typing import ClassVar
 
 
@@ -23,6 +22,8 @@ class Presented:
         return f"{type(self).__name__}({shown})"
 
     def _repr_html_(self) -> str:
+        from html import escape
+
         rows = [
             f"<tr><td>{escape(name)}</td><td>{escape(_plain(value))}</td></tr>"
             for name, value in self.facts().items()

@@ -8,7 +8,6 @@ of docs/cli.md come from it.
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import sys
 import types
@@ -131,7 +130,9 @@ def record_from(
     known = {o.name: o for o in options_of(record) if on_cli or o.only != "cli"}
     for name in given:
         if name not in known:
-            alike = difflib.get_close_matches(name, known, 1)
+            from difflib import get_close_matches
+
+            alike = get_close_matches(name, known, 1)
             hint = f"; did you mean {alike[0]!r}?" if alike else ""
             raise TypeError(f"{caller}() got an unexpected keyword argument {name!r}{hint}")
     values = {

@@ -6,7 +6,6 @@ from __future__ import annotations
 import errno
 import gzip
 import os
-import secrets
 import shutil
 import stat
 import tempfile
@@ -182,7 +181,7 @@ def _set_aside(path: str | Path | None) -> Iterator[None]:
 
 def _beside(target: Path) -> Path:
     """A new name in the folder of a file."""
-    return target.parent / f".{target.name[:_REPEATED]}.{secrets.token_hex(4)}"
+    return target.parent / f".{target.name[:_REPEATED]}.{os.urandom(4).hex()}"
 
 
 def _cannot(path: str | Path, reason: str) -> UsageError:

@@ -12,6 +12,7 @@ import shlex
 import subprocess
 import sys
 import tomllib
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -159,6 +160,31 @@ def test_help_is_light(command: list[str], coordlang: Command) -> None:
         assert (done.stderr.strip(), "Usage: coordlang" in done.stdout) == ("[]", True)
 
 
+def test_helps_begin_with_what_is_used_most_and_their_examples_run(
+    coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in COMMANDS:
+        shown = coordlang(name, "--help").out
+        first = re.search(r"^Most used:\n((?:  .*\n)+)\n(?:Options|Model):", shown, re.MULTILINE)
+        assert name == "schema" or (first and 1 <= len(re.findall("^  -", first[1], re.M)) <= 3)
+        example = shlex.split(shown.partition("Example:\n")[2])
+        assert example[:2] == ["coordlang", name]
+        if name == "simulate" and find_spec("irsim") is None:
+            continue
+        if name != "robot":
+            done = coordlang(*example[1:])
+            assert (done.code, "error" in done.err) == (0, False), done.err
+            continue
+        files = [f"domains/t-map/{file}.pddl" for file in ("domain", "problem")]
+        assert coordlang("build", *files, "--asynchronous", "-o", example[2]).code == 0
+        program = [sys.executable, "-m", "coordlang"]
+        both = [[*program, *example[1:]], [*program, *(w.replace("r1", "r2") for w in example[1:])]]
+        environment = os.environ | {"PYTHONPATH": str(ROOT)}
+        team = [subprocess.Popen(one, env=environment, stdout=subprocess.DEVNULL) for one in both]
+        assert [robot.wait(60) for robot in team] == [0, 0]
+
+
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
 def test_plans_of_small_tasks_load_little() -> None:
     """What counts the plans of a small task starts no thread and loads only what it uses."""
@@ -168,7 +194,9 @@ def test_plans_of_small_tasks_load_little() -> None:
         "from coordlang.__main__ import main\n"
         "try: main()\n"
         "finally: print([m for m in ('psutil', 'numpy.ma', 'pysat', 'networkx', 'scipy', 'rich', "
-        "'zipfile', 'coordlang.language.candidates') if m in sys.modules], "
+        "'zipfile', 'matplotlib', 'msgspec', 'hashlib', 'coordlang.language.candidates', "
+        "'planners.parallel', 'planners.pddl.factored', 'planners.search.asynchronous', "
+        "'planners.search.exact_bound', 'planners.system.writing') if m in sys.modules], "
         "len(os.listdir('/proc/self/task')), file=sys.stderr)"
     )
     environment = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"}
