@@ -103,7 +103,7 @@ COMMANDS = {
         plan @one.json D problem.pddl "w1 w0"
         plan @one.json D problem.pddl --prefer first:r2 --prefer most-plans --json
         plan @one.json D problem.pddl --prefer shortest --prefer "avoid:(at r1 c)"
-        choices @one.json D problem.pddl "w1 w0" --check
+        choices @one.json D problem.pddl "w1 w0"
         choices @one.json D problem.pddl "w1 w0" --format json -o @choices.json
         choices @one.json D problem.pddl "w1 w0" --format dot
         choices @one.json D problem.pddl "w1 w0" --robot r2 --json

@@ -30,7 +30,7 @@ def drive(
     wishes: Sequence[WishRecord] = (),
 ) -> RunRecord:
     """Let robots do a mission once; ``known`` are coordinates that names do not say."""
-    floor = Floor(prepared.world, known or {}, how.cell)
+    floor = Floor(prepared.world, known or {})
     [found] = runs_of(prepared, floor, how, 1, seed, wishes)
     return found
 

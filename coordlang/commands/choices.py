@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from math import prod
 from os import fspath
 from typing import Any
 
@@ -28,7 +27,6 @@ from coordlang.required.failure import TooManyToCount, failure_of_sentence
 from coordlang.required.miscoordination import Miscoordination
 from planners.pddl.model_options import names_in
 from planners.search.plans import Plans
-from planners.system.errors import note
 from planners.system.notebook import counted, named
 from planners.system.writing import write_atomically
 
@@ -114,14 +112,12 @@ def choices(files: Arguments, options: ChoicesOptions) -> RobotsChoices:
     """Find the subplans that each robot may follow under a sentence, whatever the others choose.
 
     Raises `NoPlanFits` if no optimal plan has the sentence, `UsageError` for a robot that there is
-    none of, and `OutOfMemory` if the automata, or with ``check`` the combinations, do not fit into
-    the memory.
+    none of, and `OutOfMemory` if the automata do not fit into the memory.
     """
     said = files.needed("SENTENCE")
     used = files.task().used
     chosen = _numbers(used.model.robots, options.robot) or tuple(range(len(used.model.robots)))
-    most = None if options.check else execution.MOST
-    return RobotsChoices(used, execution.choices(used, used.words_of(said), most=most), chosen)
+    return RobotsChoices(used, execution.choices(used, used.words_of(said)), chosen)
 
 
 def _numbers(known: tuple[str, ...], whose: str | Sequence[str]) -> tuple[int, ...]:
@@ -131,21 +127,20 @@ def _numbers(known: tuple[str, ...], whose: str | Sequence[str]) -> tuple[int, .
 def show_choices(found: RobotsChoices, options: ChoicesOptions) -> int:
     """Print or write the choices."""
     if options.form == "text":
-        text = _text(found, line_width(), is_checked=options.check)
+        text = _text(found, line_width())
     elif options.form == "dot":
         text = choices_dot(found.found, found.chosen)
     else:
         text = to_bytes(found.found, found.chosen).decode()
     write(text, options.output)
-    return _guarantee_code(found, options.check)
+    return _guarantee_code(found)
 
 
-def _guarantee_code(found: RobotsChoices, check: bool) -> int:
+def _guarantee_code(found: RobotsChoices) -> int:
     """The exit code of what is guaranteed; writes to stderr what is not."""
-    may_fail = found.tolerance is not None and found.tolerance.may_fail
-    is_tolerated = found.covered and not check and may_fail
     if found.witness is not None:
-        if is_tolerated:
+        may_fail = found.tolerance is not None and found.tolerance.may_fail
+        if is_tolerated := found.covered and may_fail:
             failure = found.failure
             share = "" if failure is None else f" in {percent(float(failure))} of all runs"
             said = f"choices of this task miscoordinate{share}, for example:"
@@ -157,26 +152,17 @@ def _guarantee_code(found: RobotsChoices, check: bool) -> int:
         echo(f"{said}\n{witness_text(found.witness)}", err=True, fit=True)
         if not is_tolerated:
             return REFUTED
-    if check and not found.covered:
-        note("the language does not cover this task; --check proved this sentence")
-        return 0
     return covered_code(found)
 
 
-def _text(found: RobotsChoices, width: int, *, is_checked: bool) -> str:
+def _text(found: RobotsChoices, width: int) -> str:
     """Each robot's automaton as a table; robots whose automata are equal are shown together."""
-    used, mixtures = found.used, found.found.mixtures
+    used = found.used
     plans = counted(Plans.of(found.found.fits).count, "plan")
     lines = [
         fitted(f"The task {describe(used.space, used.task)}", width),
         f'"{found.sentence}" leaves {plans} open.',
     ]
-    if is_checked and mixtures is not None and mixtures.holds:
-        every = counted(prod(own.automaton.count for own in found.found.robots), "combination")
-        nodes = counted(mixtures.nodes, "node")
-        lines.append(
-            f"checked: {every} of own subplans, all {used.model.kept_plans} ({nodes} walked)"
-        )
     tables = [_table(found, found.found.robots[robot], width) for robot in found.chosen]
     for group in alike(tables):
         head, *table = tables[group[0]]

@@ -461,7 +461,6 @@ class ChoicesOptions(
     """
 
     robot: str | Sequence[str] = option((), "Whose choices; may be repeated (default: all).", "R")
-    check: bool = option(False, "Walk every combination: is each an optimal plan?")
     form: Literal["text", "json", "dot"] = form_option("text", "How they are shown.")
     output: str | None = output_option("Write to this file instead of stdout.")
 

@@ -132,7 +132,7 @@ def simulate(files: Arguments, options: SimulateOptions) -> Simulated:
     preferred = [text for text in wished if text not in on_the_way]
     prepared = _prepared(task.used, options, preferred)
     points = read_coordinates_of(options.coordinates, task.files.problems[0])
-    floor = Floor(prepared.world, points, settings.cell)
+    floor = Floor(prepared.world, points)
     settings = replace(
         settings,
         step=_step(task.used, options.step),

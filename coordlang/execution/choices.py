@@ -78,25 +78,20 @@ class SentenceChoices:
         return self.robots if robots is None else tuple(self.robots[robot] for robot in robots)
 
 
-def choices(
-    task_language: TaskLanguage, words: Sequence[int], most: int | None = MOST
-) -> SentenceChoices:
+def choices(task_language: TaskLanguage, words: Sequence[int], most: int = MOST) -> SentenceChoices:
     """The choices of every robot under a sentence, given by its word numbers.
 
     What is known in a state is exact (`coordlang.execution.automaton.determinise`) where all
-    combinations of choices can be walked with at most ``most`` joint moves (None: as many as the
-    memory holds) and all of them are optimal.  Elsewhere, and without a common step, only the atoms
-    are known that the robot's own subactions alone change.  Raises `NoPlanFits`, and `OutOfMemory`
-    if the automata, or with ``most=None`` the combinations, do not fit into the memory.
+    combinations of choices can be walked with at most ``most`` joint moves and all of them are
+    optimal.  Elsewhere, and without a common step, only the atoms are known that the robot's own
+    subactions alone change.  Raises `NoPlanFits`, and `OutOfMemory` if the automata do not fit into
+    the memory.
     """
     fits, model = task_language.plans_with(words), task_language.model
     subplans = [determinise(fits, robot) for robot in range(len(model.robots))]
-    try:
+    mixtures = None
+    with suppress(OutOfMemory):
         mixtures = walk_mixtures(task_language, fits, subplans, words, most)
-    except OutOfMemory:
-        if most is None:
-            raise
-        mixtures = None
     # Without a common step a node is no state in which a robot is when it has done its events.
     space = mixtures.space if mixtures and not model.is_asynchronous else None
     truth = [] if space is None else facts_at_nodes(space)

@@ -51,7 +51,7 @@ def walk_mixtures(
     fits: PlanSpace,
     automata: Sequence[Automaton],
     words: Sequence[int],
-    most: int | None = None,
+    most: int,
 ) -> Mixtures:
     """Walk all combinations of the robots' subplans in the task's optimal plans, layer by layer.
 
@@ -147,7 +147,7 @@ def _check(
     table: Ints,
     step: int,
     held: int,
-    most: int | None,
+    most: int,
 ) -> None:
     """Estimate a layer's joint moves before they are made."""
     size = np.ones(len(table))
@@ -155,12 +155,10 @@ def _check(
         size *= own.degree[table[:, robot]]
     moves = float(size.sum())
     needed = held + moves * (48 + 24 * len(own_moves))
-    if (most is not None and moves + held / 40 > most) or (
-        needed > SMALL and needed > memory_left()
-    ):
+    if moves + held / 40 > most or (needed > SMALL and needed > memory_left()):
         smaller = model.smaller("a smaller task")
         raise OutOfMemory(
             f"step {step + 1} has {moves:,.0f} combinations of what the robots may do: "
             f"about {needed / 2**30:,.1f} GiB",
-            remedy=f"Leave out --check, use {smaller} or {more_memory()}.",
+            remedy=f"Use {smaller} or {more_memory()}.",
         )

@@ -31,19 +31,18 @@ class Floor:
     ``longest`` and ``shortest`` are the lengths of the links that moves use, in metres; 0 and
     infinite without.  ``known`` are coordinates of places, x to the right and y down, as a file of
     coordinates has them; where they are not all known, the names of the places have to say them
-    (``c2-3``).  ``cell`` is the length of one unit of them in metres.  Raises `BadInput` if the
-    coordinates are not known.
+    (``c2-3``).  Raises `BadInput` if the coordinates are not known.
     """
 
-    def __init__(self, world: World, known: Mapping[str, Point], cell: float) -> None:
+    def __init__(self, world: World, known: Mapping[str, Point]) -> None:
         links = tuple(sorted({link.ends for link in world.links}))
         points = _points(world.places, links, known)
         top = max((y for _, y in points.values()), default=0.0)
         left = min((x for x, _ in points.values()), default=0.0)
         self.points: dict[str, Point] = {
-            name: ((x - left) * cell, (top - y) * cell) for name, (x, y) in points.items()
+            name: (x - left, top - y) for name, (x, y) in points.items()
         }
-        self.walls = _walls(points, links, cell)
+        self.walls = _walls(points, links)
         moves = (link.ends for link in world.links if link.moves)
         lengths = [math.dist(self.points[a], self.points[b]) for a, b in moves]
         self.longest, self.shortest = max(lengths, default=0.0), min(lengths, default=math.inf)
@@ -97,9 +96,7 @@ def _points(
     return found
 
 
-def _walls(
-    points: Mapping[str, Point], links: Sequence[tuple[str, str]], cell: float
-) -> tuple[Wall, ...]:
+def _walls(points: Mapping[str, Point], links: Sequence[tuple[str, str]]) -> tuple[Wall, ...]:
     """The sides of the cells of a grid that no link crosses; none where places are no cells."""
     cells = {point: name for name, point in points.items()}
     if any(value != int(value) for point in cells for value in point):
@@ -111,7 +108,7 @@ def _walls(
         ends = {begin + 2 for begin in begins}
         for begin, end in zip(sorted(begins - ends), sorted(ends - begins), strict=True):
             # Whole micrometres, so that equal lengths are equal numbers.
-            at, low, high = (round(half * cell / 2, 6) for half in (line, begin, end))
+            at, low, high = (round(half / 2, 6) for half in (line, begin, end))
             found.append((at, low, at, high) if is_upright else (low, at, high, at))
     return tuple(sorted(found))
 

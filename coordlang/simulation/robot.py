@@ -99,17 +99,15 @@ class OwnStep:
 class Robot:
     """One robot.
 
-    ``cell`` is the length of one unit of the coordinates of places, ``radius`` the robot's, in
-    metres.  It follows ``monitor``, its choices, and draws among them with ``random``.  ``points``
-    are the places in metres, ``leads`` the place that each own subaction leads to, if it leads
-    anywhere.  ``words`` says how far in the sentence own subactions may lead; None where no
-    sentence is agreed.
+    ``radius`` is its own, in metres.  It follows ``monitor``, its choices, and draws among them
+    with ``random``.  ``points`` are the places in metres, ``leads`` the place that each own
+    subaction leads to, if it leads anywhere.  ``words`` says how far in the sentence own subactions
+    may lead; None where no sentence is agreed.
     """
 
     def __init__(
         self,
         name: str,
-        cell: float,
         radius: float,
         points: Mapping[str, tuple[float, float]],
         leads: Mapping[str, str],
@@ -120,7 +118,7 @@ class Robot:
     ) -> None:
         self.name = name
         self.steps: list[OwnStep] = []
-        self._cell, self._radius, self._points, self._leads = cell, radius, points, leads
+        self._radius, self._points, self._leads = radius, points, leads
         self._monitor, self._pace = monitor, pace
         self._random, self._own_words, self._word_state = random, words, 0
         #: Own steps done, and words of the sentence passed at most, by its own account.
@@ -185,7 +183,7 @@ class Robot:
         if step.place is None:
             has_ended = self._pace.is_common or sensed.time >= step.begin + self._pace.period
         else:
-            has_ended = math.dist(sensed.pose[:2], self._points[step.place]) < _ARRIVED * self._cell
+            has_ended = math.dist(sensed.pose[:2], self._points[step.place]) < _ARRIVED
         if has_ended:
             self._finish(step, sensed.time)
         if has_ended or step.place is None:
@@ -282,7 +280,7 @@ class Robot:
             self._is_turning = False
         if sensed.ahead is None:
             return STANDING
-        room = (sensed.ahead - (self._radius + 0.03 * self._cell)) / _REACTION
+        room = (sensed.ahead - (self._radius + 0.03)) / _REACTION
         if room <= 0 and self._stopped_in != self.done:
             self._stopped_in = self.done
             self._events.append(("stopped", {}))

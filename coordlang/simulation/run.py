@@ -76,6 +76,7 @@ def record_of(
         makespan=mission.steps,
         period=period(floor.longest),
         interval=_INTERVAL * TICK,
+        cell=1.0,
         **asdict(settings),
         wishes=list(wishes),
         places={name: (round(x, 6), round(y, 6)) for name, (x, y) in sorted(floor.points.items())},
@@ -101,7 +102,6 @@ class _Going:
         self.robots = {
             name: Robot(
                 name,
-                settings.cell,
                 settings.radius,
                 floor.points,
                 mission.leads[name],

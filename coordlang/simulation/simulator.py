@@ -39,14 +39,13 @@ POSITION_NOISE = 0.1
 class Settings:
     """How robots are built and keep step.
 
-    ``cell`` is the length of a unit of coordinates of places, ``radius`` a robot's, in metres.
+    ``radius`` is a robot's, in metres, as coordinates of places are.
     ``step`` is one of `coordlang.simulation.pace.PACES`.  ``noise`` is the standard deviation of
     what wheels do, as a share of what they are told, drawn anew in each tick; a tenth of it, in
     metres and in radians, is that of where a robot believes to be.  ``lidar``: robots stop before
     what a lidar sees straight ahead.
     """
 
-    cell: float = 1.0
     radius: float = 0.2
     step: str = "clock"
     noise: float = 0.1
@@ -54,13 +53,6 @@ class Settings:
 
     def __post_init__(self) -> None:
         """Raise `UsageError` for what no robot can be built with."""
-        for name in ("cell", "radius"):
-            value = getattr(self, name)
-            if not 0 < value < math.inf:
-                raise UsageError(
-                    f"{name} {value:g}: expected a length above 0",
-                    remedy="Leave it out for the usual value.",
-                )
         if self.radius < SPEED * TICK:
             raise UsageError(
                 f"robots with a radius of {self.radius:g} m are too small: in a tick they drive "
@@ -155,7 +147,7 @@ def _world(floor: Floor, poses: Mapping[str, Pose], settings: Settings) -> dict[
     spread = settings.noise**2
     lidar = {
         "type": "lidar2d",
-        "range_max": 2 * settings.cell,
+        "range_max": 2,
         "angle_range": _ANGLE,
         "number": _BEAMS,
     }

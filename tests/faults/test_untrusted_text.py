@@ -169,7 +169,6 @@ choices SPOKEN SENTENCE --format text
 choices SPOKEN SENTENCE --format json
 choices SPOKEN SENTENCE --format dot
 choices SPOKEN SENTENCE --robot R1
-choices SPOKEN SENTENCE --check
 export SPOKEN SENTENCE
 export SPOKEN SENTENCE --json
 export SPOKEN SENTENCE --to ltlf

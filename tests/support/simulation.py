@@ -41,8 +41,8 @@ def mission_of(
     return Mission(used, agreement, words)
 
 
-def floor_for(of: Mission, settings: Settings | None = None) -> Floor:
-    return Floor(of.world, {}, (settings or Settings()).cell)
+def floor_for(of: Mission) -> Floor:
+    return Floor(of.world, {})
 
 
 def recorded(
@@ -50,7 +50,7 @@ def recorded(
 ) -> SimulationRecord:
     """Runs in a shipped problem's own task, as a record."""
     of = mission_of(folder, agreement=agreement)
-    floor = floor_for(of, settings)
+    floor = floor_for(of)
     return record_of(of, floor, settings, list(runs_of(of, floor, settings, number)))
 
 
@@ -64,5 +64,5 @@ def runs(
 ) -> list[RunRecord]:
     """Runs in a shipped problem's own task, of seeds one after the other."""
     of = mission_of(folder, agreement=agreement)
-    floor = floor_for(of, settings)
+    floor = floor_for(of)
     return list(runs_of(of, floor, settings, number, first, wishes))

@@ -143,7 +143,7 @@ def test_coordination_and_few_words_within_slack(shell: Shell) -> None:
         ("understand LANGUAGE SQUARE SENTENCE", 0, False),
         ("understand LANGUAGE SQUARE 'w0 w1 w0 w1 w0 w1 w0'", 1, True),
         ("plan LANGUAGE SQUARE SENTENCE", 0, False),
-        ("choices LANGUAGE SQUARE SENTENCE --check", 0, True),
+        ("choices LANGUAGE SQUARE SENTENCE", 0, False),
         ("explain LANGUAGE SQUARE", 0, True),
         ("explain LANGUAGE SQUARE --task", 0, True),
         ("verify LANGUAGE SQUARE", 0, False),

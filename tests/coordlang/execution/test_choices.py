@@ -216,11 +216,6 @@ def test_too_many_are_refused_with_an_estimate(monkeypatch: pytest.MonkeyPatch) 
         determinise(fits, 0, most=0)
     monkeypatch.setattr("coordlang.execution.mixtures.SMALL", 0)
     monkeypatch.setattr("coordlang.execution.mixtures.memory_left", lambda: 0)
-    with pytest.raises(
-        OutOfMemory, match=r"step 1 has \d+ combinations of what the robots may do"
-    ) as caught:
-        choices(task_language, words, most=None)
-    assert caught.value.exit_code == 22
     assert choices(task_language, words).mixtures is None
     assert choices(task_language, words).guaranteed
 

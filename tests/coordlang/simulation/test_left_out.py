@@ -96,14 +96,14 @@ T = world(("c0-1", "c1-0", "c1-1", "c1-2"), ("c0-1", "c1-1"), ("c1-0", "c1-1"), 
 
 
 def test_rows_go_down_and_metres_go_up() -> None:
-    floor = Floor(T, {}, 2.0)
-    assert floor.points == {"c0-1": (2, 2), "c1-0": (0, 0), "c1-1": (2, 0), "c1-2": (4, 0)}
-    assert (floor.shortest, floor.longest) == (2, 2)
+    floor = Floor(T, {})
+    assert floor.points == {"c0-1": (1, 1), "c1-0": (0, 0), "c1-1": (1, 0), "c1-2": (2, 0)}
+    assert (floor.shortest, floor.longest) == (1, 1)
 
 
 def test_walls_are_all_sides_that_no_link_crosses() -> None:
     """Of the four cells of the T-map 16 sides, less two for each of three links."""
-    floor = Floor(T, {}, 1.0)
+    floor = Floor(T, {})
     lengths = [abs(x2 - x1) + abs(y2 - y1) for x1, y1, x2, y2 in floor.walls]
     assert sum(lengths) == 16 - 2 * 3
     assert (-0.5, -0.5, 2.5, -0.5) in floor.walls, "the lower sides of three cells are one wall"
@@ -111,20 +111,20 @@ def test_walls_are_all_sides_that_no_link_crosses() -> None:
 
 def test_neighbours_without_a_link_have_a_wall_between_them() -> None:
     ring = world(("c0-0", "c0-1", "c1-0", "c1-1"), ("c0-0", "c0-1"), ("c1-0", "c1-1"))
-    assert (-0.5, 0.5, 1.5, 0.5) in Floor(ring, {}, 1.0).walls
+    assert (-0.5, 0.5, 1.5, 0.5) in Floor(ring, {}).walls
 
 
 def test_places_that_are_no_cells_have_no_walls() -> None:
     towns = world(("depot", "town"), ("depot", "town"))
-    floor = Floor(towns, {"depot": (0, 0), "town": (1.5, 2)}, 2.0)
-    assert floor.points == {"depot": (0, 4), "town": (3, 0)}
+    floor = Floor(towns, {"depot": (0, 0), "town": (1.5, 2)})
+    assert floor.points == {"depot": (0, 2), "town": (1.5, 0)}
     assert floor.walls == ()
 
 
 def test_places_without_coordinates_are_an_error() -> None:
     towns = world(("depot", "town"), ("depot", "town"))
     with pytest.raises(BadInput, match=r"not known: depot, town(.|\n)*--coordinates"):
-        Floor(towns, {}, 1.0)
+        Floor(towns, {})
 
 
 @pytest.mark.parametrize("folder", ["t-map", "corridor"])

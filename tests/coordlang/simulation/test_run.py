@@ -57,7 +57,7 @@ def nearest(found: RunRecord) -> float:
 
 def keeps_its_promises(of: Mission, settings: Settings, number: int) -> list[RunRecord]:
     """Nobody collides, waits in vain or comes late."""
-    runs = list(runs_of(of, floor_for(of, settings), settings, number))
+    runs = list(runs_of(of, floor_for(of), settings, number))
     for found in runs:
         assert (found.collisions, found.deadlock, found.late) == (0, False, 0)
         assert found.arrived
