@@ -101,6 +101,12 @@ def test_nothing_is_mentioned_that_does_not_exist(page: Path) -> None:
             assert words[1] in COMMANDS, inline
 
 
+def test_there_are_few_options() -> None:
+    """What is said in one way in one command is not said in another way in the next one."""
+    spelled = {each for name in COMMANDS for each in options(name) if each.startswith("--")}
+    assert len(spelled) <= 60
+
+
 def test_exit_codes() -> None:
     importlib.import_module("planners.classical.fast_downward")
     importlib.import_module("coordlang.commands.building")

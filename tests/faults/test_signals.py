@@ -52,7 +52,7 @@ sys.meta_path.insert(0, Finder)
 main()
 """
 #: Before the first line of `coordlang.__main__` it is Python that hears the signal.
-_MODULES = ("first", "click", "coordlang.commands.main", "msgspec", "numpy", "clingo")
+_MODULES = ("first", "click", "coordlang.commands.main", "numpy", "tarski", "clingo")
 
 
 @pytest.mark.parametrize("module", _MODULES)

@@ -137,7 +137,7 @@ def test_what_stands_behind_the_files_is_needed(name: str, files: str, shell: Sh
 
 def test_functions(loader: tuple[Path, Path, str, Path], tmp_path: Path) -> None:
     folder, language, sentence, plan = loader
-    assert door.choices(language, factored=folder, sentence=sentence, check=True).covered
+    assert door.choices(language, factored=folder, sentence=sentence).covered
     with pytest.raises(door.UsageError, match="--factored names all files"):
         door.say(language, "d.pddl", "p.pddl", plan, factored=folder)
     for call in (door.understand, door.choices, door.export):
