@@ -107,13 +107,14 @@ class _Command(click.Command):
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         model = {each.name for each in options_of(Source)}
         work = {"no_cache", *(each.name for kind in (Jobs, Limits) for each in options_of(kind))}
-        kinds = {"Most used": self.used, "Model": model - {*self.used}, "Work and limits": work}
-        sections: dict[str, list[tuple[str, str]]] = {"Most used": [], "Options": []}
+        kinds = {"Most used": self.used, "Model": model, "Work and limits": work}
+        titles = ("Most used", "Options", "Model", "Work and limits")
+        sections: dict[str, list[tuple[str, str]]] = {title: [] for title in titles}
         for param in self.get_params(ctx):
             kind = next((each for each, names in kinds.items() if param.name in names), "Options")
             row = param.get_help_record(ctx)
             if row is not None and isinstance(param, click.Option):
-                sections.setdefault(kind, []).append(row)
+                sections[kind].append(row)
         for title, rows in sections.items():
             if rows:
                 with formatter.section(title):

@@ -11,22 +11,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from os import PathLike, fspath
-from typing import (
-    TYPE_CHECKING,
-    Any,
-    ClassVar,
-    Literal,
-    NamedTuple,
-    TypeVar,
-    Union,
-    dataclass_transform,
-)
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Union, dataclass_transform
 
 import click
 
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import UsageError, note
-from planners.system.options import cli_option, group, option
+from planners.system.options import Record, cli_option, group, option
 
 if TYPE_CHECKING:
     from coordlang.language.listed import ListedTask
@@ -36,7 +27,6 @@ if TYPE_CHECKING:
     from planners.parallel.workers import Workers
     from planners.pddl.lifted import Problem
 
-Record = TypeVar("Record")
 File = str | PathLike[str]
 ProblemSource = Union[File, "Problem"]
 #: ``"all"``, a task file, its data, or tasks: each with ``init`` and ``goal``, lists of PDDL texts.
