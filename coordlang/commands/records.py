@@ -200,7 +200,7 @@ class Listing:
     """Which plans are listed: the first ``most`` ones, or ``sample`` drawn ones."""
 
     only_count: bool = cli_option(
-        False, "Print the number of plans only.", names="--count", without="most sample form=dot"
+        False, "Print the number of plans only.", names="--count", without="most sample"
     )
     most: int | None = cli_option(
         None,
@@ -208,14 +208,9 @@ class Listing:
         "N",
         names="--max",
         least=0,
-        without="form=dot",
     )
     sample: int | None = cli_option(
-        None,
-        "Draw N plans uniformly instead of the first ones.",
-        "N",
-        least=1,
-        without="most form=dot",
+        None, "Draw N plans uniformly instead of the first ones.", "N", least=1, without="most"
     )
     seed: int = cli_option(0, "Seed of --sample.", needs="sample")
 

@@ -30,8 +30,7 @@ class Option:
     ``names`` are its spellings (none: ``--`` and the field's name), ``least`` is the smallest
     number.  It can be given in one place ``only``.  It ``is_output`` where it names a file that is
     written, or a folder, in which ``files`` are.  It ``needs`` another option, or one with one of
-    some values, and excludes those ``without`` which it must be given, or one value of them
-    (``name=value``).
+    some values, and excludes those ``without`` which it must be given.
     """
 
     help: str
@@ -165,11 +164,9 @@ def _refuse_contradictions(known: Mapping[str, Option], values: Mapping[str, obj
     """Raise `UsageError` for an option beside one that it excludes, or without what it needs."""
     given = [known[n] for n, value in values.items() if value is not False and value != ()]
     for each, other in product(given, repeat=2):
-        exact = f"{other.name}={values[other.name]}"
-        if other.name in each.without or exact in each.without:
-            of = f" {values[other.name]}" if exact in each.without else ""
+        if other.name in each.without:
             raise UsageError(
-                f"{each.spelling} and {other.spelling}{of} exclude each other",
+                f"{each.spelling} and {other.spelling} exclude each other",
                 remedy="Give one of them.",
             )
     for each in given:
