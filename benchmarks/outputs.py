@@ -105,7 +105,6 @@ COMMANDS = {
         plan @one.json D problem.pddl --prefer shortest --prefer "avoid:(at r1 c)"
         choices @one.json D problem.pddl "w1 w0"
         choices @one.json D problem.pddl "w1 w0" --format json -o @choices.json
-        choices @one.json D problem.pddl "w1 w0" --format dot
         choices @one.json D problem.pddl "w1 w0" --robot r2 --json
         export @one.json D problem.pddl "w1 w0"
         export @one.json D problem.pddl "w1 w0" --json

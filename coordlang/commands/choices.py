@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import reduce
+from operator import and_
 from os import fspath
 from typing import Any
 
@@ -18,7 +20,6 @@ from coordlang.commands.terminal import REFUTED, covered_code, echo, line_width,
 from coordlang.commands.witness import witness_text
 from coordlang.execution import choices as execution
 from coordlang.execution.choices import RobotChoices, SentenceChoices, to_bytes
-from coordlang.execution.drawing import choices_dot, distinguishing
 from coordlang.execution.monitor import Monitor
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import describe
@@ -128,8 +129,6 @@ def show_choices(found: RobotsChoices, options: ChoicesOptions) -> int:
     """Print or write the choices."""
     if options.form == "text":
         text = _text(found, line_width())
-    elif options.form == "dot":
-        text = choices_dot(found.found, found.chosen)
     else:
         text = to_bytes(found.found, found.chosen).decode()
     write(text, options.output)
@@ -184,7 +183,7 @@ def _table(found: RobotsChoices, own: RobotChoices, width: int) -> list[str]:
     for step, layer in enumerate(automaton.layers[:-1], 1):
         if layer.start >= STATES_SHOWN:
             break
-        for state, atoms in zip(layer, distinguishing(found.found, own, layer), strict=True):
+        for state, atoms in zip(layer, _distinguishing(found.used, own, layer), strict=True):
             moves = [
                 f"{model.label_text(own.robot, label) or nothing} -> {to}"
                 for label, to in automaton.moves[state].items()
@@ -201,3 +200,17 @@ def _table(found: RobotsChoices, own: RobotChoices, width: int) -> list[str]:
     if rest > 0:
         lines.append(f"  .. and {counted(rest, 'state')} more; --format json has all of them")
     return lines
+
+
+def _distinguishing(used: TaskLanguage, own: RobotChoices, states: range) -> list[list[str]]:
+    """For each state of one step the atoms known to be true there, but not in all of them."""
+    known = own.automaton.known[states.start : states.stop]
+    everywhere = reduce(and_, (knowledge.true for knowledge in known))
+    return [
+        [
+            text
+            for bit, text in enumerate(used.model.codec.facts.texts)
+            if (knowledge.true & ~everywhere) >> bit & 1
+        ]
+        for knowledge in known
+    ]

@@ -446,7 +446,7 @@ class ChoicesOptions(
     """
 
     robot: str | Sequence[str] = option((), "Whose choices; may be repeated (default: all).", "R")
-    form: Literal["text", "json", "dot"] = form_option("text", "How they are shown.")
+    form: Literal["text", "json"] = form_option("text", "How they are shown.")
     output: str | None = output_option("Write to this file instead of stdout.")
 
 

@@ -255,7 +255,7 @@ SAMPLE = "--sample and --max exclude each other"
         (f"{PLANS} --seed 0", "--seed belongs to --sample"),
         (f"{UNDERSTAND} --seed 1", "--seed belongs to --sample"),
         (f"{PLANS} --format ipc --json", "leave out --format ipc"),
-        (f"{CHOICES} --format dot --json", "leave out --format dot"),
+        (f"{CHOICES} --format text --json", "leave out --format text"),
         ("export l d p w0 --to ltlf --for fd", "--for fd belongs to --to pddl"),
         (f"{PLANS} --robots r1 --robot-type robot", "give one of them"),
         (f"{BUILD} -o l --prefer flexible --method greedy", "--prefer flexible belongs to --metho"),
