@@ -12,7 +12,7 @@ import numpy as np
 from planners.grounding.actions import GroundAction
 from planners.joint.conditions import Evaluator, Labels, Operators, speaks_of_step
 from planners.joint.interference import Choices, compatible, conflict
-from planners.joint.model import Options, Stepper, Steps
+from planners.joint.model import Options, Stepper, Steps, products
 from planners.joint.states import StateCodec
 from planners.joint.tables import Bools, Ints, Numbers, Rows, ranges, spans
 from planners.pddl.formula_tree import conjuncts, formula_text, joined, signed, substituted
@@ -75,11 +75,8 @@ class ComposingStepper(Stepper):
     def _pieces(self, rows: Rows, options: Options | None) -> Iterator[tuple[Ints, Labels]]:
         """At least one piece."""
         chosen = self.choices(rows) if options is None else options
-        sizes = np.ones(len(rows))
-        for first, _ in chosen:
-            sizes *= np.diff(first)
         waits = [own.waits(rows, *its) for own, its in zip(self._robot, chosen, strict=True)]
-        for span in list(spans(sizes, self.piece)) or [slice(0, 0)]:
+        for span in list(spans(products(chosen), self.piece)) or [slice(0, 0)]:
             yield self._compose(rows, chosen, waits, span)
 
     def choices(self, rows: Rows) -> Options:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planners.grounding.actions import GroundAction, Impossible
 from planners.joint.conditions import Evaluator, Labels
@@ -34,6 +35,14 @@ IDLE = "idle"
 SLACK_LEFT = "slack-left"
 #: A state in which nothing is true, for people; its key is empty.
 NO_FACT = "(no fact holds)"
+
+
+def products(options: Options) -> NDArray[np.float64]:
+    """How many combinations the robots' options have, by state."""
+    counts = np.ones(len(options[0][0]) - 1)
+    for first, _ in options:
+        counts *= np.diff(first)
+    return counts
 
 
 @dataclass(frozen=True, slots=True)

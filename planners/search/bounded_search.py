@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planners.joint.model import JointModel, Options, PlanningTask
+from planners.joint.model import JointModel, Options, PlanningTask, products
 from planners.joint.tables import Ints, Rows
 from planners.search.goals import FAR, searched
 from planners.search.heuristics import Heuristic
@@ -224,17 +224,19 @@ class BoundedSearch(Exploration):
     def _within_bound(self, depth: int) -> tuple[Edges, int]:
         """The joint steps into a layer, and the least bound that was too large."""
         parts: list[Edges] = []
-        beyond = FAR
+        beyond, looked_at = FAR, 0
 
         def only(rows: Rows, options: Options) -> Options:
             """Leave out choices after which too few steps are left."""
-            nonlocal beyond
+            nonlocal beyond, looked_at
             if self._limited and (
-                self.composed > self._probe or _combinations(options) > _TOO_MANY * self._probe
+                self.composed > self._probe or products(options).sum() > _TOO_MANY * self._probe
             ):
                 raise _GrownError
             if self.exact is not None:
-                options = self.exact.only(depth - 1, options)
+                states = self.layers[-1][looked_at : looked_at + len(rows)]
+                options = self.exact.only(depth - 1, states, options)
+            looked_at += len(rows)
             options, low = self._heuristic.in_time(rows, options, self.bound - depth)
             beyond = min(beyond, low + depth)
             return options
@@ -260,11 +262,3 @@ class BoundedSearch(Exploration):
         self._h, self._depth = grown(self._h, size, 0), grown(self._depth, size, _NEVER)
         if self._heuristic.value:
             self._h[before:size] = self._heuristic.value(self.table.rows(np.arange(before, size)))
-
-
-def _combinations(options: Options) -> float:
-    """How many joint labels the robots' own choices have, in all states."""
-    counts = np.ones(len(options[0][0]) - 1)
-    for first, _ in options:
-        counts *= np.diff(first)
-    return float(counts.sum())

@@ -13,13 +13,13 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, suppress
-from itertools import count, product
+from itertools import product
 
 import numpy as np
 
 from planners.joint.composition import ComposingStepper
 from planners.joint.conditions import Labels
-from planners.joint.model import JointModel, Options, PlanningTask
+from planners.joint.model import JointModel, Options, PlanningTask, products
 from planners.joint.tables import Bools, Ints, kept_runs
 from planners.search.goals import SMALLER, goal_facts
 from planners.search.plan_formula import PlanFormula, TooManyClauses
@@ -28,8 +28,8 @@ from planners.search.reachable import Edges, PieceSizes, grown
 from planners.search.state_variables import StateVariable
 from planners.system.limits import reaching
 
-#: What each step of a refuted makespan costs in conflicts, besides its clauses, however easy it is:
-#: of a task without plan there would be ever more.
+#: What a refuted makespan costs in conflicts, besides the clauses of a step, however easy it is: of
+#: a task without plan there would be ever more.
 _EASY = 100
 #: Conflicts for the least second component; without it more is searched.
 _LEAST_COST = 300_000
@@ -44,25 +44,48 @@ class ExactBound:
     """The least makespan of one task, and what its optimal plans consist of.
 
     ``plans`` are what they satisfy, to be closed by whoever asked for the bound; ``used[k][robot]``
-    (labels) says which labels occur in step k of some optimal plan; a state is kept where
-    ``effort`` conflicts do not answer its question.
+    (labels) says which labels occur in step k of some optimal plan; a state is kept where the
+    conflicts that ``pieces`` allow do not answer its question.
 
     Of each state that a search has met a cheapest way is kept as its last step: what the way costs,
     the state before, and what the robots do there.
     """
 
-    def __init__(self, plans: FixedPlans, used: list[list[Bools]], effort: int) -> None:
-        self.plans, self.makespan, self._used, self._effort = plans, plans.steps, used, effort
+    def __init__(self, plans: FixedPlans, used: list[list[Bools]], pieces: PieceSizes) -> None:
+        self.plans, self.makespan, self._used, self._pieces = plans, plans.steps, used, pieces
         self._paid: Ints = np.zeros(0, np.int64)
         self._source: Ints = np.zeros(0, np.int64)
         self._labels: Labels = np.zeros((0, plans.first.shape[1]), np.int32)
 
-    def only(self, depth: int, options: Options) -> Options:
-        """The robots' options in states after ``depth`` steps, without labels that are not used."""
-        return [
-            (kept_runs(first, used[label]), label[used[label]])
-            for (first, label), used in zip(options, self._used[depth], strict=True)
-        ]
+    def only(self, depth: int, states: Ints, options: Options) -> Options:
+        """The robots' options in states after ``depth`` steps, without labels that are not used.
+
+        Where many combinations are left, those go, too, that cannot follow a cheapest way to the
+        state, as far as unit propagation sees it.
+        """
+        options = _only(
+            options, [u[own] for u, (_, own) in zip(self._used[depth], options, strict=True)]
+        )
+        many = np.flatnonzero(products(options) > self._pieces.joint_labels)
+        kept = [np.ones(len(label), np.bool_) for _, label in options]
+        false = np.zeros(self.plans.variables + 1, np.bool_)
+        for state, way in zip(
+            many.tolist(), self._asked(self._ways(states[many], depth)), strict=True
+        ):
+            excluded = self.plans.excluded(way.tolist())
+            false[excluded] = True
+            for (first, label), good, begin in zip(
+                options, kept, self.plans.first[depth], strict=True
+            ):
+                own = slice(first[state], first[state + 1])
+                good[own] = ~false[begin + label[own]]
+            false[excluded] = False
+        return _only(options, kept)
+
+    def _asked(self, ways: Labels) -> Ints:
+        """The literals of beginnings of plans: (ways, steps x robots)."""
+        asked = ways + self.plans.first[: ways.shape[1]]
+        return asked.reshape(len(ways), ways.shape[1] * ways.shape[2])
 
     def left_out(self, edges: Edges, depth: int, states: int) -> Ints:
         """States of the layer that ``edges`` lead to through which no optimal plan passes.
@@ -85,7 +108,7 @@ class ExactBound:
         Those that no earlier answer refuted are asked for in a random order; where more than the
         share ``enough`` of the last ones pass, the others are taken to pass, too.
         """
-        asked = (ways + self.plans.first[: ways.shape[1]]).reshape(len(ways), -1)
+        asked = self._asked(ways)
         columns = np.ascontiguousarray(asked.T)
         passes = np.ones(len(ways), np.bool_)
         recent: deque[bool] = deque(maxlen=_RECENT)
@@ -107,7 +130,7 @@ class ExactBound:
 
     def _unless_refuted(self, literals: Literals) -> bool:
         try:
-            with self.plans.at_most(self._effort):
+            with self.plans.at_most(self._pieces.question):
                 return self.plans.holds(literals)
         except OutOfEffort:
             return True
@@ -133,6 +156,14 @@ class ExactBound:
         return found
 
 
+def _only(options: Options, kept: Sequence[Bools]) -> Options:
+    """Some of the options."""
+    return [
+        (kept_runs(first, good), label[good])
+        for (first, label), good in zip(options, kept, strict=True)
+    ]
+
+
 def exact_bound(
     model: JointModel,
     task: PlanningTask,
@@ -147,7 +178,7 @@ def exact_bound(
     """
     try:
         formula = PlanFormula(model, task, variables)
-        plans = _shortest(formula, task, at_least, pieces.effort)
+        plans = _shortest(formula, at_least, pieces.effort)
     except (TooManyClauses, OutOfEffort):
         return None
     try:
@@ -162,24 +193,25 @@ def exact_bound(
             plans.without_limit()
             used = _used(plans, model, plan, pieces.question)
             plans.simplify()
-            return ExactBound(plans, used, pieces.question)
+            return ExactBound(plans, used, pieces)
     except BaseException:
         plans.close()
         raise
 
 
-def _shortest(formula: PlanFormula, task: PlanningTask, at_least: int, effort: int) -> FixedPlans:
+def _shortest(formula: PlanFormula, at_least: int, effort: int) -> FixedPlans:
     """The shortest plans, one of which was found."""
-    for makespan in count(at_least):
-        plans = formula.plans(task.init, makespan, effort)
-        with ExitStack() as ended, reaching(plans.so_far, SMALLER):
-            ended.callback(plans.close)
-            if plans.holds():
+    plans = formula.plans(effort)
+    with ExitStack() as ended, reaching(plans.so_far, SMALLER):
+        ended.callback(plans.close)
+        while True:
+            begins = formula.lengthen(plans)
+            if plans.steps >= at_least and plans.holds([begins]):
+                plans.require([begins])
                 ended.pop_all()
-                break
-            plans.spend(makespan * (_EASY + len(formula.step)))
-        effort = plans.left
-    return plans
+                return plans
+            plans.require([-begins])
+            plans.spend(_EASY + len(formula.step))
 
 
 def _used(plans: FixedPlans, model: JointModel, plan: Plan, effort: int) -> list[list[Bools]]:

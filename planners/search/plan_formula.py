@@ -44,7 +44,8 @@ class PlanFormula:
 
     Variable k (from 1) of a step is fact k - 1, true in the state before it, then come labels,
     robot by robot, then helping variables; ``size`` is how many there are.  ``size + k`` is
-    variable k of the next step.  States have one value of each of the state variables.
+    variable k of the next step.  States have one value of each of the state variables.  The last
+    variable implies that the task begins in the state before the step.
 
     Raises `TooManyClauses`.
     """
@@ -74,27 +75,27 @@ class PlanFormula:
         for i, j in combinations(range(len(model.robots)), 2):
             self._apart(i, j)
         self._never_together(variables, task.init)
+        begins, true = self._fresh(), set(model.codec.true_facts(task.init))
+        for fact in range(facts):
+            self.step.append((-begins, fact + 1 if fact in true else -(fact + 1)))
         self._facts_follow()
         self._flat_step, self._goal = _flat(self.step), _flat(self._goal_clauses(task.goal))
 
-    def plans(self, row: Rows, steps: int, effort: int) -> FixedPlans:
-        """The plans of so many steps from a state to the goal, as a formula to be closed.
+    def plans(self, effort: int) -> FixedPlans:
+        """The plans of no step, that is, the goal, as a formula to be closed."""
+        return FixedPlans(self._goal, [len(own) for own in self._model.labels], effort)
 
-        Variables are numbered from the goal back: solvers take far longer the other way round.
+    def lengthen(self, plans: FixedPlans) -> int:
+        """Add a step before the others; the literal that says that the task begins there.
+
+        What a solver has learned of the way to the goal stays true of longer plans.
         """
-        before = self.size * np.arange(steps, 0, -1)[:, None]
+        before = self.size * (plans.steps + 1)
         number = np.abs(self._flat_step)
         number[number > self.size] -= 2 * self.size
-        facts = np.full(len(self._model.codec.facts), -1)
-        facts[self._model.codec.true_facts(row)] = 1
-        begin = (1 + self.size * steps + np.arange(len(facts))) * facts
-        clauses = (
-            self._goal,
-            (np.sign(self._flat_step) * (number + before)).reshape(-1),
-            np.column_stack((begin, np.zeros_like(begin))).reshape(-1),
-        )
-        sizes = [len(own) for own in self._model.labels]
-        return FixedPlans(np.concatenate(clauses), before + self._first_label, sizes, effort)
+        step = np.sign(self._flat_step) * (number + before)
+        plans.put_before(step, before + np.array(self._first_label))
+        return before + self.size
 
     def _fresh(self) -> int:
         self.size += 1

@@ -37,17 +37,23 @@ class OutOfEffort(Exception):
 
 
 class FixedPlans:
-    """Which sequences of labels are plans of a task with a fixed number of steps, as clauses.
+    """Which sequences of labels are plans of a task with a number of steps, as clauses.
 
     Each clause is followed by 0.  ``first`` is per step and robot the variable of its first label,
     in the formula as it is now; as many others follow as ``sizes`` says for the robot.  Of the
     effort, in conflicts of the solver, so much is ``left`` after so many ``calls``.
     """
 
-    def __init__(self, clauses: Ints, first: Ints, sizes: Sequence[int], effort: int) -> None:
-        self.first, self.steps, self._sizes = first, len(first), sizes
+    def __init__(self, clauses: Ints, sizes: Sequence[int], effort: int) -> None:
+        self.first: Ints = np.zeros((0, len(sizes)), np.int64)
+        self._sizes = sizes
         self.left, self.calls = effort, 0
         self._take(clauses)
+
+    @property
+    def steps(self) -> int:
+        """How many steps the plans have."""
+        return len(self.first)
 
     def _take(self, clauses: Ints) -> None:
         """Let this be the formula, in a solver of its own."""
@@ -86,6 +92,14 @@ class FixedPlans:
         )
 
     # ---- the formula
+
+    def put_before(self, clauses: Ints, first: Ints) -> None:
+        """Let the plans have one more step before the others, with its robots' first labels."""
+        self.first = np.vstack((first, self.first))
+        self.variables = max(self.variables, int(np.abs(clauses).max()))
+        self.clauses.frombytes(np.asarray(clauses, np.intc).tobytes())
+        for clause in split_clauses(clauses):
+            self._solver.add_clause(clause)
 
     def label(self, step: int, robot: int, label: int) -> int:
         """The variable of a robot's label in a step, from 0."""
@@ -145,6 +159,17 @@ class FixedPlans:
             if answer is not None:
                 return answer
             self.spend(effort)
+
+    def excluded(self, literals: Sequence[int]) -> Ints:
+        """Variables that are false where these literals hold, as far as unit propagation sees it.
+
+        All of them, where the literals cannot hold.
+        """
+        holds, implied = self._solver.propagate(list(literals))
+        if not holds:
+            return np.arange(1, self.variables + 1)
+        found = np.array(implied, np.int64)
+        return -found[found < 0]
 
     def labels_chosen(self) -> Plan:
         """The robots' labels in the plan that the last answer found."""

@@ -51,6 +51,8 @@ class PieceSizes:
     #: plans do.
     effort: int = 5_000_000
     question: int = 20_000
+    #: Joint labels of a state beyond which it is asked which robots' labels may go on there.
+    joint_labels: int = 64
 
 
 PIECES = PieceSizes()

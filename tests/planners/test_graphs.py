@@ -120,13 +120,15 @@ def test_variables_that_are_not_kept_go() -> None:
 def test_clauses_that_are_added_at_once_say_the_same_as_one_by_one(
     clauses: list[list[int]],
 ) -> None:
-    first = np.ones((1, 1), np.int64)
     none, every = (np.array(own, np.int64) for own in ((), flat(clauses)))
     with (
-        closing(FixedPlans(none, first, [VARIABLES], 100)) as one,
-        closing(FixedPlans(every, first, [VARIABLES], 100)) as many,
+        closing(FixedPlans(none, [VARIABLES], 100)) as one,
+        closing(FixedPlans(every, [VARIABLES], 100)) as many,
+        closing(FixedPlans(none, [VARIABLES], 100)) as before,
     ):
         for clause in clauses:
             one.add(clause)
-        assert many.clauses == one.clauses
-        assert many.holds() == one.holds() == bool(kept_values(clauses, []))
+        before.put_before(every, np.array([1]))
+        assert many.clauses == one.clauses == before.clauses
+        holds = many.holds()
+        assert holds == one.holds() == before.holds() == bool(kept_values(clauses, []))

@@ -32,9 +32,9 @@ from tests.support.texts import model_of
 PIECE_SIZES = (
     PIECES,
     replace(PIECES, probe=0, effort=3_000),
-    replace(PIECES, probe=0, effort=100_000, states=3),
+    replace(PIECES, probe=0, effort=100_000, states=3, joint_labels=0),
     replace(PIECES, states=2, steps=5),
-    replace(PIECES, probe=0, effort=100_000, question=0),
+    replace(PIECES, probe=0, effort=100_000, question=0, joint_labels=0),
     replace(PIECES, probe=0, effort=300, question=0),
 )
 ASKING = [pieces for pieces in PIECE_SIZES if pieces.probe == 0]
