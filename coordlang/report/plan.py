@@ -122,7 +122,7 @@ def _crosses(box: _Box, start: Point, end: Point) -> bool:
 def drawn_plan(data: Mapping[str, Any], heat: Heat | None) -> dict[str, Any]:
     """The floor plan of a page, and what it shows: ``spoken``, the words, and ``heat``.
 
-    None for words that are shown as small maps or on no map, and for a heat that there is not.
+    None for words that are shown as small maps or on no map, and where no robot is torn.
     """
     names = [place["name"] for place in data["places"]]
     plan = None
@@ -133,7 +133,7 @@ def drawn_plan(data: Mapping[str, Any], heat: Heat | None) -> dict[str, Any]:
         "plan": plan,
         "names": names,
         "spoken": plan and _spoken(data, names, plan),
-        "heat": plan and heat and heat.found and heat_map(heat, names, plan.links),
+        "heat": plan and heat and heat.most and heat_map(heat, names, plan.links),
     }
 
 

@@ -9,8 +9,8 @@ from random import Random
 
 import pytest
 
-from coordlang.report.heat import Heat, heat_of
-from coordlang.report.plan import WIDTH, floor_plan
+from coordlang.report.heat import Heat, counted_heat, heat_of
+from coordlang.report.plan import WIDTH, drawn_plan, floor_plan
 from coordlang.report.shown import select_tasks
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import Position
@@ -89,3 +89,13 @@ def test_heat_is_that_of_the_definition(domain: str, problem: str) -> None:
     assert found is not None
     assert found == by_definition(list(candidates.spaces))
     assert found.most > 0
+
+
+def test_no_heat_is_drawn_where_no_robot_is_torn() -> None:
+    """In ``domains/vans`` the driver sits in one of two vans: the plans part, and no robot does."""
+    places = [{"name": name, "x": x, "y": 0} for x, name in enumerate("ab")]
+    data = {"places": places, "links": [(0, 1)], "pair": None}
+    still = counted_heat([({"r1": "a"}, [{}, {}])], 1, every=True)
+    assert (still.found, drawn_plan(data, still)["heat"]) == (1, 0)
+    torn = counted_heat([({"r1": "a"}, [{"r1": "a"}, {"r1": "b"}])], 1, every=True)
+    assert drawn_plan(data, torn)["heat"]["top"] == "a (1) and a – b (1)"
