@@ -135,7 +135,7 @@ def read_source(app: Sphinx, docname: str, source: list[str]) -> None:
     above = "../" * (docname.count("/") + 1)
     text = re.sub(rf"\[([^\]]+)\]\({re.escape(above)}[^)]+\)", r"\1", source[0])
     if docname == "index":
-        text += toctree([*re.findall(r"\]\(([\w-]+)\.md\)", text), "api/index"], "Pages")
+        text += toctree([*re.findall(r"\]\(([\w/-]+)\.md\)", text), "api/index"], "Pages")
     elif docname == "api/index":
         text = text.replace("<!-- public names -->", "\n".join(public_names()))
         text += toctree([f"rooms/{room.replace('/', '.')}" for room in ROOMS], "Rooms")

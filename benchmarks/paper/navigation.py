@@ -86,26 +86,25 @@ def section(records: Sequence[Record]) -> Section:
 
 _DEFINITION = """\
 Two robots start in random corners: storage S1 and S2 (left), dispatch D1 and D2 (right). Robot i
-goes to Si and then to Di, or the other way round. Once they have agreed, a human appears in a
+goes to Si and then to Di, or the other way round. Once the robots have agreed, a human appears in a
 random cell that is no corner. An agreed *plan* fails if a robot would enter that cell, its
 *sentence* if some robot has no choice of its own that avoids it. Cells: successes, percent of all
-cases; with a 95 % interval (Wilson): of 10,000 runs. *Possible*: if the robots may agree again. Our
-maps are full rectangles (*open*) or their border (*ring*). *Across*: D1 is opposite S1; *along*: on
-the same side."""
+cases; with a 95 % interval (Wilson): of 10,000 runs. Our maps are full rectangles (*open*) or their
+border (*ring*). *Across*: D1 is opposite S1; *along*: on the same side."""
 
 
 def _table(by_layout: Mapping[str, Sequence[Record]]) -> str:
     cells: dict[str, dict[str, list[object]]] = {}
     for layout, records in by_layout.items():
         for record in records:
+            if record.parameters["method"] == "separating":
+                continue  # the page compares most words with fewest
             name = f"{record.parameters['warehouse']}, {method_of(record)}"
-            rates = (_exact(what, record) for what in ("plan", "sentence", "possible"))
+            rates = (_exact(what, record) for what in ("plan", "sentence"))
             cells.setdefault(name, {})[layout] = [record.result["words"], *rates]
-    heads = (
-        f"{n}: {what}" for n in by_layout for what in ("words", "plan", "sentence", "possible")
-    )
+    heads = (f"{n}: {what}" for n in by_layout for what in ("words", "plan", "sentence"))
     rows = [
-        [name, *(cell for layout in by_layout for cell in of.get(layout, [None] * 4))]
+        [name, *(cell for layout in by_layout for cell in of.get(layout, [None] * 3))]
         for name, of in cells.items()
     ]
     return markdown(("map, language", *heads), rows)

@@ -117,7 +117,9 @@ def section(records: Sequence[Record]) -> Section:
     mine = [record for record in records if record.parameters["world"] == row]
     blocks = [
         _DEFINITION.format(row=row, ratio=PLANNING_RATIO),
-        table("search", name, _COLUMNS, mine),
+        table(
+            "search", name, _COLUMNS, [r for r in mine if r.parameters["heuristic"] != "relaxed"]
+        ),
     ]
     columns = elsewhere({r"A\*": _COLUMNS["times fewer"]}, others)
     of = {(r.parameters["heuristic"], r.parameters["method"]): r.result for r in mine}

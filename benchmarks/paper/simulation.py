@@ -137,7 +137,7 @@ def section(records: Sequence[Record]) -> Section:
     floors = [record for record in found if "floor" in record.parameters]
     blocks = [_DEFINITION]
     if floors:
-        blocks += [_FLOORS, _sums(floors), _floor_table(floors), _computed(floors)]
+        blocks += [_FLOORS, _sums(floors), _computed(floors)]
     blocks += [_detour_text(record) for record in found if "detour" in record.parameters]
     blocks += [
         f"Not run: {record.key}, for want of {record.result['absent']}."
@@ -161,22 +161,6 @@ uniformly. *Nothing*: each robot follows an optimal plan of its own. *Messages* 
 at 0.4 m. *Joint model*: runs in which the robots' subplans, done in step, are an optimal plan.
 *Agree*: runs that end well exactly if they are. The simulator does not see the doors of *handover*:
 its runs with nothing agreed are no evidence."""
-
-
-def _floor_table(floors: Sequence[Record]) -> str:
-    """The runs that ended well on each floor."""
-    ways = [(agreement, way) for agreement, ways in _DRIVEN.items() for way in ways]
-    rows = [
-        [
-            record.parameters["floor"].removesuffix(" robots"),
-            record.result["words"],
-            *(record.result[agreement][way]["well"] for agreement, way in ways),
-        ]
-        for record in floors
-    ]
-    runs = floors[0].parameters["runs"]
-    heads = (f"{agreement}, {way}" for agreement, way in ways)
-    return markdown((f"well of {runs}: floor, robots", "words", *heads), rows)
 
 
 def _computed(floors: Sequence[Record]) -> str:

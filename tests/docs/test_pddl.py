@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/pddl.md and docs/concepts.md: what is not supported, dialects, examples in words, names."""
+"""docs/pddl.md and docs/concepts: what is not supported, dialects, examples in words, names."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from tests.support.pages import DOCS, blocks, code, links, prose, rows, sections
 from tests.support.texts import model_of
 
 PAGE = DOCS / "pddl.md"
+CONCEPTS = DOCS / "concepts"
 REFUSED = rows(sections(PAGE)["What is not supported"])
 
 
@@ -84,7 +85,7 @@ def test_each_example_domain_is_of_its_dialect() -> None:
     }
 
 
-# ---- examples that docs/concepts.md gives in words
+# ---- examples that docs/concepts/coordination.md gives in words
 
 
 def joint_space(actions: list[tuple[str, str, str]], robots: int, goal: str) -> PlanSpace:
@@ -143,7 +144,7 @@ def test_failing_after_the_plans_have_met() -> None:
 
 def test_names_of_the_table_exist() -> None:
     """Every name of code in the table of the paper's symbols can be imported."""
-    table = rows(sections(DOCS / "concepts.md")["Symbols and names"])
+    table = rows(sections(CONCEPTS / "definitions.md")["Symbols and names"])
     names = [name for cells in table for name in code(cells[-1]) if "." in name]
     assert len(names) >= len(table)
     for name in names:
@@ -151,7 +152,7 @@ def test_names_of_the_table_exist() -> None:
 
 
 def test_propositions_that_docstrings_cite_are_there() -> None:
-    page = prose(DOCS / "concepts.md")
+    page = "\n".join(map(prose, sorted(CONCEPTS.glob("*.md"))))
     stated = re.findall(r"(?m)^(?:- \*[^*]+\* )?\*\*Proposition (\d+)\.?\*\*", page)
     real = {*map(int, stated)}
     paths = [path for name in ("planners", "coordlang") for path in (ROOT / name).rglob("*.py")]

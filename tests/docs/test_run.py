@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -40,7 +41,7 @@ def test_matches(shown: str, real: str, same: bool) -> None:
 
 
 #: Pages of many commands, which take a while.
-LONG = ("asynchronous", "cli", "library", "lifted", "simulation")
+LONG = ("asynchronous", "cli", "gallery", "library", "lifted", "simulation")
 
 
 @pytest.mark.parametrize(
@@ -76,7 +77,7 @@ def test_there_is_something_to_run() -> None:
     kinds = {page.name: {block.kind for block in blocks(page)} for page in PAGES}
     for name in ("tutorial.md", "formats.md"):
         assert {"python", "output", "console"} <= kinds[name]
-    assert {"python", "output"} <= kinds["concepts.md"]
+    assert {"python", "output"} <= kinds["words.md"]
     assert "console" in kinds["cli.md"] & kinds["README.md"]
 
 
@@ -101,6 +102,26 @@ def test_example(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         line += cell.count("\n")
     imported = set(re.findall(r"(?m)^ *(?:import|from) ((?:coordlang|planners)[\w.]*)", text))
     assert imported == {"coordlang"}
+
+
+NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_notebook(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The code cells run in order; the file holds none of their outputs."""
+    (tmp_path / "domains").symlink_to(ROOT / "domains")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    namespace: dict[str, Any] = {"__name__": "__notebook__"}
+    cells = [c for c in json.loads(path.read_text())["cells"] if c["cell_type"] == "code"]
+    assert len(cells) > 3
+    for number, cell in enumerate(cells):
+        assert cell["outputs"] == []
+        exec(compile("".join(cell["source"]), f"{path.name}[{number}]", "exec"), namespace)
+    plots = namespace["plt"]
+    assert plots.get_fignums()
+    plots.close("all")
 
 
 SCRIPT = ROOT / "docs" / "examples" / "check_certificate.sh"

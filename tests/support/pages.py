@@ -26,6 +26,7 @@ DOCS = ROOT / "docs"
 PAGES = (
     *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")),
     *sorted(DOCS.glob("*.md")),
+    *sorted((DOCS / "concepts").glob("*.md")),
 )
 
 #: A line of a console block that stands for any number of lines; at the end of a line, for the rest
