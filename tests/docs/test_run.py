@@ -81,47 +81,40 @@ def test_there_is_something_to_run() -> None:
     assert "console" in kinds["cli.md"] & kinds["README.md"]
 
 
-EXAMPLES = sorted((ROOT / "docs" / "examples").glob("*.py"))
+EXAMPLES = [*(DOCS / "examples").glob("*.py"), *(DOCS / "notebooks").glob("*.ipynb")]
 #: It registers an engine, which has no function of its own.
 DEEPER = {"unified_planning_example"}
 
 
+def cells_of(path: Path) -> list[str]:
+    """The cells of a script, or the code cells of a notebook, which holds none of their outputs."""
+    if path.suffix == ".py":
+        return re.split(r"^(?=# %% )", path.read_text(), flags=re.MULTILINE)
+    cells = [c for c in json.loads(path.read_text())["cells"] if c["cell_type"] == "code"]
+    assert all(cell["outputs"] == [] for cell in cells)
+    return ["".join(cell["source"]) + "\n" for cell in cells]
+
+
 @pytest.mark.parametrize(
-    "path", [e for e in EXAMPLES if e.stem not in DEEPER], ids=lambda path: path.stem
+    "path", sorted(e for e in EXAMPLES if e.stem not in DEEPER), ids=lambda path: path.stem
 )
 def test_example(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "domains").symlink_to(ROOT / "domains")
     monkeypatch.chdir(tmp_path)
-    text = path.read_text()
-    cells = re.split(r"^(?=# %% )", text, flags=re.MULTILINE)
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    cells, line = cells_of(path), 0
     assert len(cells) > 3
     namespace: dict[str, Any] = {"__name__": "__example__"}
-    line = 0
     for cell in cells:
         exec(compile("\n" * line + cell, str(path), "exec"), namespace)
         line += cell.count("\n")
-    imported = set(re.findall(r"(?m)^ *(?:import|from) ((?:coordlang|planners)[\w.]*)", text))
+    imported = set(
+        re.findall(r"(?m)^ *(?:import|from) ((?:coordlang|planners)[\w.]*)", "".join(cells))
+    )
     assert imported == {"coordlang"}
-
-
-NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
-
-
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_notebook(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The code cells run in order; the file holds none of their outputs."""
-    (tmp_path / "domains").symlink_to(ROOT / "domains")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("MPLBACKEND", "Agg")
-    namespace: dict[str, Any] = {"__name__": "__notebook__"}
-    cells = [c for c in json.loads(path.read_text())["cells"] if c["cell_type"] == "code"]
-    assert len(cells) > 3
-    for number, cell in enumerate(cells):
-        assert cell["outputs"] == []
-        exec(compile("".join(cell["source"]), f"{path.name}[{number}]", "exec"), namespace)
-    plots = namespace["plt"]
-    assert plots.get_fignums()
-    plots.close("all")
+    if path.suffix == ".ipynb":
+        assert namespace["plt"].get_fignums()
+        namespace["plt"].close("all")
 
 
 SCRIPT = ROOT / "docs" / "examples" / "check_certificate.sh"
