@@ -56,7 +56,7 @@ suppress_warnings = [
 #: Names of other projects that are imported for annotations only, names of what functions read
 #: (unions without an entry), and types with arguments.
 nitpick_ignore_regex = [
-    ("py:.*", r"Axes|Figure|Drawing|(Problem|Language)Source|types\.Annotated|.*\[.*")
+    ("py:.*", r"Axes|Figure|Drawing|Point|(Problem|Language)Source|types\.Annotated|.*\[.*")
 ]
 
 default_role = "autolink"  # a name in single backticks links to its entry, where it has one
