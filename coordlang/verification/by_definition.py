@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,13 +26,17 @@ from coordlang.required.miscoordination import (
     describe_failure,
     through_same_states,
 )
+from coordlang.verification.parting import Parting, label_sequences
 from coordlang.verification.sets import SetWalk
-from planners.joint.tables import Ints, unique_tuples
+from planners.joint.tables import Ints
 from planners.parallel.batch import Batch, Table, digest
 from planners.parallel.workers import Workers
 from planners.search.plan_space import PlanSpace
-from planners.search.portions import PORTION, Source, cut
+from planners.search.portions import PORTION, Explored, Source, cut
 from planners.system.limits import reaching
+
+#: Steps towards a goal that are counted in the time in which a node is walked.
+STEPS = 300.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,11 +85,12 @@ def refuting_goal(space: PlanSpace, word: Ints) -> tuple[int | None, int]:
     ``word`` (states) are the words.  Second the nodes that were checked, as in `Verdict`.
     """
     nodes = int((space.layer > 0).sum())
-    parting = parting_nodes(space, word[space.state])
-    if not len(parting):
-        return None, nodes
-    part = space.with_tasks(parting, np.zeros(len(parting), np.int64))
-    goal, walked = SetWalk(part, word[part.state]).run()
+    for ahead in (False, True):
+        parting = parting_nodes(space, word[space.state], ahead=ahead)
+        if not len(parting):
+            return None, nodes
+        space = space.with_tasks(parting, np.zeros(len(parting), np.int64))
+    goal, walked = SetWalk(space, word[space.state]).run()
     return goal, nodes + walked
 
 
@@ -112,30 +117,19 @@ def inseparable(space: PlanSpace) -> Miscoordination | None:
     return describe_failure(part, trail)
 
 
-def parting_nodes(space: PlanSpace, word: Ints) -> Ints:
+def parting_nodes(space: PlanSpace, word: Ints, *, ahead: bool = False) -> Ints:
     """Nodes at which plans that are together may part before their sentences do.
 
-    ``word`` (nodes) are the words; O(edges log edges).  From any other node the edges either all
-    enter words or none does, and those that enter one word lead to one node and are all that their
-    labels mix to: plans that say the same stay together, and with their mixture (Proposition 9 of
-    docs/concepts.md).
+    ``word`` (nodes) are the words.  With ``ahead`` plans are together as long as each robot can do
+    the same after all of them and no mixture of that fails.  O(edges log edges).
     """
     sources, targets = space.sources, space.targets()
-    said = np.where(word[targets] != word[sources], word[targets] + 1, 0)
-    bounds = [len(space), int(said.max(initial=0)) + 1]
-    groups, group = unique_tuples(np.column_stack((sources, said)), bounds)
-    mixtures = np.ones(len(groups))
-    for robot in range(space.robots):
-        labels = space.robot_labels(robot)
-        bounds = [max(1, len(groups)), int(labels.max(initial=0)) + 1, max(1, len(space))]
-        own, _ = unique_tuples(np.column_stack((group, labels, targets)), bounds)
-        mixtures *= np.bincount(own[:, 0], minlength=len(groups))
-    # Different edges differ in their labels.
-    is_open = mixtures != np.bincount(group, minlength=len(groups))
-    found: Ints = np.union1d(
-        groups[is_open, 0], np.intersect1d(sources[said == 0], sources[said > 0])
-    )
-    return found
+    ends, fails = [targets] * space.robots, np.ones(len(space), np.bool_)
+    if ahead:
+        numbers, fails = label_sequences(space)
+        ends = list(numbers[targets].T)
+    parting = Parting.of(sources, targets, space.labels, word, ends)
+    return np.flatnonzero(parting.at(space.layer[:, None])[:, 0] & fails)
 
 
 def verify_candidates(
@@ -149,14 +143,20 @@ def verify_candidates(
 
     The witness of a violation is that of the first portion that has one.
     """
-    source = candidates.source
-    portions = cut(source.efforts, portion)
-    if len(portions) == 1:
+    source, parting, efforts = candidates.source, None, candidates.source.efforts
+    if isinstance(source, Explored) and source.has_every_way:
+        space, word = source.space, partition.word_of(source.rows)
+        ends = [space.target] * source.robots
+        parting = Parting.of(space.sources, space.target, space.labels, word, ends)
+        efforts = np.full(len(efforts), len(space.target) * source.robots / STEPS)
+    portions = cut(efforts, portion)
+    if len(portions) == 1 and parting is None:
         return verify(partition, candidates.spaces)
-    efforts = [float(source.efforts[goals.start : goals.stop].sum()) for goals in portions]
+    shared = source, partition, parting
     words = (partition.words, partition.rows, partition.word, partition.default)
     identity = digest(source.identity, *words)
-    batch = Batch("verification", _job, (source, partition), portions, identity, efforts)
+    sizes = [float(efforts[goals.start : goals.stop].sum()) for goals in portions]
+    batch = Batch("verification", _job, shared, portions, identity, sizes)
     done = nodes = 0
 
     def so_far() -> str:
@@ -166,15 +166,35 @@ def verify_candidates(
         for table in tables:
             nodes += int(table["nodes"])
             if not table["holds"]:
-                shown = verify(partition, [source.portion(portions[done])])
+                shown = _verdict(shared, portions[done])
                 return Verdict(False, candidates.count, nodes, shown.witness)
             done += 1
             progress(f"verifying by definition: {so_far()}")
     return Verdict(True, candidates.count, nodes, None)
 
 
-def _job(shared: tuple[Source, Partition], goals: range) -> Table:
+def _job(shared: tuple[Source, Partition, Parting | None], goals: range) -> Table:
     """The tasks of some goals."""
-    source, partition = shared
-    verdict = verify(partition, [source.portion(goals)])
+    verdict = _verdict(shared, goals)
     return {"holds": np.array(verdict.holds), "nodes": np.array(verdict.nodes)}
+
+
+def _verdict(shared: tuple[Source, Partition, Parting | None], goals: range) -> Verdict:
+    """That of the tasks of some goals.
+
+    Of tasks that are all pairs those are looked at that begin where plans may part: with a
+    violation from any other start there is one from the node at which its plans part.
+    """
+    source, partition, parting = shared
+    if parting is None:
+        return verify(partition, [source.portion(goals)])
+    assert isinstance(source, Explored)
+    distance = source.distances(goals)
+    begin = parting.at(distance.T.astype(np.int32)).T
+    tasks = [
+        (source.goals[k][0], source.space.rows[own]) for k, own in zip(goals, begin, strict=True)
+    ]
+    space = Explored(source.space, tasks).portion(range(len(tasks)))
+    verdict = verify(partition, [space])
+    others = int((distance > 0).sum() - (space.layer > 0).sum())
+    return replace(verdict, nodes=verdict.nodes + others)

@@ -19,12 +19,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import prod
 from typing import Any
 
 import numpy as np
 
 from coordlang.required.miscoordination import Trail
+from coordlang.verification.parting import label_sequences
 from planners.joint.tables import Ints
 from planners.search.edge_index import EdgeTrees
 from planners.search.plan_space import PlanSpace
@@ -215,7 +215,7 @@ class SetWalk:
             self._look_at_sets()
             #: Of each node every robot's label sequences, and whether some mixture of them fails.
             self._optimal = [tuple(self._done[own] for own in sets) for sets in self._of]
-            self._fails = self._failing_nodes()
+            self._fails = label_sequences(space)[1].tolist()
 
     # ---- sets of steps
 
@@ -229,28 +229,6 @@ class SetWalk:
                     own[robot].setdefault(self._step(robot, node, edge), set()).add(below)
             of.append(tuple(_united(self._steps, moves) for moves in own))
         return of
-
-    def _failing_nodes(self) -> list[bool]:
-        """Whether some mixture of the plans from each node is no optimal plan, whatever is said.
-
-        It is if the robots' first labels have more combinations than there are edges, which differ
-        in their labels; if some robot may go on, after the label of an edge, in a way that this
-        edge does not allow; or if a mixture fails from where an edge leads.
-        """
-        fails: list[bool] = []
-        for node, own in enumerate(self._optimal):
-            moves, edges = (
-                [self._sequences.moves[number] for number in own],
-                self._space.out_edges(node),
-            )
-
-            def goes_wrong(edge: int, moves: Sequence[dict[int, int]] = moves) -> bool:
-                after = tuple(m[label] for m, label in zip(moves, self._labels[edge], strict=True))
-                target = self._targets[edge]
-                return fails[target] or after != self._optimal[target]
-
-            fails.append(prod(map(len, moves)) > len(edges) or any(map(goes_wrong, edges)))
-        return fails
 
     def _step(self, robot: int, node: int, edge: int) -> int:
         """A robot's label on an edge out of a node and the word entered, as one number."""

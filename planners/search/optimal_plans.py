@@ -14,7 +14,16 @@ from dataclasses import replace
 import numpy as np
 
 from planners.joint.model import Goal, JointModel, PlanningTask
-from planners.joint.tables import Bools, Ints, Rows, packed, unique_rows, unpacked
+from planners.joint.tables import (
+    Bools,
+    Ints,
+    Rows,
+    kept_runs,
+    packed,
+    ranges,
+    unique_rows,
+    unpacked,
+)
 from planners.search.bounded_search import BoundedSearch
 from planners.search.goals import SMALLER, searched
 from planners.search.heuristics import search_heuristic
@@ -150,14 +159,9 @@ def _batch(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> PlanSpace
                 remedy=searched(space.model, tasks[number][0], space.rows),
             )
         states.append(found)
-    graph = _shortest_ways(space, distance)
-    node = np.full(distance.shape, -1)
-    begins = np.flatnonzero(graph.layer == distance[graph.goal, graph.state] + space.model.slack)
-    node[graph.goal[begins], graph.state[begins]] = begins
-    starts = node[
-        np.repeat(np.arange(len(tasks)), [len(s) for s in states]), np.concatenate(states)
-    ]
-    plans = replace(graph, goals=tuple(goal for goal, _ in tasks), starts=starts).reduced()
+    goal = np.repeat(np.arange(len(tasks)), [len(own) for own in states])
+    graph = _shortest_ways(space, distance, goal, np.concatenate(states))
+    plans = replace(graph, goals=tuple(goal for goal, _ in tasks))
     second = plans.least_sums(plans.cost)[plans.starts]
     plans = replace(plans.cheapest(plans.cost), second=second)
     if space.model.slack:
@@ -191,36 +195,57 @@ def distances(space: Space, reached: Bools) -> Ints:
     return result
 
 
-def _shortest_ways(space: Space, distance: Ints) -> PlanSpace:
-    """The graph of the ways to the goals within the bound on steps, for no task as yet.
+def _shortest_ways(space: Space, distance: Ints, goal: Ints, state: Ints) -> PlanSpace:
+    """The graph of the ways within the bound on steps, from a state of each task to its goal.
 
-    A node is a goal, a state and the steps that are left: the distance, and up to the model's slack
-    more.
+    A node is a goal, a state and the steps that are left: at the start the distance and the model's
+    slack.  Made from the starts on, layer by layer, so that it takes as long as it is large.
     """
-    goal, state = np.nonzero(distance >= 0)
-    slack = np.repeat(np.arange(space.model.slack + 1), len(goal))
-    goal, state = (np.tile(part, space.model.slack + 1) for part in (goal, state))
-    layer = distance[goal, state] + slack
-    order = np.lexsort((state, goal, layer))
-    goal, state, layer, slack = goal[order], state[order], layer[order], slack[order]
-    node = np.full((space.model.slack + 1, *distance.shape), -1)
-    node[slack, goal, state] = np.arange(len(goal))
-    source, step = space.steps_from(state)
-    after = distance[goal[source], space.target[step]]
-    left = layer[source] - 1 - after  # the slack after the step: never more than before
-    keep = (after >= 0) & (left >= 0) & (layer[source] > 0)
-    source, step, left = source[keep], step[keep], left[keep]
+    flat = distance.reshape(-1)
+    begin = goal * len(space) + state  # within a layer a goal and a state are a node
+    steps = flat[begin] + space.model.slack
+    order = np.argsort(steps, kind="stable")
+    most = int(steps.max(initial=0))
+    bounds = np.searchsorted(steps[order], np.arange(most + 2))
+    place = np.zeros(distance.size, np.int64)
+    arriving = np.zeros(0, np.int64)
+    layers, step_of, degrees, within = [], [], [], []
+    starts = np.zeros(len(begin), np.int64)
+    for left in range(most, -1, -1):
+        mine = order[bounds[left] : bounds[left + 1]]
+        keys = np.concatenate((arriving, begin[mine]))
+        place[keys] = np.arange(len(keys))
+        here = np.sort(keys[place[keys] == np.arange(len(keys))])
+        place[here] = np.arange(len(here))
+        within.append(place[arriving])
+        starts[mine] = place[begin[mine]]
+        layers.append(here)
+        at = here % len(space)
+        counts = space.first[at + 1] - space.first[at]
+        step = ranges(space.first[at], counts)
+        arriving = np.repeat(here - at, counts) + space.target[step]
+        after = flat[arriving]
+        kept = (after >= 0) & (after < left)  # what is left after the step is never too little
+        first = kept_runs(np.concatenate(([0], np.cumsum(counts))), kept)
+        degrees.append(np.diff(first))
+        step_of.append(step[kept])
+        arriving = arriving[kept]
+    sizes = np.array([len(here) for here in reversed(layers)])
+    below = np.cumsum([0, *sizes])
+    nodes = np.concatenate(layers[::-1])
+    step = np.concatenate(step_of[::-1])
     return PlanSpace(
         model=space.model,
         rows=space.rows,
-        state=state,
-        goal=goal,
-        layer=layer,
-        first=np.searchsorted(source, np.arange(len(goal) + 1)),
-        target=node[left, goal[source], space.target[step]],
+        state=nodes % len(space),
+        goal=nodes // len(space),
+        layer=np.repeat(np.arange(len(sizes)), sizes),
+        first=np.concatenate(([0], np.cumsum(np.concatenate(degrees[::-1])))),
+        # Of the layers from the lowest on, the edges out of the second lead to the first.
+        target=np.concatenate([own + below[k] for k, own in enumerate(within[::-1])]),
         labels=space.labels[step],
         cost=space.cost[step],
         goals=(),
-        starts=np.zeros(0, np.int64),
+        starts=starts + below[steps],
         second=np.zeros(0, np.int64),
     )

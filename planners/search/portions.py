@@ -55,6 +55,10 @@ class Explored:
         (space,) = plan_spaces(self.space, tasks, PieceSizes(pairs=sys.maxsize))
         return as_executed(space)
 
+    def distances(self, goals: range) -> Ints:
+        """The least makespan to some goals, (goals, states); -1 where there is no way."""
+        return distances(self.space, _holding(self.space, [self.goals[k][0] for k in goals]))
+
     @property
     def spaces(self) -> tuple[PlanSpace, ...]:
         """The plan spaces of all tasks, in batches of goals."""
@@ -87,6 +91,13 @@ class Explored:
     def is_every_pair(self) -> bool:
         """Whether all other states are initial states of each goal."""
         return all(inits is None for _, inits in self.goals)
+
+    @property
+    def has_every_way(self) -> bool:
+        """Whether each joint step by which the distance to a goal falls is on a plan of a task."""
+        model = self.space.model
+        bare = not (model.slack or model.is_asynchronous or self.space.cost.any())
+        return bare and self.is_every_pair
 
     @property
     def tasks(self) -> int:

@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from functools import cache
 from itertools import islice, product
+from math import prod
 from random import Random
 
 import numpy as np
@@ -16,11 +18,19 @@ from coordlang.language.partition import Partition
 from coordlang.required.choices import Choices
 from coordlang.required.divergences import divergences, minimal
 from coordlang.required.miscoordination import Miscoordination, miscoordination
-from coordlang.verification.by_definition import inseparable, parting_nodes, verify
+from coordlang.verification.by_definition import (
+    inseparable,
+    parting_nodes,
+    verify,
+    verify_candidates,
+)
+from coordlang.verification.parting import label_sequences
 from coordlang.vocabulary.first_differences import first_differences
+from planners.parallel.workers import Workers
 from planners.pddl.model_options import ModelOptions
+from planners.search.portions import Explored
 from tests.support import naive
-from tests.support.candidates import listed, small_candidates
+from tests.support.candidates import listed, small_candidates, steps_of
 from tests.support.random_spaces import random_spaces, runs
 from tests.support.texts import parsed
 
@@ -88,23 +98,31 @@ def test_where_plans_that_require_coordination_part(
 
 @pytest.mark.parametrize(("robots", "most", "number"), SIZES)
 def test_verdicts_are_those_of_the_definition(robots: int, most: int, number: int) -> None:
-    """Some models have nodes at which plans part, others none."""
-    seen: Counter[bool] = Counter()
+    """With few words, and with all states apart but one: of plan spaces, and in jobs."""
+    seen: Counter[tuple[bool, bool]] = Counter()
     for seed, candidates in enumerate(models(robots, most, number)):
-        random = Random(seed)
+        random, states = Random(seed), len(candidates.rows)
         size = random.randint(1, 4)
-        word = np.array([random.randrange(size) for _ in candidates.rows])
-        table = Partition(tuple(f"w{n}" for n in range(size)), candidates.rows, word, 0)
-        expected = all(
-            naive.is_language(space, dict(enumerate(word.tolist())), most)
-            for space in candidates.spaces
-        )
-        verdict = verify(table, candidates.spaces)
-        assert verdict.holds == expected
-        if verdict.witness is not None:
-            check_witness(candidates, table, verdict.witness)
-        seen[expected] += 1
-    assert min(seen[True], seen[False]) >= number // 10
+        few = np.array([random.randrange(size) for _ in range(states)])
+        apart = np.arange(states)
+        apart[random.randrange(states)] = random.randrange(states)
+        counted = isinstance(candidates.source, Explored) and candidates.source.has_every_way
+        for word in (few, apart):
+            words = tuple(f"w{n}" for n in range(int(word.max()) + 1))
+            table = Partition(words, candidates.rows, word, 0)
+            expected = all(
+                naive.is_language(space, dict(enumerate(word.tolist())), most)
+                for space in candidates.spaces
+            )
+            verdict = verify(table, candidates.spaces)
+            in_jobs = verify_candidates(table, candidates, Workers(), portion=1.0)
+            assert verdict.holds == in_jobs.holds == expected
+            for witness in (verdict.witness, in_jobs.witness):
+                assert (witness is None) == expected
+                if witness is not None:
+                    check_witness(candidates, table, witness)
+            seen[expected, counted] += 1
+    assert min(seen[True, True], seen[False, True]) >= number // 10, seen
 
 
 def check_witness(candidates: Candidates, table: Partition, witness: Miscoordination) -> None:
@@ -122,23 +140,63 @@ def check_witness(candidates: Candidates, table: Partition, witness: Miscoordina
 
 @pytest.mark.parametrize(("robots", "seeds"), runs(40, 20, 20))
 def test_nodes_at_which_plans_may_part(robots: int | None, seeds: range) -> None:
-    """Where edges that do not enter different words differ in where they, or their mixture, lead."""
-    met: Counter[bool] = Counter()
+    """Where edges that do not enter different words differ in where they, or their mixture, lead.
+
+    Looking ahead they lead to what each robot can do there, if no mixture of that fails.
+    """
+    met: Counter[tuple[bool, bool]] = Counter()
     random = np.random.default_rng(0)
     for _, space in random_spaces(seeds, robots, most=200):
-        words = random.integers(1, 4, len(space))
-        found = set(parting_nodes(space, words).tolist())
-        for node in range(len(space)):
-            own = {space.labels_of(e): space.target_of(e) for e in space.out_edges(node)}
-            parts = any(
-                len({words[own[s]] for s in steps if words[own[s]] != words[node]}) < 2
-                and {own[s] for s in steps}
-                != {own.get(tuple(step[robot] for robot, step in enumerate(steps)))}
-                for steps in product(own, repeat=space.robots)
-            )
-            assert (node in found) == parts
-            met[parts] += 1
-    assert min(met[True], met[False]) >= 40
+        word, steps = random.integers(1, 4, len(space)), steps_of(space)
+        here: list[list[object]] = [[node] * space.robots for node in range(len(space))]
+        ahead: list[list[object]] = []
+        can: list[list[set[tuple[int, ...]]]] = []
+        plans: list[int] = []
+        fails: list[bool] = []
+        for node, own in enumerate(steps):
+            pairs = [[(s[k], to) for s, to in own.items()] for k in range(space.robots)]
+            sets = [
+                {(s, *rest) for s, to in each for rest in can[to][k]} or {()}
+                for k, each in enumerate(pairs)
+            ]
+            can.append(sets)
+            plans.append(sum(plans[to] for to in own.values()) or 1)
+            fails.append(plans[node] < prod(map(len, sets)))
+            ahead.append(here[node] if fails[node] else [*sets])
+        numbers, failing = label_sequences(space)
+        assert failing.tolist() == fails
+        for robot in range(space.robots):
+            same = [
+                repr(sorted(a[robot])) if not f else k
+                for k, (a, f) in enumerate(zip(can, fails, strict=True))
+            ]
+            rows = [*zip(space.layer.tolist(), numbers[:, robot].tolist(), same, strict=True)]
+            assert len({*rows}) == len({row[:2] for row in rows}) == len({row[::2] for row in rows})
+        for looking, ends in ((False, here), (True, ahead)):
+            found = set(parting_nodes(space, word, ahead=looking).tolist())
+            for node, own in enumerate(steps):
+                said = {to: int(word[to] != word[node] and word[to]) for to in own.values()}
+                parts = (fails[node] or not looking) and may_part(own, said, ends)
+                assert (node in found) == parts
+                met[looking, parts] += 1
+    assert len(met) == 4
+    assert min(met.values()) >= 20
+
+
+def may_part(
+    own: Mapping[tuple[int, ...], int], said: Mapping[int, int], ends: Sequence[Sequence[object]]
+) -> bool:
+    """Whether some steps that enter one word, or none, differ from their mixture in it or an end."""
+    for steps in product(own, repeat=len(ends[0])):
+        mixed = own.get(tuple(step[k] for k, step in enumerate(steps)))
+        to = [own[step] for step in steps]
+        if len({said[node] for node in to} - {0}) < 2 and (
+            mixed is None
+            or any(said[node] != said[mixed] for node in to)
+            or any(ends[node][k] != ends[mixed][k] for k, node in enumerate(to))
+        ):
+            return True
+    return False
 
 
 def test_sets_of_steps_of_long_plans() -> None:
