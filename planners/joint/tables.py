@@ -8,6 +8,7 @@ in.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -71,9 +72,13 @@ def unpacked(rows: Rows, columns: int) -> Bools:
 
 def unique_rows(rows: Rows) -> tuple[Rows, NDArray[np.int64]]:
     """The different rows, sorted, and for each input row its number among them."""
-    if rows.shape[1] == 1:
-        values, inverse = np.unique(rows[:, 0], return_inverse=True)
-        return values[:, None], inverse.reshape(-1)
+    sizes = [int(column.max(initial=0)) + 1 for column in rows.T]
+    if len(sizes) == 1 or prod(sizes) <= _MOST:
+        code = rows[:, 0]
+        for column, size in zip(rows.T[1:], sizes[1:], strict=True):
+            code = code * np.uint64(size) + column
+        position, inverse = unique_codes(code)
+        return rows[position], inverse
     order = np.lexsort(rows.T[::-1])
     ordered = rows[order]
     fresh = np.ones(len(rows), np.bool_)
@@ -101,7 +106,7 @@ def _comparable(rows: Rows) -> NDArray[np.generic]:
     return wide.view(f"V{8 * rows.shape[1]}").reshape(-1)
 
 
-def unique_codes(codes: Ints) -> tuple[Ints, Ints]:
+def unique_codes(codes: NDArray[np.integer[Any]]) -> tuple[Ints, Ints]:
     """A position of each different code, in the order of codes, and each one's number among them.
 
     Twice as fast as `numpy.unique`, whose positions are those of first occurrences.
