@@ -190,7 +190,7 @@ def _verdict(shared: tuple[Source, Partition, Parting | None], goals: range) -> 
         return verify(partition, [source.portion(goals)])
     assert isinstance(source, Explored)
     distance = source.distances(goals)
-    begin = parting.at(distance.T.astype(np.int32)).T
+    begin = parting.at(distance.T.astype(np.int32, order="C")).T
     tasks = [
         (source.goals[k][0], source.space.rows[own]) for k, own in zip(goals, begin, strict=True)
     ]

@@ -45,73 +45,48 @@ class _Groups:
 
 @dataclass(frozen=True, slots=True)
 class Parting:
-    """The steps of a graph in classes, as they are for each robot.
+    """The steps of a graph in classes, and as they are for each robot.
 
-    ``sources``, ``targets`` (steps) are nodes.  ``several`` are the steps in classes of two or more
-    steps, and ``classes`` these by class; for each robot ``own`` are they by what they are for the
-    robot, and that by class.  ``nodes`` are the classes by node; ``silent`` and ``speaking`` steps
-    that enter no word, and some word, out of nodes that have both, with their nodes.
+    ``sources`` and ``targets`` (steps) are nodes.  ``classes`` are the steps by class, ``nodes``
+    the classes by node; ``speaks`` (classes) says whether a word is entered.  For each robot
+    ``own`` are the steps by what they are for it, and these by class.
     """
 
     sources: Ints
     targets: Ints
-    several: Ints
     classes: _Groups
-    own: tuple[tuple[_Groups, _Groups], ...]
     nodes: _Groups
-    silent: tuple[Ints, _Groups]
-    speaking: tuple[Ints, _Groups]
+    speaks: Bools
+    own: tuple[tuple[_Groups, _Groups], ...]
 
     @classmethod
     def of(
         cls, sources: Ints, targets: Ints, labels: Labels, word: Ints, ends: Sequence[Ints]
     ) -> Parting:
         """``word`` (nodes) are the words, ``ends`` say where each step leads for each robot."""
-        size = len(word)
         said = np.where(word[targets] != word[sources], word[targets] + 1, 0)
-        _, group = unique_tuples(np.column_stack((sources, said)), [size, _most(said)])
-        several = np.flatnonzero(np.bincount(group)[group] > 1)
-        classes, group = np.unique(group[several], return_inverse=True)
-        node = np.zeros(len(classes), np.int64)
-        node[group] = sources[several]
+        classes, group = _different(sources, said)
         own = []
         for robot, end in enumerate(ends):
-            label = labels[several, robot].astype(np.int64)
-            rows = np.column_stack((group, label, end[several]))
-            parts, part = unique_tuples(rows, list(map(_most, rows.T)))
+            parts, part = _different(group, labels[:, robot].astype(np.int64), end)
             own.append((_Groups.of(part, len(parts)), _Groups.of(parts[:, 0], len(classes))))
-        silent, speaks = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
-        silent[sources[said == 0]] = speaks[sources[said > 0]] = True
-        both = (silent & speaks)[sources]
-        mixed = [np.flatnonzero(both & enters) for enters in (said == 0, said > 0)]
-        return cls(
-            sources,
-            targets,
-            several,
-            _Groups.of(group, len(classes)),
-            tuple(own),
-            _Groups.of(node, size),
-            *((steps, _Groups.of(sources[steps], size)) for steps in mixed),
-        )
+        by_class, by_node = _Groups.of(group, len(classes)), _Groups.of(classes[:, 0], len(word))
+        return cls(sources, targets, by_class, by_node, classes[:, 1] > 0, tuple(own))
 
     def at(self, left: Ints) -> Bools:
         """At which nodes plans may part, by goal: (nodes, goals).
 
         ``left`` (nodes, goals) are the steps to each goal, -1 where it cannot be reached.
         """
-
-        def taken(steps: Ints) -> Bools:
-            onward: Bools = left[self.targets[steps]] + 1 == left[self.sources[steps]]
-            return onward
-
-        steps = taken(self.several)
-        combinations = np.ones((len(self.classes.counts), left.shape[1]))
+        taken = left[self.targets] + 1 == left[self.sources]
+        steps = self.classes.sums(taken)
+        combinations = np.ones(steps.shape)
         for parts, of_class in self.own:
-            combinations *= of_class.sums(parts.sums(steps) > 0)
-        found: Bools = self.nodes.sums(combinations != self.classes.sums(steps)) > 0
-        silent, speaking = (own.sums(taken(some)) > 0 for some, own in (self.silent, self.speaking))
-        found |= silent & speaking
-        return found & (left > 0)
+            combinations *= of_class.sums(parts.sums(taken) > 0)
+        speaks = self.speaks[:, None]
+        of_classes = combinations != steps, (steps > 0) & ~speaks, (steps > 0) & speaks
+        larger, silent, speaking = (self.nodes.sums(some) > 0 for some in of_classes)
+        return (larger | silent & speaking) & (left > 0)
 
 
 def label_sequences(space: PlanSpace) -> tuple[Ints, Bools]:
@@ -127,19 +102,16 @@ def label_sequences(space: PlanSpace) -> tuple[Ints, Bools]:
     fails = np.zeros(len(space), np.bool_)
     for nodes, below in zip(space.layers[1:], space.edges_by_layer(), strict=True):
         source, size = below.source - nodes.start, nodes.stop - nodes.start
-        combinations = np.ones(size)
-        moves = []
-        for robot in range(space.robots):
-            after = numbers[below.target, robot]
-            rows = np.column_stack((source, space.robot_labels(robot, below.edges), after))
-            moves.append(unique_tuples(rows, list(map(_most, rows.T)))[0])
-            combinations *= np.bincount(moves[-1][:, 0], minlength=size)
+        combinations, moves = np.ones(size), []
+        for robot, after in enumerate(numbers[below.target].T):
+            own, _ = _different(source, space.robot_labels(robot, below.edges), after)
+            combinations *= np.bincount(own[:, 0], minlength=size)
+            moves.append(own)
         failing = combinations != np.bincount(source, minlength=size)
         failing[source[fails[below.target]]] = True
         for robot, own in enumerate(moves):
-            numbers[nodes, robot] = np.where(
-                failing, len(own) + np.arange(size), _numbered(own, size)
-            )
+            alone = len(own) + np.arange(size)
+            numbers[nodes, robot] = np.where(failing, alone, _numbered(own, size))
         fails[nodes] = failing
     return numbers, fails
 
@@ -154,12 +126,12 @@ def _numbered(rows: Ints, size: int) -> Ints:
     number, known = np.zeros(size, np.int64), 0
     for position in range(int(counts.max(initial=0))):
         larger = np.flatnonzero(counts > position)
-        longer = np.column_stack((number[larger], rows[first[larger] + position, 1:]))
-        sets, found = unique_tuples(longer, list(map(_most, longer.T)))
+        sets, found = _different(number[larger], *rows[first[larger] + position, 1:].T)
         number[larger] = known + found
         known += len(sets)
     return number
 
 
-def _most(values: Ints) -> int:
-    return int(values.max(initial=0)) + 1
+def _different(*columns: Ints) -> tuple[Ints, Ints]:
+    """The different rows of a table, sorted, and the number of each row among them."""
+    return unique_tuples(np.column_stack(columns), [int(c.max(initial=0)) + 1 for c in columns])

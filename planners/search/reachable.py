@@ -18,7 +18,6 @@ from planners.joint.tables import (
     Numbers,
     Rows,
     find_rows,
-    ranges,
     unique_rows,
 )
 from planners.system.limits import reaching
@@ -90,11 +89,6 @@ class Space:
     def sources(self) -> Ints:
         """The state that each step leads out of."""
         return np.repeat(np.arange(len(self)), np.diff(self.first))
-
-    def steps_from(self, states: Ints) -> tuple[Ints, Ints]:
-        """All steps out of many states: for each its position in ``states``, and its number."""
-        counts = self.first[states + 1] - self.first[states]
-        return np.repeat(np.arange(len(states)), counts), ranges(self.first[states], counts)
 
     def numbers(self, rows: Rows) -> Ints:
         """The numbers of states given as rows, -1 for those that are not reachable."""
