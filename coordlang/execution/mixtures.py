@@ -18,7 +18,7 @@ from coordlang.execution.task_language import TaskLanguage
 from coordlang.required.miscoordination import Miscoordination, Trail, describe_failure
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel
-from planners.joint.tables import Ints, ranges, unique_tuples
+from planners.joint.tables import Ints, ranges, unique_rows
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace, UnfoldingStep
 from planners.system.errors import OutOfMemory
@@ -77,7 +77,7 @@ def walk_mixtures(
             last = int(source[broken[0]]), tuple(labels[broken[0]].tolist())
             return Mixtures(None, _witness(task_language, fits, words, steps, *last), walked)
         reached = np.column_stack((after, space.targets(edge)))
-        table, number = unique_tuples(reached, [*(len(a) for a in automata), len(space)])
+        table, number = unique_rows(reached)
         steps.append(UnfoldingStep(source, edge, number))
         layers.append(table[:, robots])
         walked += len(table)

@@ -20,7 +20,7 @@ from math import prod
 
 import numpy as np
 
-from planners.joint.tables import Bools, Ints, unique_tuples
+from planners.joint.tables import Bools, Ints, unique_rows
 from planners.search.plan_space import LayerEdges, PlanSpace
 from planners.system.limits import reaching
 
@@ -124,7 +124,7 @@ class LabelSets:
         for position in range(1, int(sizes.max(initial=0))):
             open_groups = np.flatnonzero(sizes > position)
             pairs = np.column_stack((result[open_groups], members[first[open_groups] + position]))
-            different, inverse = unique_tuples(pairs, [len(self)] * 2)
+            different, inverse = unique_rows(pairs)
             united = [self.union(a, b) for a, b in different.tolist()]
             result[open_groups] = np.array(united, np.int64)[inverse]
         return result
@@ -132,12 +132,11 @@ class LabelSets:
     def sets(self, first: Ints, sizes: Ints, labels: Ints, after: Ints) -> Ints:
         """For each group of moves, sorted by label, the set that has them."""
         result = np.full(len(first), END, np.int64)
-        most = int(labels.max(initial=0)) + 1
         for position in range(int(sizes.max(initial=0))):
             open_groups = np.flatnonzero(sizes > position)
             at = first[open_groups] + position
             rows = np.column_stack((result[open_groups], labels[at], after[at]))
-            different, inverse = unique_tuples(rows, [len(self), most, len(self)])
+            different, inverse = unique_rows(rows)
             extended = [self._extended(*row) for row in different.tolist()]
             result[open_groups] = np.array(extended, np.int64)[inverse]
         return result
@@ -147,7 +146,7 @@ class LabelSets:
         answers: Bools = one == other
         left = np.flatnonzero(~answers)
         pairs = np.column_stack((one[left], other[left]))
-        different, inverse = unique_tuples(pairs, [len(self)] * 2)
+        different, inverse = unique_rows(pairs)
         known = np.array([self.within(a, b) for a, b in different.tolist()], np.bool_)
         answers[left] = known[inverse]
         return answers
@@ -207,7 +206,7 @@ class Choices:
         """
         labels, after = self.space.robot_labels(robot, edges.edges), self.of_node[robot]
         table = np.column_stack((edges.source - edges.source.min(), labels, after[edges.target]))
-        rows, inverse = unique_tuples(table, [int(column.max()) + 1 for column in table.T])
+        rows, inverse = unique_rows(table)
         fresh = np.ones(len(rows), np.bool_)
         fresh[1:] = (rows[1:, :2] != rows[:-1, :2]).any(axis=1)
         first = np.flatnonzero(fresh)
@@ -270,10 +269,7 @@ class Choices:
         fails[left[equal[left]]] = True
         left = left[~equal[left]]
         chosen = self.of_node[np.arange(self._robots)[:, None], nodes[left, :-1].T]
-        table, number = unique_tuples(
-            np.column_stack((*chosen, mixed[left])),
-            [len(self.sets)] * self._robots + [len(self.space)],
-        )
+        table, number = unique_rows(np.column_stack((*chosen, mixed[left])))
         answers = [self.fails(tuple(row[:-1]), row[-1]) for row in table.tolist()]
         fails[left] = np.array(answers, np.bool_)[number]
         return fails

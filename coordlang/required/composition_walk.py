@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from coordlang.required.choices import Choices
 from planners.joint.states import bits
-from planners.joint.tables import Bools, Ints, spans, unique_tuples
+from planners.joint.tables import Bools, Ints, spans, unique_rows
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import OutOfMemory
@@ -108,7 +108,7 @@ def layered(
         fresh = np.zeros((len(here), width), np.int64)
         fresh[:, : space.robots + 1] = here[:, None]
         both = np.concatenate((fresh, arriving))
-        table, place = unique_tuples(both, [int(c.max(initial=0)) + 1 for c in both.T])
+        table, place = unique_rows(both)
         yield table, place[len(here) :]
         if number:
             arriving = expand(table)
@@ -307,14 +307,13 @@ def _walk(space: PlanSpace) -> list[_Layer]:
     def expand(table: Ints) -> Ints:
         nonlocal nodes
         nodes += len(table)
-        bounds = [len(table), *[len(space) + 1] * (width - 1), 2]
         links = [np.zeros((0, 1 + width), np.int64)]
         for move in moves(space, index, table[:, :-1]):
             targets = move.targets(space)
             parted = (table[move.source, -1] > 0) | ~in_one_state(space, targets[:, :-1])
             parted &= (targets != targets[:, :1]).any(axis=1)
             rows = np.column_stack((move.source, targets, parted))[can_fail(choices, targets)]
-            links.append(unique_tuples(rows, bounds)[0])
+            links.append(unique_rows(rows)[0])
         together = np.concatenate(links)
         sources.append(together[:, 0])
         if 8 * sum(own.nbytes for own in sources) > memory_left():

@@ -32,7 +32,6 @@ from planners.joint.tables import (
     ranges,
     spans,
     unique_rows,
-    unique_tuples,
 )
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace
@@ -192,7 +191,7 @@ class _Mixing:
         self._labels: list[tuple[Ints, Ints]] = []
         for robot in range(space.robots):
             own = np.column_stack((way, space.robot_labels(robot, edges)))
-            pairs, _ = unique_tuples(own, [int(column.max(initial=0)) + 1 for column in own.T])
+            pairs, _ = unique_rows(own)
             first = np.searchsorted(pairs[:, 0], np.arange(len(self._node) + 1))
             self._labels.append((first, pairs[:, 1]))
 

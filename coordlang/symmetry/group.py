@@ -23,7 +23,7 @@ from coordlang.symmetry.graph import LARGEST_GRAPH, Renaming, automorphism_gener
 from planners.grounding.actions import GroundAction
 from planners.joint.model import FullState, Goal
 from planners.joint.states import StateCodec
-from planners.joint.tables import Ints, Rows, find_rows, unique_tuples
+from planners.joint.tables import Ints, Rows, find_rows, unique_rows
 from planners.pddl.formula_tree import Compound, Leaf, fold
 from planners.pddl.lifted import Atom, StepAtom
 from planners.pddl.robots import natural
@@ -314,8 +314,7 @@ class _Part:
 
     def _table(self, ends: Ints, labels: Sequence[Ints]) -> Ints:
         """Edges, sorted, each once."""
-        bounds = [len(self._space.rows)] * 3 + [len(own) for own in self._space.model.labels]
-        return unique_tuples(np.column_stack((ends, *labels)), bounds)[0]
+        return unique_rows(np.column_stack((ends, *labels)))[0]
 
     def symmetry(self, renaming: Renaming) -> Symmetry | None:
         """The renaming with where it takes states; None if it is no symmetry of the part.

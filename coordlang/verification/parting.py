@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.joint.conditions import Labels
-from planners.joint.tables import Bools, Ints, unique_tuples
+from planners.joint.tables import Bools, Ints, unique_rows
 from planners.search.plan_space import PlanSpace
 
 
@@ -134,4 +134,4 @@ def _numbered(rows: Ints, size: int) -> Ints:
 
 def _different(*columns: Ints) -> tuple[Ints, Ints]:
     """The different rows of a table, sorted, and the number of each row among them."""
-    return unique_tuples(np.column_stack(columns), [int(c.max(initial=0)) + 1 for c in columns])
+    return unique_rows(np.column_stack(columns))

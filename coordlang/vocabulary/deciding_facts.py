@@ -19,7 +19,7 @@ import numpy as np
 
 from coordlang.language.candidates import Candidates
 from coordlang.vocabulary.refuter import Refuter
-from planners.joint.tables import Bools, Ints, unique_tuples
+from planners.joint.tables import Bools, Ints, unique_rows
 from planners.search.plan_space import PlanSpace
 from planners.search.sat import whole
 
@@ -90,5 +90,4 @@ def _steps_to_go(space: PlanSpace) -> Ints | None:
 
 def _classes(steps: Ints, facts: Bools) -> Ints:
     """(states) a number for each different combination of steps to go and values of facts."""
-    bounds = [int(steps.max()) + 2, *[2] * len(facts)]
-    return unique_tuples(np.column_stack((steps + 1, *facts)), bounds)[1]
+    return unique_rows(np.column_stack((steps + 1, *facts)))[1]
