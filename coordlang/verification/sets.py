@@ -8,10 +8,11 @@ steps.  A node is ``(y, ahead_1 .. ahead_n)``: the node of the plan space that t
 reached, and for each robot the words that it has said while some other robot has not, with the set
 of its steps to come.
 
-It is cut off where the robots have no sentence in common, and where no choice of label sequences
-can fail from ``y``.  At the step by which a mixture fails labels cease to matter: it is a violation
-iff the robots' sets have a sentence in common (Proposition 14a of docs/concepts.md).  Sets are
-canonical: equal ones have one number.  No method recurses, since plans may be long.
+It is cut off where the robots have no sentence in common, and where they can do what plans from
+``y`` do and no mixture of those fails.  At the step by which a mixture fails labels cease to
+matter: it is a violation iff the robots' sets have a sentence in common (Proposition 14a of
+docs/concepts.md).  Sets are canonical: equal ones have one number.  No method recurses, since plans
+may be long.
 """
 
 from __future__ import annotations
@@ -35,25 +36,23 @@ _EMPTY = 0
 
 
 class SequenceSets:
-    """Sets of label sequences of one length, by number; equal sets have equal numbers.
+    """Sets of sequences by number; equal sets have equal numbers.
 
-    A set is kept as its first labels, each with the set of what follows it.  No method recurses:
-    sequences are as long as plans.
+    A set is kept as its first members, each with the set of what follows it.
     """
 
     def __init__(self) -> None:
-        #: Per set the first labels with the set of what follows each.
+        #: Per set the first members with the set of what follows each.
         self.moves: list[dict[int, int]] = [{}]
         self._numbers: dict[tuple[tuple[int, int], ...], int] = {(): _EMPTY}
         self._unions: dict[tuple[int, ...], int] = {}
-        self._inside: dict[tuple[int, int], bool] = {}
 
     def __len__(self) -> int:
         """Count the different sets."""
         return len(self.moves)
 
     def number(self, moves: Iterable[tuple[int, int]]) -> int:
-        """The set with these first labels, in ascending order, and what follows each."""
+        """The set with these first members, in ascending order, and what follows each."""
         key = tuple(moves)
         known = self._numbers.get(key)
         if known is None:
@@ -83,37 +82,12 @@ class SequenceSets:
         return self._unions[members]
 
     def _following(self, members: tuple[int, ...]) -> dict[int, tuple[int, ...]]:
-        """Each first label of some of the sets, with the sets of what follows it."""
+        """Each first member of some of the sets, with the sets of what follows it."""
         found: dict[int, set[int]] = {}
         for member in members:
             for label, after in self.moves[member].items():
                 found.setdefault(label, set()).add(after)
         return {label: tuple(sorted(after)) for label, after in found.items()}
-
-    def inside(self, one: int, other: int) -> bool:
-        """Whether every sequence of the one set is one of the other."""
-        if one == other:
-            return True
-        if (one, other) not in self._inside:
-            # If it holds for this pair, it holds for all that were met on the way.
-            met, todo, holds = {(one, other)}, [(one, other)], True
-            while todo and holds:
-                holds, below = self._compared(*todo.pop())
-                todo += [pair for pair in below if pair not in met]
-                met.update(below)
-            self._inside.update(dict.fromkeys(met, True) if holds else {(one, other): False})
-        return self._inside[one, other]
-
-    def _compared(self, one: int, other: int) -> tuple[bool, list[tuple[int, int]]]:
-        """Whether nothing speaks against it yet, and the pairs for which it must hold, too."""
-        mine, theirs = self.moves[one], self.moves[other]
-        if not mine.keys() <= theirs.keys():
-            return False, []
-        below = [(after, theirs[label]) for label, after in mine.items() if after != theirs[label]]
-        known = [self._inside.get(pair) for pair in below]
-        if False in known:
-            return False, []
-        return True, [pair for pair, answer in zip(below, known, strict=True) if answer is None]
 
 
 #: Words, one after another.
@@ -201,10 +175,9 @@ class SetWalk:
         self._base = int(word.max(initial=0)) + 2
         self._labels: list[list[int]] = space.labels.tolist()
         self._targets: list[int] = space.targets().tolist()
-        self._sequences, self._steps = SequenceSets(), SequenceSets()
-        self._sentences = SentenceSets()
-        #: Of each set of steps its sentences, and its label sequences.
-        self._said, self._done = [self._sentences.silence], [_EMPTY]
+        self._steps, self._sentences = SequenceSets(), SentenceSets()
+        #: Of each set of steps its sentences.
+        self._said = [self._sentences.silence]
         self._edges = EdgeTrees(space)
 
         def so_far() -> str:
@@ -212,9 +185,8 @@ class SetWalk:
 
         with reaching(so_far, space.model.smaller("smaller tasks")):
             self._of = self._sets_of_nodes()
-            self._look_at_sets()
-            #: Of each node every robot's label sequences, and whether some mixture of them fails.
-            self._optimal = [tuple(self._done[own] for own in sets) for sets in self._of]
+            self._find_sentences()
+            #: Of each node whether some mixture of plans fails, whatever they say.
             self._fails = label_sequences(space)[1].tolist()
 
     # ---- sets of steps
@@ -227,7 +199,7 @@ class SetWalk:
             for edge in space.out_edges(node):
                 for robot, below in enumerate(of[self._targets[edge]]):
                     own[robot].setdefault(self._step(robot, node, edge), set()).add(below)
-            of.append(tuple(_united(self._steps, moves) for moves in own))
+            of.append(tuple(map(self._united, own)))
         return of
 
     def _step(self, robot: int, node: int, edge: int) -> int:
@@ -241,17 +213,20 @@ class SetWalk:
         entered = step % self._base
         return (entered - 1,) if entered else ()
 
-    def _look_at_sets(self) -> None:
-        """Find the sentences and label sequences of each set; what follows a step is older."""
-        sentences, labels = self._sentences, self._sequences
+    def _united(self, moves: Mapping[int, set[int]]) -> int:
+        """The set with these first steps, each followed by what one of some sets has."""
+        followed = ((step, tuple(sorted(moves[step]))) for step in sorted(moves))
+        return self._steps.number((step, self._steps.union(after)) for step, after in followed)
+
+    def _find_sentences(self) -> None:
+        """Those of each set of steps; what follows a step is older."""
+        sentences = self._sentences
         for steps in self._steps.moves[1:]:
-            said: set[int] = set()
-            done: dict[int, set[int]] = {}
-            for step, after in steps.items():
-                said.add(sentences.before(self._entered(step), self._said[after]))
-                done.setdefault(step // self._base, set()).add(self._done[after])
+            said = {
+                sentences.before(self._entered(step), self._said[after])
+                for step, after in steps.items()
+            }
             self._said.append(sentences.union(tuple(sorted(said))))
-            self._done.append(_united(labels, done))
 
     # ---- is there a violation?
 
@@ -281,7 +256,8 @@ class SetWalk:
             for here, below in pairwise(reversed(layers)):
                 for node in here:
                     walked += 1
-                    if not self._can_fail(*node):
+                    y, sets = node
+                    if not self._fails[y] and self._of[y] == tuple(own for _, own in sets):
                         continue
                     for steps, ahead, target in self._moves(*node):
                         if target is None:
@@ -292,13 +268,6 @@ class SetWalk:
                             before.setdefault(child, (node, steps))
                 here.clear()
         return None, walked
-
-    def _can_fail(self, node: int, ahead: _Ahead) -> bool:
-        """Whether some choice of label sequences may fail from a node."""
-        return self._fails[node] or not all(
-            self._sequences.inside(self._done[own], theirs)
-            for (_, own), theirs in zip(ahead, self._optimal[node], strict=True)
-        )
 
     def _common(self, ahead: _Ahead) -> tuple[Words, int | None]:
         """What the robot that is ahead of all has said, and what all can say after it."""
@@ -406,11 +375,6 @@ class SetWalk:
             path.append(layer[node])
             node = int(self._space.sources[layer[node]])
         return path[::-1]
-
-
-def _united(sets: SequenceSets, moves: Mapping[int, set[int]]) -> int:
-    """The set with these first members, each followed by what one of some sets has."""
-    return sets.number((first, sets.union(tuple(sorted(moves[first])))) for first in sorted(moves))
 
 
 def _short(ahead: _Ahead) -> _Ahead:
