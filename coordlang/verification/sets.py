@@ -131,11 +131,6 @@ class SentenceSets(SequenceSets):
             number = None if number is None else self.moves[number].get(word)
         return number
 
-    def has(self, number: int, sentence: Words) -> bool:
-        """Whether a sentence is one of a set."""
-        rest = self.after(sentence, number)
-        return rest is not None and _END in self.moves[rest]
-
     def first(self, number: int) -> Words:
         """The first sentence of a set, in the order of words."""
         said: list[int] = []
@@ -338,42 +333,33 @@ class SetWalk:
         assert common is not None
         sentence = said + self._sentences.first(common)
         plans = []
-        for robot, (words, own) in enumerate(found.ahead):
+        for robot, (words, _) in enumerate(found.ahead):
             taken = [steps[robot] for steps in (*history, found.steps) if robot < len(steps)]
-            taken += self._steps_saying(own, sentence[len(words) :])
-            plans.append(self._path(start, robot, taken))
+            entered = tuple(word for step in taken for word in self._entered(step))
+            plans.append(self._plan(start, robot, taken, entered + sentence[len(words) :]))
         return plans
 
-    def _steps_saying(self, own: int, sentence: Words) -> list[int]:
-        """Steps of a set along which a sentence is said."""
-        steps = []
-        while self._steps.moves[own]:
-            for step, after in self._steps.moves[own].items():
-                entered = self._entered(step)
-                rest = sentence[len(entered) :]
-                if sentence[: len(entered)] == entered and self._sentences.has(
-                    self._said[after], rest
-                ):
-                    break
-            steps.append(step)
-            own, sentence = after, rest
-        return steps
-
-    def _path(self, start: int, robot: int, steps: Sequence[int]) -> list[int]:
-        """The edges of a plan with these steps of a robot."""
-        layers: list[dict[int, int]] = [{start: -1}]  # node -> the edge that leads to it
-        for step in steps:
-            reached = {
-                self._targets[edge]: edge
-                for node in layers[-1]
-                for edge in self._space.out_edges(node)
-                if self._step(robot, node, edge) == step
-            }
+    def _plan(self, start: int, robot: int, taken: Sequence[int], entered: Words) -> list[int]:
+        """The edges of a plan that begins with these steps of a robot, by the words it enters."""
+        space = self._space
+        layers: list[dict[tuple[int, Words], tuple[tuple[int, Words], int]]] = []
+        here = [(start, entered)]
+        for number in range(int(space.layer[start])):
+            reached: dict[tuple[int, Words], tuple[tuple[int, Words], int]] = {}
+            for before in here:
+                node, words = before
+                for edge in space.out_edges(node):
+                    step = self._step(robot, node, edge)
+                    said = self._entered(step)
+                    fits = number >= len(taken) or step == taken[number]
+                    if fits and words[: len(said)] == said:
+                        reached[self._targets[edge], words[len(said) :]] = before, edge
             layers.append(reached)
-        node, path = next(iter(layers[-1])), list[int]()
-        for layer in layers[:0:-1]:
-            path.append(layer[node])
-            node = int(self._space.sources[layer[node]])
+            here = list(reached)
+        at, path = next(end for end in here if not end[1]), list[int]()
+        for layer in reversed(layers):
+            at, edge = layer[at]
+            path.append(edge)
         return path[::-1]
 
 

@@ -58,7 +58,7 @@ def search_within(
     """The plans of one task within the model's slack; ``makespan`` is the least one."""
     space = explore_within(model, task, makespan + model.slack, pieces)
     with reaching(lambda: f"the plans within slack, over {len(space):,} states", "less slack"):
-        graph = _batch(space, [(task.goal, task.init[None, :])])
+        graph = _plan_space(space, [(task.goal, task.init[None, :])])
     used, state = np.unique(graph.state, return_inverse=True)
     return replace(graph, rows=graph.rows[used], state=state)
 
@@ -73,7 +73,7 @@ def search_with_effort(
     forward = BoundedSearch(model, task, chosen, variables, pieces)
     with closing(forward), reaching(forward.so_far, SMALLER):
         forward.run()
-        return _batch(forward.space(), [(task.goal, task.init[None, :])]), forward
+        return _plan_space(forward.space(), [(task.goal, task.init[None, :])]), forward
 
 
 def joined(spaces: Sequence[PlanSpace]) -> PlanSpace:
@@ -119,31 +119,31 @@ def solvable(
     return kept
 
 
-def plan_spaces(
-    space: Space, tasks: Sequence[tuple[Goal, Rows | None]], pieces: PieceSizes = PIECES
-) -> Iterator[PlanSpace]:
-    """The optimal plans of many tasks over one explored space, in batches of goals.
+def plan_spaces(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> Iterator[PlanSpace]:
+    """`plan_space` in batches of goals."""
+    size = max(1, PIECES.pairs // max(1, len(space) * (1 + space.model.slack)))
+    for start in range(0, len(tasks), size):
+        yield plan_space(space, tasks[start : start + size])
+
+
+def plan_space(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> PlanSpace:
+    """The optimal plans of many tasks over one explored space.
 
     One backward pass per goal serves every initial state.  ``tasks`` are goals with tables of
     initial states; None: every other state that can reach the goal.
 
     Raises `ProvedImpossible` for a task whose goal cannot be reached.
     """
-    size = max(1, pieces.pairs // max(1, len(space) * (1 + space.model.slack)))
-    for start in range(0, len(tasks), size):
 
-        def so_far(done: int = start) -> str:
-            return (
-                f"the {space.model.kept_plans} to {done:,} of {len(tasks):,} goals, over "
-                f"{len(space):,} states"
-            )
+    def so_far() -> str:
+        kept = space.model.kept_plans
+        return f"the {kept} to {len(tasks):,} goals, over {len(space):,} states"
 
-        with reaching(so_far, "fewer candidate tasks"):
-            batch = _batch(space, tasks[start : start + size])
-        yield batch
+    with reaching(so_far, "fewer candidate tasks"):
+        return _plan_space(space, tasks)
 
 
-def _batch(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> PlanSpace:
+def _plan_space(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> PlanSpace:
     reached = np.stack([space.model.holds(goal, space.rows) for goal, _ in tasks])
     distance = distances(space, reached)
     states: list[Ints] = []

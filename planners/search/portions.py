@@ -7,7 +7,6 @@ themselves: they are sent where the plans come from, not the plans.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,9 +19,9 @@ from planners.joint.tables import Bools, Ints, Rows
 from planners.parallel.batch import digest
 from planners.search.asynchronous import as_executed
 from planners.search.graphs import parts_of_graph
-from planners.search.optimal_plans import distances, plan_spaces
+from planners.search.optimal_plans import distances, plan_space, plan_spaces
 from planners.search.plan_space import PlanSpace
-from planners.search.reachable import PIECES, PieceSizes, Space
+from planners.search.reachable import PIECES, Space
 from planners.search.slack import seen_rows
 from planners.system.errors import OutOfMemory
 from planners.system.limits import memory_left, more_memory
@@ -51,9 +50,7 @@ class Explored:
 
         O(goals x joint steps).
         """
-        tasks = self.goals[goals.start : goals.stop]
-        (space,) = plan_spaces(self.space, tasks, PieceSizes(pairs=sys.maxsize))
-        return as_executed(space)
+        return as_executed(plan_space(self.space, self.goals[goals.start : goals.stop]))
 
     def distances(self, goals: range) -> Ints:
         """The least makespan to some goals, (goals, states); -1 where there is no way."""
