@@ -179,19 +179,13 @@ class _Mixing:
         space = self._space = choices.space
         position, edges = space.edges_from(nodes)
         target = space.targets(edges)
-        order = np.lexsort((space.state[target], position))
-        position, edges, target = position[order], edges[order], target[order]
-        fresh = np.ones(len(edges), np.bool_)
-        fresh[1:] = (position[1:] != position[:-1]) | (target[1:] != target[:-1])
-        way = np.cumsum(fresh) - 1
-        self._node = nodes[position[fresh]]
-        self._target = target[fresh]
+        ways, way = unique_rows(np.column_stack((position, space.state[target], target)))
+        self._node, self._target = nodes[ways[:, 0]], ways[:, 2]
         #: One more than the last way out of the same node.
-        self._end = np.searchsorted(position[fresh], position[fresh], side="right")
+        self._end = np.searchsorted(ways[:, 0], ways[:, 0], side="right")
         self._labels: list[tuple[Ints, Ints]] = []
         for robot in range(space.robots):
-            own = np.column_stack((way, space.robot_labels(robot, edges)))
-            pairs, _ = unique_rows(own)
+            pairs, _ = unique_rows(np.column_stack((way, space.robot_labels(robot, edges))))
             first = np.searchsorted(pairs[:, 0], np.arange(len(self._node) + 1))
             self._labels.append((first, pairs[:, 1]))
 

@@ -31,6 +31,7 @@ from coordlang.verification.sets import SetWalk
 from planners.joint.tables import Ints
 from planners.parallel.batch import Batch, Table, digest
 from planners.parallel.workers import Workers
+from planners.search.optimal_plans import distances_to
 from planners.search.plan_space import PlanSpace
 from planners.search.portions import PORTION, Explored, Source, cut
 from planners.system.limits import reaching
@@ -189,11 +190,10 @@ def _verdict(shared: tuple[Source, Partition, Parting | None], goals: range) -> 
     if parting is None:
         return verify(partition, [source.portion(goals)])
     assert isinstance(source, Explored)
-    distance = source.distances(goals)
-    begin = parting.at(distance.T.astype(np.int32, order="C")).T
-    tasks = [
-        (source.goals[k][0], source.space.rows[own]) for k, own in zip(goals, begin, strict=True)
-    ]
+    wanted = [goal for goal, _ in source.goals[goals.start : goals.stop]]
+    distance = np.stack([*distances_to(source.space, wanted)])
+    begin = parting.at(distance.T.astype(np.int32, order="C"))
+    tasks = [(goal, source.space.rows[own]) for goal, own in zip(wanted, begin.T, strict=True)]
     space = Explored(source.space, tasks).portion(range(len(tasks)))
     verdict = verify(partition, [space])
     others = int((distance > 0).sum() - (space.layer > 0).sum())

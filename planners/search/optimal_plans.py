@@ -34,6 +34,9 @@ from planners.search.state_variables import state_variables
 from planners.system.errors import ProvedImpossible
 from planners.system.limits import reaching
 
+#: Goals whose distances are worked out together.
+_GOALS = 512
+
 
 def search(
     model: JointModel, task: PlanningTask, pieces: PieceSizes = PIECES, heuristic: str = "auto"
@@ -103,20 +106,12 @@ def joined(spaces: Sequence[PlanSpace]) -> PlanSpace:
     return together.reordered(np.lexsort((together.state, together.goal, together.layer)))
 
 
-def solvable(
-    space: Space, tasks: Sequence[tuple[Goal, Rows]], pieces: PieceSizes = PIECES
-) -> list[tuple[Goal, Rows]]:
+def solvable(space: Space, tasks: Sequence[tuple[Goal, Rows]]) -> list[tuple[Goal, Rows]]:
     """Leave out the tasks whose goal cannot be reached; goals with tables of initial states."""
-    size = max(1, pieces.pairs // max(1, len(space)))
-    kept = []
-    for start in range(0, len(tasks), size):
-        batch = tasks[start : start + size]
-        far = distances(space, np.stack([space.model.holds(goal, space.rows) for goal, _ in batch]))
-        for own, (goal, inits) in zip(far, batch, strict=True):
-            good = own[space.numbers(inits)] >= 0
-            if good.any():
-                kept.append((goal, inits[good]))
-    return kept
+    far = distances_to(space, [goal for goal, _ in tasks])
+    pairs = zip(tasks, far, strict=True)
+    found = [(goal, inits[own[space.numbers(inits)] >= 0]) for (goal, inits), own in pairs]
+    return [(goal, inits) for goal, inits in found if len(inits)]
 
 
 def plan_spaces(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> Iterator[PlanSpace]:
@@ -144,8 +139,7 @@ def plan_space(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> PlanS
 
 
 def _plan_space(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> PlanSpace:
-    reached = np.stack([space.model.holds(goal, space.rows) for goal, _ in tasks])
-    distance = distances(space, reached)
+    distance = np.stack([*distances_to(space, [goal for goal, _ in tasks])])
     states: list[Ints] = []
     for number, (_, inits) in enumerate(tasks):
         if inits is None:
@@ -170,6 +164,13 @@ def _plan_space(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> Plan
         left = plans.layer - distance[plans.goal, plans.state]
         plans = seeing(plans, left, seen_rows(space.model, space.rows))
     return plans
+
+
+def distances_to(space: Space, goals: Sequence[Goal]) -> Iterator[Ints]:
+    """For each goal the least makespan from every state, -1 where there is no way."""
+    for start in range(0, len(goals), _GOALS):
+        batch = goals[start : start + _GOALS]
+        yield from distances(space, np.stack([space.model.holds(g, space.rows) for g in batch]))
 
 
 def distances(space: Space, reached: Bools) -> Ints:

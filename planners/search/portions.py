@@ -15,11 +15,11 @@ from itertools import pairwise
 import numpy as np
 
 from planners.joint.model import FullState, Goal, JointModel
-from planners.joint.tables import Bools, Ints, Rows
+from planners.joint.tables import Ints, Rows
 from planners.parallel.batch import digest
 from planners.search.asynchronous import as_executed
 from planners.search.graphs import parts_of_graph
-from planners.search.optimal_plans import distances, plan_space, plan_spaces
+from planners.search.optimal_plans import distances_to, plan_space, plan_spaces
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, Space
 from planners.search.slack import seen_rows
@@ -34,8 +34,6 @@ _LARGE = 1_000_000
 #: Bytes of a node and its edges in a plan space, and more of them while it is made (measured on
 #: grids with two robots).
 _NODE_BYTES, _MAKING_BYTES = 200, 600
-#: Goals whose distances are worked out together.
-_GOALS = 512
 
 
 @dataclass(frozen=True)
@@ -51,10 +49,6 @@ class Explored:
         O(goals x joint steps).
         """
         return as_executed(plan_space(self.space, self.goals[goals.start : goals.stop]))
-
-    def distances(self, goals: range) -> Ints:
-        """The least makespan to some goals, (goals, states); -1 where there is no way."""
-        return distances(self.space, _holding(self.space, [self.goals[k][0] for k in goals]))
 
     @property
     def spaces(self) -> tuple[PlanSpace, ...]:
@@ -243,20 +237,13 @@ def _pairs(space: Space, goals: Sequence[Goal]) -> int:
     """How many pairs there are of a goal and a state that reaches it in one step or more."""
     if not goals:
         return 0
-    reached = _holding(space, goals[:1])
     size = len(space)
-    if all(isinstance(goal, FullState) for goal in goals) and reached.sum() == 1:
+    full = all(isinstance(goal, FullState) for goal in goals)
+    if full and space.model.holds(goals[0], space.rows).sum() == 1:
         parts, _ = parts_of_graph(size, space.sources, space.target, directed=True)
         if parts == 1:
             return len(goals) * (size - 1)
-    return sum(
-        int((distances(space, _holding(space, goals[low : low + _GOALS])) > 0).sum())
-        for low in range(0, len(goals), _GOALS)
-    )
-
-
-def _holding(space: Space, goals: Sequence[Goal]) -> Bools:
-    return np.stack([space.model.holds(goal, space.rows) for goal in goals])
+    return sum(int((far > 0).sum()) for far in distances_to(space, goals))
 
 
 def _of_model(model: JointModel) -> Iterator[object]:
