@@ -28,6 +28,9 @@ from planners.search.plan_space import PlanSpace
 from planners.search.portions import PORTION, Explored, Source, cut
 from planners.system.limits import reaching
 
+#: Divergences of jobs that are kept before they are merged.
+_ROWS = 2_000_000
+
 
 @dataclass(frozen=True, slots=True)
 class FirstDifferences:
@@ -91,17 +94,21 @@ def differences(
     identity = digest(source.identity, *shared[1:])
     batch = Batch("first differences", _of_goals, shared, portions, identity, efforts)
     found: list[Table] = []
+    done = rows = 0
 
     def so_far() -> str:
-        return f"{len(found):,} of {len(portions):,} portions of the goals"
+        return f"{done:,} of {len(portions):,} portions of the goals"
 
     with reaching(so_far, "fewer candidate tasks"), closing(workers.tables(batch)) as tables:
         for table in tables:
             if not table:
-                witness = inseparable(source.portion(portions[len(found)]))
+                witness = inseparable(source.portion(portions[done]))
                 assert witness is not None
                 raise Inseparable(witness, model)
             found.append(table)
+            done, rows = done + 1, rows + len(table.get("divergences", ()))
+            if rows > _ROWS:  # most of them are found again and again
+                found, rows = [_merged(found)], 0
             progress(f"looking where coordination is required: {so_far()}")
     return _together(found, goals)
 
@@ -144,15 +151,22 @@ def _together(found: Sequence[Table], goals: SymmetricGoals | None = None) -> Fi
 
     Where the ``goals`` are some that speak for all, the other figures are those of all already.
     """
-    rows = None
-    if all("divergences" in table for table in found):
-        rows = minimal(np.concatenate([table["divergences"] for table in found]))
-    states = np.unique(np.concatenate([table["states"] for table in found]))
+    table = _merged(found)
+    rows, states = table.get("divergences"), table["states"]
     if goals is not None:
         states = goals.images_of_states(states)
         rows = None if rows is None else minimal(goals.images_of_rows(rows))
+    return FirstDifferences(rows, states, *table["figures"].tolist())
+
+
+def _merged(found: Sequence[Table]) -> Table:
+    """What some jobs found as one."""
+    listed: Table = {}
+    if all("divergences" in table for table in found):
+        listed = {"divergences": minimal(np.concatenate([t["divergences"] for t in found]))}
+    states = np.unique(np.concatenate([table["states"] for table in found]))
     figures = np.stack([table["figures"] for table in found]).sum(axis=0)
-    return FirstDifferences(rows, states, *figures.tolist())
+    return {**listed, "states": states, "figures": figures}
 
 
 # ---- goals up to symmetry

@@ -18,7 +18,7 @@ from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.language.partition import Partition
 from coordlang.required.miscoordination import Inseparable
 from coordlang.required.task_answers import answers
-from coordlang.verification.by_definition import inseparable, verify, verify_candidates
+from coordlang.verification.by_definition import inseparable, verify_candidates
 from coordlang.vocabulary import first_differences
 from coordlang.vocabulary.first_differences import FirstDifferences, differences, symmetric_goals
 from planners.loading import load
@@ -163,9 +163,12 @@ def words(differences: FirstDifferences, seed: int) -> dict[int, int]:
 
 
 @pytest.mark.parametrize(("robots", "number"), [(2, 40), (3, 20)])
-def test_jobs_give_what_the_whole_gives(robots: int, number: int) -> None:
+def test_jobs_give_what_the_whole_gives(
+    robots: int, number: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     answers: Counter[object] = Counter()
-    for seed, candidates in enumerate(random_candidates(range(number), robots)):
+    monkeypatch.setattr(first_differences, "_ROWS", 20)
+    for candidates in random_candidates(range(number), robots):
         whole, parts = found(candidates, 1e9), found(candidates, ONE)
         if isinstance(whole, str) or isinstance(parts, str):
             assert whole == parts
@@ -175,14 +178,7 @@ def test_jobs_give_what_the_whole_gives(robots: int, number: int) -> None:
         a, b = whole, parts
         assert a.listed.tolist() == b.listed.tolist()
         assert (a.requiring, a.nodes, a.edges) == (b.requiring, b.nodes, b.edges)
-        partition = Partition.of_states(candidates.rows, words(whole, seed))
-        verdict = verify(partition, candidates.spaces)
-        again = verify_candidates(partition, candidates, HERE, portion=ONE)
-        assert (verdict.holds, verdict.tasks) == (again.holds, again.tasks)
-        assert (again.witness is None) == again.holds
-        if verdict.holds:
-            assert verdict.nodes == again.nodes
-        answers[verdict.holds] += 1
+        answers[bool(a.requiring)] += 1
     assert answers[True] >= 3
     assert answers[False] >= 3
 

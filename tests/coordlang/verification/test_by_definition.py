@@ -117,6 +117,7 @@ def test_verdicts_are_those_of_the_definition(robots: int, most: int, number: in
             verdict = verify(table, candidates.spaces)
             in_jobs = verify_candidates(table, candidates, Workers(), portion=1.0)
             assert verdict.holds == in_jobs.holds == expected
+            assert not expected or verdict == in_jobs
             for witness in (verdict.witness, in_jobs.witness):
                 assert (witness is None) == expected
                 if witness is not None:
