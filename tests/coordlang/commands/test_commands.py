@@ -85,7 +85,7 @@ def test_build_from_a_task_file_and_for_problems(shell: Shell) -> None:
     assert data["tasks"]["kind"] == "problems"
     assert data["tasks"]["tasks"][0]["init"] == ["(at r1 c0-0)", "(at r2 c2-2)"]
     verified = json.loads(shell("verify l.json CORNERS --json").out)
-    assert (verified["holds"], verified["tasks"], verified["nodes"]) == (True, 1, 23)
+    assert (verified["holds"], verified["tasks"], verified["nodes"]) == (True, 1, 15)
     assert verified["unchecked"].startswith("not checked: the file claims that at least 2 words")
     out = shell("build T-MAP --method greedy -o -").out
     assert json.loads(out)["format"] == "coordlang/language"
