@@ -82,6 +82,7 @@ class Workers:
             try:
                 with self._begin(batch, [batch.jobs[n] for n in left], count) as futures:
                     running = dict(zip(futures, left, strict=True))
+                    futures.clear()  # each keeps its table
                     while running:
                         for future in wait(running, return_when=FIRST_COMPLETED).done:
                             outcome, number = future.result(), running.pop(future)
