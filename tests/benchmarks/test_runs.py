@@ -12,28 +12,18 @@ from xml.etree import ElementTree
 
 import pytest
 
-from benchmarks.paper import communication, game, planning_cost, scenario, table1
+from benchmarks.frame import KeptRows, asked_for, run_python
+from benchmarks.paper import communication, game, table1
 from benchmarks.paper.__main__ import RECIPES, main
-from benchmarks.paper.driving import counted, is_well
 from benchmarks.paper.floors import FLOORS, tasks_of
-from benchmarks.paper.grid import cell_position, entered_cells, task_cells
 from benchmarks.paper.page import page_of
-from benchmarks.paper.planning_cost import manhattan
 from benchmarks.paper.recipe import Settings
 from benchmarks.paper.reported import TABLE_1
 from benchmarks.paper.runner import attempt, is_known, kept, run
-from benchmarks.paper.suite import CORRIDOR, OTHERS, ROWS, WORLDS, language_for
-from benchmarks.paper.task_choices import languages_in_tasks
-from coordlang.execution.guided_search import ExpandedStates
-from coordlang.simulation.record import EventRecord, RunRecord
-from planners.joint.tables import Rows
-from planners.loading import load
-from planners.search.heuristics import HEURISTICS
+from benchmarks.paper.suite import OTHERS, ROWS
 from planners.search.plans import Plans
-from planners.search.reachable import explore
 from tests.support import naive
-from tests.support.domains import DOMAINS, ROOT
-from tests.support.task_languages import three_cells
+from tests.support.domains import ROOT
 
 GAME, COMMUNICATION = game.RECIPE, communication.RECIPE
 QUICK = Settings(samples=2, quick=True)
@@ -106,42 +96,6 @@ def test_command(finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "invalid choice: 'everything'" in capsys.readouterr().err
 
 
-def record(**changed: Any) -> RunRecord:
-    """A run that ended well, but for what is changed."""
-    usual: dict[str, Any] = {
-        "seed": 0,
-        "collisions": 0,
-        "deadlock": False,
-        "late": 0,
-        "messages": 3,
-        "seconds": 10.0,
-        "arrived": True,
-        "mixes": True,
-        "subplans": {},
-        "steps": [],
-        "events": [
-            EventRecord(9.0, "stopped", ["r1"]),
-            EventRecord(10.0, "arrived", ["r1"], steps={"r1": 4}, places={"r1": ["c0-0", "c0-1"]}),
-        ],
-        "poses": {},
-        "nearest": 0.7,
-    }
-    return RunRecord(**usual | changed)
-
-
-def test_how_runs_end_is_counted() -> None:
-    found = [
-        record(),
-        record(late=2, nearest=0.6),
-        record(arrived=False, deadlock=True, mixes=False, seconds=20.0),
-        record(arrived=False, collisions=2, nearest=0.38),
-    ]
-    assert [is_well(run) for run in found] == [True, False, False, False]
-    once = dict.fromkeys(("well", "collisions", "deadlocks", "late"), 1)
-    rest = {"late_steps": 2, "messages": 12, "seconds": 50.0, "nearest": 0.38}
-    assert counted(found) == {"runs": 4, **once, **rest, "mixes": 3, "agree": 2}
-
-
 def test_tasks_of_floors_require_coordination() -> None:
     language, tasks = tasks_of(FLOORS["T-map, 2 robots"], 0)
     assert (len(language.words), len(tasks)) == (3, 12)
@@ -201,20 +155,6 @@ def test_table_1_has_the_papers_tasks_and_states() -> None:
 
 # ---- the recipes
 
-THOROUGH = pytest.mark.thorough
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        name if name in ("GW1", "GW2", "GWB5", "GWB6") else pytest.param(name, marks=THOROUGH)
-        for name in TABLE_1
-    ],
-)
-def test_rows_are_the_papers(name: str) -> None:
-    candidates = WORLDS[name].candidates()
-    assert (candidates.count, candidates.states) == (TABLE_1[name].tasks, TABLE_1[name].states)
-
 
 def test_units_have_names_of_their_own() -> None:
     assert [world.name for world in ROWS] == list(TABLE_1)
@@ -230,50 +170,51 @@ def test_units_have_names_of_their_own() -> None:
         assert 0 < len(worlds & {w.name for w in OTHERS}) < len(worlds)
 
 
-def test_expansions_on_three_cells() -> None:
-    """By hand: the start, then a state after one step; from all but one of them the goal is a step
-    away, and comes up next.
-    """
-    one = three_cells()
-    terrain = ExpandedStates(one.model, one.partition)
-    assert planning_cost.expansions(one, HEURISTICS["blind"], terrain) == (2, 2, 2)
-    assert planning_cost.expansions(one, HEURISTICS["relaxed"], terrain) == (2, 2, 2)
+# ---- what benchmarks share
+
+NAMES = ("depot/pfile1", "depot/pfile13", "depot/pfile3", "taxi/p01")
 
 
-def test_the_papers_bound_is_the_farthest_robots_distance() -> None:
-    loaded = load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / "gwb5-3x3.pddl"])
-    goal = loaded.tasks[0].goal
-    space = explore(loaded.model, loaded.tasks[0].init[None, :])
+@pytest.mark.parametrize(
+    ("given", "rows"),
+    [
+        ([], NAMES),
+        (["depot/pfile1"], ("depot/pfile1",)),
+        (["depot/pfile"], NAMES[:3]),
+        (["depot/pfile3", "depot/pfile1"], ("depot/pfile1", "depot/pfile3")),
+        (["taxi", "depot/pfile1"], ("depot/pfile1", "taxi/p01")),
+        (["depot/pfile1", "depot"], NAMES[:3]),
+        (["rovers"], ()),
+    ],
+)
+def test_a_name_is_that_row_and_a_beginning_is_every_row_it_begins(
+    given: list[str], rows: tuple[str, ...]
+) -> None:
+    assert asked_for(NAMES, given) == [*rows]
 
-    def cells(row: Rows) -> dict[str, tuple[int, int]]:
-        atoms = (loaded.model.codec.facts.atoms[f] for f in loaded.model.codec.true_facts(row))
-        return {atom.args[0]: cell_position(atom.args[1]) for atom in atoms}
 
-    (ends,) = (cells(row) for row in space.rows if loaded.model.holds(goal, row[None, :])[0])
-    for row, bound in zip(space.rows, manhattan(loaded.model, goal, ())(space.rows), strict=True):
-        away = [abs(x - ends[r][0]) + abs(y - ends[r][1]) for r, (x, y) in cells(row).items()]
-        assert bound == max(away)
+def test_rows_are_measured_once_and_a_line_that_was_cut_off_again(tmp_path: Path) -> None:
+    path, measured = tmp_path / "rows.jsonl", []
+
+    def measure(name: str) -> dict[str, object]:
+        measured.append(name)
+        return {"row": name, "n": len(measured)}
+
+    kept = KeptRows(path)
+    assert [kept.get(name, lambda: measure("a"))["n"] for name in "aa"] == [1, 1]
+    kept.get("b", lambda: measure("b"))
+    whole = path.read_text()
+    path.write_text(whole[:-5])
+    again = KeptRows(path)
+    assert list(again.rows) == ["a"]
+    again.get("b", lambda: {"row": "b", "n": 2})
+    assert path.read_text() == whole
+    assert KeptRows(path).rows == kept.rows
 
 
-def test_the_detour_is_optimal_and_nobody_else_moves_otherwise() -> None:
-    candidates, language = language_for(CORRIDOR, "greedy", 0, scenario.trading_rooms())
-    assert candidates.count == 36 * 36
-    one = next(
-        s
-        for s in languages_in_tasks(language, candidates)
-        if task_cells(s.space, s.task) == (scenario.START, scenario.GOAL)
-    )
-    found = scenario.detour(one)
-    way, (agreed, other) = found["detour"], found["agreed"]
-    assert scenario.PLACE in way
-    assert scenario.PLACE not in agreed
-    assert found["optimal"] is True
-    for r1, r2 in ((agreed, other), (way, other)):
-        assert (r1[0], r2[0], r1[-1], r2[-1]) == (*scenario.START, *scenario.GOAL)
-        assert len(r1) == len(r2) == len(agreed)
-        assert all(a != b for a, b in zip(r1, r2, strict=True))  # never in one cell
-    # All parts of robot 1 through the place, by listing the plans.
-    wanted = {n for n, cell in enumerate(entered_cells(one.model, 0)) if cell == scenario.PLACE}
-    parts = {tuple(step[0] for step in plan) for plan in Plans.of(one.space, one.task)}
-    assert found["parts"] == sum(bool(wanted & set(part)) for part in parts)
-    assert 0 < found["ways"] <= found["parts_that_fit"] <= found["parts"]
+def test_processes_end_at_their_limits() -> None:
+    done = run_python(("-c", "print('{\"n\": 1}')"))
+    assert (done.data, done.code) == ({"n": 1}, 0)
+    assert run_python(("-c", "while True: pass"), cpu=1).why == "no time"
+    assert run_python(("-c", "import time; time.sleep(60)"), most=0.2).why == "no time"
+    assert run_python(("-c", "bytearray(9 << 30)"), cpu=60).why == "no memory"

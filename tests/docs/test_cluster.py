@@ -6,11 +6,8 @@ from __future__ import annotations
 import json
 import re
 import shlex
-import shutil
 import subprocess
 import sys
-from importlib.util import find_spec
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -89,58 +86,3 @@ def test_the_cluster_of_the_page_has_two_workers_and_listens_on_this_machine_onl
         ]
     assert len(hosts) >= 4  # the scheduler, two workers, and who starts them
     assert set(hosts) == {"127.0.0.1"}
-
-
-@needs_distributed
-@pytest.mark.thorough
-@pytest.mark.skipif(shutil.which("openssl") is None, reason="the program openssl is not there")
-def test_only_who_has_a_key_joins(folder: Path) -> None:
-    key = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-subj", "/CN=coordlang"]
-    subprocess.run(
-        [*key, "-keyout", "key.pem", "-out", "cert.pem"],
-        cwd=folder,
-        check=True,
-        capture_output=True,
-    )
-    shutil.copy(folder / "cert.pem", folder / "ca.pem")
-    found = re.search(r"<!-- tls -->\n```sh\n(.*?)```\n", PAGE, re.DOTALL)
-    assert found is not None
-    (folder / "keys.sh").write_text(found[1])
-    here = "--host 127.0.0.1"
-    scheduler = (
-        f"dask scheduler --protocol tls --no-dashboard {here} --scheduler-file scheduler.json"
-    )
-    worker = f"dask worker --no-dashboard {here} --protocol tls --scheduler-file scheduler.json"
-    task = "domains/grid/domain.pddl domains/grid/corners-3x3.pddl"
-    work = f"-m coordlang coordination {task} --scheduler scheduler.json"
-    with running_cluster(
-        folder, 1, f"sh -c '. ./keys.sh; exec {scheduler}'", f"sh -c '. ./keys.sh; exec {worker}'"
-    ):
-        for keys, code in (". ./keys.sh; ", 0), ("", 2):
-            done = subprocess.run(
-                ["sh", "-c", f"{keys}{sys.executable} {work}"],
-                cwd=folder,
-                env=ENVIRONMENT,
-                capture_output=True,
-                text=True,
-            )
-            assert done.returncode == code, done.stderr
-            assert ("no Dask scheduler answers" in done.stderr) == (code == 2)
-
-
-@pytest.mark.skipif(
-    find_spec("dask_jobqueue") is None,
-    reason="dask-jobqueue is not installed (pip install dask-jobqueue)",
-)
-def test_the_script_of_a_slurm_job(folder: Path) -> None:
-    script = succeeds(command("slurm-print"), folder)
-    asked = ("-p normal", "-n 1", "--cpus-per-task=4", "-t 02:00:00", "--job-name=coordlang")
-    assert script.startswith("#!")
-    assert {f"#SBATCH {option}" for option in asked} <= {*script.splitlines()}
-    assert "#SBATCH --mem=" in script
-    (started,) = (line for line in script.splitlines() if "distributed.cli.dask_worker" in line)
-    options = dict(pairwise(shlex.split(started)))
-    assert (options["--nworkers"], options["--nthreads"]) == ("4", "1")
-    assert options["--memory-limit"] in ("3.73GiB", "4.00GB")
-    assert "OMP_NUM_THREADS=1" in script
-    subprocess.run(["sh", "-n"], input=script, text=True, check=True)

@@ -25,21 +25,6 @@ from tests.support.command import Command
 from tests.support.domains import ROOT, read
 from tests.support.pages import DOCS, PAGES, blocks, commands, matches, run_command, run_python
 
-
-@pytest.mark.parametrize(
-    ("shown", "real", "same"),
-    [
-        ("a|...|d", "a|b|c|d", True),
-        ("took 0.10 s|breaks: ...", "took 2.34 s|breaks: it is late", True),
-        ("a|...", "b", False),
-        ("a", "a|b", False),
-        ("a|...|d", "a|b", False),
-    ],
-)
-def test_matches(shown: str, real: str, same: bool) -> None:
-    assert matches(shown.split("|"), real.split("|")) == same
-
-
 #: Pages of many commands, which take a while.
 LONG = ("asynchronous", "cli", "gallery", "library", "lifted", "simulation")
 

@@ -17,7 +17,7 @@ import families
 import numpy as np
 import pytest
 from generate import Scenario, main, problem_text
-from gridmap import GridMap, open_grid, path, read_map, ring, three_cells
+from gridmap import GridMap, open_grid, read_map, ring, three_cells
 
 from planners.loading import build, load
 from planners.pddl import parse_problem
@@ -137,39 +137,6 @@ def written(tmp_path: Path, text: str) -> Path:
     file = tmp_path / "some.map"
     file.write_text(text, newline="")
     return file
-
-
-def connected(grid: GridMap) -> bool:
-    reached = todo = {next(iter(grid.cells))}
-    while todo:
-        todo = {near for cell in todo for near in grid.neighbours(cell)} - reached
-        reached = reached | todo
-    return len(reached) == len(grid.cells)
-
-
-@pytest.mark.parametrize(
-    ("grid", "cells", "edges", "cell", "near"),
-    [
-        (open_grid(2, 3), 6, 7, "c0-1", ["c0-0", "c0-2", "c1-1"]),
-        (path(3, [1]), 4, 3, "c0-1", ["c0-0", "c0-2", "c1-1"]),
-        (path(5, [1, 3]), 7, 6, "c1-3", ["c0-3"]),
-    ],
-)
-def test_maps_by_size(grid: GridMap, cells: int, edges: int, cell: str, near: list[str]) -> None:
-    assert connected(grid)
-    assert (len(grid.cells), len(grid.edges)) == (cells, edges)
-    assert grid.neighbours(cell) == near
-
-
-@pytest.mark.parametrize(
-    ("size", "cells"), [((2, 2), 4), ((2, 4), 8), ((4, 2), 8), ((3, 3), 8), ((3, 5), 12)]
-)
-def test_a_ring_is_one_cycle(size: tuple[int, int], cells: int) -> None:
-    grid = ring(*size)
-    assert len(grid.cells) == len(grid.edges) == cells
-    assert connected(grid)
-    assert all(len(grid.neighbours(cell)) == 2 for cell in grid.cells)
-    assert all(grid.distance(a, b) == 1 for a, b in grid.edges)
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,6 @@ from planners.pddl import read_domain
 from planners.pddl.model_options import Cost, ModelOptions
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
-from tests.support.agreement import Feature, Plan, agreement, exactly, parts, who, who_does_what
 from tests.support.domains import DOMAINS, read, world_of
 from tests.support.pages import Row, blocks, candidates, commands, run_command, table
 
@@ -247,45 +246,3 @@ def test_the_words_of_the_readme_are_a_smallest_language(
     guarantee = build_language(given, "minimal").language.guarantee
     assert guarantee.proved_minimal
     assert guarantee.size == len(words) + 1
-
-
-moves = who_does_what()
-
-
-def first(schema: str) -> Feature:
-    """Who does the first subaction of this schema."""
-
-    def feature(plan: Plan) -> frozenset[int]:
-        found = parts(plan, [schema])
-        return frozenset(robot for step, robot, _ in found if step == found[0][0])
-
-    return feature
-
-
-def aside(plan: Plan) -> frozenset[int]:
-    return frozenset(robot for _, robot, text in parts(plan, []) if text.endswith(" c0-4)"))
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    ("folder", "problem", "tasks", "told", "leaves"),
-    [
-        ("three-cells", "problem", "all", moves, True),
-        ("t-map", "problem", "all", exactly, False),
-        ("corridor", "problem", "rooms.tasks.json", aside, True),
-        ("grid", "gwb5-3x3", "gwb5-3x3.tasks.json", moves, False),
-        ("charger", "queue", "queue.tasks.json", who_does_what("mop"), True),
-        ("elevator", "two-calls", "its own", first("enter"), False),
-        ("handover", "two-doors", "its own", who_does_what("hand-over"), True),
-        ("vans", "one-van", "one-van.tasks.json", who("board"), True),
-    ],
-    ids=lambda value: value if isinstance(value, str) else "",
-)
-def test_what_the_sentences_tell(
-    folder: str, problem: str, tasks: str, told: Feature, leaves: bool
-) -> None:
-    given = candidates(folder, {"language for": problem, "--tasks": tasks, "options": ""})
-    figures = agreement(build_language(given, "minimal").language, given, told)
-    assert figures["different"] > 0
-    assert figures["told"] == figures["different"]
-    assert (figures["left"] > 0) == leaves

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.fuzz.run import COMMANDS, Mutant, Pair, complaint, fuzz, mutant, pairs
-from tests.support.command import Outcome
+from tests.fuzz.run import fuzz, mutant, pairs
 
 
 @pytest.mark.parametrize(
@@ -28,31 +27,3 @@ def test_mutants(numbers: range, seed: int, tmp_path: Path) -> None:
     codes, failures = fuzz(numbers, seed, sources, keep=tmp_path)
     assert failures == []
     assert {0, 31} <= {code for _, code in codes}, "the mutants are all broken, or none is"
-
-
-PLACED = "coordlang: domain.pddl:1:2: wrong"
-WRITTEN = "work/language.json"
-
-
-@pytest.mark.parametrize(
-    ("code", "err", "left", "why"),
-    [
-        (31, PLACED, "", "None"),
-        (0, "", WRITTEN, "None"),
-        (1, "Traceback (most recent call last):", "", "'Traceback' on stderr"),
-        (0, "Exception ignored in: <x>", WRITTEN, "'Exception ignored'"),
-        (-9, "", "", "no answer"),
-        (32, "coordlang: x", "", "exit code 32"),
-        (31, PLACED, WRITTEN, "there are the files"),
-        (0, "", "", "there are the files"),
-        (31, PLACED, "tmp/x", "there are the files"),
-        (31, "", "", "without a message"),
-        (31, "coordlang: note: r1 is the only robot", "", "without a message"),
-        (31, "coordlang: 3:4: wrong", "", "names no file"),
-        (31, "coordlang: domain.pddl: wrong", "", "names no line"),
-        (34, "coordlang: problem.pddl: wrong", "", "names no line"),
-    ],
-)
-def test_the_judge_sees_it(code: int, err: str, left: str, why: str) -> None:
-    broken = Mutant("", Pair("x", "", ""), COMMANDS[2])
-    assert why in str(complaint(broken, Outcome(code, "1\n", err), {left} - {""}))

@@ -70,13 +70,6 @@ def test_how_far_the_work_got() -> None:
     assert "searching .. 1 s" in shown or "searching .. 2 s" in shown
 
 
-@pytest.mark.thorough
-def test_no_colour() -> None:
-    _, shown = run(CODE, NO_COLOR="1")
-    assert "first thing .." in shown
-    assert "\x1b[3" not in shown  # cursor movements are no colours
-
-
 def test_short_work_shows_nothing() -> None:
     code = "from coordlang.commands import terminal\nwith terminal.working('x') as say: say('y')\n"
     code += "import sys; print('rich' in sys.modules)"

@@ -86,15 +86,6 @@ def test_the_optimal_plans_are_the_plans_that_fit(lot: str) -> None:
                 )
 
 
-def test_the_tasks_are_worth_it() -> None:
-    """Several say several sentences, some of which leave several plans open."""
-    listed = [[len(plans) for plans in numbered_sentences(used).values()] for used in tasks("few")]
-    assert sum(len(found) > 1 for found in listed) >= 15
-    assert sum(len(found) > 1 and max(found) > 1 for found in listed) >= 12
-    for asked in ("remembers", "is_joint_action"):
-        assert {getattr(used.model, asked) for used in tasks("few")} == {True, False}
-
-
 @BOTH
 def test_one_term_in_every_state(lot: str) -> None:
     for used in tasks(lot):

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cache
 from itertools import combinations
 from random import Random
@@ -13,16 +13,15 @@ from typing import Any
 import families
 import numpy as np
 import pytest
-from generate import problem_text, scenario
-from gridmap import GridMap, path
 
-from coordlang.language.candidates import Candidates, all_pairs
+from coordlang.language.candidates import all_pairs
 from coordlang.language.partition import Partition
 from coordlang.lifted.features import Feature
 from coordlang.lifted.learning import Instance, Learned, learn, simplest_hitting
 from coordlang.lifted.pool import pool_of
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary import sat
+from coordlang.vocabulary.exhaustive import partitions
 from planners.joint.tables import Ints
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.sexpr import Source
@@ -138,19 +137,6 @@ def test_the_fewest_words_over_classes() -> None:
     assert len(set(learned.word.values())) == least < len(table)
 
 
-def partitions(count: int, size: int) -> Iterator[list[int]]:
-    """Into at most so many parts: parts are named in the order of their first member."""
-
-    def grow(words: list[int]) -> Iterator[list[int]]:
-        if len(words) == count:
-            yield words
-            return
-        for word in range(min(size, 1 + max(words, default=-1) + 1)):
-            yield from grow([*words, word])
-
-    return grow([])
-
-
 def test_words_may_come_first() -> None:
     """Other features than the simplest ones may do with fewer words; never with more."""
     known = [instance("t-map", "problem")]
@@ -180,55 +166,3 @@ def track(rooms: int) -> Instance:
     domain = read_domain(DOMAINS / "push-box" / "domain.pddl")
     problem = parse_problem(Source("problem", families.push_box(rooms)), domain)
     return Instance(all_pairs(domain, [problem]))
-
-
-# ---- what docs/lifted.md proves for all sizes, on small ones
-
-
-def cycle(size: int) -> GridMap:
-    """A ring of any number of cells; the names say nothing of places."""
-    cells = {f"p{k}": (0, k) for k in range(size)}
-    names = list(cells)
-    return GridMap(cells, tuple((names[k], names[(k + 1) % size]) for k in range(size)))
-
-
-def tasks_on(grid: GridMap) -> Candidates:
-    domain = read_domain(DOMAINS / "grid" / "domain.pddl")
-    text = problem_text(scenario("some", grid), "grid")
-    return all_pairs(domain, [parse_problem(Source("some", text), domain)])
-
-
-def arcs(candidates: Candidates, size: int, cuts: tuple[int, ...]) -> Ints:
-    """The number of the arc in which r1 is, for cuts before these cells."""
-    arc = []
-    for row in candidates.rows:
-        (atom,) = (a for a in candidates.model.codec.decode(row) if a.startswith("(at r1 "))
-        place = int(atom.removeprefix("(at r1 p").removesuffix(")"))
-        arc.append(sum(cut <= place for cut in cuts) % len(cuts))
-    return np.array(arc)
-
-
-def is_language_of(candidates: Candidates, words: Ints) -> bool:
-    names = [f"w{k}" for k in range(int(words.max()) + 1)]
-    return verify(Partition.of_table(names, candidates.rows, words), candidates.spaces).holds
-
-
-@pytest.mark.parametrize(
-    "size", [3, 4, 5, *(pytest.param(n, marks=pytest.mark.thorough) for n in (6, 7))]
-)
-def test_three_arcs_of_a_ring_are_words(size: int) -> None:
-    """Every partition by arcs of r1, three or more of them; two are not enough."""
-    candidates = tasks_on(cycle(size))
-    for number in range(3, min(size, 5) + 1):
-        for cuts in combinations(range(size), number):
-            assert is_language_of(candidates, arcs(candidates, size, cuts)), cuts
-    assert not all(
-        is_language_of(candidates, arcs(candidates, size, cuts))
-        for cuts in combinations(range(size), 2)
-    )
-
-
-@pytest.mark.parametrize("size", [3, 5, 8])
-def test_a_path_needs_one_word(size: int) -> None:
-    candidates = tasks_on(path(size, []))
-    assert is_language_of(candidates, np.zeros(len(candidates.rows), np.int64))

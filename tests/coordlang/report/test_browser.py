@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 from typing import TYPE_CHECKING
 
 import pytest
@@ -281,57 +280,6 @@ def test_the_miscoordination(
     opened.page.click("#without-transport .forward")
     assert witness["reason"] in opened.page.inner_text("#verdict")
     assert "bad" in (opened.page.get_attribute("#verdict", "class") or "")
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(("width", "scheme"), [(320, "light"), (390, "dark"), (1280, "light")])
-def test_narrow_and_wide(open_page: Opener, width: int, scheme: str) -> None:
-    for domain, problem, tasks in (WORLDS[0], WORLDS[3], WORLDS[6]):
-        opened = open_page(
-            make_world(domain, problem, tasks).report.html, width=width, color_scheme=scheme
-        )
-        assert opened.page.evaluate("document.documentElement.scrollWidth") == width
-        wide = opened.page.evaluate(
-            """() => [...document.querySelectorAll('main *')].filter(e => !e.closest('svg, .scroller')
-              && e.getBoundingClientRect().right > innerWidth + 1).map(e => e.outerHTML.slice(0, 80))"""
-        )
-        assert wide == []
-        small = opened.page.evaluate(
-            """() => [...document.querySelectorAll('.transport button, .tabs button, select, .sentence')]
-              .filter(e => e.offsetHeight && e.offsetHeight < 32).map(e => e.outerHTML.slice(0, 80))"""
-        )
-        assert small == []
-
-
-#: The contrast of two colours, WCAG 2.1.
-CONTRAST = """([text, ground]) => { const of = name => { const e = document.createElement('i'); e.style.color = `var(${name})`;
-    document.body.append(e); const c = getComputedStyle(e).color.match(/[0-9.]+/g).map(Number); e.remove();
-    const [r, g, b] = c.slice(0, 3).map(v => v / 255).map(v => v <= .03928 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4);
-    return .2126 * r + .7152 * g + .0722 * b; };
-  const [a, b] = [of(text), of(ground)].sort((x, y) => y - x); return (a + .05) / (b + .05); }"""
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_text_can_be_read(open_page: Opener, scheme: str) -> None:
-    opened = open_page(make_world("t-map", "problem").report.html, color_scheme=scheme)
-    for colours in product(("--ink", "--soft", "--accent", "--bad"), ("--paper", "--panel")):
-        assert opened.page.evaluate(CONTRAST, [*colours]) >= 4.5, colours
-
-
-def test_odd_names_stay_text(open_page: Opener) -> None:
-    """Names are put into the page as text, wherever they come from."""
-    language, domain, problem = make_language("t-map", "problem")
-    odd = replace(
-        language,
-        words=tuple(f"{w}</script><b onclick='1'>" for w in language.words),
-        states={key: f"{word}</script><b onclick='1'>" for key, word in language.states.items()},
-        default=f"{language.default}</script><b onclick='1'>",
-    )
-    opened = open_page(make_report(odd, domain, [problem], tasks_shown=2).html)
-    opened.forward(2)
-    assert opened.page.evaluate("document.querySelectorAll('main b[onclick]').length") == 0
-    assert "</script>" in opened.page.inner_text("#now-word")
 
 
 def test_a_place_is_chosen_on_the_floor_plan(

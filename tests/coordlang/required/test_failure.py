@@ -200,7 +200,6 @@ def test_breaks_equal_the_walk(robots: int | None, seeds: range) -> None:
             if found is not None:
                 assert found.step == twin
                 breaks(candidates, space, found)
-    print(f"{robots or 'any'} robots: {dict(answers)}")
     for kind in ("inseparable", "break"):
         assert answers[kind, True] >= 2
         assert answers[kind, False] >= 2

@@ -41,7 +41,7 @@ from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Mission
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.sexpr import Source
-from planners.system.errors import BadInput, UsageError
+from planners.system.errors import BadInput
 from tests.support.domains import DOMAINS, ROOT
 from tests.support.simulation import floor_for, mission_of, runs
 
@@ -309,12 +309,6 @@ def test_films_have_the_frames_that_are_drawn() -> None:
     assert np.abs(film[0].astype(int) - drawn[0]).mean() < 6
     assert sheet.shape[1] > drawn[0].shape[1]
     assert recorded(found, run, ".png") == recorded(found, run, ".png")
-
-
-def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(UsageError, match=r"imageio_ffmpeg(.|\n)*coordlang\[sim\]"):
-        recorded(record(), record().runs[0], ".mp4")
 
 
 def test_a_record_that_cannot_be_played_is_refused(tmp_path: Path) -> None:

@@ -294,19 +294,6 @@ def test_steps_are_those_of_the_definition(seed: int, tmp_path: Path) -> None:
     assert (inspected["states"], inspected["joint_steps"]) == reachable(found, start, clearance)
 
 
-def test_some_of_these_buildings_differ_by_clearance_and_groups(tmp_path: Path) -> None:
-    """What the test above compares is not the same everywhere."""
-    kinds = set()
-    for seed in range(12):
-        random = Random(seed)
-        clearance = random.choice([0.0, 0.29, 0.83, 1.13])
-        found = read_building(written(tmp_path, random_building(random)))
-        with_groups = any(lane.groups for lane in found.lanes)
-        text = building_files(found, 2, [], clearance)[0]["problem.pddl"]
-        kinds.add((clearance > 0, with_groups, "excludes" in text, "keeps-clear" in text))
-    assert (True, True, True, True) in kinds
-
-
 # What is wrong, and where.
 
 BOMB = "a: &a [x, x]\nb: &b [*a, *a]\nc: [*b, *b]\n" + SQUARE

@@ -207,17 +207,3 @@ def test_a_limit_before_a_language_is_found_and_none_after() -> None:
         assert built.verdict.holds == (built.stopped is None)
         ends.append(built.verdict.holds)
     assert ends == [False, True]
-
-
-def test_words_that_a_search_begins_with_count() -> None:
-    """Stopped in its first move it has looked at those: better than silence."""
-    candidates = all_tasks("grid", "gw2-2x3")
-
-    def limited(text: str) -> None:
-        if text.startswith("annealing"):
-            raise OutOfTime("the time limit of the test is over")
-
-    job = job_for_few_words(Making(candidates, progress=limited), seed=1)
-    found, failures = few_words(job, 3)
-    assert isinstance(found.stopped, OutOfTime)
-    assert float(failures.mean) < found.figures["silence_mean"]

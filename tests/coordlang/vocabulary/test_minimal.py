@@ -17,7 +17,6 @@ from hypothesis import strategies as st
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates
 from coordlang.language.partition import Partition
-from coordlang.language.sentences import sentence
 from coordlang.language.warping import Pair, pair, short_clauses
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.verification.by_definition import verify
@@ -31,7 +30,6 @@ from planners.parallel.batch import Store
 from planners.parallel.workers import Workers
 from tests.support.candidates import small_candidates
 from tests.support.domains import all_tasks
-from tests.support.naive import separation_clause, warping_clause
 from tests.support.random_spaces import random_spaces
 
 
@@ -53,25 +51,7 @@ def test_known_minima(folder: str, stem: str, words: int) -> None:
     assert built.verdict.holds
 
 
-def test_t_map_has_two_single_words() -> None:
-    """Two words of a single state each, and two sentences of three words that say who moves first."""
-    sizes = build_language(all_tasks("t-map"), "minimal").language.sizes()
-    assert sorted(sizes.values()) == [1, 1, 10]
-
-
 SEQUENCES = st.lists(st.integers(0, 4), min_size=1, max_size=6)
-
-
-@settings(max_examples=250, deadline=None)
-@given(SEQUENCES, SEQUENCES, st.lists(st.integers(0, 2), min_size=5, max_size=5))
-def test_same_sentence_iff_a_warping_path_exists(
-    u: list[int], v: list[int], word: list[int]
-) -> None:
-    clause = warping_clause(u, v, word)
-    assert (clause is not None) == (sentence(word[s] for s in u) == sentence(word[s] for s in v))
-    if clause is not None:
-        assert all(word[a] == word[b] and a != b for a, b in clause)
-        assert len(clause) <= fewest_cells(tuple(u), tuple(v), word)
 
 
 @given(st.lists(SEQUENCES, min_size=2, max_size=3), st.integers(0, 4))
@@ -89,26 +69,6 @@ def pairs_of_paths(u: list[int], v: list[int]) -> Iterator[frozenset[Pair]]:
     for after in ((u[1:], v[1:]), (u[1:], v), (u, v[1:])):
         if all(after):
             yield from (cell | rest for rest in pairs_of_paths(*after))
-
-
-def fewest_cells(u: tuple[int, ...], v: tuple[int, ...], word: list[int]) -> int:
-    """Non-identical cells of the best warping path, by trying all of them."""
-
-    def best(i: int, j: int) -> int:
-        if word[u[i]] != word[v[j]]:
-            return 10**9
-        here = int(u[i] != v[j])
-        steps = [(i - a, j - b) for a, b in ((1, 0), (0, 1), (1, 1)) if i >= a and j >= b]
-        return here + (min(best(*step) for step in steps) if steps else 0)
-
-    return best(len(u) - 1, len(v) - 1)
-
-
-def test_separation_clause_of_three_plans() -> None:
-    assert separation_clause([[0, 1, 3], [0, 2, 3], [0, 4, 3]], [0] * 5) == frozenset(
-        {(1, 2), (1, 4)}
-    )
-    assert separation_clause([[0, 1, 3], [0, 2, 3], [0, 4, 3]], [0, 1, 0, 0, 1]) is None
 
 
 GROUPS: tuple[list[list[int]], ...] = (
@@ -204,7 +164,7 @@ def languages(candidates: Candidates, group: SymmetryGroup) -> list[dict[int, in
     return found
 
 
-def check(found: list[dict[int, int]], candidates: Candidates) -> int:
+def merges_of(found: list[dict[int, int]], candidates: Candidates) -> int:
     """Each is a language and merges words of the one before, and the last can merge none."""
     for before, after in pairwise(found):
         assert len(set(after.values())) < len(set(before.values()))
@@ -232,7 +192,7 @@ def test_random_models_merge_until_no_merge_is_left(robots: int | None, seeds: r
             start = {state: state for state in states_of(candidates)}
             if is_language(start, candidates):
                 found = languages(candidates, SymmetryGroup(()))
-                sizes[check(found, candidates)] += 1
+                sizes[merges_of(found, candidates)] += 1
     assert sum(count for size, count in sizes.items() if size > 1) >= 2, sizes
 
 
@@ -242,7 +202,7 @@ def test_random_models_merge_until_no_merge_is_left(robots: int | None, seeds: r
 )
 def test_shipped_worlds_merge_until_no_merge_is_left(folder: str, stem: str, most: int) -> None:
     candidates = all_tasks(folder, stem)
-    assert 3 <= check(languages(candidates, symmetry_group(candidates)), candidates) <= most
+    assert 3 <= merges_of(languages(candidates, symmetry_group(candidates)), candidates) <= most
 
 
 @pytest.mark.parametrize(("folder", "stem"), [("grid", "gw1-2x2"), ("t-map", "problem")])

@@ -247,7 +247,6 @@ def test_each_class_a_word_is_a_language(robots: int, separable: bool, models: i
         answers[suffice] += 1
         if sum(answers.values()) == models:
             break
-    print(answers)
     assert answers[separable]
 
 
