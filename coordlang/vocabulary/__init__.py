@@ -3,11 +3,10 @@
 
 from collections.abc import Callable
 
-from coordlang.vocabulary.best import best
 from coordlang.vocabulary.exhaustive import exhaustive
 from coordlang.vocabulary.greedy import greedy
 from coordlang.vocabulary.job import Job, Outcome
-from coordlang.vocabulary.minimal import minimal
+from coordlang.vocabulary.minimal import best, minimal
 from coordlang.vocabulary.separating import separating
 
 #: The ways to a partition, by the name that ``--method`` takes.

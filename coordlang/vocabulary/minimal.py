@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The least number of words, with proof: counterexamples in, SAT out.
+"""The least number of words, with proof, or few words soon: counterexamples in, SAT out.
 
 Words that some states decide, and the words of a known language, merged, give the first upper
 bound; numbers of words are decided by the loop (`coordlang.vocabulary.loop`), with clauses that
@@ -18,12 +18,14 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from coordlang.language.warping import Clause
+from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome, word_count
 from coordlang.vocabulary.loop import Budget, Languages, between, close_bounds, find
 from coordlang.vocabulary.merging import merged
 from coordlang.vocabulary.partitions import Partitions, Refutation
 from coordlang.vocabulary.sat import Undecided
 from planners.search.sat import SolverName
+from planners.system.errors import OutOfMemory
 from planners.system.limits import run_until_stopped
 
 if TYPE_CHECKING:  # they load networkx
@@ -53,6 +55,8 @@ _FEWER_WORDS = 5
 _MANY, _MERGED_SOON = 100, 30
 #: Merges in a row that fail before something else is tried.
 _VAIN = 15
+#: Plans that local search may measure for a unit of effort.
+_MEASURED = 1_000_000
 #: Pairs of the clauses that are all collected before long proofs without a common step.
 _SHORT = 3
 #: Merged words are verified once they are so many times the last ones that were.
@@ -68,6 +72,27 @@ def minimal(job: Job) -> Outcome:
     with closing(MinimalSearch(job)) as search:
         stopped = run_until_stopped(search.run)
     return search.outcome(stopped)
+
+
+def best(job: Job) -> Outcome:
+    """As few words as ``job.effort`` finds, and the bound that it proves; the default method.
+
+    Greedy words, merged; then the loop of `minimal` as far as the effort allows; and for a single
+    task, of the languages with so few words one whose sentences leave many plans open.  Effort is
+    counted work, so the same input gives the same language on every machine.  Anytime, like
+    `minimal`.  Without effort the words are greedy's.
+    """
+    if not job.effort:
+        assert job.incumbent is not None
+        return Outcome(job.incumbent, job.lower_bound, {"work": 0})
+    with closing(MinimalSearch(job, job.effort)) as search:
+        stopped = run_until_stopped(search.run)
+        outcome = search.outcome(stopped)
+    if stopped is not None or job.candidates.count != 1:
+        return outcome
+    job.progress("leaving plans open")
+    freer = flexible(job, outcome, _MEASURED * job.effort)
+    return replace(freer, stopped=None) if isinstance(freer.stopped, OutOfMemory) else freer
 
 
 def refuting_clauses(job: Job, size: int) -> Mapping[Clause, Evidence]:
