@@ -2,12 +2,12 @@
 """Languages among partitions of a kind, of which there are fewer than of all.
 
 States share a word that an abstraction takes for one (`coordlang.vocabulary.abstractions`), or that
-a symmetry takes to each other; in one task those of which a few facts say the same
-(`coordlang.vocabulary.deciding_facts`), or words are *stutter-free*: every step of every optimal
-plan enters another word, so that one clause rules a failing tuple out, the one of the warping path
-that goes step by step (Proposition 27 of docs/concepts.md).  One of these partitions often is a
-language where the loop finds none.  **What is not found here proves nothing about numbers of
-words**: that no partition of a kind is a language says nothing of the others (Proposition 18).
+a symmetry takes to each other; in one task those of which a few facts say the same ("has robot 2
+loaded the package?"), or words are *stutter-free*: every step of every optimal plan enters another
+word, so that one clause rules a failing tuple out, the one of the warping path that goes step by
+step (Proposition 27 of docs/concepts.md).  One of these partitions often is a language where the
+loop finds none.  **What is not found here proves nothing about numbers of words**: that no
+partition of a kind is a language says nothing of the others (Proposition 18).
 """
 
 from __future__ import annotations
@@ -19,14 +19,16 @@ from itertools import islice, pairwise
 
 import numpy as np
 
+from coordlang.language.candidates import Candidates
 from coordlang.language.warping import Pair, pair
 from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
-from coordlang.vocabulary.deciding_facts import classes_by_facts
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.loop import Budget, Languages, find
+from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
-from planners.joint.tables import Ints
+from planners.joint.tables import Bools, Ints, unique_rows
 from planners.search.plan_space import PlanSpace
+from planners.search.sat import whole
 
 #: Clauses that are taken of a refuted partition, before their images; and failing tuples after
 #: which longer ones are not looked for.
@@ -37,6 +39,9 @@ _STUTTER_FREE = Budget(rounds=8, conflicts=2_000)
 #: In the order of words for a state: to be in the word of a state before costs more than any number
 #: of states beside it.
 _FORBIDDEN = 1 << 30
+#: Failing tuples of one length, under one symmetry, that are looked at for what they differ in, and
+#: after which longer ones are not.
+_ENOUGH_FOR_FACTS = 500
 #: Refuted partitions of all kinds for each of the budget, so many conflicts counted as one.
 _TOGETHER, _CONFLICTS = 8, 250
 
@@ -286,3 +291,75 @@ def _preferred(space: PlanSpace, size: int) -> dict[int, int]:
         used[word[node]] += 1
         np.add.at(beside, (above[node], word[node]), 1)
     return dict(zip(space.state.tolist(), word.tolist(), strict=True))
+
+
+# ---- few facts that decide the words of one task
+
+
+def classes_by_facts(candidates: Candidates, refuter: Refuter) -> Iterator[Ints]:
+    """(states) the class of each state: what some facts say of it, and how many steps are to go.
+
+    Each class a word of its own is a language.  At first the class is decided by facts of which
+    none can be spared, then by more and more: each time by others that would suffice alone.  There
+    are none if a state is met with several numbers of steps to go, as within slack.
+
+    The facts are a hitting set of what failing plans differ in: two plans have one sentence under
+    such classes iff they are in one class after each step, so that nothing else tells them apart
+    (Proposition 28 of docs/concepts.md).
+
+    ``candidates``: one task.  ``refuter``: tells what is wrong with a partition.
+    """
+    (space,) = candidates.spaces
+    steps = _steps_to_go(space)
+    if steps is None:
+        return
+    facts, chosen = _changing_facts(candidates), list[int]()
+    left = np.ones(len(facts), np.bool_)
+    while (found := _deciding(facts, left, steps, refuter)) is not None:
+        left[found] = False
+        chosen += found
+        yield _classes(steps, facts[chosen])
+
+
+def _deciding(facts: Bools, left: Bools, steps: Ints, refuter: Refuter) -> list[int] | None:
+    """Facts that suffice, of those that are ``left``, by number; None if all do not."""
+    from pysat.examples.hitman import Hitman
+
+    with whole(Hitman)(htype="lbx") as hitting:
+        chosen: list[int] = []
+        while agreeing := refuter.agreeing(_classes(steps, facts[chosen]), None, _ENOUGH_FOR_FACTS):
+            for found in agreeing:
+                sequences = refuter.pool.sequences(found, found.rows[:_ENOUGH_FOR_FACTS])
+                for differing in _differing(facts, sequences):
+                    if not (differing & left).any():
+                        return None
+                    hitting.hit(np.flatnonzero(differing & left).tolist())
+            chosen = sorted(hitting.get())
+    return chosen
+
+
+def _differing(facts: Bools, sequences: Ints) -> Bools:
+    """(different sets, facts) what the plans of each tuple (tuples, robots, length) differ in."""
+    values = facts[:, sequences]
+    differ = (values != values[:, :, :1]).any(axis=(2, 3))
+    found: Bools = np.unique(differ.T, axis=0)
+    return found
+
+
+def _changing_facts(candidates: Candidates) -> Bools:
+    """(facts, states) the facts that are true in some states only."""
+    codec = candidates.model.codec
+    columns = [codec.column(candidates.rows, fact) for fact in range(len(codec.facts))]
+    return np.array([column for column in columns if column.any() and not column.all()], np.bool_)
+
+
+def _steps_to_go(space: PlanSpace) -> Ints | None:
+    """(states) how many steps are to go, -1 where no plan passes; None: several numbers for one."""
+    steps = np.full(len(space.rows), -1)
+    steps[space.state] = space.layer
+    return steps if (steps[space.state] == space.layer).all() else None
+
+
+def _classes(steps: Ints, facts: Bools) -> Ints:
+    """(states) a number for each different combination of steps to go and values of facts."""
+    return unique_rows(np.column_stack((steps + 1, *facts)))[1]

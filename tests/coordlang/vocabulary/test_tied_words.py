@@ -25,12 +25,11 @@ from coordlang.language.warping import Pair
 from coordlang.symmetry.group import symmetry_group
 from coordlang.verification.by_definition import verify_candidates
 from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
-from coordlang.vocabulary.deciding_facts import classes_by_facts
 from coordlang.vocabulary.first_differences import first_differences
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.loop import Budget, Languages
 from coordlang.vocabulary.sat import PartitionProblem
-from coordlang.vocabulary.tied_words import TiedWords, _Kind, _orbits, _Ties
+from coordlang.vocabulary.tied_words import TiedWords, _Kind, _orbits, _Ties, classes_by_facts
 from planners.joint.tables import Ints
 from planners.parallel.workers import Workers
 from planners.pddl.model_options import ModelOptions
