@@ -196,6 +196,21 @@ def test_the_disk_is_full_at_every_change(
     assert 3 <= met < 999
 
 
+@pytest.mark.parametrize("name", QUICK[:2])
+def test_an_output_is_whole_or_none_at_every_length(
+    name: str, said: dict[str, list[str]], tmp_path: Path
+) -> None:
+    once = Stage(name, tmp_path / "once", said)
+    once.succeeds()
+    most = max((once.work / output).stat().st_size for output in once.names)
+
+    def at_most(size: int) -> Fault:
+        return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+    sizes = (at_most(most * number // 5) for number in range(5))
+    assert sum(code != 0 for code in ends(name, said, tmp_path, sizes)) == 5
+
+
 def test_domains_are_copied_whole_or_not_at_all(tmp_path: Path) -> None:
     """Two of them: neither is there without the other."""
     two = ("t-map", "three-cells")
@@ -278,3 +293,11 @@ def test_kills(name: str, tmp_path: Path, said: dict[str, list[str]]) -> None:
             assert json.loads(held)["guarantee"]["lower_bound"] <= 3
         else:
             assert held in (OLD, new[output]), (output, held[:300])
+
+
+def test_two_processes_write_one_output(tmp_path: Path, said: dict[str, list[str]]) -> None:
+    stage = Stage("tasks", tmp_path, said)
+    both = [stage.start(), stage.start()]
+    assert [process.join().code for process in both] == [0, 0]
+    assert stage.others() == set()
+    assert stage.outputs() == stage.succeeds()

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import chain, combinations, islice, permutations, product
 from random import Random
 
@@ -13,7 +14,8 @@ import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates, all_pairs
-from coordlang.symmetry.group import symmetries_of_part, symmetry_group
+from coordlang.language.warping import pair
+from coordlang.symmetry.group import Symmetry, symmetries_of_part, symmetry_group
 from coordlang.verification.certificate_file import Certificate, Reason
 from coordlang.verification.check_certificate import Checked, check
 from coordlang.verification.make_certificate import _reason
@@ -30,6 +32,7 @@ from planners.pddl import parse_problem
 from planners.pddl.sexpr import Source
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan
+from planners.system.errors import Refuted
 from tests.support import naive
 from tests.support.candidates import small_candidates
 from tests.support.domains import all_tasks
@@ -208,6 +211,33 @@ def test_a_bound_of_a_part_holds_with_every_clause_checked_in_the_whole() -> Non
     assert square.refute(3, Budget()) is None
     for instance in (row, square):
         instance.close()
+
+
+def test_a_forged_symmetry_of_a_part_is_refused() -> None:
+    """The clause of what would be the image: its plans are no optimal plans of the whole."""
+    candidates = all_tasks("grid", "gw2-2x3")
+    square = parts(candidates, symmetry_group(candidates))[-1]
+    instance = ContainedInstance(square, 0)
+    instance.refute(2, Budget())
+    instance.close()
+    moved = {name for s in square.group.symmetries for name, to in s.renaming.items() if name != to}
+    one, other, *others = sorted(moved - set(candidates.model.robots))
+    # Two neighbours change names, and all others stay: no symmetry of any part with them.
+    forged = {
+        one: other,
+        other: one,
+        **{name: name for name in (*others, *candidates.model.robots)},
+    }
+    to = np.array(states_under(candidates.spaces[0], forged))
+    refused = 0
+    for clause, evidence in list(instance.languages.known.evidence.items())[:20]:
+        if evidence.symmetry is None:
+            image = frozenset(pair(int(to[a]), int(to[b])) for a, b in clause)
+            reason = _reason(image, replace(evidence, symmetry=Symmetry(forged, to)))
+            with pytest.raises(Refuted, match="reason 1 of the certificate is wrong"):
+                check(certificate(candidates, 1, [reason]), candidates)
+            refused += 1
+    assert refused > 0
 
 
 def ring(cells: int) -> list[tuple[int, int]]:
