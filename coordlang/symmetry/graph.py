@@ -7,8 +7,8 @@ fact or an action is joined to its arguments by way of one vertex for each objec
 position.  Objects that occur in no fact and in no action of the model are left out: what happens to
 them changes nothing.
 
-The generators of the automorphism group are found by nauty (B. D. McKay and A. Piperno, Practical
-graph isomorphism II, 2014).
+The generators of the automorphism group are found by bliss, which igraph holds (T. Junttila and
+P. Kaski, Engineering an efficient canonical labeling tool for large and sparse graphs, 2007).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from planners.search.plan_space import PlanSpace
 #: A renaming of objects; names that it does not hold stay.
 Renaming = Mapping[str, str]
 
-#: Vertices up to which nauty, which keeps a bit for every pair of them, takes about a second.
+#: Vertices of the largest graph that is searched: bliss takes milliseconds for as many of a torus.
 LARGEST_GRAPH = 4_000
 
 
@@ -57,7 +57,8 @@ class _ModelGraph:
 
     def __init__(self, domain: Domain, problem: Problem, model: JointModel) -> None:
         self._model = model
-        self._colours: dict[Hashable, set[int]] = {}
+        self._colours: dict[Hashable, int] = {}
+        self._colour: list[int] = []
         self._neighbours: list[list[int]] = []
         used = _used(model)
         self._objects = {
@@ -78,7 +79,7 @@ class _ModelGraph:
         """Add a vertex with edges to others; its number."""
         number = len(self._neighbours)
         self._neighbours.append(list(neighbours))
-        self._colours.setdefault(colour, set()).add(number)
+        self._colour.append(self._colours.setdefault(colour, len(self._colours)))
         return number
 
     def _look(self, name: str, domain: Domain, types: Iterable[str]) -> Hashable:
@@ -144,16 +145,13 @@ class _ModelGraph:
 
     def renamings(self) -> list[Renaming]:
         """Generators of the automorphism group, as renamings of objects; none is the identity."""
-        import pynauty
+        import igraph
 
-        graph = pynauty.Graph(
-            len(self),
-            adjacency_dict=dict(enumerate(self._neighbours)),
-            vertex_coloring=list(self._colours.values()),
-        )
+        pairs = {(min(a, b), max(a, b)) for a, near in enumerate(self._neighbours) for b in near}
+        graph = igraph.Graph(len(self), sorted(pairs))
         names = {vertex: name for name, vertex in self._objects.items()}
         found: list[Renaming] = []
-        for generator in pynauty.autgrp(graph)[0]:  # where each vertex goes
+        for generator in graph.automorphism_group(color=self._colour):  # where each vertex goes
             renaming = {name: names[generator[vertex]] for vertex, name in names.items()}
             if any(name != to for name, to in renaming.items()):
                 found.append(renaming)

@@ -166,12 +166,12 @@ def test_states_and_tasks_are_not_enough() -> None:
     group = symmetry_group(candidates)
     check_plans(candidates, group)
     assert (len(group.symmetries), group.dropped) == (3, 0)
-    # A graph without room for the actions is too symmetric: what nauty finds in it is dropped.
+    # A graph without room for the actions is too symmetric: what bliss finds in it is dropped.
     parts = [symmetry_group(candidates, largest_graph=n) for n in range(20, 60, 4)]
     for part in parts:
         check_plans(candidates, part)
         assert elements(part) <= elements(group)
-    assert {part.dropped for part in parts} == {0, 2}
+    assert {part.dropped > 0 for part in parts} == {False, True}
 
 
 def check_plans(candidates: Candidates, group: SymmetryGroup) -> None:
