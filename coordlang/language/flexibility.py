@@ -28,8 +28,8 @@ from planners.system.limits import memory_left
 
 Floats = NDArray[np.float64]
 
-#: What a sentence of a node takes while sentences are counted, in bytes.
-_SENTENCE = 200
+#: What a sentence of a node takes while sentences are counted, in bytes, and the most that are.
+_SENTENCE, _MOST = 200, 20_000_000
 #: More plans than this are not told apart by the measures: it is near the largest float.
 MANY = 10**300
 
@@ -69,7 +69,7 @@ def flexibility(spaces: Sequence[PlanSpace], words: Sequence[Ints]) -> Flexibili
     """Measure a partition; ``words[k]`` holds the word number of each node of ``spaces[k]``.
 
     From the plans counted with each sentence: O(edges * sentences of a node).  Raises `OutOfMemory`
-    when the sentences become too many to hold.
+    when there are too many sentences to count.
     """
     tasks = (task for pair in zip(spaces, words, strict=True) for task in _tasks(*pair))
     plans, *columns = zip(*tasks, strict=True)
@@ -79,7 +79,7 @@ def flexibility(spaces: Sequence[PlanSpace], words: Sequence[Ints]) -> Flexibili
 
 def _tasks(space: PlanSpace, word: Ints) -> Iterator[tuple[float, ...]]:
     """The measures of each task, in the order of the fields of `Flexibility`."""
-    counted = sentence_counts(space, word, most_steps=memory_left() // _SENTENCE)
+    counted = sentence_counts(space, word, most_steps=min(_MOST, memory_left() // _SENTENCE))
     for start in space.starts.tolist():
         said = counted[start]
         plans = said.total()
