@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from planners.system.errors import UsageError as UsageError
     from planners.system.limits import time_limit as time_limit
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 
 #: Modules of `coordlang.commands` with one function each, of the same name.
 _COMMANDS = (
