@@ -72,7 +72,9 @@ def error_json(error: CoordlangError) -> str:
 
 
 @click.command(name="schema", epilog="\b\nExample:\n  coordlang schema language")
-@click.argument("name", type=click.Choice(list(SCHEMAS)), default="language")
+@click.argument(
+    "name", metavar=f"[{'|'.join(SCHEMAS)}]", type=click.Choice(list(SCHEMAS)), default="language"
+)
 def command(name: str) -> None:
     """Print the JSON Schema of a file format: language files unless NAME is another one."""
     module, file_format = SCHEMAS[name]
