@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,11 +13,12 @@ from coordlang.commands.inputs import Arguments, InTask, public, read_coordinate
 from coordlang.commands.records import ExplainOptions
 from coordlang.commands.terminal import covered_code, echo, warn_of_failures, working
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.explanation.demands import SentenceDemands, sentence_demands
+from coordlang.explanation.demands import SentenceDemands, meaning, sentence_demands
 from coordlang.explanation.text import (
     cover_data,
     demands_text,
     descriptions_text,
+    meaning_text,
     pddl_condition,
 )
 from coordlang.explanation.text import shown as formula_text
@@ -33,10 +34,15 @@ from coordlang.explanation.words import (
 )
 from coordlang.language.candidates import describe
 from coordlang.language.provenance import tolerance_data
-from coordlang.language.sentences import TaskSentence, task_sentences
+from coordlang.language.sentences import (
+    TaskSentence,
+    leading_sentences,
+    number_of_sentences,
+    task_sentences,
+)
 from planners.search.plan_file import json_count
+from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans
-from planners.system.errors import OutOfMemory
 from planners.system.notebook import counted
 
 #: Sentences of a task that the text lists.
@@ -136,11 +142,13 @@ class Explanation(InTask):
         wanted = tuple(self.used.partition.words[word] for word in self.only)
         return tuple(s for s in self.all_sentences if s.words == wanted)
 
-    def demands(self, most: int | None = None) -> list[SentenceDemands]:
-        """Return what the (first) sentences ask of each robot."""
-        used, covers = self.used, self.words.covers
-        plans = [used.plans_with(used.words_of(s.words)) for s in self.sentences[:most]]
-        return [sentence_demands(found, used.partition, covers) for found in plans]
+    def _spaces(self, sentences: Iterable[Iterable[str]]) -> list[PlanSpace]:
+        return [self.used.plans_with(self.used.words_of(tuple(words))) for words in sentences]
+
+    def demands(self, sentences: Iterable[Iterable[str]] | None = None) -> list[SentenceDemands]:
+        """Return what sentences (default: `sentences`) ask of each robot."""
+        spaces = self._spaces(self.sentences if sentences is None else sentences)
+        return [sentence_demands(own, self.used.partition, self.words.covers) for own in spaces]
 
     @property
     def formulas(self) -> dict[str, str]:
@@ -191,25 +199,33 @@ class Explanation(InTask):
         plans = f"{counted(total, 'optimal plan')} of"
         if slack:
             plans = f"{counted(total, 'plan')} within slack {slack}, of at most"
-        sentences = counted(len(self.all_sentences), "sentence")
+        number = number_of_sentences(used.space, used.task, used.partition)
+        leading = leading_sentences(used.space, used.task, used.partition, SENTENCES_SHOWN)
+        listed = [words for words, _ in leading]
         lines = [
             f"The task {describe(used.space, used.task)}",
-            f"has {plans} {steps} in {sentences}.",
+            f"has {plans} {steps} in {number}.",
         ]
+        if len(listed) > 1:
+            all_are_listed = counted(len(listed), "sentence") == number
+            meant = meaning(self._spaces(listed)) if all_are_listed else None
+            lines.append(meaning_text(listed, meant))
         if self.with_demands and used.guaranteed:
             lines.append(
                 "Each robot may choose for itself: whatever the others choose, "
                 f"it is {'a' if slack else 'an'} {used.model.kept_plan}."
             )
+        if self.only is not None:
+            listed, number = [tuple(used.partition.words[word] for word in self.only)], ""
         if self.with_demands:
-            for asks in self.demands(SENTENCES_SHOWN):
+            for asks in self.demands(listed):
                 lines += ["", demands_text(asks)]
         else:
-            for sentence in self.sentences[:SENTENCES_SHOWN]:
-                plans = counted(sentence.plans, "plan")
-                lines.append(f'  "{" ".join(sentence.words)}" leaves {plans} open.')
-        if (more := len(self.sentences) - SENTENCES_SHOWN) > 0:
-            lines.append(f"  .. and {counted(more, 'more sentence')}")
+            for words, open_plans in leading:
+                left = counted(open_plans, "plan")
+                lines.append(f'  "{" ".join(words)}" leaves {left} open.')
+        if number and counted(len(listed), "sentence") != number:
+            lines.append(f"  .. of {number}")
         return "\n".join(lines)
 
 
@@ -217,8 +233,7 @@ class Explanation(InTask):
 def explain(files: Arguments, options: ExplainOptions) -> Explanation:
     """Explain a language: each word as a short formula, and the sentences of a task.
 
-    Raises `OutOfMemory` if the task has more than 100,000 sentences, and `NoPlanFits` if no optimal
-    plan has the sentence.
+    Raises `NoPlanFits` if no optimal plan has the sentence.
     """
     task = files.task()
     used, first = task.used, task.files.problems[0]
@@ -237,21 +252,12 @@ def explain(files: Arguments, options: ExplainOptions) -> Explanation:
 
 
 def show_explain(found: Explanation, options: ExplainOptions) -> int:
-    """Print the sentences of the task, and the words.
-
-    What is easier to read comes first; where a task has too many sentences, the words alone.
-    """
-    words = "" if options.as_json else found.words.text()
-    if words:
+    """Print the sentences of the task, then the words: what is easier to read comes first."""
+    if not options.as_json:
         echo(found.head + "\n")
-    try:
-        with working("listing the sentences of the task"):
-            text = f"{found.task_text()}\n\n{words}" if words else json.dumps(found.data())
-    except OutOfMemory:
-        if words:
-            echo(words, fit=True)
-        raise
-    echo(text, fit=not options.as_json)
+    with working("listing the sentences of the task"):
+        text = json.dumps(found.data()) if options.as_json else found.task_text()
+    echo(text if options.as_json else f"{text}\n\n{found.words.text()}", fit=not options.as_json)
     if options.task:
         return covered_code(found)
     warn_of_failures(found.tolerance)

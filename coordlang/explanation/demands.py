@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations, pairwise
 from typing import Any, Literal
 
@@ -17,6 +18,7 @@ from coordlang.language.partition import Partition
 from coordlang.required.choices import Choices
 from planners.joint.model import JointModel, own_text
 from planners.joint.tables import Bools, Ints, find_rows
+from planners.pddl.robots import natural
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 
@@ -136,6 +138,66 @@ def words_passed(space: PlanSpace, word: Ints) -> Ints:
         changes = word[edges.target] != word[edges.source]
         passed[edges.target] = passed[edges.source] + changes
     return passed
+
+
+#: Edges of a sentence's plans up to which it is looked for what the sentences mean.
+_MEANT = 100_000
+
+
+def meaning(spaces: Sequence[PlanSpace]) -> tuple[str, list[tuple[str, ...]]] | None:
+    """What the sentences of a task mean: an object, and for each sentence who first uses it.
+
+    ``spaces``: the plans with each sentence.  A robot *uses* the objects that its subactions name;
+    of several in one step all are first, and nobody where no subaction names it.  Sentences mean
+    who uses an object first if all plans of each agree about it, and no two sentences do.  None if
+    there is no such object (and where there is no common step, or more plans than are looked at);
+    of several the first by name, if possible of those where it always is one robot.
+    """
+    if spaces[0].model.is_asynchronous or any(len(s.target) > _MEANT for s in spaces):
+        return None
+    first = [_first_users(space) for space in spaces]
+    meant = []
+    for name in sorted({name for users in first for name in users}, key=natural):
+        answers = [users.get(name, {()}) for users in first]
+        said = {answer for own in answers for answer in own}
+        if all(len(own) == 1 for own in answers) and len(said) == len(spaces):
+            meant.append((name, [min(own) for own in answers]))
+    return min(meant, key=lambda one: sum(len(who) != 1 for who in one[1]), default=None)
+
+
+def _first_users(space: PlanSpace) -> dict[str, set[tuple[str, ...]]]:
+    """For each object that one task's plans use, who is the first to use it in some of them.
+
+    One pass from the start: the objects that some way to a node has not used.
+    """
+    robots = space.model.robots
+    named = [
+        [
+            frozenset((text or "").replace("(", " ").replace(")", " ").split()[1:]) - {*robots}
+            for text in map(partial(space.model.label_text, robot), range(len(labels)))
+        ]
+        for robot, labels in enumerate(space.model.labels)
+    ]
+    users: dict[str, set[tuple[str, ...]]] = defaultdict(set)
+    nothing: frozenset[str] = frozenset()
+    unused = {int(space.starts[0]): nothing.union(*(own for part in named for own in part))}
+    for layer in range(space.cost_of(0)[0], 0, -1):
+        found = space.layer_edges(layer)
+        for edge, source, target in np.column_stack(
+            (found.edges, found.source, found.target)
+        ).tolist():
+            does = [named[robot][label] for robot, label in enumerate(space.labels_of(edge))]
+            used = nothing.union(*does)
+            for name in used & unused[source]:
+                users[name].add(
+                    tuple(r for r, own in zip(robots, does, strict=True) if name in own)
+                )
+            unused[target] = unused.get(target, nothing) | (unused[source] - used)
+    for goal, left in unused.items():
+        if not space.layer[goal]:
+            for name in left & users.keys():
+                users[name].add(())
+    return users
 
 
 def _part(choices: Choices, robot: int) -> RobotPart:

@@ -122,6 +122,22 @@ def _term_lines(formula: Cover) -> list[str]:
     return [*lines, f"      .. and {counted(rest, 'more term')}"] if rest > 0 else lines
 
 
+def meaning_text(
+    sentences: Sequence[Sequence[str]], meant: tuple[str, Sequence[Sequence[str]]] | None
+) -> str:
+    """What the sentences of a task mean (`meaning`), in one line."""
+    if meant is None:
+        return (
+            "They say more, or other things, than who is the first to use something: see the words."
+        )
+    name, first = meant
+    said = [
+        f'{named(who) if who else "nobody"} in "{" ".join(words)}"'
+        for words, who in zip(sentences, first, strict=True)
+    ]
+    return f"They say who is the first to use {name}: {', '.join(said)}."
+
+
 def demands_text(demands: SentenceDemands) -> str:
     """What a sentence demands, in plain sentences."""
     lines = [f'"{" ".join(demands.sentence)}" leaves {counted(demands.plans, "plan")} open.']

@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from heapq import heappop, heappush
 from itertools import compress
 
 import numpy as np
@@ -14,12 +15,15 @@ from coordlang.language.partition import Partition
 from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import OutOfMemory
+from planners.system.notebook import counted
 
 #: A sentence as word numbers.
 Sentence = tuple[int, ...]
 
 #: More sentences than this are not listed for one task.
 _MOST = 100_000
+#: Edges that are followed at most to find the leading sentences of a task.
+_FOLLOWED = 2_000_000
 
 
 def sentence(words: Iterable[int]) -> Sentence:
@@ -70,6 +74,101 @@ def task_sentences(
         for words, plans in said.items()
     ]
     return sorted(result, key=lambda s: (-s.plans, s.words))
+
+
+def number_of_sentences(space: PlanSpace, task: int, partition: Partition) -> str:
+    """How many sentences a task has, or ``more than 100,000``."""
+    word = partition.word_of(space.rows)[space.state]
+    start = int(space.starts[task])
+    try:
+        said = sentence_counts(space, word, start=start, most_of_node=_MOST)[start]
+    except OutOfMemory:
+        return f"more than {_MOST:,} sentences"
+    return counted(len(said), "sentence")
+
+
+def leading_sentences(
+    space: PlanSpace, task: int, partition: Partition, number: int
+) -> list[tuple[tuple[str, ...], int]]:
+    """The sentences of a task that leave most plans open, and how many each leaves, exactly.
+
+    At most ``number``, those with most plans first, without a list of all: a best-first search over
+    beginnings of sentences, ordered by a bound on the plans of the sentences that begin so.  Fewer
+    are found where two million edges do not suffice.
+    """
+    start = int(space.starts[task])
+    nodes = np.flatnonzero(space.descendants(np.array([start]))).tolist()
+    words = [partition.words[w] for w in partition.word_of(space.rows)[space.state].tolist()]
+    bounds = _bounds(space, nodes, words)
+    # A beginning: minus its bound, its words, the nodes where its last word begins with the number
+    # of ways to there; of a whole sentence no nodes, and its number of plans.
+    heap: list[tuple[int, tuple[str, ...], dict[int, int]]] = []
+    heappush(heap, (-max(bounds[start].values()), (words[start],), {start: 1}))
+    found: list[tuple[tuple[str, ...], int]] = []
+    followed = 0
+    while heap and len(found) < number and followed < _FOLLOWED:
+        bound, said, ways = heappop(heap)
+        if not ways:
+            found.append((said, -bound))
+            continue
+        plans, edges, entered = _through(space, words, ways)
+        followed += edges
+        if plans:
+            heappush(heap, (-plans, said, {}))
+        for word, own in entered.items():
+            sums: Counter[str] = Counter()
+            for node, count in own.items():
+                for after, most in bounds[node].items():
+                    sums[after] += count * most
+            heappush(heap, (-max(sums.values()), (*said, word), own))
+    return found
+
+
+def _bounds(
+    space: PlanSpace, nodes: Iterable[int], words: Sequence[str]
+) -> dict[int, Counter[str]]:
+    """For each node, and each word that may come next, the most plans of one sentence from there.
+
+    At most so many: of plans with the same next word not all have one sentence.  The next word is
+    empty where the sentence ends.
+    """
+    bounds: dict[int, Counter[str]] = {}
+    for node in nodes:  # goals come first
+        bounds[node] = most = Counter() if space.layer[node] else Counter({"": 1})
+        for target in space.successors(node):
+            if words[target] == words[node]:
+                most.update(bounds[target])
+            else:
+                most[words[target]] += max(bounds[target].values())
+    return bounds
+
+
+def _through(
+    space: PlanSpace, words: Sequence[str], ways: dict[int, int]
+) -> tuple[int, int, dict[str, dict[int, int]]]:
+    """Follow plans through their present word, from nodes with a number of ways to each.
+
+    Returns the ways that end in it, the edges followed, and for each next word the ways to the
+    nodes where it begins.
+    """
+    inside, ended, edges = dict(ways), 0, 0
+    entered: dict[str, dict[int, int]] = defaultdict(lambda: defaultdict(int))
+    waiting = [-node for node in sorted(inside, reverse=True)]
+    while waiting:  # targets have smaller numbers
+        node = -heappop(waiting)
+        count = inside[node]
+        if not space.layer[node]:
+            ended += count
+        for target in space.successors(node):
+            edges += 1
+            if words[target] != words[node]:
+                entered[words[target]][target] += count
+            elif target in inside:
+                inside[target] += count
+            else:
+                inside[target] = count
+                heappush(waiting, -target)
+    return ended, edges, entered
 
 
 def sentence_counts(

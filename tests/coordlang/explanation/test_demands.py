@@ -13,10 +13,12 @@ import pytest
 from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.commands.building import build_language
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.explanation.demands import RobotPart, SentenceDemands, sentence_demands
+from coordlang.explanation.demands import RobotPart, SentenceDemands, meaning, sentence_demands
 from coordlang.explanation.text import demands_text
 from coordlang.explanation.words import all_covers, mapped_states
 from coordlang.language.candidates import all_pairs, from_problems
+from coordlang.language.sentences import leading_sentences, task_sentences
+from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
 from planners.system.errors import ProvedImpossible
 from tests.support import naive
@@ -178,3 +180,51 @@ def test_json(coordlang: Command, language: object, t_map: tuple[object, object]
         words = [said["changes"][0]["from"], *(change["to"] for change in said["changes"])]
         assert said["sentence"].split() == words
         assert [len(robot["listed"][0]) for robot in said["robots"]] == [said["steps"]] * 2
+
+
+def first_users(space: PlanSpace, name: str) -> set[tuple[str, ...]]:
+    """Who uses an object first, plan by plan."""
+    found = set()
+    for plan in Plans.of(space, 0):
+        users: tuple[str, ...] = ()
+        for step in plan:
+            texts = zip(space.model.robots, space.model.texts(step), strict=True)
+            users = tuple(r for r, text in texts if name in (text or "").strip("()").split()[1:])
+            if users:
+                break
+        found.add(users)
+    return found
+
+
+def test_which_sentences_lead_and_what_they_mean_against_listed_plans() -> None:
+    seen: Counter[bool] = Counter()
+    for seed in range(40):
+        random = Random(seed)
+        domain, problem, options = random_model(seed, 2)
+        try:
+            candidates = (all_pairs if seed % 2 else from_problems)(domain, [problem], options)
+        except ProvedImpossible:
+            continue
+        if not 0 < candidates.count <= 300:
+            continue
+        language = random_language(random, candidates)
+        for used in list(languages_in_tasks(language, candidates))[:20]:
+            said = leading_sentences(used.space, used.task, used.partition, 4)
+            every = task_sentences(used.space, used.task, used.partition, used.plans_with)
+            assert said == [(one.words, one.plans) for one in every[:4]]
+            if len(said) < 2:
+                continue
+            spaces = [used.plans_with(used.words_of(words)) for words, _ in said]
+            names = problem.objects.keys() - {*used.model.robots}
+            answers = {name: [first_users(space, name) for space in spaces] for name in names}
+            meant = {
+                name: [*map(min, own)]
+                for name, own in answers.items()
+                if all(len(one) == 1 for one in own) and len({*map(min, own)}) == len(own)
+            }
+            found = meaning(spaces)
+            assert (found is not None) == bool(meant)
+            assert found is None or meant[found[0]] == found[1]
+            seen[found is not None] += 1
+    assert seen[True] > 2
+    assert seen[False] > 1

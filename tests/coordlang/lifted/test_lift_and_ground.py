@@ -104,7 +104,7 @@ def test_a_lifted_language_is_used_as_it_is(rings: Lifted, plan: Path) -> None:
     said = api.say(lifted, GRID, LARGER, plan)
     assert said.covered
     assert api.understand(lifted, GRID, LARGER, said.sentence).count >= 1
-    found = api.choices(lifted, GRID, LARGER, said.sentence, check=True)
+    found = api.choices(lifted, GRID, LARGER, said.sentence)
     assert found.guaranteed
     assert found.monitor("r1").allowed()
     explained = api.explain(lifted, GRID, LARGER)
