@@ -35,13 +35,13 @@ from coordlang.explanation.words import (
 from coordlang.language.candidates import describe
 from coordlang.language.provenance import tolerance_data
 from coordlang.language.sentences import (
+    Sentence,
     TaskSentence,
     leading_sentences,
     number_of_sentences,
     task_sentences,
 )
 from planners.search.plan_file import json_count
-from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans
 from planners.system.notebook import counted
 
@@ -129,7 +129,7 @@ class Explanation(InTask):
     def all_sentences(self) -> tuple[TaskSentence, ...]:
         """All sentences of the task, those that leave most plans open first.
 
-        Raises `OutOfMemory` beyond 100,000 sentences.
+        Raises `OutOfMemory` beyond 100,000 sentences, or where it is too much work.
         """
         used = self.used
         return tuple(task_sentences(used.space, used.task, used.partition, used.plans_with))
@@ -142,13 +142,15 @@ class Explanation(InTask):
         wanted = tuple(self.used.partition.words[word] for word in self.only)
         return tuple(s for s in self.all_sentences if s.words == wanted)
 
-    def _spaces(self, sentences: Iterable[Iterable[str]]) -> list[PlanSpace]:
-        return [self.used.plans_with(self.used.words_of(tuple(words))) for words in sentences]
+    def demands(self, sentences: Iterable[Sentence] | None = None) -> list[SentenceDemands]:
+        """Return what sentences (word numbers; default: `sentences`) ask of each robot."""
+        used, covers = self.used, self.words.covers
+        if sentences is None:
+            sentences = [used.words_of(own.words) for own in self.sentences]
+        return [sentence_demands(used.plans_with(s), used.partition, covers) for s in sentences]
 
-    def demands(self, sentences: Iterable[Iterable[str]] | None = None) -> list[SentenceDemands]:
-        """Return what sentences (default: `sentences`) ask of each robot."""
-        spaces = self._spaces(self.sentences if sentences is None else sentences)
-        return [sentence_demands(own, self.used.partition, self.words.covers) for own in spaces]
+    def _text(self, words: Sentence) -> str:
+        return " ".join(self.used.partition.words[word] for word in words)
 
     @property
     def formulas(self) -> dict[str, str]:
@@ -199,33 +201,32 @@ class Explanation(InTask):
         plans = f"{counted(total, 'optimal plan')} of"
         if slack:
             plans = f"{counted(total, 'plan')} within slack {slack}, of at most"
-        number = number_of_sentences(used.space, used.task, used.partition)
-        leading = leading_sentences(used.space, used.task, used.partition, SENTENCES_SHOWN)
-        listed = [words for words, _ in leading]
+        number = number_of_sentences(used.space, used.word, used.start)
+        said = "too many sentences to count" if number is None else counted(number, "sentence")
+        leading = leading_sentences(used.space, used.word, used.start, SENTENCES_SHOWN)
         lines = [
             f"The task {describe(used.space, used.task)}",
-            f"has {plans} {steps} in {number}.",
+            f"has {plans} {steps} in {said}.",
         ]
+        listed = [words for words, _ in leading]
         if len(listed) > 1:
-            all_are_listed = counted(len(listed), "sentence") == number
-            meant = meaning(self._spaces(listed)) if all_are_listed else None
-            lines.append(meaning_text(listed, meant))
+            all_are_listed = number == len(listed)
+            meant = meaning([*map(used.plans_with, listed)]) if all_are_listed else None
+            lines.append(meaning_text([*map(self._text, listed)], meant))
         if self.with_demands and used.guaranteed:
             lines.append(
                 "Each robot may choose for itself: whatever the others choose, "
                 f"it is {'a' if slack else 'an'} {used.model.kept_plan}."
             )
-        if self.only is not None:
-            listed, number = [tuple(used.partition.words[word] for word in self.only)], ""
         if self.with_demands:
-            for asks in self.demands(listed):
+            shown = listed if self.only is None else [self.only]
+            for asks in self.demands(shown):
                 lines += ["", demands_text(asks)]
         else:
             for words, open_plans in leading:
-                left = counted(open_plans, "plan")
-                lines.append(f'  "{" ".join(words)}" leaves {left} open.')
-        if number and counted(len(listed), "sentence") != number:
-            lines.append(f"  .. of {number}")
+                lines.append(f'  "{self._text(words)}" leaves {counted(open_plans, "plan")} open.')
+        if self.only is None and number != len(listed):
+            lines.append(f"  .. and {'more' if number is None else number - len(listed)}")
         return "\n".join(lines)
 
 

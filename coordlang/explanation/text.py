@@ -123,7 +123,7 @@ def _term_lines(formula: Cover) -> list[str]:
 
 
 def meaning_text(
-    sentences: Sequence[Sequence[str]], meant: tuple[str, Sequence[Sequence[str]]] | None
+    sentences: Sequence[str], meant: tuple[str, Sequence[Sequence[str]]] | None
 ) -> str:
     """What the sentences of a task mean (`meaning`), in one line."""
     if meant is None:
@@ -132,7 +132,7 @@ def meaning_text(
         )
     name, first = meant
     said = [
-        f'{named(who) if who else "nobody"} in "{" ".join(words)}"'
+        f'{named(who) if who else "nobody"} in "{words}"'
         for words, who in zip(sentences, first, strict=True)
     ]
     return f"They say who is the first to use {name}: {', '.join(said)}."

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import compress
@@ -15,13 +16,14 @@ from coordlang.language.partition import Partition
 from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import OutOfMemory
-from planners.system.notebook import counted
 
 #: A sentence as word numbers.
 Sentence = tuple[int, ...]
 
-#: More sentences than this are not listed for one task.
-_MOST = 100_000
+#: More sentences than this are not listed for one task, and no more additions made to count them.
+_MOST, _ADDITIONS = 100_000, 5_000_000
+#: In place of the next word, where a sentence ends.
+_END = -1
 #: Edges that are followed at most to find the leading sentences of a task.
 _FOLLOWED = 2_000_000
 
@@ -68,7 +70,9 @@ def task_sentences(
     """
     word = partition.word_of(space.rows)[space.state]
     start = int(space.starts[task])
-    said = sentence_counts(space, word, start=start, most_of_node=_MOST)[start]
+    said = sentence_counts(space, word, start=start, most_steps=_ADDITIONS)[start]
+    if len(said) > _MOST:
+        raise _too_many()
     result = [
         TaskSentence(tuple(partition.words[w] for w in words), plans, _choices(plans_with(words)))
         for words, plans in said.items()
@@ -76,35 +80,34 @@ def task_sentences(
     return sorted(result, key=lambda s: (-s.plans, s.words))
 
 
-def number_of_sentences(space: PlanSpace, task: int, partition: Partition) -> str:
-    """How many sentences a task has, or ``more than 100,000``."""
-    word = partition.word_of(space.rows)[space.state]
-    start = int(space.starts[task])
-    try:
-        said = sentence_counts(space, word, start=start, most_of_node=_MOST)[start]
-    except OutOfMemory:
-        return f"more than {_MOST:,} sentences"
-    return counted(len(said), "sentence")
+def number_of_sentences(space: PlanSpace, word: Ints, start: int) -> int | None:
+    """How many sentences the plans from a node have; None if that is too much work.
+
+    ``word`` is the word number of each node.
+    """
+    with suppress(OutOfMemory):
+        return len(sentence_counts(space, word, start=start, most_steps=_ADDITIONS)[start])
+    return None
 
 
 def leading_sentences(
-    space: PlanSpace, task: int, partition: Partition, number: int
-) -> list[tuple[tuple[str, ...], int]]:
-    """The sentences of a task that leave most plans open, and how many each leaves, exactly.
+    space: PlanSpace, word: Ints, start: int, number: int
+) -> list[tuple[Sentence, int]]:
+    """The sentences that leave most plans from a node open, and how many each leaves, exactly.
 
-    At most ``number``, those with most plans first, without a list of all: a best-first search over
-    beginnings of sentences, ordered by a bound on the plans of the sentences that begin so.  Fewer
-    are found where two million edges do not suffice.
+    ``word`` is the word number of each node.  At most ``number``, those with most plans first,
+    without a list of all: a best-first search over beginnings of sentences, ordered by a bound on
+    the plans of the sentences that begin so.  Fewer are found where two million edges do not
+    suffice.
     """
-    start = int(space.starts[task])
     nodes = np.flatnonzero(space.descendants(np.array([start]))).tolist()
-    words = [partition.words[w] for w in partition.word_of(space.rows)[space.state].tolist()]
+    words = word.tolist()
     bounds = _bounds(space, nodes, words)
     # A beginning: minus its bound, its words, the nodes where its last word begins with the number
     # of ways to there; of a whole sentence no nodes, and its number of plans.
-    heap: list[tuple[int, tuple[str, ...], dict[int, int]]] = []
+    heap: list[tuple[int, Sentence, dict[int, int]]] = []
     heappush(heap, (-max(bounds[start].values()), (words[start],), {start: 1}))
-    found: list[tuple[tuple[str, ...], int]] = []
+    found: list[tuple[Sentence, int]] = []
     followed = 0
     while heap and len(found) < number and followed < _FOLLOWED:
         bound, said, ways = heappop(heap)
@@ -115,26 +118,26 @@ def leading_sentences(
         followed += edges
         if plans:
             heappush(heap, (-plans, said, {}))
-        for word, own in entered.items():
-            sums: Counter[str] = Counter()
+        for after, own in entered.items():
+            sums: Counter[int] = Counter()
             for node, count in own.items():
-                for after, most in bounds[node].items():
-                    sums[after] += count * most
-            heappush(heap, (-max(sums.values()), (*said, word), own))
+                for last, most in bounds[node].items():
+                    sums[last] += count * most
+            heappush(heap, (-max(sums.values()), (*said, after), own))
     return found
 
 
 def _bounds(
-    space: PlanSpace, nodes: Iterable[int], words: Sequence[str]
-) -> dict[int, Counter[str]]:
+    space: PlanSpace, nodes: Iterable[int], words: Sequence[int]
+) -> dict[int, Counter[int]]:
     """For each node, and each word that may come next, the most plans of one sentence from there.
 
-    At most so many: of plans with the same next word not all have one sentence.  The next word is
-    empty where the sentence ends.
+    At most so many: of plans with the same next word not all have one sentence.  It is `_END`
+    where the sentence ends.
     """
-    bounds: dict[int, Counter[str]] = {}
+    bounds: dict[int, Counter[int]] = {}
     for node in nodes:  # goals come first
-        bounds[node] = most = Counter() if space.layer[node] else Counter({"": 1})
+        bounds[node] = most = Counter() if space.layer[node] else Counter({_END: 1})
         for target in space.successors(node):
             if words[target] == words[node]:
                 most.update(bounds[target])
@@ -144,15 +147,15 @@ def _bounds(
 
 
 def _through(
-    space: PlanSpace, words: Sequence[str], ways: dict[int, int]
-) -> tuple[int, int, dict[str, dict[int, int]]]:
+    space: PlanSpace, words: Sequence[int], ways: dict[int, int]
+) -> tuple[int, int, dict[int, dict[int, int]]]:
     """Follow plans through their present word, from nodes with a number of ways to each.
 
     Returns the ways that end in it, the edges followed, and for each next word the ways to the
     nodes where it begins.
     """
     inside, ended, edges = dict(ways), 0, 0
-    entered: dict[str, dict[int, int]] = defaultdict(lambda: defaultdict(int))
+    entered: dict[int, dict[int, int]] = defaultdict(lambda: defaultdict(int))
     waiting = [-node for node in sorted(inside, reverse=True)]
     while waiting:  # targets have smaller numbers
         node = -heappop(waiting)
@@ -177,7 +180,6 @@ def sentence_counts(
     *,
     start: int | None = None,
     edges: Bools | None = None,
-    most_of_node: int | None = None,
     most_steps: int | None = None,
 ) -> dict[int, Counter[Sentence]]:
     """Count the plans with each sentence, from the nodes of a plan space.
@@ -186,11 +188,10 @@ def sentence_counts(
 
     ``word`` (nodes) is the word number of each node.  Counted are the plans from the nodes on plans
     from ``start`` (default: from all nodes) over the ``edges`` of a mask (default: over all), with
-    at most ``most_of_node`` sentences of one node and ``most_steps`` additions in total.
+    at most ``most_steps`` additions.
 
     Returns for each node the sentences of the plans from it, the node's own word first, with the
-    exact numbers of these plans.  Raises `OutOfMemory` if there are more sentences than one of the
-    limits allows.
+    exact numbers of these plans.  Raises `OutOfMemory` if that takes more additions.
     """
     words: list[int] = word.tolist()
     nodes = np.arange(len(space))
@@ -211,22 +212,17 @@ def sentence_counts(
             steps += len(counts[target])
             for rest, number in counts[target].items():
                 total[rest if rest[0] == words[node] else (words[node], *rest)] += number
-        _check_limits(len(total), most_of_node, steps, most_steps)
+        if most_steps is not None and steps > most_steps:
+            raise _too_many()
         counts[node] = total
     return counts
 
 
-def _check_limits(of_node: int, most_of_node: int | None, steps: int, most: int | None) -> None:
-    if most_of_node is not None and of_node > most_of_node:
-        raise OutOfMemory(
-            f"a task has more than {most_of_node:,} sentences: too many to list",
-            remedy="`coordlang understand` and `plan --prefer` need no list of sentences.",
-        )
-    if most is not None and steps > most:
-        raise OutOfMemory(
-            f"the sentences of the tasks take more than {most:,} steps to count",
-            remedy="Give fewer tasks.",
-        )
+def _too_many() -> OutOfMemory:
+    return OutOfMemory(
+        "a task has too many sentences to list",
+        remedy="`coordlang understand` and `plan --prefer` need no list of sentences.",
+    )
 
 
 def _choices(plans: PlanSpace) -> tuple[tuple[tuple[str | None, ...], ...], ...]:

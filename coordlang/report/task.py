@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from coordlang.execution.plan_sentence import carried_out
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.listed import goal_text
 from coordlang.language.partition import Partition
-from coordlang.language.sentences import Sentence, sentence, sentence_counts
+from coordlang.language.sentences import Sentence, leading_sentences, number_of_sentences
 from coordlang.report.layout import layer_orders
 from coordlang.report.shown import ShownTask
 from coordlang.required.failure import TooManyToCount, failure_probability
@@ -31,9 +30,8 @@ from planners.system.errors import OutOfMemory
 
 #: Plan-space edges of one task beyond which plans are drawn.
 EDGES = 4_000
-#: Sentences listed for one task, and those beyond which they are not all counted.
+#: Sentences listed for one task.
 SENTENCES = 60
-_ALL_SENTENCES = 5_000
 #: Members of the subsets with which one robot's own subplans are counted; beyond, they are not.
 _SUBSETS = 200_000
 #: Additions beyond which it is not counted how often robots fail in a task.
@@ -72,7 +70,7 @@ def task_data(shown: ShownTask, tables: Tables, seed: int) -> dict[str, Any]:
     """Return a task as JSON data, with states and labels as numbers into ``tables``."""
     language, space = shown.language, shown.language.space
     part = drawn_part(language, seed)
-    sentences, total = shown_sentences(language, seed)
+    leading = leading_sentences(space, language.word, language.start, SENTENCES)
     verdict = _verdict(language)
     violation = verdict.witness if verdict else None  # plans of one sentence that miscoordinate
     makespan, second = space.cost_of(language.task)
@@ -93,9 +91,9 @@ def task_data(shown: ShownTask, tables: Tables, seed: int) -> dict[str, Any]:
         **_graph_data(part, tables),
         "sentences": [
             {"words": list(words), "plans": str(plans), "own": _own_counts(language, words)}
-            for words, plans in sentences
+            for words, plans in leading
         ],
-        "all_sentences": total,
+        "all_sentences": number_of_sentences(space, language.word, language.start),
         "witness": _witness_data(language, shown.witness, tables),
         "violation": _witness_data(language, violation, tables),
     }
@@ -225,49 +223,16 @@ def drawn_part(language: TaskLanguage, seed: int, most: int = EDGES) -> PlanSpac
     space = language.space
     if len(space.target) <= most:
         return space
-    kept = np.zeros(len(space.target), np.bool_)
-    for path in _drawn_paths(language, seed, most):
-        kept[path] = True
-    return space.along(kept)
-
-
-def _drawn_paths(language: TaskLanguage, seed: int, most: int) -> list[list[int]]:
-    """The edges of plans drawn uniformly, as many as have together a quarter of ``most`` edges."""
-    plans, found, kept = Plans.of(language.space, language.task), list[list[int]](), set[int]()
+    plans, kept = Plans.of(space, language.task), set[int]()
     for plan in plans.sample(most, seed):
-        path = language.space.path_with(plans.start, plan)
+        path = space.path_with(plans.start, plan)
         assert path is not None, "a plan is a path of its plan space"
-        kept.update(path)
-        if len(kept) > most // 4:
+        if len(kept.union(path)) > most // 4:
             break
-        found.append(path)
-    return found
-
-
-def shown_sentences(
-    language: TaskLanguage, seed: int, most: int = EDGES
-) -> tuple[list[tuple[Sentence, int]], int | None]:
-    """Return the task's sentences that leave most plans open, with the exact numbers of these.
-
-    And the number of all sentences.  If there are too many to count them all (then it is None), or
-    more than ``most`` edges, those of the drawn plans are compared.
-    """
-    found: dict[Sentence, int] | None = None
-    if len(language.space.target) <= most:
-        with suppress(OutOfMemory):  # if a node has too many sentences
-            found = sentence_counts(
-                language.space, language.word, start=language.start, most_of_node=_ALL_SENTENCES
-            )[language.start]
-    total = None if found is None else len(found)
-    if found is None:
-        passed = (
-            language.word[language.space.nodes_on(language.start, path)]
-            for path in _drawn_paths(language, seed, most)
-        )
-        drawn = dict.fromkeys(sentence(words.tolist()) for words in passed)
-        some = islice(drawn, SENTENCES)
-        found = {words: Plans.of(language.plans_with(words)).count for words in some}
-    return sorted(found.items(), key=lambda entry: (-entry[1], entry[0]))[:SENTENCES], total
+        kept.update(path)
+    drawn = np.zeros(len(space.target), np.bool_)
+    drawn[sorted(kept)] = True
+    return space.along(drawn)
 
 
 def _own_counts(language: TaskLanguage, words: Sentence) -> list[str | None]:

@@ -209,12 +209,12 @@ def test_which_sentences_lead_and_what_they_mean_against_listed_plans() -> None:
             continue
         language = random_language(random, candidates)
         for used in list(languages_in_tasks(language, candidates))[:20]:
-            said = leading_sentences(used.space, used.task, used.partition, 4)
+            said = leading_sentences(used.space, used.word, used.start, 4)
             every = task_sentences(used.space, used.task, used.partition, used.plans_with)
-            assert said == [(one.words, one.plans) for one in every[:4]]
+            assert said == [(used.words_of(one.words), one.plans) for one in every[:4]]
             if len(said) < 2:
                 continue
-            spaces = [used.plans_with(used.words_of(words)) for words, _ in said]
+            spaces = [used.plans_with(words) for words, _ in said]
             names = problem.objects.keys() - {*used.model.robots}
             answers = {name: [first_users(space, name) for space in spaces] for name in names}
             meant = {

@@ -128,7 +128,6 @@ def test_random_models() -> None:
 
 def test_large_tasks_are_drawn() -> None:
     spoken = language_in_task(*make_language("grid", "three-robots-3x3", None))
-    exact = dict(page_task.shown_sentences(spoken, 0)[0])
     part = page_task.drawn_part(spoken, 0, most=60)
     assert page_task.drawn_part(spoken, 0) is spoken.space
     assert 10 < len(part.target) <= 60
@@ -137,10 +136,6 @@ def test_large_tasks_are_drawn() -> None:
     nodes, (start,) = set(range(len(part))), part.starts.tolist()
     assert set(part.target.tolist()) | {start} == nodes
     assert set(part.sources.tolist()) | set(np.flatnonzero(part.layer == 0).tolist()) == nodes
-    drawn, total = page_task.shown_sentences(spoken, 0, most=60)
-    assert total is None
-    assert drawn
-    assert all(exact.get(words, plans) == plans for words, plans in drawn)
 
 
 def test_selection() -> None:
