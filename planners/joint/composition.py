@@ -14,7 +14,7 @@ from planners.joint.conditions import Evaluator, Labels, Operators, speaks_of_st
 from planners.joint.interference import Choices, compatible, conflict
 from planners.joint.model import Options, Stepper, Steps, products
 from planners.joint.states import StateCodec
-from planners.joint.tables import Bools, Ints, Numbers, Rows, ranges, spans
+from planners.joint.tables import Bools, Ints, Numbers, Rows, differs, ranges, spans
 from planners.pddl.formula_tree import conjuncts, formula_text, joined, signed, substituted
 from planners.pddl.lifted import FALSE, And, Atom, Formula, Or, StepAtom, Truth
 from planners.pddl.model_options import Cost
@@ -205,15 +205,24 @@ class ComposingStepper(Stepper):
             )
 
     def _apply(self, rows: Rows, source: Ints, labels: Labels) -> tuple[Rows, Ints]:
-        shape = (len(source), self._codec.fact_blocks)
+        # Joint steps that begin alike stand together: what the first robots do is the same.
+        shape = (min(1, len(source)), self._codec.fact_blocks)
         adds, deletes = np.zeros(shape, np.uint64), np.zeros(shape, np.uint64)
+        run = np.zeros(len(source), np.int64)
         cost = np.zeros(len(source), np.int64)
+        begins = differs(source)
         for i, robot in enumerate(self._robot):
             mine = labels[:, i]
-            added, deleted = robot.operators.changes(rows, source, mine, labels)
-            adds |= added
-            deletes |= deleted
+            begins |= differs(mine)
+            first = np.flatnonzero(begins)
+            before, run = run[first], np.cumsum(begins) - 1
+            certain = mine[first]
+            adds = adds[before] | robot.operators.adds[certain]
+            deletes = deletes[before] | robot.operators.deletes[certain]
             cost += robot.cost[mine]
+        adds, deletes = adds[run], deletes[run]
+        for i, robot in enumerate(self._robot):
+            robot.operators.enter_conditional((adds, deletes), rows, source, labels[:, i], labels)
         return (rows[source] & ~deletes) | adds, cost
 
 

@@ -196,12 +196,23 @@ class Operators:
 
         ``labels[k]`` are what all robots do beside, where conditions may speak of that.
         """
-        adds, deletes = self.adds[chosen], self.deletes[chosen]
+        changed = self.adds[chosen], self.deletes[chosen]
+        self.enter_conditional(changed, rows, source, chosen, labels)
+        return changed
+
+    def enter_conditional(
+        self,
+        changed: tuple[Rows, Rows],
+        rows: Rows,
+        source: Ints,
+        chosen: Numbers,
+        labels: Labels | None,
+    ) -> None:
+        """Enter what actions add and delete by effects that depend on the state; see `changes`."""
         for number, effects in self.conditional.items():
             there = np.flatnonzero(chosen == number)
             beside = None if labels is None else labels[there]
             for effect in effects if len(there) else ():
                 fires = self._evaluator.holds(effect.condition, rows, source[there], beside)
-                into = adds if effect.adds else deletes
+                into = changed[0] if effect.adds else changed[1]
                 self._codec.set(into, there[fires], [self._codec.facts.index[effect.atom]])
-        return adds, deletes

@@ -36,6 +36,11 @@ def ranges(starts: Ints, counts: Ints) -> Ints:
     return within
 
 
+def differs(values: Numbers) -> Bools:
+    """Which entries differ from the one before; the first does."""
+    return np.append(np.ones(min(1, len(values)), np.bool_), values[1:] != values[:-1])
+
+
 def kept_runs(first: Ints, kept: Bools) -> Ints:
     """The bounds of the runs of a CSR table (runs + 1) of whose entries only some are kept."""
     bounds: Ints = np.concatenate(([0], np.cumsum(kept)))[first]
