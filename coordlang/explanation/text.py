@@ -128,7 +128,8 @@ def meaning_text(
     """What the sentences of a task mean (`meaning`), in one line."""
     if meant is None:
         return (
-            "They say more, or other things, than who is the first to use something: see the words."
+            "No one thing was found that they say, such as who is the first to use an object: "
+            "see the words."
         )
     name, first = meant
     said = [
