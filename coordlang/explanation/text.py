@@ -128,7 +128,7 @@ def meaning_text(
     """What the sentences of a task mean (`meaning`), in one line."""
     if meant is None:
         return (
-            "No one thing was found that they say, such as who is the first to use an object: "
+            "No one thing was found that the sentences say, such as who first uses an object: "
             "see the words."
         )
     name, first = meant
@@ -136,7 +136,7 @@ def meaning_text(
         f'{named(who) if who else "nobody"} in "{words}"'
         for words, who in zip(sentences, first, strict=True)
     ]
-    return f"They say who is the first to use {name}: {', '.join(said)}."
+    return f"The sentences say who is the first to use {name}: {', '.join(said)}."
 
 
 def demands_text(demands: SentenceDemands) -> str:
