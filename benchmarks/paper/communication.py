@@ -82,7 +82,7 @@ _COLUMNS = {
 _DEFINITION = f"""\
 The *communication saving* of a plan is `1 - words / states`: only if states are counted do the
 paper's two values agree ({percent(SAVING_DIFFERING)} over {DIFFERING} tasks, \
-{percent(SAVING_ALL)} over all 956). It is
+{percent(SAVING_ALL)} over all 956). The saving is
 that of each task's first plan; *any plan*: in expectation. Measured in percent on """
 
 

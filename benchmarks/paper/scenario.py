@@ -206,9 +206,9 @@ def section(records: Sequence[Record]) -> Section:
 
 _DEFINITION = f"""\
 Two robots exchange rooms on the map `domains/corridor`: r1 from {START[0]} to {GOAL[0]}, r2 from
-{START[1]} to {GOAL[1]}. They have agreed on the sentence of the first plan. Then {PLACE} becomes a
-place of interest. r1 finds a path through it among its own choices. r2 is not informed and does not
-change its part; no robot is late."""
+{START[1]} to {GOAL[1]}. The robots have agreed on the sentence of the first plan. Then {PLACE}
+becomes a place of interest. r1 finds a path through it among its own choices. r2 is not informed
+and does not change its part; no robot is late."""
 
 _ALT = "The agreed plan in the corridor, and below it the detour of r1"
 

@@ -212,8 +212,8 @@ def _about_orders(rows: Mapping[str, _Columns]) -> Iterator[str]:
         return
     text = (
         f"**Words of the greedy method** differ from the paper's on {len(other)} of {len(rows)} "
-        f"rows ({', '.join(other)}). They depend on the order of the states, which the paper does "
-        "not give."
+        f"rows ({', '.join(other)}). The words depend on the order of the states, which the paper "
+        "does not give."
     )
     beyond = [
         name
