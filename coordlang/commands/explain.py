@@ -209,9 +209,8 @@ class Explanation(InTask):
             f"has {plans} {steps} in {said}.",
         ]
         listed = [words for words, _ in leading]
-        if len(listed) > 1:
-            all_are_listed = number == len(listed)
-            meant = meaning([*map(used.plans_with, listed)]) if all_are_listed else None
+        if 1 < len(listed) == number:
+            meant = meaning([*map(used.plans_with, listed)])
             lines.append(meaning_text([*map(self._text, listed)], meant))
         if self.with_demands and used.guaranteed:
             lines.append(

@@ -312,13 +312,13 @@ def show(atom: Atom | StepAtom) -> str:
 def own_text(text: str, robot: str) -> str:
     """A subaction's text as the robot says it of itself.
 
-    ``(pass r1 r2 ball)`` of r1 is ``pass r2 ball``.
+    ``(pass r1 r2 ball)`` of r1 is ``pass r2 ball``, and of r2 ``pass r1 r2 ball``.
 
-    Without the parentheses and the first of its arguments that is the robot's name; a further one
-    is what it acts on.  What an event waits for follows as it is.
+    Without the parentheses, and without the robot's name if it is the first argument: elsewhere it
+    says which part the robot has.  What an event waits for follows as it is.
     """
     subaction, more, waits = text.partition(") (")
     name, *args = subaction.strip("()").split()
-    if robot in args:
-        args.remove(robot)
+    if args[:1] == [robot]:
+        del args[0]
     return " ".join((name, *args)) + more[1:] + waits

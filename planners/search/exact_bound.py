@@ -60,8 +60,9 @@ class ExactBound:
     def only(self, depth: int, states: Ints, options: Options) -> Options:
         """The robots' options in states after ``depth`` steps, without labels that are not used.
 
-        Where many combinations are left, those go, too, that cannot follow a cheapest way to the
-        state, as far as unit propagation sees it.
+        Where many combinations are left, labels go, too, that cannot follow a cheapest way to the
+        state, as far as unit propagation sees it: an optimal plan through the state may begin with
+        any such way.  The states are of one layer, all edges into which were seen by `left_out`.
         """
         options = _only(
             options, [u[own] for u, (_, own) in zip(self._used[depth], options, strict=True)]
@@ -206,12 +207,13 @@ def _shortest(formula: PlanFormula, at_least: int, effort: int) -> FixedPlans:
         ended.callback(plans.close)
         while True:
             begins = formula.lengthen(plans)
-            if plans.steps >= at_least and plans.holds([begins]):
-                plans.require([begins])
-                ended.pop_all()
-                return plans
+            if plans.steps >= at_least:
+                if plans.holds([begins]):
+                    plans.require([begins])
+                    ended.pop_all()
+                    return plans
+                plans.spend(_EASY + len(formula.step))
             plans.require([-begins])
-            plans.spend(_EASY + len(formula.step))
 
 
 def _used(plans: FixedPlans, model: JointModel, plan: Plan, effort: int) -> list[list[Bools]]:
