@@ -25,29 +25,6 @@ from planners.system.options import Option, options_of, record_from
 _PDDL = ("DOMAIN", "PROBLEM", "PROBLEMS...")
 #: Options whose metavar has one of these name a file that is read or written.
 _FILES = ("FILE", "LANGUAGE", "PROBLEM", "RECORD")
-#: Command -> the options that are used most, and an example; words in capitals are `_EXAMPLES`.
-_HELP = {
-    "inspect": ("states write as_json", "MAP"),
-    "plans": ("only_count most sample", "MAP --count"),
-    "check": ("as_json", "MAP"),
-    "coordination": ("asynchronous jobs as_json", "MAP"),
-    "tasks": ("start goal output", 'MAP --start "(at r1 ?)" -o tasks.json'),
-    "build": ("tasks method output", "MAP --tasks all --method minimal -o t-map.json"),
-    "verify": ("tasks certificate as_json", "t-map.json MAP"),
-    "lift": ("tasks check output", "GRID --tasks all -o lifted.json"),
-    "ground": ("tasks verified output", "lifted.json GRID -o 2x2.json"),
-    "say": ("as_json", "t-map.json MAP plan.txt"),
-    "understand": ("only_count most output", 't-map.json MAP "w0 w2 w1 w0" -o plan.txt'),
-    "plan": ("prefer form as_json", "t-map.json MAP --prefer first:r2"),
-    "choices": ("robot form output", 't-map.json MAP "w0 w2 w1 w0" --robot r1'),
-    "robot": ("robot prefer play", "events.json MAP --robot r1 --play 1"),
-    "simulate": ("sentence step output", "t-map.json MAP --runs 3"),
-    "export": ("to for_planner output", 't-map.json MAP "w0 w2 w1 w0" --to bt'),
-    "explain": ("task sentence as_json", "t-map.json MAP --task"),
-    "report": ("output coordinates seed", "t-map.json MAP -o t-map.html"),
-    "domains": ("copy as_json", "--copy all domains"),
-    "import": ("robots task output", "SITE --robots 2 -o mine"),
-}
 #: Files that examples have.
 _EXAMPLES = {
     "MAP": "domains/t-map/domain.pddl domains/t-map/problem.pddl",
@@ -90,12 +67,12 @@ def command_of(name: str, record: type[CommandOptions]) -> click.Command:
 
     argument = click.Argument(["arguments"], nargs=-1, type=FILE, metavar=record.takes)
     params = [*([argument] if record.takes else []), *map(_click_option, on_cli.values())]
-    used, example = _HELP[name]
+    example = record.example
     for word, files in _EXAMPLES.items():
         example = example.replace(word, files)
     example = f"\b\nExample:\n  coordlang {name} {example}"
     made = _Command(name, params=params, callback=called, help=record.__doc__, epilog=example)
-    made.used = tuple(used.split())
+    made.used = tuple(record.used.split())
     return made
 
 

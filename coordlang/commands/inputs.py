@@ -247,6 +247,11 @@ def robot_number(robots: Sequence[str], name: str) -> int:
     return robots.index(name)
 
 
+def wishes_in(prefer: str | Sequence[str]) -> tuple[str, ...]:
+    """What ``prefer`` says: one wish, or several."""
+    return (prefer,) if isinstance(prefer, str) else tuple(prefer)
+
+
 def extended(kind: type[Result], found: Any, *more: object, **named: object) -> Result:
     """A result that has the fields of what was found, and after them its own."""
     return kind(*(getattr(found, each.name) for each in fields(found)), *more, **named)

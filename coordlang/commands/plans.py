@@ -12,11 +12,10 @@ from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.records import DEFAULT_MAX, PlansOptions, UnderstandOptions
 from coordlang.commands.terminal import echo, note_single_robot, write
 from planners.search.kept_plans import search
-from planners.search.plans import Plan, Plans
+from planners.search.plans import Plan, Plans, Texts, texts
 from planners.system.notebook import Presented
 
-#: Each robot's subaction as text, None where it idles; and one plan: these for each joint step.
-Texts = tuple[str | None, ...]
+#: One plan, joint step by joint step.
 PlanSteps = tuple[Texts, ...]
 
 
@@ -107,7 +106,7 @@ class OptimalPlans(Presented):
         return to_json(self._plans, [self._known(plan) for plan in listed])
 
     def _texts(self, plan: Plan) -> PlanSteps:
-        return tuple(map(self._plans.space.model.in_step.texts, self._plans.steps(plan)))
+        return texts(self._plans.space.model.in_step, self._plans.steps(plan))
 
     def _numbers(self, plan: Sequence[Texts]) -> Plan | None:
         model = self._plans.space.model.in_step
@@ -162,7 +161,7 @@ def show_listed(
         write(f"{count}\n", output)
     else:
         title = "sampled plan {}" if listing.sample else f"plan {{}} of {count}"
-        texts = [f"; {title.format(n)}\n{found.ipc(plan)}\n" for n, plan in enumerate(listed, 1)]
-        write("".join(texts), output)
+        files = [f"; {title.format(n)}\n{found.ipc(plan)}\n" for n, plan in enumerate(listed, 1)]
+        write("".join(files), output)
         if not listing.sample and len(listed) < count:
             echo(f"{len(listed)} of {count} {what} listed; --max N lists more", err=True)

@@ -96,7 +96,8 @@ class CommandOptions:
     ``takes`` arguments as the usage line shows them, and none where the option ``alone`` is given.
     A terminal shows what it is ``doing``.  Its ``function`` has its name and is in the ``module``
     of its name, unless others are named, and searches no task again that was searched before if it
-    ``keeps_plans``.
+    ``keeps_plans``.  Its help begins with the options that are ``used`` most, by name, and ends
+    with an ``example``, in which words in capitals are files (`coordlang.commands.command`).
     """
 
     takes: ClassVar[str] = ""
@@ -105,6 +106,8 @@ class CommandOptions:
     function: ClassVar[str | None] = None
     keeps_plans: ClassVar[bool] = True
     alone: ClassVar[str] = ""
+    used: ClassVar[str] = ""
+    example: ClassVar[str] = ""
 
     no_cache: bool = cli_option(False, "Search anew: read no plans that were found before.")
     limits: Limits = group(Limits)
@@ -249,7 +252,12 @@ class MethodOptions:
 
 
 class InspectOptions(
-    AnswerOptions, takes="DOMAIN PROBLEM", doing="reading and grounding", keeps_plans=False
+    AnswerOptions,
+    takes="DOMAIN PROBLEM",
+    doing="reading and grounding",
+    keeps_plans=False,
+    used="states write as_json",
+    example="MAP",
 ):
     """Show what was understood of a domain: robots, subactions, constraints."""
 
@@ -259,7 +267,12 @@ class InspectOptions(
     )
 
 
-class PlansOptions(AnswerOptions, takes="DOMAIN PROBLEM"):
+class PlansOptions(
+    AnswerOptions,
+    takes="DOMAIN PROBLEM",
+    used="only_count most sample",
+    example="MAP --count",
+):
     """Count, list or sample all optimal plans of a task.
 
     With --slack B those that take at most B steps more, too.
@@ -271,7 +284,12 @@ class PlansOptions(AnswerOptions, takes="DOMAIN PROBLEM"):
 
 
 class CheckOptions(
-    AnswerOptions, takes="DOMAIN PROBLEM", doing="solving the task twice", keeps_plans=False
+    AnswerOptions,
+    takes="DOMAIN PROBLEM",
+    doing="solving the task twice",
+    keeps_plans=False,
+    used="as_json",
+    example="MAP",
 ):
     """Compare our optimal cost with Fast Downward's.
 
@@ -279,7 +297,12 @@ class CheckOptions(
     """
 
 
-class CoordinationOptions(AnswerOptions, takes="DOMAIN PROBLEMS..."):
+class CoordinationOptions(
+    AnswerOptions,
+    takes="DOMAIN PROBLEMS...",
+    used="asynchronous jobs as_json",
+    example="MAP",
+):
     """Decide which tasks require coordination, with a miscoordination shown."""
 
     work: Jobs = group(Jobs)
@@ -292,6 +315,8 @@ class TasksOptions(
     module="domains",
     doing="reading and grounding",
     keeps_plans=False,
+    used="start goal output",
+    example='MAP --start "(at r1 ?)" -o tasks.json',
 ):
     """Write a task file: PROBLEM with other starts and goals; ? in a PATTERN is any name."""
 
@@ -300,7 +325,12 @@ class TasksOptions(
     output: str = result_option("The task file")
 
 
-class BuildOptions(AnswerOptions, takes="DOMAIN PROBLEMS..."):
+class BuildOptions(
+    AnswerOptions,
+    takes="DOMAIN PROBLEMS...",
+    used="tasks method output",
+    example="MAP --tasks all --method minimal -o t-map.json",
+):
     """Build a coordination language and verify it.
 
     Exit 0: written, with the proof that the method promises.  3: without it (a limit was hit).
@@ -334,7 +364,11 @@ class BuildOptions(AnswerOptions, takes="DOMAIN PROBLEMS..."):
 
 
 class VerifyOptions(
-    AnswerOptions, takes="LANGUAGE DOMAIN PROBLEMS...", doing="verifying by definition"
+    AnswerOptions,
+    takes="LANGUAGE DOMAIN PROBLEMS...",
+    doing="verifying by definition",
+    used="tasks certificate as_json",
+    example="t-map.json MAP",
 ):
     """Check by definition that LANGUAGE is a coordination language.
 
@@ -357,7 +391,12 @@ class VerifyOptions(
     work: Jobs = group(Jobs)
 
 
-class LiftOptions(AnswerOptions, takes="DOMAIN PROBLEMS..."):
+class LiftOptions(
+    AnswerOptions,
+    takes="DOMAIN PROBLEMS...",
+    used="tasks check output",
+    example="GRID --tasks all -o lifted.json",
+):
     """Learn words as functions of features of states, for all PROBLEMS at once.
 
     Exit 0: written.  3: written, but a limit ended the search.  11: no features suffice.
@@ -390,7 +429,13 @@ class LiftOptions(AnswerOptions, takes="DOMAIN PROBLEMS..."):
             )
 
 
-class GroundOptions(PlanningOptions, takes="LIFTED DOMAIN PROBLEM", module="lift"):
+class GroundOptions(
+    PlanningOptions,
+    takes="LIFTED DOMAIN PROBLEM",
+    module="lift",
+    used="tasks verified output",
+    example="lifted.json GRID -o 2x2.json",
+):
     """Write the language file of one problem from a lifted language.
 
     Exit 0: written, and verified unless --unverified.  1: refuted, and nothing is written.  3:
@@ -406,7 +451,13 @@ class GroundOptions(PlanningOptions, takes="LIFTED DOMAIN PROBLEM", module="lift
     output: str = result_option("The language file (.json, .json.gz)", "LANGUAGE")
 
 
-class SayOptions(AnswerOptions, takes="LANGUAGE DOMAIN PROBLEM PLAN", module="sentences"):
+class SayOptions(
+    AnswerOptions,
+    takes="LANGUAGE DOMAIN PROBLEM PLAN",
+    module="sentences",
+    used="as_json",
+    example="t-map.json MAP plan.txt",
+):
     """Print the sentence of an optimal plan, or of each plan of a file, one a line."""
 
 
@@ -415,6 +466,8 @@ class UnderstandOptions(
     takes="LANGUAGE DOMAIN PROBLEM SENTENCE",
     module="sentences",
     doing="finding the plans with the sentence",
+    used="only_count most output",
+    example='t-map.json MAP "w0 w2 w1 w0" -o plan.txt',
 ):
     """Count, list or sample the optimal plans that a SENTENCE ("w1 w0") leaves open."""
 
@@ -428,6 +481,8 @@ class PlanOptions(
     takes="LANGUAGE DOMAIN PROBLEM [SENTENCE]",
     module="sentences",
     doing="searching for a plan",
+    used="prefer form as_json",
+    example="t-map.json MAP --prefer first:r2",
 ):
     """Find one optimal plan under SENTENCE ("w1 w0"), or under the best sentence (--prefer)."""
 
@@ -438,7 +493,11 @@ class PlanOptions(
 
 
 class ChoicesOptions(
-    AnswerOptions, takes="LANGUAGE DOMAIN PROBLEM SENTENCE", doing="finding the robots' choices"
+    AnswerOptions,
+    takes="LANGUAGE DOMAIN PROBLEM SENTENCE",
+    doing="finding the robots' choices",
+    used="robot form output",
+    example='t-map.json MAP "w0 w2 w1 w0" --robot r1',
 ):
     """Show what each robot may do under SENTENCE ("w1 w0"), whatever the others choose.
 
@@ -454,6 +513,8 @@ class RobotOptions(
     PlanningOptions,
     takes="LANGUAGE DOMAIN PROBLEM [SENTENCE]",
     doing="finding the robot's choices",
+    used="robot prefer play",
+    example="events.json MAP --robot r1 --play 1",
 ):
     """Execute one robot's part under SENTENCE ("w1 w0"), or one that robots agree on.
 
@@ -478,7 +539,12 @@ class RobotOptions(
 
 
 class SimulateOptions(
-    AnswerOptions, takes="LANGUAGE DOMAIN PROBLEM", doing="simulating", alone="replay"
+    AnswerOptions,
+    takes="LANGUAGE DOMAIN PROBLEM",
+    doing="simulating",
+    alone="replay",
+    used="sentence step output",
+    example="t-map.json MAP --runs 3",
 ):
     """Let robots with wheels do a task in a simulator (`pip install 'coordlang[sim]'`)."""
 
@@ -510,7 +576,11 @@ class SimulateOptions(
 
 
 class ExportOptions(
-    AnswerOptions, takes="LANGUAGE DOMAIN PROBLEM SENTENCE", doing="compiling the task"
+    AnswerOptions,
+    takes="LANGUAGE DOMAIN PROBLEM SENTENCE",
+    doing="compiling the task",
+    used="to for_planner output",
+    example='t-map.json MAP "w0 w2 w1 w0" --to bt',
 ):
     """Write a task under SENTENCE ("w1 w0") as PDDL, LTLf or behaviour trees.
 
@@ -534,7 +604,11 @@ class ExportOptions(
 
 
 class ExplainOptions(
-    AnswerOptions, takes="LANGUAGE DOMAIN PROBLEM", doing="finding formulas of the words"
+    AnswerOptions,
+    takes="LANGUAGE DOMAIN PROBLEM",
+    doing="finding formulas of the words",
+    used="task sentence as_json",
+    example="t-map.json MAP --task",
 ):
     """Show a language: words as formulas, sentences of a task."""
 
@@ -544,7 +618,13 @@ class ExplainOptions(
     )
 
 
-class ReportOptions(PlanningOptions, takes="LANGUAGE DOMAIN PROBLEMS...", doing="drawing the page"):
+class ReportOptions(
+    PlanningOptions,
+    takes="LANGUAGE DOMAIN PROBLEMS...",
+    doing="drawing the page",
+    used="output coordinates seed",
+    example="t-map.json MAP -o t-map.html",
+):
     """Write a page that shows a language: words, sentences, plans played."""
 
     output: str = result_option("The HTML file", "PAGE")
@@ -552,7 +632,13 @@ class ReportOptions(PlanningOptions, takes="LANGUAGE DOMAIN PROBLEMS...", doing=
     seed: int = option(0, "Draws the tasks.")
 
 
-class DomainsOptions(CommandOptions, doing="copying", keeps_plans=False):
+class DomainsOptions(
+    CommandOptions,
+    doing="copying",
+    keeps_plans=False,
+    used="copy as_json",
+    example="--copy all domains",
+):
     """List or copy the domains that come with coordlang."""
 
     copy: tuple[str, str] | None = option(
@@ -568,6 +654,8 @@ class ImportOptions(
     function="import_site",
     doing="reading",
     keeps_plans=False,
+    used="robots task output",
+    example="SITE --robots 2 -o mine",
 ):
     """Write FILE.map with FILE.scen, or FILE.building.yaml of Open-RMF, as PDDL."""
 

@@ -23,6 +23,7 @@ from coordlang.commands.inputs import (
     public,
     read_coordinates_of,
     robot_number,
+    wishes_in,
 )
 from coordlang.commands.records import RobotOptions
 from coordlang.commands.terminal import echo
@@ -111,7 +112,7 @@ def robot(files: Arguments, options: RobotOptions) -> RobotInTask:
         words = used.words_of(sentence)
         used.plans_with(words)
         sentence = used.text(words)
-    wishes = (options.prefer,) if isinstance(options.prefer, str) else tuple(options.prefer)
+    wishes = wishes_in(options.prefer)
 
     def wanted(wished: Sequence[str]) -> list[Preference]:
         return [read_preference(used, wish) for wish in wished]

@@ -10,7 +10,7 @@ from functools import partial
 from os import PathLike, fspath
 from typing import Any
 
-from coordlang.commands.inputs import Arguments, InTask, public
+from coordlang.commands.inputs import Arguments, InTask, public, wishes_in
 from coordlang.commands.plans import OptimalPlans, PlanSteps, show_listed
 from coordlang.commands.records import PlanOptions, SayOptions, UnderstandOptions
 from coordlang.commands.terminal import covered_code, echo
@@ -26,8 +26,8 @@ from coordlang.execution.plan_sentence import read_plan_file, sentence_of_plan
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.provenance import tolerance_data
 from planners.search.heuristics import HEURISTICS
-from planners.search.plan_file import Texts, json_count
-from planners.search.plans import Plans
+from planners.search.plan_file import json_count
+from planners.search.plans import Plans, Texts
 from planners.system.errors import CoordlangError, UsageError
 from planners.system.notebook import counted
 
@@ -234,8 +234,7 @@ def plan(files: Arguments, options: PlanOptions) -> PlanUnderSentence:
             remedy="--prefer shortest finds the sentence with the fewest words.",
         )
     used = files.task().used
-    wanted = (options.prefer,) if isinstance(options.prefer, str) else options.prefer
-    preferences = [read_preference(used, text) for text in wanted]
+    preferences = [read_preference(used, text) for text in wishes_in(options.prefer)]
     best = best_sentence(used, preferences) if preferences else None
     words = best.words if best else used.words_of(sentence or ())
     expanded = ExpandedStates(used.model, used.partition)

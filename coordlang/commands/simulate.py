@@ -12,7 +12,7 @@ from typing import Any
 
 import msgspec
 
-from coordlang.commands.inputs import Arguments, public, read_coordinates_of
+from coordlang.commands.inputs import Arguments, public, read_coordinates_of, wishes_in
 from coordlang.commands.records import File, SimulateOptions
 from coordlang.commands.terminal import covered_code, echo, ended_early, working
 from coordlang.execution.best_sentence import best_sentence, read_preference
@@ -127,7 +127,7 @@ def simulate(files: Arguments, options: SimulateOptions) -> Simulated:
     settings, runs = Settings(noise=options.noise), options.runs
     require_simulator()
     task = files.task(options.coordinates)
-    wished = (options.prefer,) if isinstance(options.prefer, str) else options.prefer
+    wished = wishes_in(options.prefer)
     on_the_way = [text for text in wished if text.startswith(_VISIT)]
     preferred = [text for text in wished if text not in on_the_way]
     prepared = _prepared(task.used, options, preferred)

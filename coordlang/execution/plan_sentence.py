@@ -12,8 +12,8 @@ from coordlang.language.sentences import sentence
 from planners.joint.model import IDLE, FullState, Goal, JointModel
 from planners.joint.tables import Rows
 from planners.pddl.formula_tree import conjuncts, formula_text
-from planners.search.plan_file import NoSuchAction, Texts, read_plans
-from planners.search.plans import Plan, Plans
+from planners.search.plan_file import NoSuchAction, read_plans
+from planners.search.plans import Plan, Plans, Texts
 from planners.system.errors import BadInput, Position, Refuted
 from planners.system.notebook import counted
 

@@ -173,7 +173,7 @@ def _first_users(space: PlanSpace) -> dict[str, set[tuple[str, ...]]]:
     robots = space.model.robots
     named = [
         [
-            frozenset((text or "").replace("(", " ").replace(")", " ").split()[1:]) - {*robots}
+            frozenset((text or "").strip("()").split()[1:]) - {*robots}
             for text in map(partial(space.model.label_text, robot), range(len(labels)))
         ]
         for robot, labels in enumerate(space.model.labels)

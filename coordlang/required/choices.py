@@ -20,7 +20,7 @@ from math import prod
 
 import numpy as np
 
-from planners.joint.tables import Bools, Ints, unique_rows
+from planners.joint.tables import Bools, Ints, differs, unique_rows
 from planners.search.plan_space import LayerEdges, PlanSpace
 from planners.system.limits import reaching
 
@@ -207,8 +207,7 @@ class Choices:
         labels, after = self.space.robot_labels(robot, edges.edges), self.of_node[robot]
         table = np.column_stack((edges.source - edges.source.min(), labels, after[edges.target]))
         rows, inverse = unique_rows(table)
-        fresh = np.ones(len(rows), np.bool_)
-        fresh[1:] = (rows[1:, :2] != rows[:-1, :2]).any(axis=1)
+        fresh = differs(rows[:, 0]) | differs(rows[:, 1])
         first = np.flatnonzero(fresh)
         following = self.sets.unions(first, np.diff(np.append(first, len(rows))), rows[:, 2])
         groups = rows[first]

@@ -48,9 +48,8 @@ from planners.check.rules import validate
 from planners.grounding.instantiate import idling_schemas
 from planners.loading import build
 from planners.search.optimal_plans import search
-from planners.search.plan_file import Texts
 from planners.search.plan_space import PlanSpace
-from planners.search.plans import Plans
+from planners.search.plans import Plans, Texts
 from planners.system.errors import (
     BadInput,
     CoordlangError,

@@ -26,8 +26,8 @@ from unified_planning.plans import (
 from coordlang.unified.translation import Translated
 from planners.joint.model import JointModel
 from planners.pddl.robots import Team
-from planners.search.plan_file import Texts, numbered_actions
-from planners.search.plans import Plan, Plans
+from planners.search.plan_file import numbered_actions
+from planners.search.plans import Plan, Plans, Texts
 from planners.system.errors import UsageError
 
 

@@ -345,9 +345,9 @@ class JointActionStepper(Stepper):
         cost, operator = self._cost[operator[order]], operator[order]
         same = np.zeros(len(row), np.bool_)
         same[1:] = (row[1:] == row[:-1]) & (labels[1:] == labels[:-1]).all(axis=1)
-        differs = np.flatnonzero(same[1:] & (result[1:] != result[:-1]).any(axis=1))
-        if len(differs):
-            first, second = (self._actions[operator[differs[0] + k]] for k in (0, 1))
+        unlike = np.flatnonzero(same[1:] & (result[1:] != result[:-1]).any(axis=1))
+        if len(unlike):
+            first, second = (self._actions[operator[unlike[0] + k]] for k in (0, 1))
             raise BadInput(
                 f"{first.label} and {second.label} have the same subactions but different results",
                 position=self._positions.get(second.schema),

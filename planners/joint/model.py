@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from planners.grounding.actions import GroundAction, Impossible
 from planners.joint.conditions import Evaluator, Labels
 from planners.joint.states import StateCodec
-from planners.joint.tables import Bools, Ints, Rows
+from planners.joint.tables import Bools, Ints, Rows, kept_runs
 from planners.pddl.formula_tree import label
 from planners.pddl.lifted import Atom, Formula, StepAtom
 from planners.pddl.model_options import Cost
@@ -35,6 +35,14 @@ IDLE = "idle"
 SLACK_LEFT = "slack-left"
 #: A state in which nothing is true, for people; its key is empty.
 NO_FACT = "(no fact holds)"
+
+
+def some_options(options: Options, kept: Sequence[Bools]) -> Options:
+    """Those of the robots' options that are ``kept``."""
+    return [
+        (kept_runs(first, good), label[good])
+        for (first, label), good in zip(options, kept, strict=True)
+    ]
 
 
 def products(options: Options) -> NDArray[np.float64]:

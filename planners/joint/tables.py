@@ -94,9 +94,8 @@ def unique_rows(table: NDArray[T]) -> tuple[NDArray[T], Ints]:
             codes[-1] = codes[-1] * np.uint64(bound) + column.astype(np.uint64)
     order = np.argsort(codes[0]) if len(codes) == 1 else np.lexsort(codes[::-1])
     fresh = np.zeros(len(table), np.bool_)
-    fresh[:1] = True
     for code in codes:
-        fresh[1:] |= code[order[1:]] != code[order[:-1]]
+        fresh |= differs(code[order])
     number = np.empty(len(table), np.int64)
     number[order] = np.cumsum(fresh) - 1
     return table[order[fresh]], number

@@ -224,19 +224,17 @@ class BoundedSearch(Exploration):
     def _within_bound(self, depth: int) -> tuple[Edges, int]:
         """The joint steps into a layer, and the least bound that was too large."""
         parts: list[Edges] = []
-        beyond, looked_at = FAR, 0
+        beyond = FAR
 
-        def only(rows: Rows, options: Options) -> Options:
+        def only(states: Ints, rows: Rows, options: Options) -> Options:
             """Leave out choices after which too few steps are left."""
-            nonlocal beyond, looked_at
+            nonlocal beyond
             if self._limited and (
                 self.composed > self._probe or products(options).sum() > _TOO_MANY * self._probe
             ):
                 raise _GrownError
             if self.exact is not None:
-                states = self.layers[-1][looked_at : looked_at + len(rows)]
                 options = self.exact.only(depth - 1, states, options)
-            looked_at += len(rows)
             options, low = self._heuristic.in_time(rows, options, self.bound - depth)
             beyond = min(beyond, low + depth)
             return options

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.joint.tables import Ints
+from planners.joint.tables import Ints, differs
 from planners.search.plan_space import PlanSpace
 
 
@@ -35,8 +35,7 @@ class EdgeIndex:
             labels = space.robot_labels(robot)
             size = int(labels.max(initial=0)) + 1
             code = prefix * size + labels
-            fresh = np.ones(len(code), np.bool_)
-            fresh[1:] = code[1:] != code[:-1]
+            fresh = differs(code)
             radix.append(size)
             keys.append(code[fresh])
             prefix = np.cumsum(fresh) - 1

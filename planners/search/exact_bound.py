@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exact bounds from a SAT solver: what is left after them is on optimal plans, and nothing else.
+"""Exact bounds from a SAT solver: what is left after them is, nearly always, on optimal plans.
 
 First the least makespan, then the least second component (where no action costs more than 1), then
 the labels that some optimal plan has in each step; then, state by state, whether an optimal plan
-passes through it: whether one begins with a cheapest way to it.  The solver's models are only hints
-(states and costs come from the joint model); its refutations are trusted.  A question that is not
-decided with some effort is answered with yes: more is searched then.
+passes through it: whether one begins with a cheapest way to it; and in states with many joint
+labels which labels may follow that way.  The solver's models are only hints (states and costs come
+from the joint model); its refutations are trusted.  A question that is not decided with some effort
+is answered with yes: more is searched then.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ import numpy as np
 
 from planners.joint.composition import ComposingStepper
 from planners.joint.conditions import Labels
-from planners.joint.model import JointModel, Options, PlanningTask, products
-from planners.joint.tables import Bools, Ints, kept_runs
+from planners.joint.model import JointModel, Options, PlanningTask, products, some_options
+from planners.joint.tables import Bools, Ints
 from planners.search.goals import SMALLER, goal_facts
 from planners.search.plan_formula import PlanFormula, TooManyClauses
 from planners.search.questions import FixedPlans, Literals, OutOfEffort, Plan
@@ -64,24 +65,25 @@ class ExactBound:
         state, as far as unit propagation sees it: an optimal plan through the state may begin with
         any such way.  The states are of one layer, all edges into which were seen by `left_out`.
         """
-        options = _only(
-            options, [u[own] for u, (_, own) in zip(self._used[depth], options, strict=True)]
-        )
+        used = [u[label] for u, (_, label) in zip(self._used[depth], options, strict=True)]
+        options = some_options(options, used)
         many = np.flatnonzero(products(options) > self._pieces.joint_labels)
-        kept = [np.ones(len(label), np.bool_) for _, label in options]
+        ways = self._asked(self._ways(states[many], depth))
+        #: The variables of the robots' options, and which of these are left.
+        variables = [
+            begin + label
+            for begin, (_, label) in zip(self.plans.first[depth], options, strict=True)
+        ]
+        kept = [np.ones(len(own), np.bool_) for own in variables]
         false = np.zeros(self.plans.variables + 1, np.bool_)
-        for state, way in zip(
-            many.tolist(), self._asked(self._ways(states[many], depth)), strict=True
-        ):
+        for state, way in zip(many.tolist(), ways, strict=True):
             excluded = self.plans.excluded(way.tolist())
             false[excluded] = True
-            for (first, label), good, begin in zip(
-                options, kept, self.plans.first[depth], strict=True
-            ):
-                own = slice(first[state], first[state + 1])
-                good[own] = ~false[begin + label[own]]
+            for robot, (first, _) in enumerate(options):
+                here = slice(first[state], first[state + 1])
+                kept[robot][here] = ~false[variables[robot][here]]
             false[excluded] = False
-        return _only(options, kept)
+        return some_options(options, kept)
 
     def _asked(self, ways: Labels) -> Ints:
         """The literals of beginnings of plans: (ways, steps x robots)."""
@@ -155,14 +157,6 @@ class ExactBound:
             found[:, step] = self._labels[states]
             states = self._source[states]
         return found
-
-
-def _only(options: Options, kept: Sequence[Bools]) -> Options:
-    """Some of the options."""
-    return [
-        (kept_runs(first, good), label[good])
-        for (first, label), good in zip(options, kept, strict=True)
-    ]
 
 
 def exact_bound(

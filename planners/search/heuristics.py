@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from planners.joint.composition import ComposingStepper
-from planners.joint.model import Goal, JointModel, Options, PlanningTask
+from planners.joint.model import Goal, JointModel, Options, PlanningTask, some_options
 from planners.joint.states import TrueFacts
-from planners.joint.tables import Bools, Ints, Rows, kept_runs, packed, unpacked
+from planners.joint.tables import Bools, Ints, Rows, packed, unpacked
 from planners.search.goals import FAR, Values, goal_facts, ways_to_facts
 from planners.search.state_variables import StateVariable, state_variables
 from planners.system.errors import UsageError
@@ -244,7 +244,7 @@ class Projections:
         if not any(self._own):
             return options, FAR
         true = TrueFacts.of(rows)
-        kept, beyond = [], FAR
+        kept, beyond = list[Bools](), FAR
         for (first, label), own in zip(options, self._own, strict=True):
             state = np.repeat(np.arange(len(rows)), np.diff(first))
             need = np.zeros(len(label), np.int64)
@@ -254,8 +254,8 @@ class Projections:
                 need = np.maximum(need, np.where(after >= 0, after, here[state]))
             good = need <= left
             beyond = min(beyond, int(need[~good].min(initial=FAR)))
-            kept.append((kept_runs(first, good), label[good]))
-        return kept, beyond
+            kept.append(good)
+        return some_options(options, kept), beyond
 
 
 def _distances(variable: StateVariable, wanted: frozenset[int]) -> dict[int, int]:

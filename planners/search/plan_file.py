@@ -13,13 +13,10 @@ from msgspec import Meta
 
 from planners.joint.model import JointModel
 from planners.pddl.model_options import Execution
-from planners.search.plans import Plan, Plans
+from planners.search.plans import Plan, Plans, Texts, texts
 from planners.system.errors import BadInput, Position
 from planners.system.files import FileFormat, read_text
 from planners.system.messages import echoed
-
-#: Each robot's subaction, None for idling.
-Texts = tuple[str | None, ...]
 
 #: Larger counts are written as strings: not every JSON reader has big integers.
 _EXACT = 2**53
@@ -95,11 +92,6 @@ _END = re.compile(r"\s*;\s*(?:makespan|cost) = \d", re.IGNORECASE)
 _LINE = re.compile(
     r"(?:(?P<step>\d+)(?:\.0+)?\s*:)?\s*(?P<action>\([^()]*\))\s*(?:\[\s*[\d.]+\s*\])?$"
 )
-
-
-def texts(model: JointModel, plan: Plan) -> tuple[Texts, ...]:
-    """A plan's label numbers as text."""
-    return tuple(model.texts(step) for step in plan)
 
 
 def to_ipc(plans: Plans, plan: Plan) -> str:

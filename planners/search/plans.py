@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from planners.joint.model import JointModel
 from planners.search.plan_space import PlanSpace
 from planners.search.slack import rests
 
@@ -21,6 +22,13 @@ if TYPE_CHECKING:
 
 #: A plan: the label numbers of all robots, step by step.
 Plan = tuple[tuple[int, ...], ...]
+#: A joint step as text: each robot's subaction, None where it idles.
+Texts = tuple[str | None, ...]
+
+
+def texts(model: JointModel, plan: Plan) -> tuple[Texts, ...]:
+    """A plan's label numbers as text."""
+    return tuple(model.texts(step) for step in plan)
 
 
 def counts(space: PlanSpace) -> list[int]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -23,6 +24,8 @@ from planners.joint.tables import (
 from planners.system.limits import reaching
 
 T = TypeVar("T", bound=np.generic)
+#: States by number, their rows and the robots' options there -> those of the options that are kept.
+Only = Callable[[Ints, Rows, Options], Options]
 
 #: States expanded first; from the joint steps that they have the next numbers of states follow.
 _FIRST = 500
@@ -237,7 +240,7 @@ class Exploration:
 
     def steps(
         self,
-        only: Callable[[Rows, Options], Options] | None = None,
+        only: Only | None = None,
         first: int = _FIRST,
         most: int | None = None,
     ) -> Iterator[tuple[Ints, Steps]]:
@@ -251,15 +254,14 @@ class Exploration:
         states, start, size = self.layers[-1], 0, min(self._pieces.states, first)
         while start < len(states):
             numbers = states[start : start + size]
-            steps = self._model.successors(self.table.rows(numbers), only)
+            chosen = None if only is None else partial(only, numbers)
+            steps = self._model.successors(self.table.rows(numbers), chosen)
             self.composed += len(steps)
             yield numbers, steps
             start += size
             size = max(1, min(self._pieces.states, most * size // max(1, len(steps))))
 
-    def expand(
-        self, only: Callable[[Rows, Options], Options] | None = None, *, keep: bool = True
-    ) -> Ints:
+    def expand(self, only: Only | None = None, *, keep: bool = True) -> Ints:
         """The states that the layer's joint steps lead to and that were not met before.
 
         With ``keep`` the steps are kept for `space`.

@@ -43,7 +43,7 @@ def explore_within(
     def so_far() -> str:
         return f"{found.states:,} states within {found.depth} of {steps} steps of {task.name}"
 
-    def only(rows: Rows, options: Options) -> Options:
+    def only(_: Ints, rows: Rows, options: Options) -> Options:
         return heuristic.in_time(rows, options, steps - found.depth - 1)[0]
 
     with reaching(so_far, "less slack"):

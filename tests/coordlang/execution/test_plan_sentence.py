@@ -23,9 +23,8 @@ from planners.joint.tables import Rows
 from planners.pddl.model_options import ModelOptions
 from planners.search.heuristics import HEURISTICS
 from planners.search.optimal_plans import search
-from planners.search.plan_file import Texts, texts
 from planners.search.plan_space import PlanSpace
-from planners.search.plans import Plan, Plans
+from planners.search.plans import Plan, Plans, Texts, texts
 from planners.system.errors import ProvedImpossible
 from tests.support.domains import read
 from tests.support.naive import plans_by_sentence

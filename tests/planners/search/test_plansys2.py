@@ -9,8 +9,8 @@ import pytest
 
 from planners.loading import load
 from planners.search.optimal_plans import search
-from planners.search.plan_file import read_plans, texts, to_ipc, to_plansys2
-from planners.search.plans import Plans
+from planners.search.plan_file import read_plans, to_ipc, to_plansys2
+from planners.search.plans import Plans, texts
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
 
