@@ -32,7 +32,7 @@ from planners.search.plan_file import Count, json_count
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans
 from planners.system.errors import OutOfMemory
-from planners.system.files import FileFormat
+from planners.system.files import FileFormat, about
 
 #: Combinations of the robots' moves beyond which exact knowledge is not tried by default.
 MOST = 2_000_000
@@ -194,44 +194,36 @@ _Facts = list[Annotated[int, Meta(ge=0)]]
 class StateRecord(msgspec.Struct, frozen=True):
     """A state of a robot's automaton; state 0 is the start."""
 
-    step: Annotated[int, Meta(description="The number of steps or events done.", ge=0)]
-    left: Annotated[Count, Meta(description="The number of own subplans that lead on from it.")]
-    next: Annotated[
-        dict[str, int], Meta(description="What the robot may do now -> the state after that.")
-    ]
-    true: Annotated[_Facts, Meta(description="Numbers of facts that are certainly true.")]
-    unknown: Annotated[
-        _Facts, Meta(description="Numbers of facts that depend on the other robots.")
-    ]
+    step: Annotated[int, about("The number of steps or events done.", ge=0)]
+    left: Annotated[Count, about("The number of own subplans that lead on from it.")]
+    next: Annotated[dict[str, int], about("What the robot may do now -> the state after that.")]
+    true: Annotated[_Facts, about("Numbers of facts that are certainly true.")]
+    unknown: Annotated[_Facts, about("Numbers of facts that depend on the other robots.")]
 
 
 class OwnEvent(msgspec.Struct, frozen=True, rename={"meets": "with"}):
     """An event of a robot that keeps no common step with the others."""
 
-    subaction: Annotated[str, Meta(description="What is done.")]
+    subaction: Annotated[str, about("What is done.")]
     after: Annotated[
         dict[str, int],
-        Meta(description="Robot -> how many of its events that interfere must have ended before."),
+        about("Robot -> how many of its events that interfere must have ended before."),
     ]
-    meets: Annotated[
-        dict[str, str], Meta(description="Robot that starts together with it -> its subaction.")
-    ]
+    meets: Annotated[dict[str, str], about("Robot that starts together with it -> its subaction.")]
 
 
 class Passings(msgspec.Struct, frozen=True):
     """What a robot waits for that keeps no common step with the others."""
 
-    events: Annotated[
-        dict[str, OwnEvent], Meta(description="What the keys of 'next' mean, but for 'idle'.")
-    ]
+    events: Annotated[dict[str, OwnEvent], about("What the keys of 'next' mean, but for 'idle'.")]
     interferes: Annotated[
         dict[str, dict[str, list[str]]],
-        Meta(description="Own subaction -> other robot -> its subactions that interfere with it."),
+        about("Own subaction -> other robot -> its subactions that interfere with it."),
     ]
     others: Annotated[
         dict[str, list[dict[str, int]]],
-        Meta(
-            description="Other robot -> for its first event, its second one and so on what it may "
+        about(
+            "Other robot -> for its first event, its second one and so on what it may "
             "be -> how many own events that interfere with it must have ended before."
         ),
     ]
@@ -240,53 +232,45 @@ class Passings(msgspec.Struct, frozen=True):
 class RobotRecord(msgspec.Struct, frozen=True):
     """The choices of one robot."""
 
-    robot: Annotated[str, Meta(description="The robot.")]
-    steps: Annotated[int, Meta(description="The number of steps of each plan.")]
-    subplans: Annotated[Count, Meta(description="The number of its own subplans.")]
+    robot: Annotated[str, about("The robot.")]
+    steps: Annotated[int, about("The number of steps of each plan.")]
+    subplans: Annotated[Count, about("The number of its own subplans.")]
     atoms: Annotated[
         Literal["exact", "own"],
-        Meta(
-            description="How 'true' and 'unknown' were found: over all combinations of the robots' "
+        about(
+            "How 'true' and 'unknown' were found: over all combinations of the robots' "
             "choices, or from the robot's own subactions alone."
         ),
     ]
-    facts: Annotated[
-        list[str], Meta(description="The atoms of which something is known in some state.")
-    ]
-    others: Annotated[list[str], Meta(description="The other atoms that can change.")]
-    states: Annotated[list[StateRecord], Meta(description="The states of the automaton.")]
+    facts: Annotated[list[str], about("The atoms of which something is known in some state.")]
+    others: Annotated[list[str], about("The other atoms that can change.")]
+    states: Annotated[list[StateRecord], about("The states of the automaton.")]
     passings: Annotated[
         Passings | UnsetType,
-        Meta(description="What it waits for; missing where robots step together."),
+        about("What it waits for; missing where robots step together."),
     ] = UNSET
 
 
 class ChoicesFile(msgspec.Struct, frozen=True):
     """A choices file, version 1.  Keys that are not listed here are ignored by readers."""
 
-    format: Annotated[str, Meta(description="What kind of file this is.")]
-    version: Annotated[int, Meta(description="Readers refuse a version that they do not know.")]
-    domain: Annotated[
-        dict[str, Any], Meta(description="The language's domain, as in a language file.")
-    ]
-    robots: Annotated[list[str], Meta(description="All robots, in the order of joint actions.")]
-    task: Annotated[str, Meta(description="The task; for information.")]
-    sentence: Annotated[str, Meta(description="The sentence; for information.")]
-    plans: Annotated[Count, Meta(description="The number of plans with the sentence.")]
-    covered: Annotated[bool, Meta(description="Whether it is a candidate task of the language.")]
-    guaranteed: Annotated[
-        bool, Meta(description="Whether every combination of choices is an optimal plan.")
-    ]
+    format: Annotated[str, about("What kind of file this is.")]
+    version: Annotated[int, about("Readers refuse a version that they do not know.")]
+    domain: Annotated[dict[str, Any], about("The language's domain, as in a language file.")]
+    robots: Annotated[list[str], about("All robots, in the order of joint actions.")]
+    task: Annotated[str, about("The task; for information.")]
+    sentence: Annotated[str, about("The sentence; for information.")]
+    plans: Annotated[Count, about("The number of plans with the sentence.")]
+    covered: Annotated[bool, about("Whether it is a candidate task of the language.")]
+    guaranteed: Annotated[bool, about("Whether every combination of choices is an optimal plan.")]
     combinations_walked: Annotated[
         int | None,
-        Meta(description="Nodes that were walked to prove it; null if there were too many."),
+        about("Nodes that were walked to prove it; null if there were too many."),
     ]
-    choices: Annotated[
-        list[RobotRecord], Meta(description="The choices of each robot that was asked for.")
-    ]
+    choices: Annotated[list[RobotRecord], about("The choices of each robot that was asked for.")]
     tolerance: Annotated[
         dict[str, float] | UnsetType,
-        Meta(description="What the language tolerates, as in its file; missing: nothing."),
+        about("What the language tolerates, as in its file; missing: nothing."),
     ] = UNSET
 
 

@@ -13,7 +13,6 @@ from typing import Annotated, Any
 
 import msgspec
 import numpy as np
-from msgspec import Meta
 
 from planners.grounding.instantiate import ground_goal
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask, show
@@ -30,7 +29,7 @@ from planners.pddl.sexpr import Source, parse
 from planners.search.optimal_plans import distances
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, Position, ProvedImpossible, UsageError, note
-from planners.system.files import FileFormat, read_bytes
+from planners.system.files import FileFormat, about, read_bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +37,11 @@ class ListedTask:
     """A task as a file lists it, as PDDL text."""
 
     init: Annotated[
-        tuple[str, ...], Meta(description="The fluents that are true at the start, as PDDL atoms.")
+        tuple[str, ...], about("The fluents that are true at the start, as PDDL atoms.")
     ]
     goal: Annotated[
         tuple[str, ...],
-        Meta(description="PDDL literals or formulas that must all hold at the end."),
+        about("PDDL literals or formulas that must all hold at the end."),
     ]
 
 
@@ -152,9 +151,9 @@ def _read_text(domain: Domain, problem: Problem, text: str, position: Position |
 class TaskFile(msgspec.Struct, frozen=True):
     """A task file, version 1.  Keys that are not listed here are ignored by readers."""
 
-    format: Annotated[str, Meta(description="What kind of file this is.")]
-    version: Annotated[int, Meta(description="Readers refuse a version that they do not know.")]
-    tasks: Annotated[list[ListedTask], Meta(description="The tasks; each goal may be partial.")]
+    format: Annotated[str, about("What kind of file this is.")]
+    version: Annotated[int, about("Readers refuse a version that they do not know.")]
+    tasks: Annotated[list[ListedTask], about("The tasks; each goal may be partial.")]
 
 
 TASKS = FileFormat("tasks", "task file", TaskFile, "coordlang/tasks")

@@ -18,6 +18,7 @@ from planners.pddl.model_options import MOST_SLACK
 from planners.pddl.pddl_text import domain_text
 from planners.pddl.robots import fluent_predicates, static_atoms
 from planners.pddl.sexpr import Source
+from planners.system.files import about
 from planners.system.notebook import counted
 
 _SIZE = {"minimum": 1}
@@ -33,18 +34,18 @@ class Tolerance:
 
     failure_mean: Annotated[
         Annotated[float, Meta(ge=0, le=1)] | None,
-        Meta(
-            description="How often robots that choose by themselves under a sentence "
+        about(
+            "How often robots that choose by themselves under a sentence "
             "miscoordinate: the probability for a task drawn uniformly."
         ),
     ] = None
     failure_worst: Annotated[
         Annotated[float, Meta(ge=0, le=1)] | None,
-        Meta(description="The same for the task in which it is highest."),
+        about("The same for the task in which it is highest."),
     ] = None
     slack: Annotated[
         Annotated[int, Meta(ge=0, le=MOST_SLACK)] | None,
-        Meta(description="The joint steps by which plans may be longer than the least makespan."),
+        about("The joint steps by which plans may be longer than the least makespan."),
     ] = None
 
     @property
@@ -96,21 +97,21 @@ def percent(share: float) -> str:
 class Guarantee:
     """What is known of the language's size."""
 
-    method: Annotated[str, Meta(description="How it was made.")]
-    size: Annotated[int, Meta(description="The number of words.", extra_json_schema=_SIZE)]
+    method: Annotated[str, about("How it was made.")]
+    size: Annotated[int, about("The number of words.", extra_json_schema=_SIZE)]
     lower_bound: Annotated[
         int,
-        Meta(
-            description="A proved lower bound on the words of any language for these tasks that "
+        about(
+            "A proved lower bound on the words of any language for these tasks that "
             "gives each state one word.",
             extra_json_schema=_SIZE,
         ),
     ]
-    proved_minimal: Annotated[bool, Meta(description="Whether the size equals that bound.")]
+    proved_minimal: Annotated[bool, about("Whether the size equals that bound.")]
     coordination_language: Annotated[
         bool,
-        Meta(
-            description="Whether all plans of a task with one sentence mix freely; false where "
+        about(
+            "Whether all plans of a task with one sentence mix freely; false where "
             "'tolerance' says how often they do not."
         ),
     ] = True

@@ -11,7 +11,6 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 import numpy as np
-from msgspec import Meta
 
 from coordlang.language.candidates import Candidates, Kind
 from coordlang.language.file import (
@@ -32,7 +31,7 @@ from coordlang.lifted.notation import LARGEST, feature_of
 from coordlang.lifted.world import States
 from planners.joint.tables import Ints
 from planners.system.errors import BadInput, Position
-from planners.system.files import FileFormat, read_bytes, require_seen
+from planners.system.files import FileFormat, about, read_bytes, require_seen
 from planners.system.messages import echoed
 from planners.system.writing import write_compressed
 
@@ -62,14 +61,12 @@ def vectors(features: Sequence[Feature], states: States) -> Ints:
 class Verified:
     """A problem on which the language was verified by definition."""
 
-    problem: Annotated[str, Meta(description="The problem's name.")]
-    sha256: Annotated[str, Meta(description="The SHA-256 of its objects and static facts.")]
-    kind: Annotated[
-        Kind, Meta(description="All pairs of states, those of problems, or those of a task file.")
-    ]
-    states: Annotated[int, Meta(description="How many states there are on its plans.", ge=0)]
-    tasks: Annotated[int, Meta(description="How many candidate tasks it has.", ge=0)]
-    words: Annotated[int, Meta(description="How many words its states have.", ge=0)]
+    problem: Annotated[str, about("The problem's name.")]
+    sha256: Annotated[str, about("The SHA-256 of its objects and static facts.")]
+    kind: Annotated[Kind, about("All pairs of states, those of problems, or those of a task file.")]
+    states: Annotated[int, about("How many states there are on its plans.", ge=0)]
+    tasks: Annotated[int, about("How many candidate tasks it has.", ge=0)]
+    words: Annotated[int, about("How many words its states have.", ge=0)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,31 +202,29 @@ _OWN_WORD = re.compile(r"v-?[0-9]+([.]-?[0-9]+)*")
 class FeatureRecord(msgspec.Struct):
     """A feature of states."""
 
-    name: Annotated[str, Meta(description="Its name, for people.")]
-    definition: Annotated[str, Meta(description="What it is, as an s-expression.")]
-    complexity: Annotated[int, Meta(description="How much there is to say.")]
+    name: Annotated[str, about("Its name, for people.")]
+    definition: Annotated[str, about("What it is, as an s-expression.")]
+    complexity: Annotated[int, about("How much there is to say.")]
 
 
 class LiftedRecord(msgspec.Struct):
     """A lifted file, version 1.  Keys that are not listed here are ignored by readers."""
 
-    format: Annotated[str, Meta(description="What kind of file this is.")]
-    version: Annotated[int, Meta(description="Readers refuse a version that they do not know.")]
+    format: Annotated[str, about("What kind of file this is.")]
+    version: Annotated[int, about("Readers refuse a version that they do not know.")]
     domain: DomainRecord
-    robots: Annotated[list[str], Meta(description="The robots, in the order of joint actions.")]
-    features: Annotated[list[FeatureRecord], Meta(description="What is looked at.")]
-    words: Annotated[list[str], Meta(description="The words.")]
+    robots: Annotated[list[str], about("The robots, in the order of joint actions.")]
+    features: Annotated[list[FeatureRecord], about("What is looked at.")]
+    words: Annotated[list[str], about("The words.")]
     values: FeatureValues
     verified: Annotated[
         list[Verified],
-        Meta(description="The problems on which this was verified; of others nothing is claimed."),
+        about("The problems on which this was verified; of others nothing is claimed."),
     ]
     model: ModelRecord = msgspec.field(default_factory=ModelRecord)
-    names_robots: Annotated[
-        bool, Meta(description="Whether the robots were named, as in --robots.")
-    ] = False
+    names_robots: Annotated[bool, about("Whether the robots were named, as in --robots.")] = False
     producer: Annotated[
-        dict[str, Any], Meta(description="Version and arguments; may differ between two runs.")
+        dict[str, Any], about("Version and arguments; may differ between two runs.")
     ] = {}
 
 

@@ -11,7 +11,7 @@ from msgspec import Meta
 
 from coordlang.simulation.floor import Wall
 from planners.system.errors import BadInput, Position
-from planners.system.files import FileFormat, read_bytes
+from planners.system.files import FileFormat, about, read_bytes
 
 FORMAT = "coordlang/simulation"
 VERSION = 1
@@ -19,7 +19,7 @@ VERSION = 1
 #: Places, walls and poses lie within so many metres.
 _LARGEST = 1e6
 
-_Seconds = Annotated[float, Meta(description="Seconds since the start of the run.", ge=0)]
+_Seconds = Annotated[float, about("Seconds since the start of the run.", ge=0)]
 _Count = Annotated[int, Meta(ge=0)]
 #: x and y in metres, heading in radians.
 _Pose = tuple[float, float, float]
@@ -28,18 +28,16 @@ _Pose = tuple[float, float, float]
 class StepRecord(msgspec.Struct, frozen=True):
     """A step of one robot."""
 
-    robot: Annotated[str, Meta(description="The robot.")]
-    step: Annotated[_Count, Meta(description="Its number, from 0; by the robot's own count.")]
-    subaction: Annotated[str | None, Meta(description="What the robot did; null: idle.")]
-    place: Annotated[str | None, Meta(description="Where it leads; null: the robot stays.")]
+    robot: Annotated[str, about("The robot.")]
+    step: Annotated[_Count, about("Its number, from 0; by the robot's own count.")]
+    subaction: Annotated[str | None, about("What the robot did; null: idle.")]
+    place: Annotated[str | None, about("Where it leads; null: the robot stays.")]
     begin: _Seconds
-    end: Annotated[
-        float | None, Meta(description="Seconds since the start; null: it was never done.")
-    ]
+    end: Annotated[float | None, about("Seconds since the start; null: it was never done.")]
     words: Annotated[
         int | None,
-        Meta(
-            description="How many words of the sentence the robot has passed then, at most; null "
+        about(
+            "How many words of the sentence the robot has passed then, at most; null "
             "before that, and without a sentence."
         ),
     ] = None
@@ -60,8 +58,8 @@ class EventRecord(msgspec.Struct, frozen=True, omit_defaults=True):
             "deadlock",
             "arrived",
         ],
-        Meta(
-            description="collision: robots touch each other or a wall; stopped: a robot "
+        about(
+            "collision: robots touch each other or a wall; stopped: a robot "
             "stands before what its lidar sees, told once in a step; missed: a robot was not there "
             "when a step began by the clock; word: a robot told that it may have come to a word; "
             "contradicted: a robot heard of an event that its choices exclude; detour: a robot "
@@ -69,119 +67,111 @@ class EventRecord(msgspec.Struct, frozen=True, omit_defaults=True):
             "arrived: all steps of all robots are done."
         ),
     ]
-    robots: Annotated[list[str], Meta(description="The robots that it concerns.")]
-    touched: Annotated[
-        str | None, Meta(description="What a robot collided with that is no robot: wall.")
-    ] = None
-    visit: Annotated[str | None, Meta(description="The atom that a detour visits.")] = None
+    robots: Annotated[list[str], about("The robots that it concerns.")]
+    touched: Annotated[str | None, about("What a robot collided with that is no robot: wall.")] = (
+        None
+    )
+    visit: Annotated[str | None, about("The atom that a detour visits.")] = None
     granted: Annotated[
-        bool | None, Meta(description="Whether the detour can be had; then the robot makes it.")
+        bool | None, about("Whether the detour can be had; then the robot makes it.")
     ] = None
-    steps: Annotated[
-        dict[str, int], Meta(description="How many steps each robot has done by then.")
-    ] = {}
+    steps: Annotated[dict[str, int], about("How many steps each robot has done by then.")] = {}
     words: Annotated[
         dict[str, int],
-        Meta(description="How many words of the sentence each robot has passed, as it believes."),
+        about("How many words of the sentence each robot has passed, as it believes."),
     ] = {}
     places: Annotated[
         dict[str, list[str]],
-        Meta(description="The place of each robot; under way the place left and the one ahead."),
+        about("The place of each robot; under way the place left and the one ahead."),
     ] = {}
 
 
 class WishRecord(msgspec.Struct, frozen=True):
     """What a robot comes to want on the way: to visit an atom."""
 
-    robot: Annotated[str, Meta(description="The robot.")]
-    step: Annotated[_Count, Meta(description="How many steps it has done by then.")]
-    visit: Annotated[str, Meta(description="The atom.")]
+    robot: Annotated[str, about("The robot.")]
+    step: Annotated[_Count, about("How many steps it has done by then.")]
+    visit: Annotated[str, about("The atom.")]
 
 
 class RunRecord(msgspec.Struct, frozen=True):
     """One run."""
 
-    seed: Annotated[int, Meta(description="It draws all that is random in this run.")]
-    collisions: Annotated[
-        _Count, Meta(description="How often a robot came to touch a robot or a wall.")
-    ]
+    seed: Annotated[int, about("It draws all that is random in this run.")]
+    collisions: Annotated[_Count, about("How often a robot came to touch a robot or a wall.")]
     deadlock: Annotated[
-        bool, Meta(description="Nobody moved any more before all were there, without a collision.")
+        bool, about("Nobody moved any more before all were there, without a collision.")
     ]
     late: Annotated[
         _Count,
-        Meta(
-            description="Joint steps more than the plans have that it took until all were there; "
+        about(
+            "Joint steps more than the plans have that it took until all were there; "
             "0 where they never were."
         ),
     ]
-    messages: Annotated[
-        _Count, Meta(description="Messages in the run; one to all robots counts once.")
-    ]
-    seconds: Annotated[float, Meta(description="Seconds until the run ended, simulated.", ge=0)]
-    arrived: Annotated[bool, Meta(description="Whether all robots did all their steps.")]
+    messages: Annotated[_Count, about("Messages in the run; one to all robots counts once.")]
+    seconds: Annotated[float, about("Seconds until the run ended, simulated.", ge=0)]
+    arrived: Annotated[bool, about("Whether all robots did all their steps.")]
     mixes: Annotated[
         bool,
-        Meta(
-            description="Whether the robots' own subplans, done in step, are an optimal plan: what "
+        about(
+            "Whether the robots' own subplans, done in step, are an optimal plan: what "
             "the joint model says."
         ),
     ]
     subplans: Annotated[
         dict[str, list[str | None]],
-        Meta(description="What each robot chose, step by step; what it did not come to, too."),
+        about("What each robot chose, step by step; what it did not come to, too."),
     ]
-    steps: Annotated[list[StepRecord], Meta(description="All steps, by their beginnings.")]
-    events: Annotated[list[EventRecord], Meta(description="What else happened, by time.")]
+    steps: Annotated[list[StepRecord], about("All steps, by their beginnings.")]
+    events: Annotated[list[EventRecord], about("What else happened, by time.")]
     poses: Annotated[
         dict[str, list[_Pose]],
-        Meta(description="Robot -> its poses, one each ``interval``: x, y (metres), heading."),
+        about("Robot -> its poses, one each ``interval``: x, y (metres), heading."),
     ]
     nearest: Annotated[
         float | None,
-        Meta(description="The least distance of two robots' middles in metres; null: no two."),
+        about("The least distance of two robots' middles in metres; null: no two."),
     ] = None
 
 
 class SimulationRecord(msgspec.Struct, frozen=True):
     """A record of simulated runs, version 1.  Keys that are not listed here are ignored."""
 
-    format: Annotated[str, Meta(description="What kind of file this is.")]
-    version: Annotated[int, Meta(description="Readers refuse a version that they do not know.")]
-    domain: Annotated[
-        dict[str, Any], Meta(description="The language's domain, as in a language file.")
-    ]
-    task: Annotated[str, Meta(description="The task; for information.")]
-    robots: Annotated[list[str], Meta(description="All robots, in the order of joint actions.")]
+    format: Annotated[str, about("What kind of file this is.")]
+    version: Annotated[int, about("Readers refuse a version that they do not know.")]
+    domain: Annotated[dict[str, Any], about("The language's domain, as in a language file.")]
+    task: Annotated[str, about("The task; for information.")]
+    robots: Annotated[list[str], about("All robots, in the order of joint actions.")]
     agreement: Annotated[
         Literal["sentence", "plan", "nothing"],
-        Meta(description="What all robots know of: a sentence, a whole plan, or nothing."),
+        about("What all robots know of: a sentence, a whole plan, or nothing."),
     ]
-    sentence: Annotated[str | None, Meta(description="The sentence; null for another agreement.")]
-    covered: Annotated[bool, Meta(description="Whether it is a candidate task of the language.")]
+    sentence: Annotated[str | None, about("The sentence; null for another agreement.")]
+    covered: Annotated[bool, about("Whether it is a candidate task of the language.")]
     step: Annotated[
         Literal["clock", "barrier", "word", "passings"],
-        Meta(description="The way to keep step; passings: there are no steps, but events."),
+        about("The way to keep step; passings: there are no steps, but events."),
     ]
-    makespan: Annotated[_Count, Meta(description="The joint steps of each plan.")]
+    makespan: Annotated[_Count, about("The joint steps of each plan.")]
     period: Annotated[
-        float, Meta(description="Seconds for a joint step where nothing comes in between.", gt=0)
+        float, about("Seconds for a joint step where nothing comes in between.", gt=0)
     ]
-    interval: Annotated[float, Meta(description="Seconds between two poses.", gt=0)]
-    cell: Annotated[float, Meta(description="Metres for one unit of coordinates.", gt=0)]
-    radius: Annotated[float, Meta(description="The radius of a robot in metres.", gt=0)]
-    noise: Annotated[float, Meta(description="The noise of wheels, as a share.", ge=0)]
-    lidar: Annotated[bool, Meta(description="Whether robots stop before what they see ahead.")]
-    wishes: Annotated[list[WishRecord], Meta(description="What robots came to want on the way.")]
+    interval: Annotated[float, about("Seconds between two poses.", gt=0)]
+    cell: Annotated[float, about("Metres for one unit of coordinates.", gt=0)]
+    radius: Annotated[float, about("The radius of a robot in metres.", gt=0)]
+    noise: Annotated[float, about("The noise of wheels, as a share.", ge=0)]
+    lidar: Annotated[bool, about("Whether robots stop before what they see ahead.")]
+    wishes: Annotated[list[WishRecord], about("What robots came to want on the way.")]
     places: Annotated[
         dict[str, tuple[float, float]],
-        Meta(description="Place -> the point of its middle in metres, x to the right and y up."),
+        about("Place -> the point of its middle in metres, x to the right and y up."),
     ]
-    walls: Annotated[list[Wall], Meta(description="Walls: x, y of one end, x, y of the other.")]
+    walls: Annotated[list[Wall], about("Walls: x, y of one end, x, y of the other.")]
     goals: Annotated[
-        dict[str, str], Meta(description="Robot -> its last place on the plans, where it has one.")
+        dict[str, str], about("Robot -> its last place on the plans, where it has one.")
     ]
-    runs: Annotated[list[RunRecord], Meta(description="The runs.")]
+    runs: Annotated[list[RunRecord], about("The runs.")]
 
 
 SIMULATION = FileFormat("simulation", "record of runs", SimulationRecord, FORMAT, VERSION)

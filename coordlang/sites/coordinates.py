@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import Annotated
 
 import msgspec
-from msgspec import Meta
 
 from planners.system.errors import BadInput, Position
-from planners.system.files import FileFormat, read_bytes
+from planners.system.files import FileFormat, about, read_bytes
 from planners.system.messages import echoed
 
 Point = tuple[float, float]
@@ -32,7 +31,7 @@ class CoordinatesFile(msgspec.Struct):
 
     coordinates: Annotated[
         dict[str, tuple[float, float]],
-        Meta(description="Place -> [x, y], x to the right and y down; no two alike."),
+        about("Place -> [x, y], x to the right and y down; no two alike."),
     ]
 
 

@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
-from msgspec import Meta
 
 from coordlang.language.file import refuse_duplicates
 from coordlang.language.warping import Clause, Pair
 from coordlang.vocabulary.clauses import most_constrained_first
 from planners.search.sat import SolverName, sat_solver, solve_slice
 from planners.system.errors import OutOfMemory, Position
-from planners.system.files import FileFormat, read_bytes
+from planners.system.files import FileFormat, about, read_bytes
 from planners.system.limits import memory_left, more_memory
 from planners.system.writing import write_compressed
 
@@ -31,10 +30,10 @@ PlanTexts = list[list[str | None]]
 class WarpingPath(msgspec.Struct, frozen=True):
     """A warping path of the states of two plans of a reason."""
 
-    plans: Annotated[tuple[int, int], Meta(description="The numbers of the plans, from 0.")]
+    plans: Annotated[tuple[int, int], about("The numbers of the plans, from 0.")]
     cells: Annotated[
         list[tuple[int, int]],
-        Meta(description="Its cells: a step of the one plan and a step of the other, from 0."),
+        about("Its cells: a step of the one plan and a step of the other, from 0."),
     ]
 
 
@@ -46,36 +45,25 @@ class Reason(msgspec.Struct, frozen=True):
     words.
     """
 
-    init: Annotated[
-        list[str], Meta(description="The fluents that are true at the start, as PDDL atoms.")
-    ]
-    goal: Annotated[
-        list[str], Meta(description="PDDL literals or formulas that must all hold at the end.")
-    ]
+    init: Annotated[list[str], about("The fluents that are true at the start, as PDDL atoms.")]
+    goal: Annotated[list[str], about("PDDL literals or formulas that must all hold at the end.")]
     plans: Annotated[
         list[PlanTexts],
-        Meta(
-            description="Optimal plans, one for each robot: its subactions by step, null for "
-            "idling."
-        ),
+        about("Optimal plans, one for each robot: its subactions by step, null for idling."),
     ]
-    paths: Annotated[
-        list[WarpingPath], Meta(description="Warping paths that join all of the plans.")
-    ]
+    paths: Annotated[list[WarpingPath], about("Warping paths that join all of the plans.")]
 
 
 class Certificate(msgspec.Struct, frozen=True):
     """Why every coordination language for the candidate tasks has more than ``refuted`` words."""
 
-    domain: Annotated[str, Meta(description="The domain's name.")]
-    robots: Annotated[list[str], Meta(description="The robots, in the order of joint actions.")]
-    refuted: Annotated[int, Meta(description="A number of words that is too small.")]
-    reasons: Annotated[list[Reason], Meta(description="Why it is, all together.")]
-    format: Annotated[str, Meta(description="What kind of file this is.")] = FORMAT
-    version: Annotated[int, Meta(description="Readers refuse a version that they do not know.")] = (
-        VERSION
-    )
-    producer: Annotated[dict[str, Any], Meta(description="Who wrote it; for information.")] = {}
+    domain: Annotated[str, about("The domain's name.")]
+    robots: Annotated[list[str], about("The robots, in the order of joint actions.")]
+    refuted: Annotated[int, about("A number of words that is too small.")]
+    reasons: Annotated[list[Reason], about("Why it is, all together.")]
+    format: Annotated[str, about("What kind of file this is.")] = FORMAT
+    version: Annotated[int, about("Readers refuse a version that they do not know.")] = VERSION
+    producer: Annotated[dict[str, Any], about("Who wrote it; for information.")] = {}
 
 
 CERTIFICATE = FileFormat("certificate", "certificate", Certificate, FORMAT, VERSION)

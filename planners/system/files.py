@@ -105,6 +105,13 @@ class FileFormat(Generic[T]):
         }
 
 
+def about(text: str, **more: Any) -> Any:
+    """What a field of a format's record holds, for its schema; ``more`` is of `msgspec.Meta`."""
+    import msgspec
+
+    return msgspec.Meta(description=text, **more)
+
+
 @cache
 def _head() -> type[Any]:
     """What every format has: its name and its version."""
