@@ -96,7 +96,7 @@ class Clock:
 def build(grid: Grid) -> Figures:
     """From PDDL text to a verified greedy language, in this process."""
     from coordlang.language.candidates import all_pairs, from_problems
-    from coordlang.language.partition import Partition
+    from coordlang.language.words import Partition
     from coordlang.verification.by_definition import verify_candidates
     from coordlang.vocabulary.first_differences import differences
     from coordlang.vocabulary.greedy import greedy

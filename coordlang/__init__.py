@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from coordlang.commands.check import check as check
     from coordlang.commands.choices import choices as choices
     from coordlang.commands.coordination import coordination as coordination
+    from coordlang.commands.domains import import_site as import_site
     from coordlang.commands.explain import explain as explain
     from coordlang.commands.export import export as export
-    from coordlang.commands.importing import import_site as import_site
     from coordlang.commands.inputs import load as load
     from coordlang.commands.inputs import load_language as load_language
     from coordlang.commands.inspect import inspect as inspect
@@ -76,7 +76,7 @@ _DEFINED_IN = {
     "coordlang.commands.lift": ("lift", "ground"),
     "coordlang.commands.sentences": ("say", "understand", "plan"),
     "coordlang.commands.inputs": ("load", "load_language"),
-    "coordlang.commands.importing": ("import_site",),
+    "coordlang.commands.domains": ("import_site",),
     "coordlang.language.words": ("Language",),
     "coordlang.execution.monitor": (
         "EventMonitor",

@@ -19,7 +19,7 @@ from planners.loading import PlanningInstance
 from planners.pddl.formula_tree import formula_text
 from planners.pddl.lifted import Domain, StepAtom
 from planners.search.search_estimate import SearchEstimate, estimate
-from planners.system.notebook import some
+from planners.system.messages import some
 
 #: States in which an example of interference is looked for.
 _LOOK_AT = 2000

@@ -13,7 +13,7 @@ from benchmarks.paper.reported import OPEN_ALL, OPEN_SEVERAL, SEVERAL
 from benchmarks.paper.sentences import MOST_LISTED, Comparison, compare, comparison_units
 from benchmarks.paper.suite import ROW, TITLES, method_of
 from benchmarks.paper.tables import elsewhere, rounded_mean, table
-from coordlang.language.flexibility import Flexibility
+from coordlang.language.sentences import Flexibility
 
 
 def run(unit: Unit, settings: Settings) -> Result:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from benchmarks.paper.recipe import Record, Result, Settings, Unit
 from benchmarks.paper.state_orders import RANDOM_ORDERS, greedy_partitions
 from benchmarks.paper.suite import METHODS, OTHERS, QUICK_ROW, ROW, WORLDS, language_for
-from coordlang.language.flexibility import Flexibility, flexibility
+from coordlang.language.sentences import Flexibility, flexibility
 
 #: Tasks whose own numbers are kept in the results.
 MOST_LISTED = 1000

@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.frame import markdown
 from benchmarks.paper.recipe import Record
 from benchmarks.paper.suite import METHODS, world_and_method
-from coordlang.language.flexibility import Floats
+from coordlang.language.sentences import Floats
 from coordlang.required.failure import wilson
 from planners.joint.tables import Ints
 

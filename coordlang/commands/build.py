@@ -35,8 +35,7 @@ from coordlang.vocabulary import EXACT
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import OutOfTime, ProvedImpossible, UsageError
 from planners.system.limits import run_until_stopped, start_clock, stop_clock, time_left
-from planners.system.messages import visible
-from planners.system.notebook import counted
+from planners.system.messages import counted, visible
 from planners.system.signals import Postponed, postponed_signals
 from planners.system.writing import is_device, remove_file
 

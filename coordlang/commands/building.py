@@ -18,9 +18,8 @@ from coordlang.commands.records import BuildPreference, MethodOptions
 from coordlang.commands.witness import witness_data, witness_text
 from coordlang.explanation.simple import simple
 from coordlang.language.candidates import Candidates, require_solvable
-from coordlang.language.partition import Partition, read_key
 from coordlang.language.provenance import Guarantee, Tolerance, provenance_of
-from coordlang.language.words import Language
+from coordlang.language.words import Language, Partition, read_key
 from coordlang.required.failure import NONE, Failures
 from coordlang.required.miscoordination import Inseparable, Miscoordination
 from coordlang.verification.by_definition import Verdict, verify_candidates
@@ -44,7 +43,7 @@ from planners.parallel.workers import Workers
 from planners.search.portions import require_room
 from planners.system.errors import BadInput, OutOfMemory, Refuted, UsageError
 from planners.system.limits import little_time_after, run_until_stopped, start_clock, time_left
-from planners.system.notebook import Presented, counted
+from planners.system.messages import Presented, counted
 from planners.system.options import record_from
 
 PREFERENCES: Mapping[BuildPreference, Callable[[Job, Outcome], Outcome]] = {

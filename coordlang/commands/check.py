@@ -13,7 +13,7 @@ from coordlang.commands.terminal import IMPOSSIBLE, REFUTED, echo
 from planners.classical.fast_downward import optimal_cost
 from planners.search.optimal_plans import search
 from planners.system.errors import ProvedImpossible
-from planners.system.notebook import Presented
+from planners.system.messages import Presented
 
 
 @dataclass(frozen=True, slots=True, repr=False)

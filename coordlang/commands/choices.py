@@ -28,7 +28,7 @@ from coordlang.required.failure import TooManyToCount, failure_of_sentence
 from coordlang.required.miscoordination import Miscoordination
 from planners.pddl.model_options import names_in
 from planners.search.plans import Plans
-from planners.system.notebook import counted, named
+from planners.system.messages import counted, named
 from planners.system.writing import write_atomically
 
 #: Additions that are made to count how often choices fail, some seconds of work.

@@ -19,7 +19,7 @@ from coordlang.required.failure import Failures
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.required.task_answers import TaskAnswer, answers
 from planners.search.plan_file import json_count
-from planners.system.notebook import Presented, counted
+from planners.system.messages import Presented, counted
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -43,7 +43,7 @@ from coordlang.language.sentences import (
 )
 from planners.search.plan_file import json_count
 from planners.search.plans import Plans
-from planners.system.notebook import counted
+from planners.system.messages import counted
 
 #: Sentences of a task that the text lists.
 SENTENCES_SHOWN = 10

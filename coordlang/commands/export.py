@@ -24,8 +24,7 @@ from coordlang.language.provenance import tolerance_data
 from planners.search.plan_file import json_count, only_one_plan
 from planners.system.errors import BadInput, Position, Refuted, UsageError
 from planners.system.files import read_text
-from planners.system.messages import visible
-from planners.system.notebook import counted
+from planners.system.messages import counted, visible
 from planners.system.writing import write_texts
 
 

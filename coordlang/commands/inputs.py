@@ -19,7 +19,7 @@ from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import Position, UsageError, note
 from planners.system.files import names_format, read_bytes
-from planners.system.notebook import Presented
+from planners.system.messages import Presented
 from planners.system.options import options_of, record_from
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from planners.pddl.pddl_text import domain_text, problem_text
 from planners.search.reachable import count as count_reachable
 from planners.search.search_estimate import SearchEstimate
 from planners.system.errors import note
-from planners.system.notebook import Presented, counted
+from planners.system.messages import Presented, counted
 from planners.system.writing import write_texts
 
 #: States, and joint steps out of one layer, beyond which a search is not likely to end.

@@ -52,7 +52,7 @@ from planners.system.errors import (
     note,
 )
 from planners.system.limits import stop_clock
-from planners.system.notebook import Presented, counted
+from planners.system.messages import Presented, counted
 
 #: What a lifted file says of the model.
 _MODEL = ("cost", "unowned", "remember_actions", "execution")

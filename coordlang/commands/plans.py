@@ -13,7 +13,7 @@ from coordlang.commands.records import DEFAULT_MAX, PlansOptions, UnderstandOpti
 from coordlang.commands.terminal import echo, note_single_robot, write
 from planners.search.kept_plans import search
 from planners.search.plans import Plan, Plans, Texts, texts
-from planners.system.notebook import Presented
+from planners.system.messages import Presented
 
 #: One plan, joint step by joint step.
 PlanSteps = tuple[Texts, ...]

@@ -650,7 +650,7 @@ class DomainsOptions(
 class ImportOptions(
     CommandOptions,
     takes="FILES...",
-    module="importing",
+    module="domains",
     function="import_site",
     doing="reading",
     keeps_plans=False,

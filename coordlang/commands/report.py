@@ -9,8 +9,7 @@ from coordlang.commands.terminal import warn_of_failures, write
 from coordlang.language.provenance import Tolerance
 from coordlang.language.recorded import check_source
 from coordlang.report.page import Report, make_report
-from planners.system.messages import visible
-from planners.system.notebook import counted
+from planners.system.messages import counted, visible
 
 #: A page, and what the language tolerates.
 Page = tuple[Report, Tolerance | None]

@@ -27,11 +27,11 @@ from coordlang.commands.inputs import (
 )
 from coordlang.commands.records import RobotOptions
 from coordlang.commands.terminal import echo
-from coordlang.execution.agreement import Agreement
 from coordlang.execution.best_sentence import Preference, best_sentence, grants, read_preference
 from coordlang.execution.bus import Bus, opened
 from coordlang.execution.choices import choices, monitor
 from coordlang.execution.executive import Executive
+from coordlang.execution.fleet_log import Agreement
 from coordlang.execution.monitor import EventMonitor
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.file import to_data

@@ -12,7 +12,7 @@ import msgspec
 
 from coordlang.commands.terminal import echo
 from planners.system.errors import CoordlangError
-from planners.system.files import FileFormat, about
+from planners.system.files import FileFormat, doc
 from planners.system.messages import sentence
 
 #: Where the formats of files are.
@@ -32,19 +32,19 @@ SCHEMAS = {
 class ErrorPosition(msgspec.Struct, frozen=True):
     """Where, in a file; lines and columns are counted from 1."""
 
-    file: Annotated[str, about("The file, as it was given.")]
-    line: Annotated[int | None, about("Null where it is the whole file.")]
-    column: Annotated[int | None, about("Null where the line is.")]
+    file: Annotated[str, doc("The file, as it was given.")]
+    line: Annotated[int | None, doc("Null where it is the whole file.")]
+    column: Annotated[int | None, doc("Null where the line is.")]
 
 
 class ErrorEntry(msgspec.Struct, frozen=True, omit_defaults=True):
     """What is wrong."""
 
-    message: Annotated[str, about("What is wrong, in one sentence.")]
+    message: Annotated[str, doc("What is wrong, in one sentence.")]
     position: ErrorPosition | None
-    remedy: Annotated[str | None, about("What to do about it.")]
-    exit_code: Annotated[int, about("What the process ends with (docs/cli.md).")]
-    reached: Annotated[str | None, about("How far the work got that a limit ended.")] = None
+    remedy: Annotated[str | None, doc("What to do about it.")]
+    exit_code: Annotated[int, doc("What the process ends with (docs/cli.md).")]
+    reached: Annotated[str | None, doc("How far the work got that a limit ended.")] = None
 
 
 class ErrorObject(msgspec.Struct, frozen=True):

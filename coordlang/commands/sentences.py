@@ -21,15 +21,20 @@ from coordlang.execution.best_sentence import (
     read_preference,
 )
 from coordlang.execution.guided_search import ExpandedStates, GuidedPlan, plan_under_sentence
-from coordlang.execution.open_plans import PlanDag, open_plans_data, plan_dag
-from coordlang.execution.plan_sentence import read_plan_file, sentence_of_plan
+from coordlang.execution.plan_sentence import (
+    PlanDag,
+    open_plans_data,
+    plan_dag,
+    read_plan_file,
+    sentence_of_plan,
+)
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.provenance import tolerance_data
 from planners.search.heuristics import HEURISTICS
 from planners.search.plan_file import json_count
 from planners.search.plans import Plans, Texts
 from planners.system.errors import CoordlangError, UsageError
-from planners.system.notebook import counted
+from planners.system.messages import counted
 
 #: The lower bound of A*.
 _BOUND = "relaxed"

@@ -32,8 +32,7 @@ from coordlang.simulation.simulator import Settings, require_simulator
 from coordlang.simulation.team import Agreement, Mission
 from planners.system.errors import UsageError, note
 from planners.system.limits import reaching, run_until_stopped
-from planners.system.messages import echoed
-from planners.system.notebook import Presented, counted
+from planners.system.messages import Presented, counted, echoed
 from planners.system.writing import write_atomically
 
 #: What a wish for a place on the way begins with.

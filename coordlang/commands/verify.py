@@ -22,7 +22,7 @@ from coordlang.verification.check_certificate import Checked
 from coordlang.verification.check_certificate import check as check_certificate
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import Refuted
-from planners.system.notebook import Presented, counted
+from planners.system.messages import Presented, counted
 
 
 @dataclass(frozen=True, slots=True, repr=False)

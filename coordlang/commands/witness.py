@@ -12,7 +12,7 @@ from coordlang.commands.layout import HELD, WIDTH, alike
 from coordlang.required.miscoordination import Miscoordination, Step
 from planners.joint.model import IDLE, NO_FACT
 from planners.joint.states import split_atoms
-from planners.system.notebook import named
+from planners.system.messages import named
 
 _MARK = f"  <--{HELD}breaks{HELD}here"
 

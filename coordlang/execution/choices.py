@@ -32,7 +32,7 @@ from planners.search.plan_file import Count, json_count
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans
 from planners.system.errors import OutOfMemory
-from planners.system.files import FileFormat, about
+from planners.system.files import FileFormat, doc
 
 #: Combinations of the robots' moves beyond which exact knowledge is not tried by default.
 MOST = 2_000_000
@@ -194,35 +194,35 @@ _Facts = list[Annotated[int, Meta(ge=0)]]
 class StateRecord(msgspec.Struct, frozen=True):
     """A state of a robot's automaton; state 0 is the start."""
 
-    step: Annotated[int, about("The number of steps or events done.", ge=0)]
-    left: Annotated[Count, about("The number of own subplans that lead on from it.")]
-    next: Annotated[dict[str, int], about("What the robot may do now -> the state after that.")]
-    true: Annotated[_Facts, about("Numbers of facts that are certainly true.")]
-    unknown: Annotated[_Facts, about("Numbers of facts that depend on the other robots.")]
+    step: Annotated[int, doc("The number of steps or events done.", ge=0)]
+    left: Annotated[Count, doc("The number of own subplans that lead on from it.")]
+    next: Annotated[dict[str, int], doc("What the robot may do now -> the state after that.")]
+    true: Annotated[_Facts, doc("Numbers of facts that are certainly true.")]
+    unknown: Annotated[_Facts, doc("Numbers of facts that depend on the other robots.")]
 
 
 class OwnEvent(msgspec.Struct, frozen=True, rename={"meets": "with"}):
     """An event of a robot that keeps no common step with the others."""
 
-    subaction: Annotated[str, about("What is done.")]
+    subaction: Annotated[str, doc("What is done.")]
     after: Annotated[
         dict[str, int],
-        about("Robot -> how many of its events that interfere must have ended before."),
+        doc("Robot -> how many of its events that interfere must have ended before."),
     ]
-    meets: Annotated[dict[str, str], about("Robot that starts together with it -> its subaction.")]
+    meets: Annotated[dict[str, str], doc("Robot that starts together with it -> its subaction.")]
 
 
 class Passings(msgspec.Struct, frozen=True):
     """What a robot waits for that keeps no common step with the others."""
 
-    events: Annotated[dict[str, OwnEvent], about("What the keys of 'next' mean, but for 'idle'.")]
+    events: Annotated[dict[str, OwnEvent], doc("What the keys of 'next' mean, but for 'idle'.")]
     interferes: Annotated[
         dict[str, dict[str, list[str]]],
-        about("Own subaction -> other robot -> its subactions that interfere with it."),
+        doc("Own subaction -> other robot -> its subactions that interfere with it."),
     ]
     others: Annotated[
         dict[str, list[dict[str, int]]],
-        about(
+        doc(
             "Other robot -> for its first event, its second one and so on what it may "
             "be -> how many own events that interfere with it must have ended before."
         ),
@@ -232,45 +232,45 @@ class Passings(msgspec.Struct, frozen=True):
 class RobotRecord(msgspec.Struct, frozen=True):
     """The choices of one robot."""
 
-    robot: Annotated[str, about("The robot.")]
-    steps: Annotated[int, about("The number of steps of each plan.")]
-    subplans: Annotated[Count, about("The number of its own subplans.")]
+    robot: Annotated[str, doc("The robot.")]
+    steps: Annotated[int, doc("The number of steps of each plan.")]
+    subplans: Annotated[Count, doc("The number of its own subplans.")]
     atoms: Annotated[
         Literal["exact", "own"],
-        about(
+        doc(
             "How 'true' and 'unknown' were found: over all combinations of the robots' "
             "choices, or from the robot's own subactions alone."
         ),
     ]
-    facts: Annotated[list[str], about("The atoms of which something is known in some state.")]
-    others: Annotated[list[str], about("The other atoms that can change.")]
-    states: Annotated[list[StateRecord], about("The states of the automaton.")]
+    facts: Annotated[list[str], doc("The atoms of which something is known in some state.")]
+    others: Annotated[list[str], doc("The other atoms that can change.")]
+    states: Annotated[list[StateRecord], doc("The states of the automaton.")]
     passings: Annotated[
         Passings | UnsetType,
-        about("What it waits for; missing where robots step together."),
+        doc("What it waits for; missing where robots step together."),
     ] = UNSET
 
 
 class ChoicesFile(msgspec.Struct, frozen=True):
     """A choices file, version 1.  Keys that are not listed here are ignored by readers."""
 
-    format: Annotated[str, about("What kind of file this is.")]
-    version: Annotated[int, about("Readers refuse a version that they do not know.")]
-    domain: Annotated[dict[str, Any], about("The language's domain, as in a language file.")]
-    robots: Annotated[list[str], about("All robots, in the order of joint actions.")]
-    task: Annotated[str, about("The task; for information.")]
-    sentence: Annotated[str, about("The sentence; for information.")]
-    plans: Annotated[Count, about("The number of plans with the sentence.")]
-    covered: Annotated[bool, about("Whether it is a candidate task of the language.")]
-    guaranteed: Annotated[bool, about("Whether every combination of choices is an optimal plan.")]
+    format: Annotated[str, doc("What kind of file this is.")]
+    version: Annotated[int, doc("Readers refuse a version that they do not know.")]
+    domain: Annotated[dict[str, Any], doc("The language's domain, as in a language file.")]
+    robots: Annotated[list[str], doc("All robots, in the order of joint actions.")]
+    task: Annotated[str, doc("The task; for information.")]
+    sentence: Annotated[str, doc("The sentence; for information.")]
+    plans: Annotated[Count, doc("The number of plans with the sentence.")]
+    covered: Annotated[bool, doc("Whether it is a candidate task of the language.")]
+    guaranteed: Annotated[bool, doc("Whether every combination of choices is an optimal plan.")]
     combinations_walked: Annotated[
         int | None,
-        about("Nodes that were walked to prove it; null if there were too many."),
+        doc("Nodes that were walked to prove it; null if there were too many."),
     ]
-    choices: Annotated[list[RobotRecord], about("The choices of each robot that was asked for.")]
+    choices: Annotated[list[RobotRecord], doc("The choices of each robot that was asked for.")]
     tolerance: Annotated[
         dict[str, float] | UnsetType,
-        about("What the language tolerates, as in its file; missing: nothing."),
+        doc("What the language tolerates, as in its file; missing: nothing."),
     ] = UNSET
 
 

@@ -19,8 +19,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from random import Random
 from typing import Any
 
-from coordlang.execution.agreement import Agreement
 from coordlang.execution.fleet_log import (
+    Agreement,
     Contradiction,
     Event,
     Message,

@@ -11,8 +11,8 @@ import numpy as np
 
 from coordlang.execution.plan_sentence import sentence_of_plan
 from coordlang.execution.task_language import TaskLanguage
-from coordlang.language.partition import Partition
 from coordlang.language.sentences import sentence
+from coordlang.language.words import Partition
 from planners.joint.model import Goal, JointModel
 from planners.joint.tables import Rows
 from planners.search.goals import FAR, Values

@@ -10,10 +10,9 @@ from itertools import pairwise
 import numpy as np
 
 from coordlang.language.listed import ListedTask, model_of_listed
-from coordlang.language.partition import Partition
 from coordlang.language.provenance import Tolerance
 from coordlang.language.recorded import check_source, options_of, recorded_list
-from coordlang.language.words import Language
+from coordlang.language.words import Language, Partition
 from coordlang.verification.by_definition import Verdict, verify
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask
 from planners.joint.tables import Ints

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from coordlang.explanation.words import Cover
-from coordlang.language.partition import Partition
+from coordlang.language.words import Partition
 from coordlang.required.choices import Choices
 from planners.joint.model import JointModel, own_text
 from planners.joint.tables import Bools, Ints, find_rows

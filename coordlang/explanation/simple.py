@@ -19,10 +19,15 @@ import numpy as np
 
 from coordlang.explanation.variables import valuation
 from coordlang.explanation.words import MappedStates, all_covers
-from coordlang.vocabulary.clauses import most_constrained_first, without_implied
 from coordlang.vocabulary.job import Assignment, Job, Outcome
 from coordlang.vocabulary.loop import Budget, Languages, close_bounds
-from coordlang.vocabulary.sat import PartitionProblem, Undecided, at_most
+from coordlang.vocabulary.sat import (
+    PartitionProblem,
+    Undecided,
+    at_most,
+    most_constrained_first,
+    without_implied,
+)
 from planners.joint.tables import Ints
 from planners.system.limits import run_until_stopped
 

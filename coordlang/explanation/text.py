@@ -11,7 +11,7 @@ from typing import Any
 from coordlang.explanation.demands import RobotPart, SentenceDemands, WordChange
 from coordlang.explanation.words import Cover, Literal, MappedStates, Term, WordDescriptions
 from planners.joint.model import show
-from planners.system.notebook import counted, named
+from planners.system.messages import counted, named
 
 #: Terms of one formula, and alternatives of one choice, that are written out.
 _TERMS = 12

@@ -19,7 +19,7 @@ from coordlang.language.provenance import Guarantee, Provenance, Tolerance
 from coordlang.language.words import Language
 from planners.pddl.model_options import Cost, Execution, Unowned
 from planners.system.errors import BadInput, Position
-from planners.system.files import FileFormat, about, read_bytes, require_seen
+from planners.system.files import FileFormat, doc, read_bytes, require_seen
 from planners.system.messages import echoed
 from planners.system.writing import write_compressed
 
@@ -31,10 +31,10 @@ _WORD = {"pattern": r"^\S+$"}
 class DomainRecord(msgspec.Struct):
     """The domain that a language belongs to."""
 
-    name: Annotated[str, about("The domain's name.")]
+    name: Annotated[str, doc("The domain's name.")]
     sha256: Annotated[
         str | None,
-        about(
+        doc(
             "The SHA-256 of the tokens of the domain file in lower case, each on a "
             "line (comments, line ends and spacing do not matter), or of its text; a file without "
             "it is not held to one domain."
@@ -42,7 +42,7 @@ class DomainRecord(msgspec.Struct):
     ] = None
     fluents: Annotated[
         list[str] | None,
-        about(
+        doc(
             "The predicates of atoms in state keys: those of some action's effect, "
             "and 'last' where last subactions are remembered. Other atoms are static."
         ),
@@ -52,56 +52,54 @@ class DomainRecord(msgspec.Struct):
 class ModelRecord(msgspec.Struct):
     """How the PDDL files are understood."""
 
-    cost: Annotated[Cost, about("What optimal means.")] = "makespan"
-    unowned: Annotated[Unowned, about("Who owns actions that name no robot.")] = "error"
+    cost: Annotated[Cost, doc("What optimal means.")] = "makespan"
+    unowned: Annotated[Unowned, doc("Who owns actions that name no robot.")] = "error"
     remember_actions: Annotated[
-        bool, about("Whether states also hold each robot's last subaction.")
+        bool, doc("Whether states also hold each robot's last subaction.")
     ] = False
     words_see_slack: Annotated[
         bool | UnsetType,
-        about(
-            "Whether states also say how many joint steps of the slack are left: (slack-left 1)."
-        ),
+        doc("Whether states also say how many joint steps of the slack are left: (slack-left 1)."),
     ] = UNSET
     execution: Annotated[
         Execution | UnsetType,
-        about("How robots act: in step (where nothing is said), or without one."),
+        doc("How robots act: in step (where nothing is said), or without one."),
     ] = UNSET
     idle: Annotated[
         list[str] | None,
-        about(
+        doc(
             "Of older versions: the robots that may idle. Every robot may; a file that "
             "says otherwise is refused."
         ),
     ] = None
     problem_sha256: Annotated[
         str | None,
-        about("The SHA-256 of the (first) problem file, made alike; for information."),
+        doc("The SHA-256 of the (first) problem file, made alike; for information."),
     ] = None
     world_sha256: Annotated[
         str | None,
-        about("The SHA-256 of objects with their types, static facts and function values."),
+        doc("The SHA-256 of objects with their types, static facts and function values."),
     ] = None
 
 
 class TasksRecord(msgspec.Struct):
     """The candidate tasks that the language is guaranteed for."""
 
-    kind: Annotated[Kind, about("All pairs of states, those of problems, or those of a task file.")]
-    count: Annotated[int, about("How many they are.", ge=0)]
+    kind: Annotated[Kind, doc("All pairs of states, those of problems, or those of a task file.")]
+    count: Annotated[int, doc("How many they are.", ge=0)]
     states_sha256: Annotated[
         str | None,
-        about(
+        doc(
             "For 'all', the SHA-256 of the keys of all reachable states, sorted, each "
             "on a line; without it only their number is compared."
         ),
     ] = None
-    tasks: Annotated[list[ListedTask] | None, about("The tasks; not for 'all'.")] = None
+    tasks: Annotated[list[ListedTask] | None, doc("The tasks; not for 'all'.")] = None
 
 
 FeatureValues = Annotated[
     dict[str, str],
-    about(
+    doc(
         "The features' values, in their order, joined by blanks -> word. States with "
         "other values have words of their own."
     ),
@@ -111,9 +109,9 @@ FeatureValues = Annotated[
 class LiftedFromRecord(msgspec.Struct):
     """The lifted language whose words these are, in one problem."""
 
-    features: Annotated[list[str], about("Features of states, as s-expressions.")]
+    features: Annotated[list[str], doc("Features of states, as s-expressions.")]
     values: FeatureValues
-    verified: Annotated[list[str], about("The names of the problems on which it was verified.")]
+    verified: Annotated[list[str], doc("The names of the problems on which it was verified.")]
 
 
 Word = Annotated[str, Meta(extra_json_schema=_WORD)]
@@ -122,17 +120,17 @@ Word = Annotated[str, Meta(extra_json_schema=_WORD)]
 class LanguageRecord(msgspec.Struct):
     """A language file, version 1.  Keys that are not listed here are ignored by readers."""
 
-    format: Annotated[str, about("What kind of file this is.")]
-    version: Annotated[int, about("Readers refuse a version that they do not know.")]
-    words: Annotated[list[Word], about("The words.", extra_json_schema=_SOME)]
+    format: Annotated[str, doc("What kind of file this is.")]
+    version: Annotated[int, doc("Readers refuse a version that they do not know.")]
+    words: Annotated[list[Word], doc("The words.", extra_json_schema=_SOME)]
     states: Annotated[
         dict[str, str],
-        about("State key -> word.  A key lists the true fluents, sorted, joined by one space."),
+        doc("State key -> word.  A key lists the true fluents, sorted, joined by one space."),
     ]
-    default: Annotated[str, about("The word of every state that is not listed.")]
+    default: Annotated[str, doc("The word of every state that is not listed.")]
     robots: Annotated[
         list[str] | UnsetType,
-        about(
+        doc(
             "The robots, in the order of joint actions; without it: as the domain says.",
             extra_json_schema=_SOME,
         ),
@@ -143,18 +141,18 @@ class LanguageRecord(msgspec.Struct):
     guarantee: Guarantee | UnsetType = UNSET
     producer: Annotated[
         dict[str, Any],
-        about("Version, arguments, seed, seconds; the only part that may differ between two runs."),
+        doc("Version, arguments, seed, seconds; the only part that may differ between two runs."),
     ] = {}
     tolerance: Annotated[
         Tolerance | UnsetType,
-        about(
+        doc(
             "What may go wrong, or be longer, under these words; without it they are a "
             "coordination language for optimal plans."
         ),
     ] = UNSET
     lifted: Annotated[
         LiftedFromRecord | UnsetType,
-        about("The features of which the words are functions, if they are lifted."),
+        doc("The features of which the words are functions, if they are lifted."),
     ] = UNSET
 
 

@@ -29,19 +29,17 @@ from planners.pddl.sexpr import Source, parse
 from planners.search.optimal_plans import distances
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, Position, ProvedImpossible, UsageError, note
-from planners.system.files import FileFormat, about, read_bytes
+from planners.system.files import FileFormat, doc, read_bytes
 
 
 @dataclass(frozen=True, slots=True)
 class ListedTask:
     """A task as a file lists it, as PDDL text."""
 
-    init: Annotated[
-        tuple[str, ...], about("The fluents that are true at the start, as PDDL atoms.")
-    ]
+    init: Annotated[tuple[str, ...], doc("The fluents that are true at the start, as PDDL atoms.")]
     goal: Annotated[
         tuple[str, ...],
-        about("PDDL literals or formulas that must all hold at the end."),
+        doc("PDDL literals or formulas that must all hold at the end."),
     ]
 
 
@@ -151,9 +149,9 @@ def _read_text(domain: Domain, problem: Problem, text: str, position: Position |
 class TaskFile(msgspec.Struct, frozen=True):
     """A task file, version 1.  Keys that are not listed here are ignored by readers."""
 
-    format: Annotated[str, about("What kind of file this is.")]
-    version: Annotated[int, about("Readers refuse a version that they do not know.")]
-    tasks: Annotated[list[ListedTask], about("The tasks; each goal may be partial.")]
+    format: Annotated[str, doc("What kind of file this is.")]
+    version: Annotated[int, doc("Readers refuse a version that they do not know.")]
+    tasks: Annotated[list[ListedTask], doc("The tasks; each goal may be partial.")]
 
 
 TASKS = FileFormat("tasks", "task file", TaskFile, "coordlang/tasks")

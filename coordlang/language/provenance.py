@@ -18,8 +18,8 @@ from planners.pddl.model_options import MOST_SLACK
 from planners.pddl.pddl_text import domain_text
 from planners.pddl.robots import fluent_predicates, static_atoms
 from planners.pddl.sexpr import Source
-from planners.system.files import about
-from planners.system.notebook import counted
+from planners.system.files import doc
+from planners.system.messages import counted
 
 _SIZE = {"minimum": 1}
 _UNKNOWN = (
@@ -34,18 +34,18 @@ class Tolerance:
 
     failure_mean: Annotated[
         Annotated[float, Meta(ge=0, le=1)] | None,
-        about(
+        doc(
             "How often robots that choose by themselves under a sentence "
             "miscoordinate: the probability for a task drawn uniformly."
         ),
     ] = None
     failure_worst: Annotated[
         Annotated[float, Meta(ge=0, le=1)] | None,
-        about("The same for the task in which it is highest."),
+        doc("The same for the task in which it is highest."),
     ] = None
     slack: Annotated[
         Annotated[int, Meta(ge=0, le=MOST_SLACK)] | None,
-        about("The joint steps by which plans may be longer than the least makespan."),
+        doc("The joint steps by which plans may be longer than the least makespan."),
     ] = None
 
     @property
@@ -97,20 +97,20 @@ def percent(share: float) -> str:
 class Guarantee:
     """What is known of the language's size."""
 
-    method: Annotated[str, about("How it was made.")]
-    size: Annotated[int, about("The number of words.", extra_json_schema=_SIZE)]
+    method: Annotated[str, doc("How it was made.")]
+    size: Annotated[int, doc("The number of words.", extra_json_schema=_SIZE)]
     lower_bound: Annotated[
         int,
-        about(
+        doc(
             "A proved lower bound on the words of any language for these tasks that "
             "gives each state one word.",
             extra_json_schema=_SIZE,
         ),
     ]
-    proved_minimal: Annotated[bool, about("Whether the size equals that bound.")]
+    proved_minimal: Annotated[bool, doc("Whether the size equals that bound.")]
     coordination_language: Annotated[
         bool,
-        about(
+        doc(
             "Whether all plans of a task with one sentence mix freely; false where "
             "'tolerance' says how often they do not."
         ),

@@ -23,15 +23,14 @@ from coordlang.language.file import (
     refuse_duplicates,
     refuse_first,
 )
-from coordlang.language.partition import Partition
 from coordlang.language.provenance import Guarantee, Provenance, provenance_of
-from coordlang.language.words import Language
+from coordlang.language.words import Language, Partition
 from coordlang.lifted.features import Feature
 from coordlang.lifted.notation import LARGEST, feature_of
 from coordlang.lifted.world import States
 from planners.joint.tables import Ints
 from planners.system.errors import BadInput, Position
-from planners.system.files import FileFormat, about, read_bytes, require_seen
+from planners.system.files import FileFormat, doc, read_bytes, require_seen
 from planners.system.messages import echoed
 from planners.system.writing import write_compressed
 
@@ -61,12 +60,12 @@ def vectors(features: Sequence[Feature], states: States) -> Ints:
 class Verified:
     """A problem on which the language was verified by definition."""
 
-    problem: Annotated[str, about("The problem's name.")]
-    sha256: Annotated[str, about("The SHA-256 of its objects and static facts.")]
-    kind: Annotated[Kind, about("All pairs of states, those of problems, or those of a task file.")]
-    states: Annotated[int, about("How many states there are on its plans.", ge=0)]
-    tasks: Annotated[int, about("How many candidate tasks it has.", ge=0)]
-    words: Annotated[int, about("How many words its states have.", ge=0)]
+    problem: Annotated[str, doc("The problem's name.")]
+    sha256: Annotated[str, doc("The SHA-256 of its objects and static facts.")]
+    kind: Annotated[Kind, doc("All pairs of states, those of problems, or those of a task file.")]
+    states: Annotated[int, doc("How many states there are on its plans.", ge=0)]
+    tasks: Annotated[int, doc("How many candidate tasks it has.", ge=0)]
+    words: Annotated[int, doc("How many words its states have.", ge=0)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,29 +201,29 @@ _OWN_WORD = re.compile(r"v-?[0-9]+([.]-?[0-9]+)*")
 class FeatureRecord(msgspec.Struct):
     """A feature of states."""
 
-    name: Annotated[str, about("Its name, for people.")]
-    definition: Annotated[str, about("What it is, as an s-expression.")]
-    complexity: Annotated[int, about("How much there is to say.")]
+    name: Annotated[str, doc("Its name, for people.")]
+    definition: Annotated[str, doc("What it is, as an s-expression.")]
+    complexity: Annotated[int, doc("How much there is to say.")]
 
 
 class LiftedRecord(msgspec.Struct):
     """A lifted file, version 1.  Keys that are not listed here are ignored by readers."""
 
-    format: Annotated[str, about("What kind of file this is.")]
-    version: Annotated[int, about("Readers refuse a version that they do not know.")]
+    format: Annotated[str, doc("What kind of file this is.")]
+    version: Annotated[int, doc("Readers refuse a version that they do not know.")]
     domain: DomainRecord
-    robots: Annotated[list[str], about("The robots, in the order of joint actions.")]
-    features: Annotated[list[FeatureRecord], about("What is looked at.")]
-    words: Annotated[list[str], about("The words.")]
+    robots: Annotated[list[str], doc("The robots, in the order of joint actions.")]
+    features: Annotated[list[FeatureRecord], doc("What is looked at.")]
+    words: Annotated[list[str], doc("The words.")]
     values: FeatureValues
     verified: Annotated[
         list[Verified],
-        about("The problems on which this was verified; of others nothing is claimed."),
+        doc("The problems on which this was verified; of others nothing is claimed."),
     ]
     model: ModelRecord = msgspec.field(default_factory=ModelRecord)
-    names_robots: Annotated[bool, about("Whether the robots were named, as in --robots.")] = False
+    names_robots: Annotated[bool, doc("Whether the robots were named, as in --robots.")] = False
     producer: Annotated[
-        dict[str, Any], about("Version and arguments; may differ between two runs.")
+        dict[str, Any], doc("Version and arguments; may differ between two runs.")
     ] = {}
 
 

@@ -21,8 +21,8 @@ from typing import Literal
 import numpy as np
 
 from coordlang.language.candidates import Candidates
-from coordlang.language.partition import Partition
 from coordlang.language.warping import Clause, pair
+from coordlang.language.words import Partition
 from coordlang.lifted.features import Feature
 from coordlang.lifted.language import Vector, vectors
 from coordlang.lifted.pool import Pool, pool_of

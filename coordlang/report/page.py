@@ -25,9 +25,8 @@ from coordlang.explanation.words import (
 from coordlang.language.provenance import domain_sha256, percent
 from coordlang.language.recorded import options_of
 from coordlang.language.words import Language
-from coordlang.report.heat import heat_of
 from coordlang.report.layout import graph_layout, place_layout
-from coordlang.report.plan import drawn_plan
+from coordlang.report.plan import drawn_plan, heat_of
 from coordlang.report.shown import Selection, select_tasks
 from coordlang.report.task import Tables, task_data, task_summary
 from coordlang.sites.coordinates import Point
@@ -38,7 +37,7 @@ from planners.joint.tables import find_rows
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import OutOfMemory, Position
-from planners.system.notebook import counted, named
+from planners.system.messages import counted, named
 
 #: States of the language beyond which their graph is not drawn, they are not listed, formulas are
 #: not sought.

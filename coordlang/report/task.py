@@ -13,8 +13,8 @@ from coordlang.execution.automaton import determinise
 from coordlang.execution.plan_sentence import carried_out
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.listed import goal_text
-from coordlang.language.partition import Partition
 from coordlang.language.sentences import Sentence, leading_sentences, number_of_sentences
+from coordlang.language.words import Partition
 from coordlang.report.layout import layer_orders
 from coordlang.report.shown import ShownTask
 from coordlang.required.failure import TooManyToCount, failure_probability

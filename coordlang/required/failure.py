@@ -33,9 +33,9 @@ from typing import Any
 import numpy as np
 
 from coordlang.language.candidates import Candidates
-from coordlang.language.partition import Partition
 from coordlang.language.provenance import Tolerance, percent
 from coordlang.language.sentences import Sentence, sentence
+from coordlang.language.words import Partition
 from coordlang.required.choices import Choices, LabelSets
 from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace

@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from coordlang.language.flexibility import MANY, Floats
+from coordlang.language.sentences import MANY, Floats
 from coordlang.required.divergences import required_nodes
 from planners.joint.tables import Ints, ranges
 from planners.search.plan_space import PlanSpace
@@ -65,7 +65,7 @@ class PlanTable:
     def plans_ruled_out(self, word: Ints, tasks: Ints) -> Floats:
         """How many plans of some of the tasks a sentence rules out, in expectation.
 
-        N - E of `coordlang.language.flexibility`, of what was drawn where not all plans are listed.
+        N - E of `coordlang.language.sentences`, of what was drawn where not all plans are listed.
         """
         _, task, _, sizes = self._sentences(word, tasks)
         squares = np.bincount(task, sizes.astype(np.float64) ** 2, minlength=len(tasks))

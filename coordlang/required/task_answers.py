@@ -26,7 +26,7 @@ from planners.search.kept_plans import keeping_plans, search, store_in_use
 from planners.search.plan_file import json_count
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
-from planners.system.notebook import counted
+from planners.system.messages import counted
 
 #: Additions after which the failures of one task are estimated, some seconds of work.
 _ADDITIONS = 3_000_000

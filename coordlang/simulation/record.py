@@ -11,7 +11,7 @@ from msgspec import Meta
 
 from coordlang.simulation.floor import Wall
 from planners.system.errors import BadInput, Position
-from planners.system.files import FileFormat, about, read_bytes
+from planners.system.files import FileFormat, doc, read_bytes
 
 FORMAT = "coordlang/simulation"
 VERSION = 1
@@ -19,7 +19,7 @@ VERSION = 1
 #: Places, walls and poses lie within so many metres.
 _LARGEST = 1e6
 
-_Seconds = Annotated[float, about("Seconds since the start of the run.", ge=0)]
+_Seconds = Annotated[float, doc("Seconds since the start of the run.", ge=0)]
 _Count = Annotated[int, Meta(ge=0)]
 #: x and y in metres, heading in radians.
 _Pose = tuple[float, float, float]
@@ -28,15 +28,15 @@ _Pose = tuple[float, float, float]
 class StepRecord(msgspec.Struct, frozen=True):
     """A step of one robot."""
 
-    robot: Annotated[str, about("The robot.")]
-    step: Annotated[_Count, about("Its number, from 0; by the robot's own count.")]
-    subaction: Annotated[str | None, about("What the robot did; null: idle.")]
-    place: Annotated[str | None, about("Where it leads; null: the robot stays.")]
+    robot: Annotated[str, doc("The robot.")]
+    step: Annotated[_Count, doc("Its number, from 0; by the robot's own count.")]
+    subaction: Annotated[str | None, doc("What the robot did; null: idle.")]
+    place: Annotated[str | None, doc("Where it leads; null: the robot stays.")]
     begin: _Seconds
-    end: Annotated[float | None, about("Seconds since the start; null: it was never done.")]
+    end: Annotated[float | None, doc("Seconds since the start; null: it was never done.")]
     words: Annotated[
         int | None,
-        about(
+        doc(
             "How many words of the sentence the robot has passed then, at most; null "
             "before that, and without a sentence."
         ),
@@ -58,7 +58,7 @@ class EventRecord(msgspec.Struct, frozen=True, omit_defaults=True):
             "deadlock",
             "arrived",
         ],
-        about(
+        doc(
             "collision: robots touch each other or a wall; stopped: a robot "
             "stands before what its lidar sees, told once in a step; missed: a robot was not there "
             "when a step began by the clock; word: a robot told that it may have come to a word; "
@@ -67,111 +67,105 @@ class EventRecord(msgspec.Struct, frozen=True, omit_defaults=True):
             "arrived: all steps of all robots are done."
         ),
     ]
-    robots: Annotated[list[str], about("The robots that it concerns.")]
-    touched: Annotated[str | None, about("What a robot collided with that is no robot: wall.")] = (
-        None
-    )
-    visit: Annotated[str | None, about("The atom that a detour visits.")] = None
+    robots: Annotated[list[str], doc("The robots that it concerns.")]
+    touched: Annotated[str | None, doc("What a robot collided with that is no robot: wall.")] = None
+    visit: Annotated[str | None, doc("The atom that a detour visits.")] = None
     granted: Annotated[
-        bool | None, about("Whether the detour can be had; then the robot makes it.")
+        bool | None, doc("Whether the detour can be had; then the robot makes it.")
     ] = None
-    steps: Annotated[dict[str, int], about("How many steps each robot has done by then.")] = {}
+    steps: Annotated[dict[str, int], doc("How many steps each robot has done by then.")] = {}
     words: Annotated[
         dict[str, int],
-        about("How many words of the sentence each robot has passed, as it believes."),
+        doc("How many words of the sentence each robot has passed, as it believes."),
     ] = {}
     places: Annotated[
         dict[str, list[str]],
-        about("The place of each robot; under way the place left and the one ahead."),
+        doc("The place of each robot; under way the place left and the one ahead."),
     ] = {}
 
 
 class WishRecord(msgspec.Struct, frozen=True):
     """What a robot comes to want on the way: to visit an atom."""
 
-    robot: Annotated[str, about("The robot.")]
-    step: Annotated[_Count, about("How many steps it has done by then.")]
-    visit: Annotated[str, about("The atom.")]
+    robot: Annotated[str, doc("The robot.")]
+    step: Annotated[_Count, doc("How many steps it has done by then.")]
+    visit: Annotated[str, doc("The atom.")]
 
 
 class RunRecord(msgspec.Struct, frozen=True):
     """One run."""
 
-    seed: Annotated[int, about("It draws all that is random in this run.")]
-    collisions: Annotated[_Count, about("How often a robot came to touch a robot or a wall.")]
+    seed: Annotated[int, doc("It draws all that is random in this run.")]
+    collisions: Annotated[_Count, doc("How often a robot came to touch a robot or a wall.")]
     deadlock: Annotated[
-        bool, about("Nobody moved any more before all were there, without a collision.")
+        bool, doc("Nobody moved any more before all were there, without a collision.")
     ]
     late: Annotated[
         _Count,
-        about(
+        doc(
             "Joint steps more than the plans have that it took until all were there; "
             "0 where they never were."
         ),
     ]
-    messages: Annotated[_Count, about("Messages in the run; one to all robots counts once.")]
-    seconds: Annotated[float, about("Seconds until the run ended, simulated.", ge=0)]
-    arrived: Annotated[bool, about("Whether all robots did all their steps.")]
+    messages: Annotated[_Count, doc("Messages in the run; one to all robots counts once.")]
+    seconds: Annotated[float, doc("Seconds until the run ended, simulated.", ge=0)]
+    arrived: Annotated[bool, doc("Whether all robots did all their steps.")]
     mixes: Annotated[
         bool,
-        about(
+        doc(
             "Whether the robots' own subplans, done in step, are an optimal plan: what "
             "the joint model says."
         ),
     ]
     subplans: Annotated[
         dict[str, list[str | None]],
-        about("What each robot chose, step by step; what it did not come to, too."),
+        doc("What each robot chose, step by step; what it did not come to, too."),
     ]
-    steps: Annotated[list[StepRecord], about("All steps, by their beginnings.")]
-    events: Annotated[list[EventRecord], about("What else happened, by time.")]
+    steps: Annotated[list[StepRecord], doc("All steps, by their beginnings.")]
+    events: Annotated[list[EventRecord], doc("What else happened, by time.")]
     poses: Annotated[
         dict[str, list[_Pose]],
-        about("Robot -> its poses, one each ``interval``: x, y (metres), heading."),
+        doc("Robot -> its poses, one each ``interval``: x, y (metres), heading."),
     ]
     nearest: Annotated[
         float | None,
-        about("The least distance of two robots' middles in metres; null: no two."),
+        doc("The least distance of two robots' middles in metres; null: no two."),
     ] = None
 
 
 class SimulationRecord(msgspec.Struct, frozen=True):
     """A record of simulated runs, version 1.  Keys that are not listed here are ignored."""
 
-    format: Annotated[str, about("What kind of file this is.")]
-    version: Annotated[int, about("Readers refuse a version that they do not know.")]
-    domain: Annotated[dict[str, Any], about("The language's domain, as in a language file.")]
-    task: Annotated[str, about("The task; for information.")]
-    robots: Annotated[list[str], about("All robots, in the order of joint actions.")]
+    format: Annotated[str, doc("What kind of file this is.")]
+    version: Annotated[int, doc("Readers refuse a version that they do not know.")]
+    domain: Annotated[dict[str, Any], doc("The language's domain, as in a language file.")]
+    task: Annotated[str, doc("The task; for information.")]
+    robots: Annotated[list[str], doc("All robots, in the order of joint actions.")]
     agreement: Annotated[
         Literal["sentence", "plan", "nothing"],
-        about("What all robots know of: a sentence, a whole plan, or nothing."),
+        doc("What all robots know of: a sentence, a whole plan, or nothing."),
     ]
-    sentence: Annotated[str | None, about("The sentence; null for another agreement.")]
-    covered: Annotated[bool, about("Whether it is a candidate task of the language.")]
+    sentence: Annotated[str | None, doc("The sentence; null for another agreement.")]
+    covered: Annotated[bool, doc("Whether it is a candidate task of the language.")]
     step: Annotated[
         Literal["clock", "barrier", "word", "passings"],
-        about("The way to keep step; passings: there are no steps, but events."),
+        doc("The way to keep step; passings: there are no steps, but events."),
     ]
-    makespan: Annotated[_Count, about("The joint steps of each plan.")]
-    period: Annotated[
-        float, about("Seconds for a joint step where nothing comes in between.", gt=0)
-    ]
-    interval: Annotated[float, about("Seconds between two poses.", gt=0)]
-    cell: Annotated[float, about("Metres for one unit of coordinates.", gt=0)]
-    radius: Annotated[float, about("The radius of a robot in metres.", gt=0)]
-    noise: Annotated[float, about("The noise of wheels, as a share.", ge=0)]
-    lidar: Annotated[bool, about("Whether robots stop before what they see ahead.")]
-    wishes: Annotated[list[WishRecord], about("What robots came to want on the way.")]
+    makespan: Annotated[_Count, doc("The joint steps of each plan.")]
+    period: Annotated[float, doc("Seconds for a joint step where nothing comes in between.", gt=0)]
+    interval: Annotated[float, doc("Seconds between two poses.", gt=0)]
+    cell: Annotated[float, doc("Metres for one unit of coordinates.", gt=0)]
+    radius: Annotated[float, doc("The radius of a robot in metres.", gt=0)]
+    noise: Annotated[float, doc("The noise of wheels, as a share.", ge=0)]
+    lidar: Annotated[bool, doc("Whether robots stop before what they see ahead.")]
+    wishes: Annotated[list[WishRecord], doc("What robots came to want on the way.")]
     places: Annotated[
         dict[str, tuple[float, float]],
-        about("Place -> the point of its middle in metres, x to the right and y up."),
+        doc("Place -> the point of its middle in metres, x to the right and y up."),
     ]
-    walls: Annotated[list[Wall], about("Walls: x, y of one end, x, y of the other.")]
-    goals: Annotated[
-        dict[str, str], about("Robot -> its last place on the plans, where it has one.")
-    ]
-    runs: Annotated[list[RunRecord], about("The runs.")]
+    walls: Annotated[list[Wall], doc("Walls: x, y of one end, x, y of the other.")]
+    goals: Annotated[dict[str, str], doc("Robot -> its last place on the plans, where it has one.")]
+    runs: Annotated[list[RunRecord], doc("The runs.")]
 
 
 SIMULATION = FileFormat("simulation", "record of runs", SimulationRecord, FORMAT, VERSION)

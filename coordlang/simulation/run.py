@@ -12,7 +12,6 @@ from typing import Any
 
 from coordlang.language.candidates import describe
 from coordlang.simulation.floor import Floor, require_room
-from coordlang.simulation.pace import Message, Pace
 from coordlang.simulation.record import (
     FORMAT,
     VERSION,
@@ -22,7 +21,7 @@ from coordlang.simulation.record import (
     StepRecord,
     WishRecord,
 )
-from coordlang.simulation.robot import TICK, Pose, Robot, Sensed, period
+from coordlang.simulation.robot import TICK, Message, Pace, Pose, Robot, Sensed, period
 from coordlang.simulation.simulator import POSITION_NOISE, WALL, Settings, Simulator
 from coordlang.simulation.team import Mission
 from coordlang.sites.coordinates import Point

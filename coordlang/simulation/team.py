@@ -18,13 +18,12 @@ from coordlang.execution.choices import choices, knowing, knowing_own, monitor
 from coordlang.execution.monitor import IDLE, Monitor
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import words_passed
-from coordlang.simulation.pace import OwnWords
+from coordlang.simulation.robot import OwnWords
 from coordlang.sites.world import World, find_world
 from planners.search.plan_space import PlanSpace, UnfoldingStep
 from planners.search.plans import Plan, Plans
 from planners.system.errors import BadInput, UsageError, note
-from planners.system.messages import echoed
-from planners.system.notebook import some
+from planners.system.messages import echoed, some
 
 #: What the robots have agreed on: a sentence, a whole plan, or nothing.
 Agreement = Literal["sentence", "plan", "nothing"]

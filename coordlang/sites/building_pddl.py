@@ -15,8 +15,7 @@ import networkx as nx
 from coordlang.sites.building import Building, Lane, Place, pddl_name
 from coordlang.sites.clearance import Motion, clash, excluded, motions, staying
 from planners.system.errors import BadInput, Position, UsageError, note
-from planners.system.messages import echoed, visible
-from planners.system.notebook import counted, named, some
+from planners.system.messages import counted, echoed, named, some, visible
 
 _DOMAIN = """\
 ; Robots that drive along the lanes of a building, all at the same time (MA-PDDL).

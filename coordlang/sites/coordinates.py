@@ -12,7 +12,7 @@ from typing import Annotated
 import msgspec
 
 from planners.system.errors import BadInput, Position
-from planners.system.files import FileFormat, about, read_bytes
+from planners.system.files import FileFormat, doc, read_bytes
 from planners.system.messages import echoed
 
 Point = tuple[float, float]
@@ -31,7 +31,7 @@ class CoordinatesFile(msgspec.Struct):
 
     coordinates: Annotated[
         dict[str, tuple[float, float]],
-        about("Place -> [x, y], x to the right and y down; no two alike."),
+        doc("Place -> [x, y], x to the right and y down; no two alike."),
     ]
 
 

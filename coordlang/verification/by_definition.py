@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from coordlang.language.candidates import Candidates
-from coordlang.language.partition import Partition
 from coordlang.language.sentences import sentence
+from coordlang.language.words import Partition
 from coordlang.required.miscoordination import (
     Miscoordination,
     Trail,

@@ -13,10 +13,10 @@ import msgspec
 
 from coordlang.language.file import refuse_duplicates
 from coordlang.language.warping import Clause, Pair
-from coordlang.vocabulary.clauses import most_constrained_first
+from coordlang.vocabulary.sat import most_constrained_first
 from planners.search.sat import SolverName, sat_solver, solve_slice
 from planners.system.errors import OutOfMemory, Position
-from planners.system.files import FileFormat, about, read_bytes
+from planners.system.files import FileFormat, doc, read_bytes
 from planners.system.limits import memory_left, more_memory
 from planners.system.writing import write_compressed
 
@@ -30,10 +30,10 @@ PlanTexts = list[list[str | None]]
 class WarpingPath(msgspec.Struct, frozen=True):
     """A warping path of the states of two plans of a reason."""
 
-    plans: Annotated[tuple[int, int], about("The numbers of the plans, from 0.")]
+    plans: Annotated[tuple[int, int], doc("The numbers of the plans, from 0.")]
     cells: Annotated[
         list[tuple[int, int]],
-        about("Its cells: a step of the one plan and a step of the other, from 0."),
+        doc("Its cells: a step of the one plan and a step of the other, from 0."),
     ]
 
 
@@ -45,25 +45,25 @@ class Reason(msgspec.Struct, frozen=True):
     words.
     """
 
-    init: Annotated[list[str], about("The fluents that are true at the start, as PDDL atoms.")]
-    goal: Annotated[list[str], about("PDDL literals or formulas that must all hold at the end.")]
+    init: Annotated[list[str], doc("The fluents that are true at the start, as PDDL atoms.")]
+    goal: Annotated[list[str], doc("PDDL literals or formulas that must all hold at the end.")]
     plans: Annotated[
         list[PlanTexts],
-        about("Optimal plans, one for each robot: its subactions by step, null for idling."),
+        doc("Optimal plans, one for each robot: its subactions by step, null for idling."),
     ]
-    paths: Annotated[list[WarpingPath], about("Warping paths that join all of the plans.")]
+    paths: Annotated[list[WarpingPath], doc("Warping paths that join all of the plans.")]
 
 
 class Certificate(msgspec.Struct, frozen=True):
     """Why every coordination language for the candidate tasks has more than ``refuted`` words."""
 
-    domain: Annotated[str, about("The domain's name.")]
-    robots: Annotated[list[str], about("The robots, in the order of joint actions.")]
-    refuted: Annotated[int, about("A number of words that is too small.")]
-    reasons: Annotated[list[Reason], about("Why it is, all together.")]
-    format: Annotated[str, about("What kind of file this is.")] = FORMAT
-    version: Annotated[int, about("Readers refuse a version that they do not know.")] = VERSION
-    producer: Annotated[dict[str, Any], about("Who wrote it; for information.")] = {}
+    domain: Annotated[str, doc("The domain's name.")]
+    robots: Annotated[list[str], doc("The robots, in the order of joint actions.")]
+    refuted: Annotated[int, doc("A number of words that is too small.")]
+    reasons: Annotated[list[Reason], doc("Why it is, all together.")]
+    format: Annotated[str, doc("What kind of file this is.")] = FORMAT
+    version: Annotated[int, doc("Readers refuse a version that they do not know.")] = VERSION
+    producer: Annotated[dict[str, Any], doc("Who wrote it; for information.")] = {}
 
 
 CERTIFICATE = FileFormat("certificate", "certificate", Certificate, FORMAT, VERSION)

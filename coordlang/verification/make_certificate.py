@@ -19,9 +19,8 @@ from coordlang.verification.certificate_file import (
     encode,
     states_of,
 )
-from coordlang.vocabulary.clauses import without_implied
 from coordlang.vocabulary.job import Evidence
-from coordlang.vocabulary.sat import PartitionProblem, Undecided, satisfiable
+from coordlang.vocabulary.sat import PartitionProblem, Undecided, satisfiable, without_implied
 from planners.joint.states import split_atoms
 from planners.search.sat import sat_solver
 

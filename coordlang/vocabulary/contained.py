@@ -20,8 +20,7 @@ from networkx.algorithms.isomorphism import GraphMatcher
 from coordlang.language.candidates import Candidates
 from coordlang.symmetry.graph import Renaming, joined_order
 from coordlang.symmetry.group import SymmetryGroup, symmetries_of_part
-from coordlang.vocabulary.loop import Budget, Languages, find
-from coordlang.vocabulary.partitions import Partitions, Refutation
+from coordlang.vocabulary.loop import Budget, Languages, Partitions, Refutation, find
 from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
 

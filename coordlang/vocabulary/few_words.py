@@ -16,7 +16,7 @@ from random import Random
 
 import numpy as np
 
-from coordlang.language.flexibility import Floats
+from coordlang.language.sentences import Floats
 from coordlang.language.warping import Clause
 from coordlang.required.failure import FailureProbability, TooManyToCount, failure_probability
 from coordlang.required.plan_table import PlanTable, plan_table

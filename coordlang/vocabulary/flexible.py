@@ -2,7 +2,7 @@
 """Among languages with equally many words, one whose sentences leave many plans open.
 
 Maximises the average of E = sum_s n_s^2 / N over the candidate tasks
-(`coordlang.language.flexibility`) by local search (`coordlang.vocabulary.local_search`), with
+(`coordlang.language.sentences`) by local search (`coordlang.vocabulary.local_search`), with
 necessary clauses as constraints.  A partition without counterexample is verified by definition
 before it counts.
 """
@@ -17,7 +17,7 @@ from random import Random
 
 import numpy as np
 
-from coordlang.language.flexibility import MANY, Flexibility, Floats, flexibility
+from coordlang.language.sentences import MANY, Flexibility, Floats, flexibility
 from coordlang.language.warping import Clause
 from coordlang.required.divergences import required_nodes
 from coordlang.required.plan_table import PlanTable, plan_table

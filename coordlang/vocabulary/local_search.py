@@ -16,7 +16,7 @@ from typing import Protocol
 
 import numpy as np
 
-from coordlang.language.flexibility import Floats
+from coordlang.language.sentences import Floats
 from coordlang.language.warping import Clause
 from coordlang.required.plan_table import PlanTable
 from planners.joint.tables import Ints

@@ -20,9 +20,16 @@ from typing import TYPE_CHECKING
 from coordlang.language.warping import Clause
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome, word_count
-from coordlang.vocabulary.loop import Budget, Languages, between, close_bounds, find
+from coordlang.vocabulary.loop import (
+    Budget,
+    Languages,
+    Partitions,
+    Refutation,
+    between,
+    close_bounds,
+    find,
+)
 from coordlang.vocabulary.merging import merged
-from coordlang.vocabulary.partitions import Partitions, Refutation
 from coordlang.vocabulary.sat import Undecided
 from planners.search.sat import SolverName
 from planners.system.errors import OutOfMemory

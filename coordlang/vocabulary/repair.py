@@ -16,10 +16,14 @@ from contextlib import closing
 from dataclasses import dataclass
 
 from coordlang.language.warping import Clause
-from coordlang.vocabulary.clauses import most_constrained_first, without_implied
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.loop import Budget, Languages, ProblemsBySize, close_bounds, find
-from coordlang.vocabulary.sat import PartitionProblem, Undecided
+from coordlang.vocabulary.sat import (
+    PartitionProblem,
+    Undecided,
+    most_constrained_first,
+    without_implied,
+)
 from planners.search.sat import whole
 from planners.system.limits import run_until_stopped
 

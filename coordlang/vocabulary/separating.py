@@ -16,11 +16,10 @@ import numpy as np
 from coordlang.language.warping import Clause, Pair, pair
 from coordlang.required.composition_walk import Difference, DifferenceWalk
 from coordlang.symmetry.group import symmetry_group
-from coordlang.vocabulary.clauses import clique, most_constrained_first
 from coordlang.vocabulary.greedy import Constraint, alternatives, greedy_partition, separations
 from coordlang.vocabulary.job import Assignment, Job, Outcome
 from coordlang.vocabulary.loop import Budget, ProblemsBySize, close_bounds, find
-from coordlang.vocabulary.sat import PartitionProblem, Undecided
+from coordlang.vocabulary.sat import PartitionProblem, Undecided, clique, most_constrained_first
 from planners.system.limits import run_until_stopped
 
 #: Greedy partitions, each under the constraints that the one before broke, before SAT takes over.

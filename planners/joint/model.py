@@ -24,7 +24,7 @@ from planners.pddl.formula_tree import label
 from planners.pddl.lifted import Atom, Formula, StepAtom
 from planners.pddl.model_options import Cost
 from planners.system.errors import Position
-from planners.system.notebook import named
+from planners.system.messages import named
 
 if TYPE_CHECKING:
     from planners.joint.traces import Event

@@ -12,8 +12,7 @@ from planners.pddl.formula_tree import required_atoms
 from planners.pddl.lifted import Atom, Domain, Formula, Problem, Schema, Variable
 from planners.pddl.model_options import ModelOptions, Unowned
 from planners.system.errors import BadInput, UsageError, note
-from planners.system.messages import echoed
-from planners.system.notebook import some
+from planners.system.messages import echoed, some
 
 #: The name of the extra robot that owns actions without a robot, under ``--unowned environment``.
 ENVIRONMENT = "environment"

@@ -105,7 +105,7 @@ class FileFormat(Generic[T]):
         }
 
 
-def about(text: str, **more: Any) -> Any:
+def doc(text: str, **more: Any) -> Any:
     """What a field of a format's record holds, for its schema; ``more`` is of `msgspec.Meta`."""
     import msgspec
 

@@ -17,7 +17,7 @@ from itertools import product
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
 from planners.system.errors import UsageError
-from planners.system.notebook import named
+from planners.system.messages import named
 
 Record = TypeVar("Record")
 

@@ -9,7 +9,7 @@ from random import Random
 from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.commands.building import build_language
 from coordlang.execution.choices import SentenceChoices, choices
-from coordlang.language.partition import Partition
+from coordlang.language.words import Partition
 from planners.loading import build
 from planners.pddl.model_options import ModelOptions
 from planners.search.asynchronous import as_executed

@@ -20,8 +20,7 @@ from coordlang.commands.building import build_language
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
 from coordlang.language.listed import ListedTask
-from coordlang.language.partition import Partition
-from coordlang.language.words import Language
+from coordlang.language.words import Language, Partition
 from coordlang.required.miscoordination import Inseparable
 from coordlang.verification.by_definition import verify
 from planners.pddl.model_options import ModelOptions

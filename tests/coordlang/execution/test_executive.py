@@ -19,10 +19,10 @@ from typing import Any
 
 import pytest
 
-from coordlang.execution.agreement import Agreement
 from coordlang.execution.choices import SentenceChoices, to_bytes
 from coordlang.execution.executive import Executive
 from coordlang.execution.fleet_log import (
+    Agreement,
     Contradiction,
     Event,
     LogPart,

@@ -20,7 +20,7 @@ from py_trees.common import Status
 from coordlang.execution.choices import choices
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.exports.behaviour_tree import behaviour_trees
-from coordlang.language.partition import Partition
+from coordlang.language.words import Partition
 from planners.joint.model import IDLE, JointModel
 from planners.search.plans import Plan
 from tests.support import naive

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from coordlang.language.candidates import all_pairs
-from coordlang.language.partition import Partition
+from coordlang.language.words import Partition
 from coordlang.lifted.features import Feature
 from coordlang.lifted.learning import Instance, Learned, learn, simplest_hitting
 from coordlang.lifted.pool import pool_of

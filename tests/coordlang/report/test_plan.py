@@ -9,8 +9,7 @@ from random import Random
 
 import pytest
 
-from coordlang.report.heat import Heat, counted_heat, heat_of
-from coordlang.report.plan import WIDTH, drawn_plan, floor_plan
+from coordlang.report.plan import WIDTH, Heat, counted_heat, drawn_plan, floor_plan, heat_of
 from coordlang.report.shown import select_tasks
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import Position

@@ -14,8 +14,8 @@ import pytest
 
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import Candidates
-from coordlang.language.partition import Partition
 from coordlang.language.sentences import sentence_counts
+from coordlang.language.words import Partition
 from coordlang.required.choices import Choices
 from coordlang.required.composition_walk import Difference, DifferenceWalk
 from coordlang.required.failure import (

@@ -15,7 +15,7 @@ import pytest
 import coordlang
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
-from coordlang.language.partition import Partition
+from coordlang.language.words import Partition
 from coordlang.required.miscoordination import Inseparable
 from coordlang.required.task_answers import answers
 from coordlang.verification.by_definition import inseparable, verify_candidates

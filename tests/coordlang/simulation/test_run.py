@@ -341,7 +341,6 @@ def test_a_record_that_cannot_be_played_is_refused(tmp_path: Path) -> None:
 #: What a robot's logic is made of, besides the standard library.
 OWN = {
     "coordlang.execution.monitor",
-    "coordlang.simulation.pace",
     "coordlang.simulation.robot",
 }
 

@@ -42,8 +42,7 @@ from coordlang.language.candidates import from_problems
 from coordlang.language.sentences import task_sentences
 from coordlang.unified import engine as engine_module
 from coordlang.unified import register
-from coordlang.unified.engine import CoordlangEngine
-from coordlang.unified.options import PLAN_KINDS
+from coordlang.unified.engine import PLAN_KINDS, CoordlangEngine
 from coordlang.unified.plans import label
 from coordlang.unified.translation import PddlNames, translate
 from planners.loading import load

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from coordlang.language.candidates import Candidates, from_problems
-from coordlang.language.partition import Partition
+from coordlang.language.words import Partition
 from coordlang.required.choices import Choices
 from coordlang.required.divergences import divergences, minimal
 from coordlang.required.miscoordination import Miscoordination, miscoordination

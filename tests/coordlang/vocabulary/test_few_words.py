@@ -14,7 +14,7 @@ import pytest
 import coordlang as library
 from coordlang.commands.building import Making, build_language, job_for_few_words
 from coordlang.language.candidates import Candidates
-from coordlang.language.flexibility import flexibility
+from coordlang.language.sentences import flexibility
 from coordlang.required.choices import Choices
 from coordlang.required.failure import failure_probability
 from coordlang.required.plan_table import plan_table

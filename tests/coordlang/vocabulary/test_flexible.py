@@ -14,7 +14,7 @@ import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates
-from coordlang.language.flexibility import flexibility
+from coordlang.language.sentences import flexibility
 from coordlang.required.divergences import required_nodes
 from coordlang.vocabulary.flexible import flexibility_bounds, flexible
 from coordlang.vocabulary.job import Assignment, Outcome

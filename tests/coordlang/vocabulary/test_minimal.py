@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates
-from coordlang.language.partition import Partition
 from coordlang.language.warping import Pair, pair, short_clauses
+from coordlang.language.words import Partition
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.verification.by_definition import verify
 from coordlang.vocabulary.failing_tuples import FailingTuples

@@ -13,7 +13,7 @@ import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates, all_pairs, from_problems
-from coordlang.language.partition import Partition
+from coordlang.language.words import Partition
 from coordlang.required.miscoordination import Inseparable
 from coordlang.verification.by_definition import verify
 from coordlang.verification.check_certificate import check

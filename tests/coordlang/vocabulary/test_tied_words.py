@@ -20,8 +20,8 @@ from hypothesis import strategies as st
 
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates
-from coordlang.language.partition import Partition
 from coordlang.language.warping import Pair
+from coordlang.language.words import Partition
 from coordlang.symmetry.group import symmetry_group
 from coordlang.verification.by_definition import verify_candidates
 from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry

@@ -12,7 +12,7 @@ import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import all_pairs
-from coordlang.language.partition import Partition
+from coordlang.language.words import Partition
 from coordlang.verification.by_definition import verify
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import Goal
