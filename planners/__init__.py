@@ -1,5 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Planning for several robots: PDDL -> joint model -> all optimal plans.
-
-Knows nothing of languages.
-"""
+"""Planning for several robots: PDDL -> joint model -> all optimal plans.  No languages here."""

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What was understood of a domain and problem.
-
-Robots, subactions, constraints, interference, fluents.
-"""
+"""What was understood of a domain and problem: robots, subactions, interference, fluents."""
 
 from __future__ import annotations
 

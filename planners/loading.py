@@ -48,10 +48,7 @@ class PlanningInstance:
 def load(
     domain: str | Path, problems: Sequence[str | Path], options: ModelOptions | None = None
 ) -> PlanningInstance:
-    """Read PDDL files and build their joint model.
-
-    Raises `BadInput`, `Unsupported` or `UsageError` with position and remedy.
-    """
+    """Read PDDL files; raises `BadInput`, `Unsupported` or `UsageError` with the position."""
     lifted = read_domain(domain)
     return build(lifted, [read_problem(p, lifted) for p in problems], options)
 

@@ -237,10 +237,7 @@ class Making:
         self._since = now
 
     def job(self, options: MethodOptions, found: FirstDifferences | None = None) -> Job:
-        """What words are to be found, for plans that part as ``found``.
-
-        `Inseparable` if there is no language over states.
-        """
+        """What words are to be found, for plans that part as ``found``; raises `Inseparable`."""
         if found is None:
             most = _most_divergences(options.method, self.candidates)
             found = differences(self.candidates, self.workers, self.progress, most=most)
@@ -300,10 +297,7 @@ def _most_divergences(method: str, candidates: Candidates) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Old:
-    """The words of a language to repair, of those of its states that are some of this model.
-
-    So many of its states are ``gone``.
-    """
+    """Words to repair, of those old states that this model has; so many others are ``gone``."""
 
     language: Language
     candidates: Candidates

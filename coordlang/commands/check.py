@@ -46,10 +46,7 @@ class CrossCheck(Presented):
 
 @public(CheckOptions)
 def check(files: Arguments, options: CheckOptions) -> CrossCheck:
-    """Compare our optimal cost with Fast Downward's.
-
-    Raises `CoordlangError` if Fast Downward gives no answer.
-    """
+    """Compare our optimal cost with Fast Downward's; `CoordlangError` if that gives no answer."""
     loaded = files.instance()
     task = loaded.tasks[0]
     try:

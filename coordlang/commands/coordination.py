@@ -36,10 +36,7 @@ class TaskCoordination(Presented, TaskAnswer):
 
     @property
     def failure(self) -> Fraction | None:
-        """How often robots miscoordinate that draw their plans uniformly and without a word.
-
-        None where that is too much to count.
-        """
+        """How often robots fail that draw plans uniformly without a word; None: not counted."""
         return self.failures.mean
 
     @property

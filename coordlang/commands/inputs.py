@@ -218,10 +218,7 @@ class ReadTask(NamedTuple):
 
 
 class InTask(Presented):
-    """A result about one task under a language.
-
-    ``used`` is the language in the task.
-    """
+    """A result about one task under a language.  ``used`` is the language in the task."""
 
     __slots__ = ()
     used: TaskLanguage

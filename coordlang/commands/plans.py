@@ -85,10 +85,7 @@ class OptimalPlans(Presented):
         return [self._texts(plan) for plan in self._plans.sample(number, seed)]
 
     def ipc(self, plan: Sequence[Texts]) -> str:
-        """Return a plan as an IPC plan file (docs/formats.md).
-
-        Raises `ValueError` if it is no optimal plan of the task.
-        """
+        """Return a plan as an IPC plan file (docs/formats.md); `ValueError` if it is none here."""
         from planners.search.plan_file import to_ipc
 
         return to_ipc(self._plans, self._known(plan))

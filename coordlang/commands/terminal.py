@@ -149,10 +149,7 @@ def say(text: str) -> None:
 
 @contextmanager
 def working(message: str) -> Iterator[Callable[[str], None]]:
-    """Show on a terminal what is being done, until the block ends.
-
-    Yields a function that changes the message.
-    """
+    """Show on a terminal what the block does; yields a function that changes the message."""
     if sys.stderr is None or not sys.stderr.isatty():
         yield lambda _: None
         return

@@ -48,10 +48,7 @@ Preference = str | PlanPreference
 
 
 def read_preference(task_language: TaskLanguage, text: str) -> Preference:
-    """Read ``shortest``, ``most-plans``, ``first:ROBOT`` or ``avoid:ATOMS``.
-
-    Raises `UsageError` for anything else.
-    """
+    """Read ``shortest``, ``most-plans``, ``first:ROBOT`` or ``avoid:ATOMS``; else `UsageError`."""
     kind, _, argument = text.strip().partition(":")
     if task_language.model.is_asynchronous and (kind == "first" or argument.count("(") > 1):
         raise UsageError(
@@ -313,10 +310,7 @@ class _Graph:
         return *values, length
 
     def _grades(self, counts: Mapping[int, int]) -> Iterator[tuple[int, int]]:
-        """The (worst, best) grades at least.
-
-        Some node's plans go on, and all that came to this node can go on in the same way.
-        """
+        """The (worst, best) grades at least: all that came to a node can go on as its plans do."""
         by_node: dict[int, list[tuple[int, ...]]] = defaultdict(list)
         for point in counts:
             by_node[self.node[point]].append(self.grades[point])

@@ -67,10 +67,7 @@ class SentenceChoices:
 
     @property
     def guaranteed(self) -> bool:
-        """Whether every combination is optimal.
-
-        Proved by walking them all, or else by the language's own guarantee.
-        """
+        """Whether every combination is optimal, by a walk of all or by the language's guarantee."""
         return self.task_language.guaranteed if self.mixtures is None else self.mixtures.holds
 
     def of(self, robots: Sequence[int] | None) -> tuple[RobotChoices, ...]:

@@ -77,10 +77,7 @@ class RobotLog:
         return LogPart(self.version, first, tuple(self.events[first : first + _EVENTS_SENT]))
 
     def join(self, part: LogPart) -> bool:
-        """Take in what is new; whether anything was.
-
-        Raises `Contradiction`, and is then as it was before.
-        """
+        """Take in what is new; whether anything was.  `Contradiction`: and all is as before."""
         known, told = self.events, part.version
         is_possible = told.ended <= told.told <= told.begun <= told.events <= told.ended + 1
         if not is_possible or part.first + len(part.events) > told.events:

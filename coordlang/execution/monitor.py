@@ -229,10 +229,7 @@ class Monitor:
         return self._here.left
 
     def allowed(self) -> tuple[str | None, ...]:
-        """What the robot may do next (None: idle), sorted, idling first.
-
-        Nothing when it has finished.
-        """
+        """What the robot may do next, sorted, idling (None) first; nothing when it has finished."""
         return tuple(self._here.moves)
 
     def did(self, subaction: str | None) -> None:

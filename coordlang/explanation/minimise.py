@@ -304,10 +304,7 @@ def _freed(points: Points, seed: Bools) -> Bools:
 
 
 def _hitting(rows: Bools, weights: Sequence[int]) -> Sequence[int]:
-    """Columns of which every row has one: the fewest, and of these the least weight.
-
-    Greedily if there are too many sets to try.
-    """
+    """Columns that hit every row: the fewest and lightest, or greedily where sets are many."""
     every = range(rows.shape[1])
     tried = 0
     for size in range(len(every) + 1):

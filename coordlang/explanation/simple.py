@@ -104,10 +104,7 @@ class _Search:
                     self.bound = self.lengths
 
     def _decide(self, terms: int, budget: Budget) -> bool:
-        """Find a language with so many terms or prove that there is none.
-
-        False if the budget was not enough.
-        """
+        """Find a language with so many terms, or prove that there is none; False: not yet."""
         if budget.conflicts > _CONFLICTS:
             raise Undecided
         try:

@@ -77,10 +77,7 @@ def _best_test(values: Bools, word: Ints, words: int) -> int:
 
 
 def refuse_seen_slack(model: JointModel, what: str) -> None:
-    """Raise `UsageError` if words depend on how much is left of the slack.
-
-    ``what`` is what cannot say so.
-    """
+    """Raise `UsageError` if words depend on the slack that is left, which ``what`` cannot say."""
     if model.slack_facts:
         raise UsageError(
             f"{what} speaks of the facts of the problem, and the words of this language see how "

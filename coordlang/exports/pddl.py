@@ -342,10 +342,7 @@ class _Naming:
         ]
 
     def goal(self) -> tuple[Condition, ...]:
-        """The whole sentence is passed, and the last state is named.
-
-        ``reach the goal`` consumes the time to act.
-        """
+        """The whole sentence is passed, and the last state is named, by ``reach the goal``, too."""
         conditions = {*self.plain.goal, (self.said[-1], True)}
         old = (number < self.first_new or number == self.between for number, _ in self.plain.goal)
         if all(old):

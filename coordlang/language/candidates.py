@@ -320,10 +320,7 @@ def from_recorded(
     options: ModelOptions | None = None,
     position: Position | None = None,
 ) -> Candidates:
-    """Problems' tasks as a language file records them.
-
-    They are searched one by one, without the rest of the space.
-    """
+    """Problems' tasks as a language file records them, searched one by one."""
     loaded, tasks = model_of_listed(domain, problems, listed, options, position)
     source = Searched(as_executed(joined([search(loaded.model, task) for task in tasks])))
     return Candidates("problems", loaded, source, listed=tuple(listed))

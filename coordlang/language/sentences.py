@@ -32,10 +32,7 @@ _FOLLOWED = 2_000_000
 
 
 def sentence(words: Iterable[int]) -> Sentence:
-    """The words of a state sequence, repeated neighbours collapsed.
-
-    The TSC of a plan, in the paper's terms.
-    """
+    """The words of a state sequence, repeated neighbours collapsed (the paper's TSC of a plan)."""
     result: list[int] = []
     for word in words:
         if not result or result[-1] != word:
@@ -84,10 +81,7 @@ def task_sentences(
 
 
 def number_of_sentences(space: PlanSpace, word: Ints, start: int) -> int | None:
-    """How many sentences the plans from a node have; None if that is too much work.
-
-    ``word`` is the word number of each node.
-    """
+    """How many sentences the plans from a node have, by the word of each node; None: too many."""
     with suppress(OutOfMemory):
         return len(sentence_counts(space, word, start=start, most_steps=_ADDITIONS)[start])
     return None

@@ -27,10 +27,7 @@ def pair(a: int, b: int) -> Pair:
 def warping_path(
     u: Sequence[int], v: Sequence[int], joined: Sequence[Sequence[bool]]
 ) -> list[tuple[int, int]] | None:
-    """A warping path over cells with ``joined[i][j]`` that has the fewest non-identical cells.
-
-    None if there is none.
-    """
+    """A warping path over ``joined[i][j]`` with the fewest non-identical cells, or None."""
     best = [[_NO_PATH] * len(v) for _ in u]
     for i, a in enumerate(u):
         for j, b in enumerate(v):

@@ -162,10 +162,7 @@ class Language(Presented):
         }
 
     def partition(self, model: JointModel) -> Partition:
-        """Read the states' keys over a joint model.
-
-        Raises `BadInput` for a key that is not that of a state of the model.
-        """
+        """Read the keys as states of a joint model; raises `BadInput` for a key that is none."""
         number = {word: n for n, word in enumerate(self.words)}
         word = np.fromiter(
             map(number.__getitem__, self.states.values()), np.int64, len(self.states)

@@ -120,10 +120,7 @@ def written_values(values: Mapping[Vector, str]) -> dict[str, str]:
 
 
 def read_values(entries: Mapping[str, str], size: int, position: Position) -> dict[Vector, str]:
-    """The values of so many features -> word, as `written_values` writes them.
-
-    Raises `BadInput` for keys that are no such values.
-    """
+    """The values of so many features -> word; `BadInput` for keys not as `written_values` has."""
     found: dict[Vector, str] = {}
     for key, word in entries.items():
         try:

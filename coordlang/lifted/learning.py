@@ -391,10 +391,7 @@ class _Learner:
         )
 
     def _words(self, chosen: Sequence[int], prefer: Preference | None) -> _Words:
-        """Words over some features: one for each class of states, or as few as are found.
-
-        They are numbered as they come.
-        """
+        """Words over features, numbered as they come: one for each class of states, or fewer."""
         every = self._every
         features = tuple(self._pool.features[k] for k in chosen)
         vectors = np.concatenate([own.vectors(features) for own in every])

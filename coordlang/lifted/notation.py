@@ -50,10 +50,7 @@ _MADE: dict[tuple[str, str], type[Expression]] = {
 
 
 def feature_of(text: str, position: Position) -> Feature:
-    """The feature that a text defines.
-
-    Raises `BadInput` for anything else.
-    """
+    """The feature that a text defines.  Raises `BadInput` for anything else."""
     try:
         found: Feature | None = _read("Feature", _tree(text))
     except (ValueError, IndexError):

@@ -200,10 +200,7 @@ class FloorPlan:
 def floor_plan(
     names: Sequence[str], places: Sequence[Point], links: Sequence[tuple[int, int]]
 ) -> FloorPlan:
-    """Draw places at their coordinates; names that nobody gave give way to others.
-
-    O(places^2 + places x links).
-    """
+    """Draw places at their coordinates, given names first.  O(places^2 + places x links)."""
     left, top, right, bottom = (
         pick(point[axis] for point in places) for pick in (min, max) for axis in (0, 1)
     )

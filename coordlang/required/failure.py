@@ -116,10 +116,7 @@ class TooManyToCount(OutOfMemory):
 
 @dataclass(frozen=True, slots=True)
 class FailureProbability:
-    """How often robots miscoordinate, over some tasks: exactly.
-
-    ``tasks`` has one probability for each task, in their order.
-    """
+    """How often robots miscoordinate, exactly: ``tasks`` has one probability for each task."""
 
     tasks: tuple[Fraction, ...]
 

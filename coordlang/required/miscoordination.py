@@ -251,10 +251,7 @@ def describe_failure(
 
 
 def _reason(space: PlanSpace, node: int, labels: tuple[int, ...]) -> str:
-    """Why the mixed joint action is no optimal step in a state.
-
-    Not applicable, or it wastes something.
-    """
+    """Why the mixed joint action is no optimal step in a state: not applicable, or wasteful."""
     model = space.model
     if model.is_asynchronous:
         return "no optimal plan has these events, with what they wait for"

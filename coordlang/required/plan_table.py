@@ -75,10 +75,7 @@ class PlanTable:
         return found
 
     def failures(self, word: Ints, tasks: Ints) -> Floats:
-        """How often robots fail in some of the tasks, under the word of each state.
-
-        O(plans + sentences x cells) of these tasks.
-        """
+        """How often robots fail in tasks, by each state's word.  O(plans + sentences x cells)."""
         plans, task, said, sizes = self._sentences(word, tasks)
 
         def weights(robot: int) -> tuple[Ints, Ints, Ints]:

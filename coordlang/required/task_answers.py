@@ -120,10 +120,7 @@ def _fewest(space: PlanSpace, found: Failures) -> FewestActions | None:
 
 
 def fewest_actions(space: PlanSpace) -> PlanSpace | None:
-    """The plans with the fewest actions, None if all plans are or the cost is no makespan.
-
-    O(edges).
-    """
+    """The plans with the fewest actions; None: all plans are, or the cost is no makespan."""
     model = space.model
     if model.cost != "makespan" or model.slack or model.is_asynchronous:
         return None

@@ -99,10 +99,7 @@ def pddl_name(text: str) -> str:
 
 
 def read_building(path: Path) -> Building:
-    """Read a building.
-
-    Raises `BadInput`, with the line, for what is none; see `coordlang.sites.yaml_file.read_yaml`.
-    """
+    """Read a building; raises `BadInput`, with the line, for what is none, as `read_yaml` does."""
     root = read_yaml(path)
     content = root.mapping()
     named = content["levels"].mapping() if "levels" in content else {}
@@ -311,10 +308,7 @@ def _spawning(vertices: Iterable[_Vertex]) -> dict[str, _Vertex]:
 
 
 def _set_names(vertices: Iterable[_Vertex], taken: set[str]) -> None:
-    """Name places as the file does, else by the level and the number of the vertex.
-
-    A name that is taken already gets these, too.
-    """
+    """Name places as the file does, or, if that is none or taken, by level and vertex, too."""
     for vertex in vertices:
         number = pddl_name(f"{vertex.level}-{vertex.number}") or f"p-{vertex.number}"
         vertex.name = pddl_name(vertex.said) or number

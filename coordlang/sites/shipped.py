@@ -13,10 +13,7 @@ _INSTALLED = "shipped_domains"
 
 
 def shipped_domains() -> Path:
-    """Return the folder with a folder for each shipped domain.
-
-    Raises `UsageError` if the package was installed without them.
-    """
+    """Return the folder of the shipped domains; `UsageError` if it was not installed."""
     package = Path(__file__).resolve().parents[1]
     for place in (package / _INSTALLED, package.parent / "domains"):
         if (place / "grid" / "domain.pddl").is_file():

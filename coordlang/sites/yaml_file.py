@@ -144,10 +144,7 @@ def _no_yaml(said: str, file: str, mark: yaml.Mark | None) -> BadInput:
 
 
 def _read(text: str, file: str) -> list[Value]:
-    """The value of a text's document, if it has one, read one event after another.
-
-    Raises `BadInput` for what no plain data has.
-    """
+    """The value of a text's document, if any; raises `BadInput` for what no plain data has."""
     found: list[Value] = []
     within, number = [found], 0
     for event in yaml.parse(text, _LOADER):

@@ -173,10 +173,7 @@ def _name(leaf: Formula) -> str:
 
 
 def joined_order(candidates: Candidates) -> list[str]:
-    """The objects of the graph, each where possible after one that it shares a static fact with.
-
-    Otherwise in natural order.
-    """
+    """The objects of the graph, if possible each after one that shares a static fact with it."""
     domain, problem = candidates.loaded.domain, candidates.loaded.problems[0]
     used = _used(candidates.model) & problem.objects.keys()
     near: dict[str, set[str]] = {name: set() for name in used}

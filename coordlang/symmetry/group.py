@@ -221,10 +221,7 @@ class _Check:
         return states if self._under(renaming, states) == self._itself else None
 
     def _under(self, renaming: Renaming, states: Ints) -> tuple[Hashable, ...]:
-        """Robots, ground actions and tasks, as renamed.
-
-        Robots come with what idling costs them; joint actions name their robots.
-        """
+        """Robots with their idling costs, ground actions and tasks, as renamed."""
         model, image = self._model, _Image(renaming, self._model.codec.facts.atoms)
         robots = list(map(image.name, model.robots))
         kinds = model.robots if model.is_joint_action else model.idling_costs

@@ -10,10 +10,7 @@ NAME = "coordlang"
 
 
 def register(environment: Any = None) -> None:
-    """Add the engine to the factory of a unified-planning environment (default: the global one).
-
-    Twice does no harm.
-    """
+    """Add the engine to an environment's factory (default: the global one); twice does no harm."""
     from unified_planning.environment import get_environment
 
     factory = get_environment(environment).factory

@@ -319,10 +319,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         return found, task_language.plans_with(words), messages
 
     def _language_in(self, found: Translated) -> TaskLanguage:
-        """The language in this problem.
-
-        Texts are not compared, because the problem has none of its own.
-        """
+        """The language in this problem, which has no texts of its own to compare."""
         language = self._options.language
         assert language is not None
         hashes = ("sha256", "problem_sha256", "world_sha256")

@@ -146,10 +146,7 @@ class Cnf:
             yield f"c clause {clause}: reason {reason}"
 
     def refuted(self, solver: SolverName = "maplesat") -> bool:
-        """Whether the formula is unsatisfiable.
-
-        Decided by a solver and a loop that the builders do not use.
-        """
+        """Whether the formula is unsatisfiable, by a solver and a loop that builders do not use."""
         with sat_solver(solver, self.clauses) as sat:
             answer = None
             while answer is None:

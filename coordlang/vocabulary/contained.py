@@ -63,10 +63,7 @@ class ContainedInstance:
         return Partitions(self.states, self.languages.clauses, permutations)
 
     def refute(self, size: int, budget: Budget) -> Refutation | None:
-        """That so many words do not suffice; None if they do for this part.
-
-        Raises `Undecided` if the budget was not enough.
-        """
+        """That so many words do not suffice; None: they do here.  Raises `Undecided`."""
         partitions, languages = self._partitions, self.languages
         found = find(lambda most: partitions.find(size, most), languages.holds, budget)
         partitions.drop(size)

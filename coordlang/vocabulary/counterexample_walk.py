@@ -77,10 +77,7 @@ class CounterexampleWalk:
         self._choices, self._index = choices, EdgeIndex.of(choices.space)
 
     def failing(self, word: Ints, most: int, ways: int = 1) -> list[Counterexamples]:
-        """Those that differ at the fewest steps, and drawn ones; one table for a number of steps.
-
-        See `many_counterexamples`.
-        """
+        """One table for a number of steps: the fewest differences, and drawn ones."""
         space = self._choices.space
         if not self._choices.requires[space.starts].any():
             return []

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The paper's brute force: all partitions by increasing size, judged by the definition.
-
-For tiny inputs.
-"""
+"""The paper's brute force, for tiny inputs: all partitions by size, judged by the definition."""
 
 from __future__ import annotations
 

@@ -158,10 +158,7 @@ def largest_boxes(spaces: Sequence[PlanSpace]) -> Iterator[tuple[int, list[int] 
 
 
 def flexibility_bounds(spaces: Sequence[PlanSpace]) -> Floats:
-    """(tasks) an upper bound on E = sum_s n_s^2 / N under any language.
-
-    N where the task does not require coordination.
-    """
+    """(tasks) an upper bound on E (`Flexibility`) under any language; N where none is required."""
     bounds = [
         float(min(count, MANY)) if sizes is None else float(sum(sizes) / count)
         for count, sizes in largest_boxes(spaces)
@@ -170,10 +167,7 @@ def flexibility_bounds(spaces: Sequence[PlanSpace]) -> Floats:
 
 
 def _box_sizes(plans: Sequence[Plan]) -> list[int]:
-    """For each plan the size of the largest box with it.
-
-    Of all divisions of the robots the least size counts.
-    """
+    """For each plan the size of the largest box with it, the least over divisions of robots."""
     robots = len(plans[0][0])
     # With two robots both divisions are one table.
     divisions = range(robots) if robots > 2 else range(1)
@@ -221,10 +215,7 @@ def _table(plans: Sequence[Plan], robot: int) -> tuple[list[tuple[int, int]], li
 
 
 def _intersections(rows: Iterable[int]) -> set[int] | None:
-    """All intersections of rows but the empty one: the column sets of boxes that cannot grow.
-
-    None if there are too many.
-    """
+    """All intersections of rows but the empty one, boxes that cannot grow; None: too many."""
     found: set[int] = set()
     for row in sorted(set(rows)):
         found |= {row & other for other in found} | {row}

@@ -308,10 +308,7 @@ class MinimalSearch:
         return bounds != (self.lower, self.upper) or self.decide(size, budget)
 
     def decide(self, size: int, budget: Budget) -> bool:
-        """Find a language with ``size`` words, or prove that there is none.
-
-        False if the budget was not enough.
-        """
+        """Find a language of ``size`` words, or prove that there is none; False: not yet."""
         is_last = size == self.lower == self.upper - 1
         ties_first = not self._is_one_task and (is_last or size > self.lower)
         if ties_first and self._finds_tied(size, budget.rounds):

@@ -154,10 +154,7 @@ class Refuter:
         return known
 
     def violated(self, word: Ints) -> Mapping[Clause, Evidence]:
-        """Necessary clauses, some image of each of which a partition violates.
-
-        None if it is a language.
-        """
+        """Necessary clauses of which a partition violates some image; none if it is a language."""
         return self.pool.clauses(word, self.agreeing(word, enough=_ENOUGH), self._random)
 
     def _walk(self, walked: _Walked, word: Ints, steps: int) -> bool:

@@ -225,10 +225,7 @@ class _Repair:
         return self._languages.holds(partition)
 
     def _decide(self, new_words: int, budget: Budget) -> bool:
-        """Find a language with so many new words or prove that there is none.
-
-        False if the budget was not enough.
-        """
+        """Find a language with so many new words, or prove that there is none; False: not yet."""
         size = self._old_words + new_words
 
         def partition(conflicts: int) -> dict[int, int] | None:

@@ -57,10 +57,7 @@ def most_constrained_first(states: Iterable[int], clauses: Iterable[Clause]) -> 
 
 
 def clique(edges: Iterable[Pair]) -> list[int]:
-    """A large clique, the best that greedy search finds from any state.
-
-    Its states need words of their own.
-    """
+    """A large clique, by greedy search from any state: its states need words of their own."""
     near: dict[int, set[int]] = {}
     for a, b in sorted(edges):
         near.setdefault(a, set()).add(b)

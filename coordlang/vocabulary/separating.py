@@ -78,10 +78,7 @@ class _Search:
             self.best = partition
 
     def decide(self, size: int, budget: Budget) -> bool:
-        """Find a separating partition with ``size`` words, or prove that there is none.
-
-        False: not with this budget.
-        """
+        """Find a separating partition of a size, or prove that there is none; False: not yet."""
         known = self._source.known
         problems = self._problems
 

@@ -45,10 +45,7 @@ Labels = Sequence[str | None]
 
 @dataclass(frozen=True, slots=True)
 class Instance:
-    """A schema with arguments, and the robots that must choose it together.
-
-    ``name`` is what formulas call it.
-    """
+    """A schema with arguments, by ``name`` in formulas, and the robots that choose it together."""
 
     schema: Schema
     name: StepAtom
@@ -147,10 +144,7 @@ class Rules:
         return Instance(schema, StepAtom(schema.name, args), binding, owners)
 
     def _wrong_choice(self, chosen: Sequence[Instance | None]) -> str | None:
-        """Labels that no step may have.
-
-        Another robot's action, a shared action that not all its owners chose.
-        """
+        """Labels that no step may have: another robot's action, or a part of a shared one alone."""
         robots = self.team.robots
         for robot, action in enumerate(chosen):
             if action is None:

@@ -24,10 +24,7 @@ class TooManyError(Exception):
 
 
 def explicit(team: Selectors, model: JointModel, goal: Goal, step_cost: int, limit: int) -> Writer:
-    """One classical action per joint action.
-
-    One per case where it has disjunctions or conditional effects.
-    """
+    """One action per joint action, and case of its disjunctions and conditional effects."""
     out = Writer(model.codec.facts)
     for step in _joint_steps(team, limit):
         for known, adds, deletes in _cases_of(team, model, step):
@@ -49,10 +46,7 @@ def explicit(team: Selectors, model: JointModel, goal: Goal, step_cost: int, lim
 
 
 def _joint_steps(team: Selectors, limit: int) -> list[tuple[int, ...]]:
-    """The sets of actions that may share a step as far as owners and interference say.
-
-    `TooManyError` beyond a limit.
-    """
+    """Sets of actions that owners and interference allow; `TooManyError` beyond a limit."""
     partial: list[tuple[int, ...]] = [()]
     for robot, idling in enumerate(team.idling):
         first = [n for n, owners in enumerate(team.owners) if owners[0] == robot]
@@ -76,10 +70,7 @@ def _may_join(team: Selectors, number: int, step: Sequence[int]) -> bool:
 
 
 def _name(team: Selectors, step: Sequence[int]) -> str:
-    """Ground actions by their label tuple.
-
-    Ground actions of joint-action PDDL that do the same with the same labels are one.
-    """
+    """A joint action by its label tuple, the same for ground actions that do the same."""
     chosen = {robot: team.actions[n].label for n in step for robot in team.owners[n]}
     parts = next((team.actions[n].parts for n in step), ()) or [
         chosen.get(r) for r in range(len(team.names))
@@ -119,10 +110,7 @@ def _lookup(known: Known) -> Callable[[GroundLeaf], Formula]:
 def _split(
     known: Known, formulas: Sequence[Formula], conditions: Sequence[Formula]
 ) -> Iterator[dict[Atom, bool]]:
-    """Disjoint conjunctions that together say ``formulas`` and decide all ``conditions``.
-
-    Each is a conjunction of literals.
-    """
+    """Disjoint conjunctions of literals that say ``formulas`` and decide all ``conditions``."""
     found = known_literals(joined(And, (substituted(f, _lookup(known)) for f in formulas)))
     if found is None:
         return

@@ -53,10 +53,7 @@ _FULL = "See whether the disk of the temporary directory (TMPDIR) is full."
 
 
 class FastDownwardFailed(CoordlangError):
-    """Fast Downward gave no answer.
-
-    The cost that was to be checked is neither confirmed nor refuted.
-    """
+    """Fast Downward gave no answer: the cost is neither confirmed nor refuted."""
 
     exit_code = 3
 
@@ -103,10 +100,7 @@ def optimal_cost(
 
 
 def total_cost(classical: ClassicalTask) -> int | None:
-    """The total cost of an optimal plan by Fast Downward, None if there is no plan.
-
-    See `optimal_cost`.
-    """
+    """The total cost of an optimal plan by Fast Downward, None without one; see `optimal_cost`."""
     with postponed_signals() as signals, ExitStack() as ended:
         directory = _written(classical, ended)
         process = _started(directory)

@@ -48,10 +48,7 @@ def select_then_apply(team: Selectors, model: JointModel, goal: Goal, step_cost:
 
 
 def _of_selections(team: Selectors, model: JointModel) -> Callable[[GroundLeaf], Formula]:
-    """The meaning of leaves on the classical facts.
-
-    That a subaction is done means that its first owner has selected it.
-    """
+    """Leaves on the classical facts: a subaction is done if its first owner has selected it."""
     on_state = state_reader(model)
     who = {
         StepAtom(action.schema, action.args): selected(team, owners[0], action.label)

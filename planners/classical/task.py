@@ -32,10 +32,7 @@ _RESERVED = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class ClassicalAction:
-    """A ground STRIPS action with negative preconditions.
-
-    Facts by number, ``adds`` and ``deletes`` are disjoint.
-    """
+    """A ground STRIPS action with negative preconditions; disjoint ``adds`` and ``deletes``."""
 
     name: str
     preconditions: tuple[Condition, ...]
@@ -201,10 +198,7 @@ def _all_of(names: Sequence[str], conditions: Iterable[Condition]) -> str:
 
 
 def _safe_names(texts: Iterable[str]) -> list[str]:
-    """For each text a PDDL name of its own.
-
-    Letters, digits, ``-`` and ``_``, beginning with a letter.
-    """
+    """For each text a PDDL name of its own: letters, digits, ``-`` and ``_``, a letter first."""
     taken: dict[str, int] = defaultdict(int)
     used: set[str] = set()
     names = []

@@ -125,10 +125,7 @@ class Writer:
 
 
 def known_literals(formula: Formula) -> tuple[dict[Atom, bool], list[Formula]] | None:
-    """The values of facts that a ground formula demands, and its other conjuncts.
-
-    None if it contradicts itself at once.
-    """
+    """The facts' values that a ground formula demands, and the rest; None: a contradiction."""
     known: dict[Atom, bool] = {}
     rest: list[Formula] = []
     for part in conjuncts(formula):
@@ -148,10 +145,7 @@ def _ordered(atoms: Iterable[Atom]) -> list[Atom]:
 
 
 def own_fact(kind: str, *args: str) -> Atom:
-    """A fact of the compilation.
-
-    Its predicate contains a space, so that no name of the user's can be the same.
-    """
+    """A fact of the compilation, with a space in its predicate: no name of the user's has one."""
     assert " " in kind
     return Atom(kind, args)
 

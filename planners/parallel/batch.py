@@ -85,10 +85,7 @@ def code_hash(package: str) -> str:
 
 
 def digest(*parts: object) -> str:
-    """The SHA-256 of values, the same in every process.
-
-    Numbers, texts, arrays, ranges, None, and tuples of these.
-    """
+    """The SHA-256 of numbers, texts, arrays, ranges, None and tuples: the same in every process."""
     found = sha256()
     for part in parts:
         for chunk in _chunks(part):

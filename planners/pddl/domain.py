@@ -158,10 +158,7 @@ def _arities(found: Iterable[tuple[str, int]]) -> dict[str, frozenset[int]]:
 def _fields(
     item: Group, keys: Collection[str], form: str
 ) -> tuple[Token, dict[str, tuple[Expression, ...]]]:
-    """The name of a section, and what stands behind each keyword, in any order.
-
-    One expression each, but for ``:agent``.
-    """
+    """The name of a section, and one expression behind each keyword (several for ``:agent``)."""
     what = f"the name of the {item.head[1:]}"
     if len(item) < 2:
         raise item.fail(f"expected {what}", form)

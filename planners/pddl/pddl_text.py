@@ -18,10 +18,7 @@ _UNNAMED = re.compile(r"[^a-z0-9_-]+")
 
 
 def named_like(text: str) -> str:
-    """A text with the characters of PDDL names alone; empty if none is left.
-
-    It may begin with a digit, which no name does.
-    """
+    """A text with PDDL's characters alone, perhaps a digit first; empty if none is left."""
     return _UNNAMED.sub("-", text.lower()).strip("-")
 
 

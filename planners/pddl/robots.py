@@ -169,10 +169,7 @@ def _declared(domain: Domain, problem: Problem) -> tuple[tuple[str, ...], str] |
 def _possible_agents(
     domain: Domain, problem: Problem, agent: Variable, precondition: Formula
 ) -> tuple[str, ...]:
-    """The objects of the agent's type.
-
-    In untyped domains those that its static type predicates hold for.
-    """
+    """The objects of the agent's type, or, untyped, of its static type predicates."""
     objects = objects_of(domain, problem, agent.types)
     if agent.types != ("object",):
         return objects
@@ -248,10 +245,7 @@ def _detect(kinds: _Kinds) -> tuple[tuple[str, ...], str]:
 
 
 def _guessed(kinds: _Kinds, kind: str) -> tuple[tuple[str, ...], str]:
-    """The objects of the one type that every action takes, with a note.
-
-    Raises `BadInput` where they are unlikely to be robots.
-    """
+    """The objects of the one type that every action takes, noted; `BadInput` for unlikely ones."""
     domain, robots = kinds.domain, kinds.of(kind)
     first = [variable for schema in domain.schemas for variable in schema.parameters[:1]]
     doubt = None

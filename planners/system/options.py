@@ -65,10 +65,7 @@ class Option:
 
 
 def option(default: object, help: str, metavar: str | None = None, **more: Any) -> Any:
-    """A field of an options record.
-
-    ``more`` are attributes of `Option`, of which several names may be one text.
-    """
+    """A field of an options record; ``more`` is of `Option`, several names in one text."""
     read: dict[str, Any] = {k: tuple(v.split()) if type(v) is str else v for k, v in more.items()}
     return field(default=default, metadata={"option": Option(help, metavar, **read)})
 
