@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from planners.inspection import inspect
+from coordlang.commands.inspect import inspection
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import Options, Stepper, Steps
 from planners.joint.tables import Rows
@@ -55,7 +55,7 @@ TASK = """(define (problem p) (:domain pushing) (:objects r1 r2 - robot a b - pl
 
 
 def test_what_can_never_be_is_shown() -> None:
-    found = inspect(model_of(PUSHING, TASK))
+    found = inspection(model_of(PUSHING, TASK))
     assert found.impossible == ("carry", "melt")
     assert found.never == ("glows",)
     assert found.objects == {"heavy": 1, "place": 2, "robot": 2}
@@ -63,14 +63,14 @@ def test_what_can_never_be_is_shown() -> None:
 
 
 def test_formulas_are_shown_with_what_is_there() -> None:
-    assert inspect(model_of(PUSHING, TASK)).formulas == (
+    assert inspection(model_of(PUSHING, TASK)).formulas == (
         "(push r1 anvil a b) speaks of (push r2 anvil a b) in the same step",
         "(look r1 a) forbids (look r2 a) in the same step",
     )
     # The partner's places in the wrong order: it would have to push the other way from where the
     # anvil is not.
     misread = PUSHING.replace("(push ?o ?x ?from ?to)", "(push ?o ?x ?from ?from)")
-    shown = inspect(model_of(misread, TASK)).formulas
+    shown = inspection(model_of(misread, TASK)).formulas
     assert (
         "(push r1 anvil a b) speaks of (push r2 anvil a a), which no robot can ever do, in the same step"
         in shown
@@ -79,7 +79,7 @@ def test_formulas_are_shown_with_what_is_there() -> None:
 
 def test_the_goal_is_the_one_that_was_understood() -> None:
     assert (
-        inspect(model_of(PUSHING, TASK)).goal
+        inspection(model_of(PUSHING, TASK)).goal
         == "(forall (?x - heavy) (or (in ?x b) (not (seen a))))"
     )
 
@@ -116,7 +116,7 @@ def test_the_example_can_happen_in_random_models() -> None:
     for seed in range(60):
         text = random_model(seed, ("agent", "plain")[seed % 2])
         loaded = model_of(text.domain, text.problem, ModelOptions(unowned=text.unowned))
-        found = inspect(loaded)
+        found = inspection(loaded)
         if found.example is None:
             hidden += found.interfering > 0
             continue
