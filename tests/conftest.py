@@ -23,10 +23,7 @@ os.environ["COORDLANG_CACHE"] = "off"
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems() -> None:
-    """Let hypothesis draw nothing that stands in files of the packages.
-
-    Reading them takes five seconds in each process, and each change of the code gives other examples.
-    """
+    """Hypothesis draws nothing from the packages' files: it takes 5 s and varies with the code."""
     from hypothesis.internal.conjecture import providers
 
     if hasattr(providers, "_get_local_constants"):

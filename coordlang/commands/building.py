@@ -239,7 +239,9 @@ class Making:
     def job(self, options: MethodOptions, found: FirstDifferences | None = None) -> Job:
         """What words are to be found, for plans that part as ``found``; raises `Inseparable`."""
         if found is None:
-            most = _most_divergences(options.method, self.candidates)
+            # A method that begins without divergences gets some of those of one task.
+            begins_with = options.method in ("greedy", "separating")
+            most = inf if begins_with or self.candidates.count > 1 else _MIXTURES
             found = differences(self.candidates, self.workers, self.progress, most=most)
         return Job(
             self.candidates,
@@ -286,13 +288,6 @@ class Making:
             provenance = replace(provenance, tolerance=replace(tolerance, slack=slack))
         language = Language.of(partition, self.candidates.model, provenance)
         return Built(language, job, verdict, found, self.seconds, **more)
-
-
-def _most_divergences(method: str, candidates: Candidates) -> float:
-    """How many mixtures may be looked at for divergences: what begins without them gets some."""
-    if method in ("greedy", "separating"):
-        return inf
-    return _MIXTURES if candidates.count == 1 else inf
 
 
 @dataclass(frozen=True, slots=True)

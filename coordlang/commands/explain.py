@@ -41,6 +41,7 @@ from coordlang.language.sentences import (
     number_of_sentences,
     task_sentences,
 )
+from planners.joint.model import show
 from planners.search.plan_file import json_count
 from planners.search.plans import Plans
 from planners.system.messages import counted
@@ -82,7 +83,8 @@ class WordsExplained:
             "words": self.states,
             "default": self.used.language.default,
             "variables": [
-                {"name": v.name, "values": list(v.value_texts)} for v in self.mapped.variables
+                {"name": v.name, "values": [None if a is None else show(a) for a in v.values]}
+                for v in self.mapped.variables
             ],
             "formulas": {word: cover_data(cover) for word, cover in self.covers.items()},
             "told": {"in_order": self.descriptions.in_order, "rules": rules},

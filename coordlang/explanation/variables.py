@@ -15,7 +15,7 @@ from itertools import chain, combinations
 
 import numpy as np
 
-from planners.joint.model import JointModel, show
+from planners.joint.model import JointModel
 from planners.joint.tables import Bools, Ints, Rows, find_rows, unique_rows
 from planners.pddl.lifted import Atom
 
@@ -48,11 +48,6 @@ class Variable:
     def atoms(self) -> tuple[Atom, ...]:
         """The values without None."""
         return tuple(value for value in self.values if value is not None)
-
-    @property
-    def value_texts(self) -> tuple[str | None, ...]:
-        """The values as PDDL text."""
-        return tuple(None if value is None else show(value) for value in self.values)
 
 
 def valuation(model: JointModel, rows: Rows) -> tuple[tuple[Variable, ...], Ints]:

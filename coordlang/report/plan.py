@@ -280,7 +280,8 @@ def drawn_plan(data: Mapping[str, Any], heat: Heat | None) -> dict[str, Any]:
 
 def _spoken(data: Mapping[str, Any], names: Sequence[str], plan: FloorPlan) -> Any:
     """The words on a floor plan while the first thing is where it starts."""
-    if data["pair"] is None or _small_maps(len(names), is_grid=data["grid"]):
+    # Few places: the words are shown as small maps, one in each place, as far as one can read them.
+    if data["pair"] is None or len(names) <= (_MOST_CELLS if data["grid"] else _MOST_BOXES):
         return None
     (one, two), start = data["pair"]["things"], data["pair"]["start"]
     spots = [{"look": "unmapped", "title": name, "text": ""} for name in names]
@@ -295,8 +296,3 @@ def _spoken(data: Mapping[str, Any], names: Sequence[str], plan: FloorPlan) -> A
     lanes = [{"look": "passage", "title": f"{names[a]} – {names[b]}"} for a, b in plan.links]
     who = {"one": data["things"][one], "two": data["things"][two], "start": start}
     return {**who, "spots": spots, "lanes": lanes}
-
-
-def _small_maps(places: int, *, is_grid: bool) -> bool:
-    """Whether the words are shown as small maps, one in each place: as far as one can read them."""
-    return places <= (_MOST_CELLS if is_grid else _MOST_BOXES)

@@ -24,7 +24,6 @@ from coordlang.simulation.record import (
 from coordlang.simulation.robot import TICK, Message, Pace, Pose, Robot, Sensed, period
 from coordlang.simulation.simulator import POSITION_NOISE, WALL, Settings, Simulator
 from coordlang.simulation.team import Mission
-from coordlang.sites.coordinates import Point
 
 #: A run ends when no step has begun or ended for so many periods: nobody will move any more.
 _PATIENCE = 4
@@ -161,7 +160,8 @@ class _Going:
         self.simulator.tick(velocities)
         self.ticks += 1
         self._see_collisions()
-        apart = (math.dist(one, other) for one, other in combinations(self._middles(), 2))
+        middles = [self.simulator.pose(name)[:2] for name in self.robots]
+        apart = (math.dist(one, other) for one, other in combinations(middles, 2))
         self.nearest = min(self.nearest, *apart, math.inf)
 
     def record(self) -> RunRecord:
@@ -209,10 +209,6 @@ class _Going:
             self.wishes = [one for one in self.wishes if one not in wanted]
         visits = tuple(wish.visit for wish in wanted)
         return Sensed(self.time, (x, y, heading), ahead, heard, visits)
-
-    def _middles(self) -> list[Point]:
-        """Where the robots are."""
-        return [self.simulator.pose(name)[:2] for name in self.robots]
 
     def _see_collisions(self) -> None:
         touching = self.simulator.touching()

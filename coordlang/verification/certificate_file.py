@@ -168,7 +168,11 @@ def encode(clauses: Sequence[Clause], size: int) -> Cnf:
     counter = iter(range(1, 2**62))
     word = {state: tuple(islice(counter, size)) for state in states}
     separated = dict(zip(pairs, counter, strict=False))
-    one_word = [clause for own in word.values() for clause in _exactly_one(own)]
+    one_word = [
+        clause
+        for own in word.values()
+        for clause in (own, *((-a, -b) for a, b in combinations(own, 2)))
+    ]
     apart = [
         (-variable, -x, -y)
         for (a, b), variable in separated.items()
@@ -202,10 +206,6 @@ def states_of(clauses: Sequence[Clause]) -> list[int]:
     """The states that clauses speak of, the most constrained first."""
     states = {state for clause in clauses for two in clause for state in two}
     return list(most_constrained_first(sorted(states), clauses))
-
-
-def _exactly_one(variables: Sequence[int]) -> list[tuple[int, ...]]:
-    return [tuple(variables), *((-a, -b) for a, b in combinations(variables, 2))]
 
 
 def _words_in_order(

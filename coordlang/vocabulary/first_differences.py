@@ -87,7 +87,8 @@ def differences(
     goals = symmetric_goals(candidates)
     if goals is not None and isinstance(source, Explored):
         progress(f"looking at {len(goals.chosen):,} of {len(source.goals):,} goals, by symmetry")
-        source, spoken_for = source.only(goals.chosen), goals.spoken_for[goals.chosen]
+        source = source.only(goals.chosen)
+        spoken_for = np.bincount(goals.representative)[goals.chosen]
     portions = cut(source.efforts, portion)
     efforts = [float(source.efforts[own.start : own.stop].sum()) for own in portions]
     shared = source, spoken_for, 0 if model.hides_slack else most
@@ -203,11 +204,6 @@ class SymmetricGoals:
     def chosen(self) -> Ints:
         """The goals that speak for all, sorted."""
         return np.unique(self.representative)
-
-    @property
-    def spoken_for(self) -> Ints:
-        """(goals) for how many goals each speaks: 0 for those that are not chosen."""
-        return np.bincount(self.representative, minlength=len(self.representative))
 
     def images_of_states(self, states: Ints) -> Ints:
         """The images of states under all symmetries of the group, sorted."""

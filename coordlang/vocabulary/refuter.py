@@ -147,7 +147,7 @@ class Refuter:
                 break
             words = [word[self.pool.images[image]] for image in walked.images]
             different = {own.tobytes(): own for own in words}.values()
-            if any(self._walk(walked, own, steps) for own in different):
+            if any(self._add(walked, walked.failing(w, _LATER, steps)) for w in different):
                 known = self.pool.agreeing(word, images, enough)
                 assert known, "plans that a walk has found are known"
                 self._parts.insert(0, self._parts.pop(number))
@@ -156,10 +156,6 @@ class Refuter:
     def violated(self, word: Ints) -> Mapping[Clause, Evidence]:
         """Necessary clauses of which a partition violates some image; none if it is a language."""
         return self.pool.clauses(word, self.agreeing(word, enough=_ENOUGH), self._random)
-
-    def _walk(self, walked: _Walked, word: Ints, steps: int) -> bool:
-        """Add failing plans with one sentence to the pool; whether there are any."""
-        return self._add(walked, walked.failing(word, _LATER, steps))
 
     def _add(self, walked: _Walked, found: Sequence[Counterexamples]) -> bool:
         """Add what a walk has found; whether that is anything."""

@@ -211,7 +211,11 @@ class _AlphaOrBeta(_Alpha):
         ]
 
     def _new_images(self, constraint: Constraint) -> Iterator[Constraint]:
-        for image in (constraint, *(_image(constraint, to) for to in self._permutations)):
+        moved = (
+            _ordered(frozenset(pair(to[a], to[b]) for a, b in pairs) for pairs in constraint)
+            for to in self._permutations
+        )
+        for image in (constraint, *moved):
             if image not in self._met:
                 self._met.add(image)
                 yield image
@@ -241,12 +245,6 @@ def constraints(differences: Iterable[tuple[Difference, Difference]]) -> Iterato
 def _ordered(alternatives: Iterable[Clause]) -> Constraint:
     """Alternatives in one order, so that equal constraints are equal."""
     return tuple(sorted(alternatives, key=sorted))
-
-
-def _image(constraint: Constraint, permutation: Sequence[int]) -> Constraint:
-    return _ordered(
-        frozenset(pair(permutation[a], permutation[b]) for a, b in pairs) for pairs in constraint
-    )
 
 
 def _dsatur(states: Sequence[int], edges: Iterable[Pair]) -> dict[int, int]:

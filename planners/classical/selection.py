@@ -178,7 +178,8 @@ class _SelectThenApply:
         ``first`` is the first owner of what is selected: robots that wait for another selection of
         this one forbid it.  ``late``: something of it is left for later stages.
         """
-        waiting = {self._waits(caller, robot): caller == first for caller in self._callers(robot)}
+        callers = sorted({own[0] for own in self._team.owners if robot in own} - {robot})
+        waiting = {self._waits(caller, robot): caller == first for caller in callers}
         name, known = f"choose {self._team.names[robot]} {label}", {**known, **waiting}
         cost += self._step_cost if robot == 0 else 0
         here, following = self._choosing[robot], self._choosing[robot + 1 :]
@@ -200,10 +201,6 @@ class _SelectThenApply:
     def _waits(self, caller: int, robot: int) -> Atom:
         """The caller has selected an action that this robot has to select too."""
         return own_fact("waits for", self._team.names[caller], self._team.names[robot])
-
-    def _callers(self, robot: int) -> list[int]:
-        owners = [own for own in self._team.owners if robot in own]
-        return sorted({own[0] for own in owners if own[0] != robot})
 
     def _none_left(self, stage: str, robot: int) -> Atom:
         return own_fact(f"nothing left to {stage}", self._team.names[robot])

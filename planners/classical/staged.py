@@ -85,16 +85,6 @@ class StagedAction:
         """Whether something is checked after the selection."""
         return self.checks != TRUE or bool(self.groups)
 
-    @property
-    def may_add(self) -> set[Atom]:
-        """The atoms that it adds in some step."""
-        return self.adds.union(*(adds for _, (adds, _) in self.groups))
-
-    @property
-    def may_delete(self) -> set[Atom]:
-        """The atoms that it deletes in some step; not those that it always adds."""
-        return self.deletes.union(*(deletes for _, (_, deletes) in self.groups)) - self.adds
-
     def has(self, stage: str) -> bool:
         """Whether there is something to do in a stage, one of `STAGES`."""
         return {"check": self.has_checks, "undo": bool(self.early), "apply": True}[stage]
@@ -115,12 +105,13 @@ def staged_actions(
     actions = tuple(StagedAction(team, number, value) for number in range(len(team.actions)))
     adders: dict[Atom, set[int]] = defaultdict(set)
     for action in actions:
-        for atom in action.may_add:
+        for atom in action.adds.union(*(adds for _, (adds, _) in action.groups)):
             adders[atom].add(action.number)
     for action in actions:
+        may_delete = action.deletes.union(*(deletes for _, (_, deletes) in action.groups))
         action.early = frozenset(
             atom
-            for atom in action.may_delete
+            for atom in may_delete - action.adds
             if any(
                 other == action.number or actions[other].robot != action.robot
                 for other in adders[atom] - team.clashes[action.number]

@@ -131,7 +131,8 @@ def read_bytes(path: str | Path, *, most: int = MAX_TEXT) -> bytes:
         return data
     position = Position(str(path))
     try:
-        size = _decompressed_size(data, most)
+        # Counted to a little more than ``most``; nothing of it is kept.
+        size = sum(map(len, _pieces(_unzipped(data), most)))
         _require_size(size, most, position)
         return _unzipped(data).read(size)
     except (OSError, EOFError, zlib.error) as error:
@@ -222,11 +223,6 @@ def require_seen(name: str, position: Position, what: str = "name") -> None:
             position=position,
             remedy="Names and words hold no control characters and none that cannot be seen.",
         )
-
-
-def _decompressed_size(data: bytes, most: int) -> int:
-    """The size of what gzip compressed, counted to a little more than ``most``; nothing is kept."""
-    return sum(len(piece) for piece in _pieces(_unzipped(data), most))
 
 
 def _unzipped(data: bytes) -> IO[bytes]:

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every field of every kind of file, edited: a verdict is true of the edited file, or refused.
-
-What is true is found by listing plans and mixing them (`tests.support.naive`).
-"""
+"""Every field of every file edited: a verdict is true of the edited file (as naive), or refused."""
 
 from __future__ import annotations
 
@@ -73,9 +70,7 @@ def edits(data: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[str | int, A
 
 
 def others(key: object, value: Any, words: tuple[str, ...]) -> list[Any]:
-    """Other values of its type: of texts a robot or a number for another one, another order (as of
-    a hash), less and more text.
-    """
+    """Other values of its type: another robot or number, order (as of a hash), less, more text."""
     found: list[Any] = []
     match value:
         case bool():
@@ -202,10 +197,7 @@ def require_true_repair(built: Outcome, path: Path) -> None:
 def require_true_use(
     data: dict[str, Any], found: Outcome, value: Callable[[dict[Any, str]], object]
 ) -> None:
-    """What a command says of the own task: covered only if the plans of each sentence mix in it.
-
-    Or, with a warning, if the file claims no more.
-    """
+    """The own task is covered only if its sentences' plans mix, or the file claims no more."""
     if found.code in _REFUSED:
         return
     assert found.code in (0, 1), found.err

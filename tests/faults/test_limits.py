@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Inputs that are too large, in size, time or digits: the right answer, or the documented end.
-
-One table line for each run under a limit is printed (``-s``).
-"""
+"""Inputs too large in size, time or digits: right, or the documented end; ``-s`` has a table."""
 
 from __future__ import annotations
 

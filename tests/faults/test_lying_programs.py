@@ -60,10 +60,7 @@ def _lying(random: Random) -> type:
 def test_a_false_refutation_is_not_told(
     coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, world: str, certified: bool
 ) -> None:
-    """Exit code 0 with a certificate that holds, or an error with every file as it was.
-
-    Without a certificate, too, a contradiction is an error: no bound is above the size.
-    """
+    """Code 0 with a certificate that holds, or an error with every file as it was."""
     language, proof = tmp_path / "language.json", tmp_path / "proof.json"
     outputs = ("-o", language, *(("--certificate", proof) if certified else ()))
     build = ("build", *files(world), "--tasks", "all", "--method", "minimal", "--jobs", 1, *outputs)

@@ -26,10 +26,7 @@ from tests.fuzz.mutations import places
 
 
 def choices_file(length: int = 3, cells: int = 4) -> dict[str, Any]:
-    """The data of a choices file of one robot, which goes around a ring and may wait once.
-
-    States 2k - 1 and 2k are those after k steps in which it has waited already, or not yet.
-    """
+    """A robot's choices: around a ring, with one wait; states 2k - 1, 2k: it has waited, or not."""
     states: list[dict[str, Any]] = []
     for step, waited in [(0, 0), *((step, it) for step in range(1, length + 1) for it in (1, 0))]:
         cell, following = (step - waited) % cells, {}

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""PDDL that others wrote, read where it lies, against independent reference numbers (its README has
-the table), and against the table of docs/pddl.md.
-"""
+"""PDDL that others wrote, against independent reference numbers and the table of docs/pddl.md."""
 
 from __future__ import annotations
 

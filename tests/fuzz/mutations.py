@@ -44,10 +44,7 @@ def renamed(text: str, names: dict[str, str]) -> str:
 
 
 def edit_tokens(text: str, random: Random) -> str:
-    """One to three tokens are left out, doubled or, if they are words, replaced by another word.
-
-    The parentheses stay balanced in most cases.
-    """
+    """Leave out, double or replace (words) up to three tokens; mostly parentheses stay balanced."""
     tokens = tokens_of(text)
     for _ in range(random.choice((1, 1, 1, 2, 3))):
         seen = [n for n, t in enumerate(tokens) if t.strip() and t[0] != ";"]

@@ -153,10 +153,7 @@ def complaint(m: Mutant, outcome: Outcome, left: set[str]) -> str | None:
 def fuzz(
     numbers: Iterable[int], seed: int, sources: Sequence[Pair], *, keep: Path
 ) -> tuple[Counter[tuple[str, int]], list[str]]:
-    """Run mutants and judge them: how often each command ended with each code, and what was wrong.
-
-    The files of failures go to ``keep``.
-    """
+    """How often each command ended with each code on mutants, and what was wrong (in ``keep``)."""
     codes: Counter[tuple[str, int]] = Counter()
     failures = []
     for number in numbers:

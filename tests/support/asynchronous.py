@@ -287,10 +287,7 @@ def random_tasks(robots: int, seeds: range) -> Iterator[tuple[PlanSpace, World, 
 def random_plans(
     robots: int, seeds: range, most: int
 ) -> Iterator[tuple[World, PlanSpace, Plans, PlanSpace, Random]]:
-    """Tasks of random models, in step, with plans up to timing, and their graph.
-
-    Without those that have more than so many plans in step, or that change by themselves.
-    """
+    """Random tasks, their plans up to timing, and their graph; not those with too many plans."""
     for space, world, tasks, random in random_tasks(robots, seeds):
         for task in tasks:
             own = space.with_tasks(space.starts[[task]], space.second[[task]])
@@ -302,11 +299,7 @@ def random_plans(
 
 
 class Plans:
-    """The plans of a task up to timing.
-
-    ``states`` has for the parts of each the states that the plan passes which does everything as
-    soon as possible.
-    """
+    """Plans up to timing; ``states``: for the parts of each those passed as soon as possible."""
 
     def __init__(self, world: World, space: PlanSpace, task: int, most: int) -> None:
         best: dict[Parts, tuple[tuple[tuple[int, ...], ...], tuple[int, ...]]] = {}

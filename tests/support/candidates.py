@@ -162,9 +162,7 @@ def steps_of(space: PlanSpace) -> Steps:
 
 
 def first_break(steps: Steps, robots: int, starts: list[int], *, together: bool) -> int | None:
-    """The least step after which a mixture of plans from one of the nodes begins no optimal plan;
-    with ``together`` of plans in the same states only.
-    """
+    """The step at which a mixture from a node breaks; ``together``: of plans in the same states."""
     layer, step = {((start,) * robots, start) for start in starts}, 0
     seen = {*layer}
     while layer:

@@ -57,10 +57,7 @@ def choices_in(domain: str, problem: str) -> SentenceChoices:
 def random_choices(
     robots: int, seeds: range
 ) -> Iterator[tuple[World, Plans, list[Parts], SentenceChoices, Random]]:
-    """Sentences of random models whose states have one of two words at random.
-
-    Each with all plans of its task, its own plans, and the robots' choices.
-    """
+    """Sentences of random models, two words at random: all plans, own plans, robots' choices."""
     for world, space, plans, made, random in random_plans(robots, seeds, 40):
         word = {state: random.randrange(2) for state in range(len(space.rows))}
         table = Partition.of_states(space.rows, word)

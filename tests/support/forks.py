@@ -45,10 +45,7 @@ class Fork:
 
 
 def fork(work: Callable[[], object]) -> Fork:
-    """Do the work in a fork; its exit code is that of `SystemExit`, or 0, or 70 for an error.
-
-    What it says must fit into a pipe (64 kB).
-    """
+    """Work in a fork: exit code of `SystemExit`, 0, or 70 for an error; it may say up to 64 kB."""
     out, err = os.pipe(), os.pipe()
     pid = os.fork()
     if pid:

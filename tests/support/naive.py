@@ -136,10 +136,7 @@ def failure(space: PlanSpace, task: int, word: Sequence[int] | None, most: int) 
 
 
 def plans_by_sentence(task_language: TaskLanguage) -> dict[tuple[str, ...], set[Plan]]:
-    """All optimal plans of the task by their sentences, at most 1,000.
-
-    The words are looked up in the language's own list of states.  Raises `TooLarge`.
-    """
+    """All optimal plans, at most 1,000, by sentence, by the listed states.  Raises `TooLarge`."""
     space, language = task_language.space, task_language.language
     keys = [space.model.codec.key(row) for row in space.rows]
     words = [language.states.get(key, language.default) for key in keys]
@@ -170,12 +167,7 @@ def warping_clause(
 def separation_clause(
     sequences: Sequence[Sequence[int]], word: Mapping[int, int] | Sequence[int]
 ) -> Clause | None:
-    """The clause of a failing tuple of plans.
-
-    The union of warping paths from the first to each other one.
-
-    None if not all of them have one sentence.
-    """
+    """The union of warping paths from a failing tuple's first plan; None if sentences differ."""
     clause: set[Pair] = set()
     for other in sequences[1:]:
         pairs = warping_clause(sequences[0], other, word)

@@ -67,10 +67,7 @@ def holds(conditions: Sequence[tuple[int, bool]], state: PlainState) -> bool:
 def successors(
     plain: ClassicalTask,
 ) -> Callable[[PlainState], Iterator[tuple[int, int, PlainState]]]:
-    """Of a state the (action number, cost, next state) of all actions that apply.
-
-    An action is looked at only where the first fact that it needs is true.
-    """
+    """Each (action number, cost, next state); actions are looked at by the first fact they need."""
     by_fact = defaultdict(list)
     for n, action in enumerate(plain.actions):
         needs = frozenset(fact for fact, positive in action.preconditions if positive)

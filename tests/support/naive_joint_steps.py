@@ -43,10 +43,7 @@ class TooLarge(Exception):
 
 
 class Twin:
-    """Brute force over one problem, with a memory of the states already expanded.
-
-    ``budget`` bounds the tuples of subactions tried, over all states; beyond it, `TooLarge`.
-    """
+    """Brute force over one problem that remembers states; beyond ``budget`` tuples, `TooLarge`."""
 
     def __init__(
         self, domain: Domain, problem: Problem, team: Team, budget: int = 1_000_000

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Markdown pages as data: code blocks, headings, tables, links; their blocks are run, and their
-output is compared with what the page shows.
-"""
+"""Markdown pages as data: blocks, headings, tables, links; blocks are run and outputs compared."""
 
 from __future__ import annotations
 

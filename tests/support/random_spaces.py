@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random models of all kinds (STRIPS with two and three robots, MA-PDDL, plain and joint actions),
-and plan spaces of their tasks, small enough for the walks that are twins.
-"""
+"""Random models of all kinds and plan spaces of their tasks, small enough for their twins."""
 
 from __future__ import annotations
 
@@ -34,10 +32,7 @@ MOST = {2: 3_000, 3: 250, 4: 60}
 
 @lru_cache(500)
 def candidates_of(seed: int, robots: int | None) -> Candidates | None:
-    """Those of a seed, of any kind if ``robots`` is None; None where they are refused, or large.
-
-    Many files use the same ones, which are made once in a process.
-    """
+    """Those of a seed, once in a process (``robots`` None: any kind); None if refused or large."""
     random = Random(seed)
     try:
         if robots is None:
@@ -94,10 +89,7 @@ def blind_search(model: JointModel, task: PlanningTask) -> PlanSpace:
 def random_spaces(
     seeds: range, robots: int | None, most: int | None = None
 ) -> Iterator[tuple[Candidates, PlanSpace]]:
-    """Plan spaces of random candidate tasks, of at most ``most`` nodes.
-
-    ``most`` None: as many as the walk is waited for; ``robots`` None: models of any kind.
-    """
+    """Plan spaces of random tasks, of ``most`` nodes (None: many); ``robots`` None: any kind."""
     for seed in seeds:
         found = candidates_of(seed, robots)
         if found is None:

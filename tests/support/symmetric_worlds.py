@@ -30,9 +30,7 @@ def world(cells: int, edges: list[tuple[int, int]], robots: int) -> str:
 
 
 def state_symmetries(candidates: Candidates) -> set[tuple[int, ...]]:
-    """All permutations of the state numbers that are symmetries, without the identity: actions go
-    to actions, states to states, tasks to tasks.
-    """
+    """All symmetric permutations of states but the identity: of actions, states and tasks."""
     model, spaces = candidates.model, candidates.spaces
     keys = [frozenset(model.codec.decode(row)) for row in candidates.rows]
     number = {key: n for n, key in enumerate(keys)}

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Languages in tasks: of shipped worlds, built or the paper's own, and of random models; and what a
-naive twin lists of each of their sentences.
-"""
+"""Languages in tasks, shipped or random, and what a naive twin lists of each of their sentences."""
 
 from __future__ import annotations
 

@@ -35,10 +35,7 @@ REMEDIED = (1, 2, 11, 22, 23, 31, 32, 34)
 
 @pytest.fixture
 def shell(coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Shell:
-    """``shell(line, code, *said)`` runs a command, and checks its exit code and what it says.
-
-    Names of `FILES` stand for two files.
-    """
+    """``shell(line, code, *said)`` runs a command; names of `FILES` stand for two files."""
     monkeypatch.chdir(tmp_path)
 
     def call(line: str, code: int = 0, *said: str) -> Outcome:

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A language for plans within slack from its making to its use: every command follows or refuses.
-
-No answer calls plans optimal that are not.
-"""
+"""A language for plans within slack, from making to use: nothing calls such plans optimal."""
 
 from __future__ import annotations
 

@@ -131,9 +131,7 @@ def test_text_and_pddl() -> None:
 
 
 def test_conditions_of_sets_of_values() -> None:
-    """Not excluding the others, where "none of them" is one of the others; and text that says which
-    are excluded.
-    """
+    """Exclusions where "none of them" is a value; and text that says which are excluded."""
     atoms = tuple(Atom("at", ("b", place)) for place in "xyz")
     places = tuple(("at(b)", place) for place in "xyz")
     carried = Variable("at(b)", (*atoms, None), (*places, ("at(b)", "none")))

@@ -40,9 +40,7 @@ BOTH = pytest.mark.parametrize("lot", ["few", pytest.param("many", marks=pytest.
 
 @cache
 def tasks(lot: str) -> tuple[TaskLanguage, ...]:
-    """Tasks with random words: of random models, of joint actions, of remembered actions; and one
-    with a language in which "w0" and "w0 w2 w1 w0" are both said.
-    """
+    """Random models of all kinds, words at random; one says both "w0" and "w0 w2 w1 w0"."""
     found = [*task_languages("t-map", "problem", everything=False)]
     found += [u for robots in (2, 3) for _, _, u in random_task_languages(robots, NUMBER[lot])]
     for name, remember in product(("grid-joint/three-cells", "handover/one-door"), (True, False)):

@@ -138,9 +138,7 @@ def test_a_robots_options_are_its_own_subplans(open_page: Opener) -> None:
 
 @pytest.mark.thorough
 def test_choosing_for_a_robot(open_page: Opener) -> None:
-    """Every mixture of the robots' choices is optimal: over and over with other choices of the
-    others.  With all optimal plans open (a language of one word) some mixture breaks.
-    """
+    """Every mixture of the robots' choices is optimal; with all plans open some mixture breaks."""
     page = open_page(make_world("grid", "three-robots-3x3", None).report.html).page
     page.click("[data-mode='0']")
     assert page.evaluate("taskView.sentence") >= 0  # being a robot needs a sentence: one was chosen

@@ -134,10 +134,7 @@ def test_a_count_that_takes_too_long_is_given_up() -> None:
 
 
 def breaks(candidates: Candidates, space: PlanSpace, found: Miscoordination) -> None:
-    """The plans are optimal, the mixture is theirs, and with its last step it is no optimal plan.
-
-    The independent plan checker agrees where the task is the problem's own.
-    """
+    """Optimal plans whose mixture breaks in its last step; own tasks: the plan checker agrees."""
     model = space.model
     mixed = [numbers(model, step) for step in found.mixture]
     (start,) = {states[0] for states in found.states}

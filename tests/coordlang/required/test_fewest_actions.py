@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The plans with the fewest actions are cut out of the plan space of the least makespan; what is
-said of them is what a search under that cost finds.
-"""
+"""The plans with the fewest actions, cut out of the space, against a search under that cost."""
 
 from __future__ import annotations
 

@@ -138,10 +138,7 @@ SIGNS = """(define (domain signs) (:types robot place sign)
 
 
 def test_a_renaming_that_changes_what_an_action_needs_is_no_symmetry() -> None:
-    """Two ways around; where a sign is posted one robot at a time may come.
-
-    Signs are in no fact and in no action.
-    """
+    """Two ways around; by a sign, which no fact or action names, robots come one at a time."""
     domain = parse_domain(Source("signs", SIGNS))
     text = """(define (problem p) (:domain signs) (:objects r1 r2 - robot a b c d - place s - sign)
       (:init (at r1 a) (at r2 a) (way a c) (way a d) (way c b) (way d b) {})

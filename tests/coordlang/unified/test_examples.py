@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All example problems of unified-planning itself: what is not supported is refused, and what is
-solved is compared with Fast Downward and with unified-planning's own validator.
-"""
+"""unified-planning's own examples: refused, or as Fast Downward and its own validator say."""
 
 from __future__ import annotations
 

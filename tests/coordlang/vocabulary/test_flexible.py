@@ -140,9 +140,7 @@ def test_flexible_is_best_by_trying_all() -> None:
 
 
 def largest(plans: list[Plan], robot: int, robots: int) -> list[int]:
-    """For each plan the most plans, it among them, of which every two mix when the robot follows one
-    of them and all others the other one; all sets are tried.
-    """
+    """For each plan the most plans, with it, of which every two mix; all sets are tried."""
 
     def mixes(one: Plan, other: Plan) -> bool:
         return naive.mixture(tuple(one if n == robot else other for n in range(robots))) in plans

@@ -87,10 +87,7 @@ def test_against_the_theorem(
     asynchronous: bool,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Least sizes with and without beta, and the order of the four methods.
-
-    With all constraints written down, and with constraints asked of the walk.
-    """
+    """Least sizes with and without beta, the order of the methods; constraints written or asked."""
     if not written:
         monkeypatch.setattr(DifferenceWalk, "every", lambda *_: None)
     seen: Counter[tuple[int, ...]] = Counter()

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Words of a kind: languages are found, nothing is proved by not finding one; and where the kinds
-come from: abstractions of states, and classes that a few facts decide.
-"""
+"""Words of a kind: languages are found, nothing is proved by finding none; how kinds are made."""
 
 from __future__ import annotations
 

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rules of joint steps, kept and broken by plans made by hand; more of them in docs/pddl.md,
-whose examples ask the checker, too."""
+"""The rules of joint steps, kept and broken by plans made by hand; docs/pddl.md has more."""
 
 from __future__ import annotations
 

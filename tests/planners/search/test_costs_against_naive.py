@@ -62,10 +62,7 @@ def priced(seed: int, kind: Kind) -> tuple[PlanningInstance, Price]:
 
 
 def step_price(twin: Twin, price: Price) -> Callable[[Labels], int]:
-    """What a joint step costs: each subaction once, and the robots that idle.
-
-    Idling costs as much as the robot's cheapest action that is idling, else nothing.
-    """
+    """Each subaction once; idling costs as the robot's cheapest action that is idling, or 0."""
     rules = twin.rules
     found: list[list[int]] = [[] for _ in rules.team.robots]
     for schema in filter(twin.is_idling, rules.domain.schemas):
