@@ -72,29 +72,21 @@ _COMMANDS = (
 )
 #: Module -> the public names that it defines.
 _DEFINED_IN = {
-    **{f"coordlang.commands.{name}": (name,) for name in _COMMANDS},
-    "coordlang.commands.lift": ("lift", "ground"),
-    "coordlang.commands.sentences": ("say", "understand", "plan"),
-    "coordlang.commands.inputs": ("load", "load_language"),
-    "coordlang.commands.domains": ("import_site",),
-    "coordlang.language.words": ("Language",),
-    "coordlang.execution.monitor": (
-        "EventMonitor",
-        "Monitor",
-        "MonitorError",
-        "NotAllowed",
-        "NotPossible",
-    ),
-    "coordlang.execution.task_language": ("NoPlanFits",),
-    "coordlang.execution.plan_sentence": ("NotAPlan", "NotOptimal"),
-    "coordlang.required.miscoordination": ("Inseparable",),
-    "planners.system.errors": (
-        *("CoordlangError", "Refuted", "UsageError", "ProvedImpossible", "OutOfMemory"),
-        *("OutOfTime", "BadInput", "Unsupported"),
-    ),
-    "planners.system.limits": ("time_limit",),
+    **{f"coordlang.commands.{name}": name for name in _COMMANDS},
+    "coordlang.commands.lift": "lift ground",
+    "coordlang.commands.sentences": "say understand plan",
+    "coordlang.commands.inputs": "load load_language",
+    "coordlang.commands.domains": "import_site",
+    "coordlang.language.words": "Language",
+    "coordlang.execution.monitor": "EventMonitor Monitor MonitorError NotAllowed NotPossible",
+    "coordlang.execution.task_language": "NoPlanFits",
+    "coordlang.execution.plan_sentence": "NotAPlan NotOptimal",
+    "coordlang.required.miscoordination": "Inseparable",
+    "planners.system.errors": "CoordlangError Refuted UsageError ProvedImpossible OutOfMemory "
+    "OutOfTime BadInput Unsupported",
+    "planners.system.limits": "time_limit",
 }
-_MODULE_OF = {name: module for module, names in _DEFINED_IN.items() for name in names}
+_MODULE_OF = {name: module for module, names in _DEFINED_IN.items() for name in names.split()}
 
 __all__ = [*_MODULE_OF, "__version__"]
 

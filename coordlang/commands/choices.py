@@ -14,9 +14,17 @@ from typing import Any
 import msgspec
 
 from coordlang.commands.inputs import Arguments, InTask, public, robot_number
-from coordlang.commands.layout import alike, columns, fitted
 from coordlang.commands.records import ChoicesOptions, File
-from coordlang.commands.terminal import REFUTED, covered_code, echo, line_width, write
+from coordlang.commands.terminal import (
+    REFUTED,
+    alike,
+    columns,
+    covered_code,
+    echo,
+    fitted,
+    line_width,
+    write,
+)
 from coordlang.commands.witness import witness_text
 from coordlang.execution import choices as execution
 from coordlang.execution.choices import RobotChoices, SentenceChoices, to_bytes

@@ -10,9 +10,8 @@ from statistics import mean
 from typing import Any
 
 from coordlang.commands.inputs import Arguments, extended, public
-from coordlang.commands.layout import WIDTH, fitted
 from coordlang.commands.records import CoordinationOptions
-from coordlang.commands.terminal import note_single_robot, show_answer
+from coordlang.commands.terminal import WIDTH, fitted, note_single_robot, show_answer
 from coordlang.commands.witness import witness_data, witness_text
 from coordlang.language.provenance import percent
 from coordlang.required.failure import Failures

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 
 from coordlang.commands.inputs import Arguments, public
-from coordlang.commands.layout import WIDTH, columns
 from coordlang.commands.records import WRITTEN, InspectOptions
-from coordlang.commands.terminal import echo, line_width, note_single_robot
+from coordlang.commands.terminal import WIDTH, columns, echo, line_width, note_single_robot
 from planners.grounding.instantiate import idling_schemas
 from planners.joint.interference import footprint
 from planners.joint.model import JointModel, show

@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from coordlang.commands.layout import HELD, WIDTH, alike
+from coordlang.commands.terminal import HELD, WIDTH, alike
 from coordlang.required.miscoordination import Miscoordination, Step
 from planners.joint.model import IDLE, NO_FACT
 from planners.joint.states import split_atoms

@@ -48,22 +48,12 @@ _SHOWN, _REFUSED = 200, 100
 class Executive:
     """One robot's executive.
 
-    Parameters
-    ----------
-    robot, others
-        The names.
-    run
-        Names what all must have alike: domain, task and words.
-    agreement
-        On which sentence.
-    monitor_of
-        The robot's choices under a sentence.
-    silent_after
-        Seconds after which a robot that says nothing is named to the driver.
-
-    ``lines`` are for the driver, oldest first; whoever writes them takes them away.  ``life`` is
-    another number for every process that ever is this robot.  ``random`` draws what to do; without
-    it the robot does as little as it may, and keeps most open.  So many messages were ``sent``.
+    ``run`` names what all must have alike (domain, task and words), ``monitor_of`` has the robot's
+    choices under a sentence; after ``silent_after`` seconds a robot that says nothing is named to
+    the driver.  ``lines`` are for the driver, oldest first; whoever writes them takes them away.
+    ``life`` is another number for every process that ever is this robot.  ``random`` draws what to
+    do; without it the robot does as little as it may, and keeps most open.  So many messages were
+    ``sent``.
     """
 
     def __init__(

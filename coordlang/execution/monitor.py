@@ -115,13 +115,7 @@ class Monitor:
     (None, '(move r1 a b)')
     >>> monitor.did("(move r1 a b)")                        # doctest: +SKIP
 
-    Parameters
-    ----------
-    data
-        The data of a choices file.
-    robot
-        Whose choices; needed where the file has several.
-
+    ``data`` is that of a choices file, ``robot`` whose choices, needed where the file has several.
     Raises `MonitorError` for data that is no choices file, or that contradicts itself.
     """
 

@@ -41,30 +41,14 @@ def words_of_states(partition: Assignment, states: int) -> Ints:
 class Job:
     """A partition to find.
 
-    Attributes
-    ----------
-    candidates
-        The tasks that it is for.
-    states
-        Those on optimal plans, by their numbers in ``candidates.rows``.
-    first_differences
-        Where coordination is required, and how plans that introduce RC part.
-    incumbent
-        A partition that is known to be a language: what an anytime method returns in the worst
-        case.
-    seed
-        Of whatever is drawn at random.
-    alpha_only
-        For `separating`: separate plans where they part, never where they meet.
-    effort
-        For `best`: what it may spend, in thousands of conflicts of the solver.
-    progress
-        Called with a line of text now and then.
-    check
-        Verifies a partition by definition, and raises if it is no language.  An anytime method
-        calls it for every better one that it finds: when it is stopped there is no time left.
-    workers
-        Who does what can be done beside the method's own work.
+    ``states`` are those on optimal plans, by their numbers in the rows of the ``candidates``;
+    ``first_differences`` says where coordination is required, and how plans that introduce RC part;
+    ``incumbent`` is known to be a language: what an anytime method returns in the worst case.
+    ``alpha_only`` is for `separating`: plans are separated where they part, never where they meet;
+    ``effort`` for `best`: what it may spend, in thousands of conflicts of the solver.  ``progress``
+    is called with a line of text now and then.  ``check`` verifies a partition by definition, and
+    raises if it is no language; an anytime method calls it for every better one that it finds:
+    when it is stopped there is no time left.  ``workers`` do what can be done beside the method.
     """
 
     candidates: Candidates

@@ -105,12 +105,8 @@ def best(job: Job) -> Outcome:
 def refuting_clauses(job: Job, size: int) -> Mapping[Clause, Evidence]:
     """Necessary clauses that no partition into ``size`` words satisfies together.
 
-    Not anytime: it takes as long as the proof takes.
-
-    Raises
-    ------
-    ValueError
-        If there is a language with so few words.
+    Not anytime: it takes as long as the proof takes.  Raises `ValueError` if there is a language
+    with so few words.
     """
     with closing(MinimalSearch(replace(job, incumbent=None))) as search:
         budget = Budget()
@@ -124,14 +120,8 @@ def refuting_clauses(job: Job, size: int) -> Mapping[Clause, Evidence]:
 class MinimalSearch:
     """Closes in on the least number of words.
 
-    Attributes
-    ----------
-    lower, refuting
-        So many words are proved to be needed, and why.
-    best
-        The language with the fewest words so far, None before there is one.
-    work
-        The conflicts of the solver, refuted partitions counted as some.
+    ``lower`` words are proved to be needed, and ``refuting`` says why; ``best`` is the language
+    with the fewest words so far, None before there is one.
     """
 
     def __init__(self, job: Job, effort: int | None = None) -> None:
@@ -260,7 +250,7 @@ class MinimalSearch:
 
     @property
     def work(self) -> int:
-        """What was done so far."""
+        """What was done so far: the conflicts of the solver, refuted partitions counted as some."""
         if "languages" not in self.__dict__:
             return 0
         rounds = self.languages.rounds + self._merges // _MERGES

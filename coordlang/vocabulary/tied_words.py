@@ -50,15 +50,10 @@ _TOGETHER, _CONFLICTS = 8, 250
 class _Ties:
     """What the words of a kind have in common.
 
-    Attributes
-    ----------
-    classes
-        (states) the class of each state: those of one class share a word.
-    stutter_free
-        The plans of the one task whose steps all enter other words, None if they need not.
-    clauses
-        Those of refuted partitions, of one task whatever the number of words: (clauses, pairs)
-        codes ``a * states + b``, -1 for no pair.
+    ``classes`` (states): those of one class share a word.  ``stutter_free``: the plans of the one
+    task whose steps all enter other words, None if they need not.  ``clauses``: those of refuted
+    partitions, of one task whatever the number of words: (clauses, pairs) codes ``a * states + b``,
+    -1 for no pair.
     """
 
     classes: Ints
@@ -67,20 +62,7 @@ class _Ties:
 
 
 class TiedWords:
-    """Looks for languages among such partitions, with effort that grows from call to call.
-
-    Parameters
-    ----------
-    job
-        What they are for.
-    languages
-        Tells what is wrong with a partition.
-
-    Attributes
-    ----------
-    conflicts
-        Those of the solvers so far on kinds that stayed undecided.
-    """
+    """Looks for languages among such partitions, with effort that grows from call to call."""
 
     def __init__(self, job: Job, languages: Languages) -> None:
         self._states, self._languages = np.array(job.states), languages
@@ -91,6 +73,7 @@ class TiedWords:
         self._first = _OF_ONE if self._is_one_task else _OF_MANY
         self._tied: list[_Ties] = []
         self._untied = self._classes(job)
+        #: Those of the solvers so far on kinds that stayed undecided.
         self.conflicts = 0
         #: Of each number of words the kinds that are undecided, and how many were looked at.
         self._kinds: dict[int, deque[_Kind]] = {}
@@ -196,16 +179,10 @@ class TiedWords:
 class _Kind:
     """One kind of partitions into a number of words.
 
-    Attributes
-    ----------
-    ties
-        What they have in common.
-    first
-        (states) the first state that has the same word, of those that need one.
-    images
-        Of some symmetries those after which ``first`` is not the same.
-    problem, effort, rounds
-        The partitions that are left, what may be spent on them, and those refuted so far.
+    ``ties`` are what they have in common, ``first`` (states) the first state that has the same
+    word, of those that need one, ``images`` of some symmetries those after which that is not the
+    same.  ``problem`` has the partitions that are left; ``effort`` may be spent on them, and
+    ``rounds`` of them are refuted so far.
     """
 
     def __init__(

@@ -10,7 +10,7 @@ from functools import cache
 
 import pytest
 
-from planners.classical import selection, staged
+from planners.classical import selection
 from planners.joint.tables import Rows
 from planners.loading import PlanningInstance
 from planners.pddl.model_options import Cost, ModelOptions, Unowned
@@ -206,7 +206,7 @@ def written(way: str) -> Iterator[None]:
     """Let select-then-apply be written in one of `WAYS`."""
     with pytest.MonkeyPatch.context() as patch:
         if way == "nothing at once":
-            patch.setattr(staged, "_may_be_at_once", lambda *_: False)
+            patch.setattr(selection, "_may_be_at_once", lambda *_: False)
         if way == "tidied":
             patch.setattr(selection, "_MANY", -1)
         yield

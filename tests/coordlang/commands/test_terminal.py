@@ -15,7 +15,7 @@ import pytest
 
 import coordlang as door
 from coordlang.commands import terminal
-from coordlang.commands.layout import WIDTH, columns, fitted, wrapped
+from coordlang.commands.terminal import WIDTH, columns, fitted, wrapped
 from coordlang.commands.witness import witness_text
 from planners.joint.states import split_atoms
 from tests.support.command import Command, Outcome, on_a_terminal
