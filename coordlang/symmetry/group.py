@@ -279,21 +279,18 @@ class _Image:
         )
 
 
-def symmetries_of_part(
-    space: PlanSpace, end: Ints, proposed: Iterable[Renaming], largest: int = LARGEST_GROUP
-) -> SymmetryGroup:
+def symmetries_of_part(space: PlanSpace, end: Ints, proposed: Iterable[Renaming]) -> SymmetryGroup:
     """The group of those proposed renamings that map a part of a plan space onto itself.
 
     Each is checked on the edges of the part themselves (Proposition 20 of docs/concepts.md).
 
     ``end`` (goals) is the state that each goal is, -1 for a goal of the whole that the part does
     not have.  The ``proposed`` renamings have the same names.  Of a group with more than
-    ``largest`` elements, the identity among them, a subgroup is taken.  States outside the part
-    stay.
+    `LARGEST_GROUP` elements a subgroup is taken.  States outside the part stay.
     """
     part = _Part(space, end)
     checked = (part.symmetry(renaming) for renaming in proposed)
-    return SymmetryGroup(tuple(generated((s for s in checked if s is not None), largest)))
+    return SymmetryGroup(tuple(generated((s for s in checked if s is not None), LARGEST_GROUP)))
 
 
 class _Part:
