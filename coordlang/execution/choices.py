@@ -93,14 +93,12 @@ def choices(task_language: TaskLanguage, words: Sequence[int], most: int = MOST)
     space = mixtures.space if mixtures and not model.is_asynchronous else None
     truth = [] if space is None else facts_at_nodes(space)
     robots = []
-    for robot in range(len(model.robots)):
+    for robot, own in enumerate(subplans):
         exact = None
         with suppress(OutOfMemory):  # the combinations are checked all the same
             exact = space and determinise(space, robot, truth, most)
         robots.append(
-            RobotChoices(robot, exact, "exact")
-            if exact
-            else knowing_own(fits, robot, subplans[robot])
+            RobotChoices(robot, exact, "exact") if exact else knowing_own(fits, robot, own)
         )
     return SentenceChoices(task_language, tuple(words), fits, tuple(robots), mixtures)
 

@@ -41,16 +41,10 @@ def domain_text(domain: Domain) -> str:
 
 def problem_text(problem: Problem, domain: Domain) -> str:
     """A problem of ``domain`` as PDDL text; the domain's constants are left out."""
-    objects = {
-        name: types
-        for name, types in problem.objects.items()
-        if domain.constants.get(name) != types
-    }
-    init = sorted(label(atom.predicate, atom.args) for atom in problem.init)
-    init += sorted(
-        f"(= {label(atom.predicate, atom.args)} {value:g})"
-        for atom, value in problem.values.items()
-    )
+    known = domain.constants
+    objects = {name: own for name, own in problem.objects.items() if known.get(name) != own}
+    init = sorted(map(formula_text, problem.init))
+    init += sorted(f"(= {formula_text(atom)} {value:g})" for atom, value in problem.values.items())
     lines = [
         f"(define (problem {problem.name})",
         f"  (:domain {domain.name})",
@@ -103,11 +97,7 @@ def _action(schema: Schema) -> list[str]:
         agent, parameters = f"    :agent {declaration(parameters[0])}", parameters[1:]
     effects = [_effect(effect) for effect in schema.effects]
     if schema.cost is not None:
-        cost = (
-            schema.cost
-            if isinstance(schema.cost, int)
-            else label(schema.cost.predicate, schema.cost.args)
-        )
+        cost = schema.cost if isinstance(schema.cost, int) else formula_text(schema.cost)
         effects.append(f"(increase (total-cost) {cost})")
     return [
         f"  (:action {schema.name}",
@@ -124,7 +114,7 @@ def _part(template: tuple[str, ...] | None) -> str:
 
 
 def _effect(effect: Effect) -> str:
-    atom = label(effect.atom.predicate, effect.atom.args)
+    atom = formula_text(effect.atom)
     text = atom if effect.adds else label("not", (atom,))
     if effect.condition != TRUE:
         text = label("when", (_condition(effect.condition), text))

@@ -111,10 +111,8 @@ def _found(domain: Domain, problem: Problem, choice: ModelOptions) -> tuple[tupl
         return declared
     if choice.names:
         if missing := [name for name in choice.names if name not in problem.objects]:
-            name, remedy = (
-                missing[0],
-                f"Objects: {', '.join(sorted(problem.objects, key=natural))}.",
-            )
+            name = missing[0]
+            remedy = f"Objects: {', '.join(sorted(problem.objects, key=natural))}."
             if not choice.recorded:
                 raise UsageError(f"--robots: there is no object {echoed(name)}", remedy=remedy)
             what = f"the language file's robot {echoed(name)} is no object of the problem"
