@@ -240,9 +240,7 @@ def _started(
     robots = []
     for name, start in starts.items():
         graph = min(lane.graph for lane in building.lanes if start in (lane.start, lane.end))
-        lanes = nx.DiGraph((lane.start, lane.end) for lane in building.lanes if lane.graph == graph)
-        reached = frozenset({start, *nx.descendants(lanes, start)})
-        robots.append(Robot(name, start, graph, reached))
+        robots.append(Robot(name, start, graph, _reached(building, start, graph)))
     return robots
 
 
@@ -298,3 +296,9 @@ def _require_apart(
 
 def _too_near(one: Place, other: Place, clearance: float) -> bool:
     return one is other or clash(staying(one), staying(other), clearance)
+
+
+def _reached(building: Building, start: str, graph: int) -> frozenset[str]:
+    """Where the lanes of a graph lead from a place that is on some of them."""
+    lanes = nx.DiGraph((lane.start, lane.end) for lane in building.lanes if lane.graph == graph)
+    return frozenset({start, *nx.descendants(lanes, start)})

@@ -180,8 +180,7 @@ def _of_division(plans: Sequence[Plan], robot: int) -> list[int]:
     cells, rows = _table(plans, robot)
     maximal = _intersections(rows)
     if maximal is None:
-        # What the rows with a column share with one of them: no box with this cell is larger.
-        return [sum((rows[r] & own).bit_count() for own in rows if own & c) for r, c in cells]
+        return [_shared(rows, *cell) for cell in cells]
 
     def size(columns: int) -> int:
         return sum(row & columns == columns for row in rows) * columns.bit_count()
@@ -191,6 +190,11 @@ def _of_division(plans: Sequence[Plan], robot: int) -> list[int]:
         next(n for n, columns in boxes if columns & column and not columns & ~rows[row])
         for row, column in cells
     ]
+
+
+def _shared(rows: Sequence[int], row: int, column: int) -> int:
+    """What the rows with a column share with one of them: no box with this cell is larger."""
+    return sum((rows[row] & other).bit_count() for other in rows if other & column)
 
 
 def _table(plans: Sequence[Plan], robot: int) -> tuple[list[tuple[int, int]], list[int]]:

@@ -98,6 +98,16 @@ class StagedAction:
         """Whether something is checked after the selection."""
         return self.checks != TRUE or bool(self.groups)
 
+    @property
+    def may_add(self) -> set[Atom]:
+        """The atoms that it adds in some step."""
+        return self.adds.union(*(adds for _, (adds, _) in self.groups))
+
+    @property
+    def may_delete(self) -> set[Atom]:
+        """The atoms that it deletes in some step; not those that it always adds."""
+        return self.deletes.union(*(deletes for _, (_, deletes) in self.groups)) - self.adds
+
     def has(self, stage: str) -> bool:
         """Whether there is something to do in a stage, one of `STAGES`."""
         return {"check": self.has_checks, "undo": bool(self.early), "apply": True}[stage]
@@ -118,13 +128,12 @@ def staged_actions(
     actions = tuple(StagedAction(team, number, value) for number in range(len(team.actions)))
     adders: dict[Atom, set[int]] = defaultdict(set)
     for action in actions:
-        for atom in action.adds.union(*(adds for _, (adds, _) in action.groups)):
+        for atom in action.may_add:
             adders[atom].add(action.number)
     for action in actions:
-        may_delete = action.deletes.union(*(deletes for _, (_, deletes) in action.groups))
         action.early = frozenset(
             atom
-            for atom in may_delete - action.adds
+            for atom in action.may_delete
             if any(
                 other == action.number or actions[other].robot != action.robot
                 for other in adders[atom] - team.clashes[action.number]
@@ -344,8 +353,7 @@ class _SelectThenApply:
         ``first`` is the first owner of what is selected: robots that wait for another selection of
         this one forbid it.  ``late``: something of it is left for later stages.
         """
-        callers = sorted({own[0] for own in self._team.owners if robot in own} - {robot})
-        waiting = {self._waits(caller, robot): caller == first for caller in callers}
+        waiting = {self._waits(caller, robot): caller == first for caller in self._callers(robot)}
         name, known = f"choose {self._team.names[robot]} {label}", {**known, **waiting}
         cost += self._step_cost if robot == 0 else 0
         here, following = self._choosing[robot], self._choosing[robot + 1 :]
@@ -367,6 +375,10 @@ class _SelectThenApply:
     def _waits(self, caller: int, robot: int) -> Atom:
         """The caller has selected an action that this robot has to select too."""
         return own_fact("waits for", self._team.names[caller], self._team.names[robot])
+
+    def _callers(self, robot: int) -> list[int]:
+        owners = [own for own in self._team.owners if robot in own]
+        return sorted({own[0] for own in owners if own[0] != robot})
 
     def _none_left(self, stage: str, robot: int) -> Atom:
         return own_fact(f"nothing left to {stage}", self._team.names[robot])
