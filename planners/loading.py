@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from planners.grounding.actions import GroundAction, apply_network, impossible_actions
 from planners.grounding.instantiate import FEWER, ground_actions, ground_goal, idling_costs
@@ -28,6 +28,9 @@ from planners.pddl.robots import (
 from planners.system.errors import BadInput, Position, UsageError
 from planners.system.limits import reaching
 from planners.system.messages import echoed
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 #: The texts of a robot's labels, idling first.
 Labels = tuple[str, ...]

@@ -10,7 +10,6 @@ import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from importlib import import_module
-from pathlib import Path
 from typing import Any, get_args, get_origin
 
 import click
@@ -189,13 +188,16 @@ def _files(
     These no output may overwrite: arguments, what is read beside them, those of options.
     """
     outputs: list[OutputFile] = []
-    read = [*arguments, *(str(Path(path).parent / "coordinates.json") for path in arguments)]
+    folders = {os.path.dirname(path) for path in arguments}
+    read = [*arguments, *(os.path.join(each, "coordinates.json") for each in sorted(folders))]
     makes_folder = getattr(options, "writes_folder", True)
     for each, value in given:
         paths = [*map(str, value)] if isinstance(value, tuple) else [str(value)]
         if each.is_output:
             outputs += _outputs(each, paths, each.files if makes_folder else ())
         elif each.name == "factored":
+            from pathlib import Path
+
             read += map(str, Path(paths[0]).glob("*.pddl"))
         elif _names_file(each):
             read += paths

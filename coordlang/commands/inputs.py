@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import functools
 import inspect
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from os import PathLike, fspath
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from coordlang.commands import records as given
@@ -349,9 +349,10 @@ def read_coordinates_of(
         return read_coordinates(fspath(given))
     if given is not None:
         return checked(given, Position("the coordinates"))
-    file = Path(problem.source.name)
-    beside = (file if file.is_dir() else file.parent) / "coordinates.json"
-    return read_coordinates(beside) if file.exists() and beside.is_file() else {}
+    name = problem.source.name
+    folder = name if os.path.isdir(name) else os.path.dirname(name)
+    beside = os.path.join(folder, "coordinates.json")
+    return read_coordinates(beside) if os.path.exists(name) and os.path.isfile(beside) else {}
 
 
 def note_size(candidates: Candidates) -> None:

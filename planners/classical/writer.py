@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from planners.classical.task import ClassicalAction, Condition, Known
 from planners.joint.model import FullState, Goal, JointModel
 from planners.pddl.formula_tree import GroundLeaf, conjuncts, negated, signed, substituted
-from planners.pddl.lifted import FALSE, And, Atom, Formula, Not, Or
+from planners.pddl.lifted import FALSE, And, Atom, Formula, Junction, Not
 
 
 class Writer:
@@ -70,7 +70,7 @@ class Writer:
         right, as in a programming language, so that there is one way in every state, and the size
         is linear.
         """
-        if isinstance(formula, And | Or) and formula.parts:
+        if isinstance(formula, Junction) and formula.parts:
             if isinstance(formula, And) and otherwise is None:
                 self._route_conjunction(name, formula, start, end, known, gain)
                 return

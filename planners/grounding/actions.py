@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from itertools import chain, combinations, islice, product
+from typing import NamedTuple
 
 from planners.pddl.formula_tree import conjuncts, label, negated, required_atoms
 from planners.pddl.lifted import (
@@ -28,8 +29,7 @@ from planners.pddl.model_options import Cost
 from planners.pddl.robots import Team, fluent_predicates, objects_of
 
 
-@dataclass(frozen=True, slots=True)
-class GroundEffect:
+class GroundEffect(NamedTuple):
     """``atom`` becomes true (``adds``) or false if ``condition`` holds before the step."""
 
     atom: Atom
@@ -76,8 +76,7 @@ class GroundAction:
         return self.label if robot in self.owners else None
 
 
-@dataclass(frozen=True, slots=True)
-class Impossible:
+class Impossible(NamedTuple):
     """An action of a robot that needs an atom which nothing makes true.
 
     ``atom`` has variables where no object would do; ``is_fluent``: actions of others can change

@@ -36,6 +36,7 @@ from planners.pddl.lifted import (
     Exists,
     Forall,
     Formula,
+    Junction,
     Not,
     Or,
     Problem,
@@ -281,7 +282,7 @@ class _Grounder:
             return _truth((atom in self._statics) == positive)
         if isinstance(f, Not):
             return self.formula(f.part, binding, not positive, acting)
-        if isinstance(f, And | Or):
+        if isinstance(f, Junction):
             kind = And if isinstance(f, And) == positive else Or
             ground = (self.formula(part, binding, positive, acting) for part in f.parts)
             return joined(kind, ground)

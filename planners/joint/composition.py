@@ -16,7 +16,7 @@ from planners.joint.model import Options, Stepper, Steps, products
 from planners.joint.states import StateCodec
 from planners.joint.tables import Bools, Ints, Numbers, Rows, differs, ranges, spans
 from planners.pddl.formula_tree import conjuncts, formula_text, joined, signed, substituted
-from planners.pddl.lifted import FALSE, And, Atom, Formula, Or, StepAtom, Truth
+from planners.pddl.lifted import FALSE, And, Atom, Formula, Junction, StepAtom, Truth
 from planners.pddl.model_options import Cost
 from planners.system.errors import BadInput, OutOfMemory, Position
 from planners.system.limits import memory_left, more_memory
@@ -281,7 +281,7 @@ def _by_value(items: Ints, values: Numbers) -> list[Ints]:
 
 def _enough(formula: Formula) -> Formula:
     """What of the state makes a formula in negation normal form true, whatever the step is."""
-    if isinstance(formula, And | Or):
+    if isinstance(formula, Junction):
         return joined(type(formula), map(_enough, formula.parts))
     return FALSE if isinstance(signed(formula)[0], StepAtom) else formula
 

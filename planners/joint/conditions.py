@@ -15,7 +15,7 @@ from planners.grounding.actions import GroundAction, GroundEffect
 from planners.joint.states import FactTable, StateCodec, TrueFacts, test_bits
 from planners.joint.tables import Bools, Ints, Numbers, Rows, ranges
 from planners.pddl.formula_tree import Compound, Leaf, conjuncts, fold, literals, signed
-from planners.pddl.lifted import TRUE, And, Atom, Formula, Not, Or, StepAtom, Truth
+from planners.pddl.lifted import TRUE, And, Atom, Formula, Junction, Not, StepAtom, Truth
 
 Labels = NDArray[np.int32]
 
@@ -54,7 +54,7 @@ class Evaluator:
         def compound(kind: Compound, parts: Iterator[Bools]) -> Bools:
             if isinstance(kind, Not):
                 return ~next(parts)
-            assert isinstance(kind, And | Or), "a quantifier in a ground formula"
+            assert isinstance(kind, Junction), "a quantifier in a ground formula"
             if isinstance(kind, And):
                 return reduce(np.logical_and, parts, np.ones(count, np.bool_))
             return reduce(np.logical_or, parts, np.zeros(count, np.bool_))

@@ -4,9 +4,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -18,8 +17,7 @@ from planners.pddl.lifted import FALSE, Atom, Formula, StepAtom, Truth
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
-class Footprint:
+class Footprint(NamedTuple):
     """What an action touches, as the interference rule reads it.
 
     Every literal left after grounding counts as required, also inside disjunctions and effect
@@ -127,7 +125,7 @@ class Choices:
         self.actions = actions
         #: The labels of subactions with more than one owner.
         self.shared = [n for n, a in enumerate(actions) if a and len(a.owners) > 1]
-        self._labels: dict[str, dict[Leaf, list[int]]] = {f: {} for f in Footprint.__slots__}
+        self._labels: dict[str, dict[Leaf, list[int]]] = {f: {} for f in Footprint._fields}
         for number, action in enumerate(actions):
             if action:
                 own = footprint(action, frozenset((_name(action),)))

@@ -80,7 +80,7 @@ class PlanningTask:
     position: Position | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Steps:
     """Joint steps out of a table of states, sorted by source and labels.
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -234,8 +234,7 @@ def test_bits(rows: Rows, which: Ints, facts: Ints) -> Bools:
     return (blocks >> (facts % _BLOCK_BITS).astype(np.uint64) & np.uint64(1)).astype(np.bool_)
 
 
-@dataclass(frozen=True, slots=True)
-class TrueFacts:
+class TrueFacts(NamedTuple):
     """The facts that are true in each row of a table, in order, CSR."""
 
     first: Ints

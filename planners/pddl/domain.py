@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 from itertools import chain
-from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 from planners.pddl.formula_tree import step_atoms
 from planners.pddl.formulas import read_effects, read_formula
@@ -36,6 +36,9 @@ from planners.pddl.sexpr import Expression, Group, Source, Token, first_text, pa
 from planners.system.files import require_seen
 from planners.system.limits import reaching
 from planners.system.messages import echoed
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 #: What an action looks like.
 _FORM = "As in (:action move :parameters (?r - robot ?to - place) :precondition .. :effect ..)."
@@ -185,8 +188,7 @@ def _fields(
     return name, fields
 
 
-@dataclass(frozen=True, slots=True)
-class _Head:
+class _Head(NamedTuple):
     """An action as far as formulas of others need it: what a literal about it has to look like."""
 
     item: Group

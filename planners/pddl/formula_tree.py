@@ -18,8 +18,10 @@ from planners.pddl.lifted import (
     Exists,
     Forall,
     Formula,
+    Junction,
     Not,
     Or,
+    Quantified,
     Schema,
     StepAtom,
     Term,
@@ -70,12 +72,12 @@ def _collect(
     formula: Formula, positive: bool, found: list[tuple[Atom | StepAtom | Equal, bool]]
 ) -> None:
     """Append the literals; every ground action is taken apart so, hence no `fold`."""
-    if isinstance(formula, And | Or):
+    if isinstance(formula, Junction):
         for part in formula.parts:
             _collect(part, positive, found)
     elif isinstance(formula, Not):
         _collect(formula.part, not positive, found)
-    elif isinstance(formula, Forall | Exists):
+    elif isinstance(formula, Quantified):
         _collect(formula.part, positive, found)
     elif not isinstance(formula, Truth):
         found.append((formula, positive))
@@ -131,7 +133,7 @@ def joined(kind: type[And] | type[Or], parts: Iterable[Formula]) -> Formula:
         if isinstance(part, Truth):
             if part.value != neutral:
                 return FALSE if neutral else TRUE
-        elif isinstance(part, And | Or) and isinstance(part, kind):
+        elif isinstance(part, kind):
             kept.update(dict.fromkeys(part.parts))
         else:
             kept[part] = None
@@ -149,7 +151,7 @@ def substituted(formula: Formula, value: Callable[[GroundLeaf], Formula]) -> For
     def compound(kind: Compound, parts: Iterator[Formula]) -> Formula:
         if isinstance(kind, Not):
             return negated(next(parts))
-        assert isinstance(kind, And | Or), "a quantifier in a ground formula"
+        assert isinstance(kind, Junction), "a quantifier in a ground formula"
         return joined(type(kind), parts)
 
     return fold(formula, leaf, compound)
@@ -177,7 +179,7 @@ def _leaf_text(leaf: Leaf) -> str:
 
 def _compound_text(compound: Compound, parts: Iterator[str]) -> str:
     declared = []
-    if isinstance(compound, Forall | Exists):
+    if isinstance(compound, Quantified):
         declared = [f"({' '.join(map(declaration, compound.variables))})"]
     return label(type(compound).__name__.lower(), (*declared, *parts))
 

@@ -65,33 +65,42 @@ class Not:
 
 
 @dataclass(frozen=True, slots=True)
-class And:
+class Junction:
+    """A conjunction or disjunction of some parts."""
+
+    parts: tuple[Formula, ...]
+
+
+class And(Junction):
     """Conjunction; true without parts."""
 
-    parts: tuple[Formula, ...]
+    __slots__ = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Or:
+class Or(Junction):
     """Disjunction; false without parts."""
 
-    parts: tuple[Formula, ...]
+    __slots__ = ()
 
 
 @dataclass(frozen=True, slots=True)
-class Forall:
-    """Universal quantification over typed variables."""
+class Quantified:
+    """A formula for all or for some values of typed variables."""
 
     variables: tuple[Variable, ...]
     part: Formula
 
 
-@dataclass(frozen=True, slots=True)
-class Exists:
-    """Existential quantification over typed variables."""
+class Forall(Quantified):
+    """Universal quantification."""
 
-    variables: tuple[Variable, ...]
-    part: Formula
+    __slots__ = ()
+
+
+class Exists(Quantified):
+    """Existential quantification."""
+
+    __slots__ = ()
 
 
 Formula = Truth | Atom | StepAtom | Equal | Not | And | Or | Forall | Exists

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from planners.pddl.formulas import NUMBER, read_formula
 from planners.pddl.lifted import Atom, Domain, Formula, Problem
@@ -12,6 +12,9 @@ from planners.pddl.names import Names, Sections, read_header, read_objects
 from planners.pddl.sexpr import Group, Source, Token, parse, read_source
 from planners.system.limits import reaching
 from planners.system.messages import echoed
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 def read_problem(path: str | Path, domain: Domain) -> Problem:

@@ -10,12 +10,15 @@ import re
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
+from typing import TYPE_CHECKING
 from unicodedata import normalize
 
 from planners.system.errors import BadInput, Position, Unsupported
 from planners.system.files import not_utf8, read_stored_bytes, require_seen
 from planners.system.messages import UNSEEN, echoed
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 #: A byte that is not UTF-8, as Python's ``surrogateescape`` decodes it.
 _NOT_DECODED = re.compile("[\udc80-\udcff]")
@@ -24,9 +27,6 @@ MAX_DEPTH = 200
 
 #: What begins the comments that are read: they say a robot's part of a joint action.
 SUBACTION = "subaction"
-
-#: A character that no name may hold, and that separates no names.
-_UNSEEN_IN_NAME = re.compile(rf"(?!\s){UNSEEN.pattern}")
 
 #: A variable may follow a name without a space, as in ``(aircraft?a)``.
 _TOKEN = re.compile(r";[^\n\r]*|[()]|\?*[^\s();?]+|\?+")
@@ -264,11 +264,11 @@ def _require_plain_names(source: Source) -> None:
     Such as ``ß`` and ``ss``, the sign for Kelvin and ``k``, or an accent in one or two characters:
     people would take them for one name, and programs now for one, now for two.
     """
-    if source.text.isascii() and not _UNSEEN_IN_NAME.search(source.text):
+    if source.text.isascii() and "".join(source.text.split()).isprintable():
         return
     names = [(m[0], m.start()) for m in _TOKEN.finditer(source.text) if m[0][0] != ";"]
     for name, offset in names:
-        if UNSEEN.search(name):
+        if re.search(UNSEEN, name):
             require_seen(name, source.position(offset))
     seen: dict[str, str] = {}
     for name, offset in names:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from planners.grounding.actions import GroundAction
 from planners.joint.conditions import split_condition
@@ -33,8 +33,7 @@ def goal_facts(model: JointModel, goal: Goal) -> frozenset[int]:
     return frozenset(index[atom] for atom in required_atoms(goal) if atom in index)
 
 
-@dataclass(frozen=True, slots=True)
-class FactsOf:
+class FactsOf(NamedTuple):
     """What a ground action reads and writes, as facts by number, as far as that is certain.
 
     It ``needs`` facts to be true, and in any case ``adds`` some and ``deletes`` others; each of the

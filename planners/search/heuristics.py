@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -46,8 +46,7 @@ def heuristic(bound: Bound, model: JointModel, goal: Goal, init: Rows) -> Values
     return value
 
 
-@dataclass(frozen=True, slots=True)
-class Heuristic:
+class Heuristic(NamedTuple):
     """What a search for all optimal plans is bounded by; ``name`` is what messages call it.
 
     Where nothing is known (``value`` None) all states are searched, in one round.  ``in_time``
@@ -129,8 +128,7 @@ def relaxed(model: JointModel, goal: Goal) -> Values:
     return value
 
 
-@dataclass(frozen=True, slots=True)
-class _RelaxedReach:
+class _RelaxedReach(NamedTuple):
     """The ways in which facts that a goal needs come true, sorted by that fact.
 
     Way k needs ``need[first_need[k] : first_need[k + 1]]``; fact ``made[m]`` has the ways from
@@ -197,8 +195,7 @@ class _RelaxedReach:
         return there
 
 
-@dataclass(frozen=True, slots=True)
-class _OwnVariable:
+class _OwnVariable(NamedTuple):
     """A variable that one robot alone changes.
 
     ``distance`` (facts) is the distance of each value, 0 for other facts; ``after`` (labels) that

@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +20,8 @@ from planners.search.plan_space import PlanSpace
 from planners.system.errors import CoordlangError, note
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from planners.parallel.batch import Store, Table
 
 #: The version of the tables: those of another one are never looked at, and go in time.
@@ -64,8 +65,12 @@ def default_folder(environment: Mapping[str, str] = os.environ) -> Path | None:
     in ``~/.cache``.
     """
     chosen = environment.get("COORDLANG_CACHE", "")
+    if chosen.lower() == "off":
+        return None
+    from pathlib import Path
+
     if chosen:
-        return None if chosen.lower() == "off" else Path(chosen)
+        return Path(chosen)
     base = environment.get("XDG_CACHE_HOME", "")
     with suppress(RuntimeError):
         # By its specification a relative path is ignored.

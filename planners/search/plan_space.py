@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,8 +25,7 @@ from planners.joint.tables import Bools, Ints, Rows, kept_runs, ranges
 _NO_WAY = np.iinfo(np.int64).max // 4
 
 
-@dataclass(frozen=True, slots=True)
-class LayerEdges:
+class LayerEdges(NamedTuple):
     """All edges out of the nodes of one layer.
 
     ``edges`` are their numbers, one after another; ``source`` and ``target`` (edges) the nodes.
@@ -36,8 +36,7 @@ class LayerEdges:
     target: Ints
 
 
-@dataclass(frozen=True, slots=True)
-class UnfoldingStep:
+class UnfoldingStep(NamedTuple):
     """The edges from one layer of an unfolding to the next (`PlanSpace.from_layers`).
 
     ``source`` numbers nodes of the upper layer, ``target`` of the lower one; ``edge`` is the edge
@@ -49,7 +48,7 @@ class UnfoldingStep:
     target: Ints
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class PlanSpace:
     """The optimal plans of one or several tasks as paths of one layered graph.
 

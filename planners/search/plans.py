@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
-from random import Random
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -197,6 +196,8 @@ class Plans:
 
     def sample(self, number: int, seed: int) -> Iterator[Plan]:
         """Plans drawn uniformly and independently; the same seed draws the same plans."""
+        from random import Random
+
         random = Random(seed)
         for _ in range(number):
             yield self.unrank(random.randrange(self.count))

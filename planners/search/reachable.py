@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import partial
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +60,7 @@ class PieceSizes:
 PIECES = PieceSizes()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Space:
     """All states reachable from some initial states, with every joint step between them.
 
@@ -169,8 +169,7 @@ def grown(values: NDArray[T], size: int, empty: int) -> NDArray[T]:
     return np.concatenate((values, np.full((more, *values.shape[1:]), empty, values.dtype)))
 
 
-@dataclass(frozen=True, slots=True)
-class Edges:
+class Edges(NamedTuple):
     """Joint steps between two layers, by source, states by their numbers in the table."""
 
     source: Numbers
@@ -196,7 +195,7 @@ def joined_edges(parts: Sequence[Edges], robots: int) -> Edges:
     every = [Edges(none, none, np.zeros((0, robots), np.int8), none), *parts]
     if len(parts) == 1:
         return parts[0]
-    return Edges(*(np.concatenate([getattr(p, f.name) for p in every]) for f in fields(Edges)))
+    return Edges(*map(np.concatenate, zip(*every, strict=True)))
 
 
 def _narrow(numbers: Numbers) -> Numbers:

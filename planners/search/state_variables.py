@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import combinations
+from typing import NamedTuple
 
 from planners.grounding.actions import GroundAction
 from planners.joint.model import JointModel
@@ -26,8 +26,7 @@ from planners.search.goals import FactsOf
 _SHAPES = 3
 
 
-@dataclass(frozen=True, slots=True)
-class StateVariable:
+class StateVariable(NamedTuple):
     """A group of facts of which exactly one is true.
 
     ``facts`` are its values by number, sorted; ``changes``, for each action that may change it, by

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import errno
+import re
 import sys
 import zlib
 from collections.abc import Iterator
@@ -12,12 +13,14 @@ from dataclasses import dataclass
 from functools import cache
 from inspect import cleandoc
 from io import BytesIO
-from pathlib import Path
-from typing import IO, Any, Generic, TypeVar, cast
+from typing import IO, TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from planners.system.errors import BadInput, OutOfMemory, Position
 from planners.system.limits import memory_left, more_memory
 from planners.system.messages import UNSEEN, echoed
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 T = TypeVar("T")
 
@@ -216,7 +219,7 @@ def require_seen(name: str, position: Position, what: str = "name") -> None:
     Control characters could steer a terminal, and characters that nobody sees could make one name
     look like another.
     """
-    found = UNSEEN.search(name)
+    found = re.search(UNSEEN, name)
     if found is not None:
         raise BadInput(
             f"the {what} {echoed(name)} holds the character U+{ord(found[0]):04X}",

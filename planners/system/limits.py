@@ -19,7 +19,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from pathlib import Path
 from types import FrameType
 
 from planners.system.errors import OutOfMemory, OutOfTime
@@ -51,11 +50,11 @@ _LONGER = "Use a larger --time-limit."
 _SHARE = 0.8
 #: Where Linux says what the machine has and what a process takes; elsewhere psutil knows, which
 #: takes as long to load as a small task to solve.
-_MEMORY_OF_MACHINE = Path("/proc/meminfo")
-_MEMORY_OF_PROCESS = Path("/proc/self/statm")
+_MEMORY_OF_MACHINE = "/proc/meminfo"
+_MEMORY_OF_PROCESS = "/proc/self/statm"
 _AVAILABLE = re.compile(r"^MemAvailable:\s*(\d+) kB$", re.MULTILINE)
 #: Where control groups (version 2) are.
-_GROUPS = Path("/sys/fs/cgroup")
+_GROUPS = "/sys/fs/cgroup"
 
 
 @contextmanager
@@ -274,7 +273,7 @@ def _available() -> int:
 def _machine_memory_left() -> int:
     """Bytes that the machine has free or can free at once."""
     with suppress(OSError):
-        found = _AVAILABLE.search(_MEMORY_OF_MACHINE.read_text())
+        found = _AVAILABLE.search(_text(_MEMORY_OF_MACHINE))
         if found is not None:
             return int(found[1]) * 2**10
     import psutil
@@ -287,26 +286,32 @@ def _group_memory_left() -> int:
     left = sys.maxsize
     for folder in _memory_groups():
         with suppress(OSError, ValueError):  # no group of its own, or one without a limit
-            most = int((folder / "memory.max").read_text())
-            used = int((folder / "memory.current").read_text())
+            most, used = (int(_text(f"{folder}/memory.{name}")) for name in ("max", "current"))
             # Files in memory are given up where it is short.
-            files = re.search(r"^inactive_file (\d+)", (folder / "memory.stat").read_text(), re.M)
+            files = re.search(r"^inactive_file (\d+)", _text(f"{folder}/memory.stat"), re.M)
             left = min(left, max(0, most - used + (int(files[1]) if files else 0)))
     return left
 
 
-def _memory_groups() -> Iterator[Path]:
+def _memory_groups() -> Iterator[str]:
     """The folders of the control groups that this process is in."""
     with suppress(OSError):
-        own = _GROUPS / Path("/proc/self/cgroup").read_text().strip().rpartition("0::/")[2]
-        # In a container the path may be that of the machine, and the root is the own group.
-        yield from (folder for folder in (own, *own.parents) if folder.is_relative_to(_GROUPS))
+        own = _text("/proc/self/cgroup").strip().rpartition("0::/")[2]
+        while own:
+            yield f"{_GROUPS}/{own}"
+            own = own.rpartition("/")[0]
+        yield _GROUPS  # in a container ``own`` may be of the machine, and this is the own group
 
 
 def address_space() -> int:
     """Bytes of address space that this process has."""
     with suppress(OSError):
-        return int(_MEMORY_OF_PROCESS.read_text().split()[0]) * resource.getpagesize()
+        return int(_text(_MEMORY_OF_PROCESS).split()[0]) * resource.getpagesize()
     import psutil
 
     return int(psutil.Process().memory_info().vms)
+
+
+def _text(path: str) -> str:
+    with open(path) as file:
+        return file.read()

@@ -10,7 +10,7 @@ from typing import ClassVar
 #: Characters that steer a terminal, reorder what is read, or cannot be seen: C0 and C1 controls and
 #: DEL, format characters (bidirectional controls, zero-width characters, tags), line and paragraph
 #: separators, and halves of surrogate pairs, which are what bytes of no encoding become.
-UNSEEN = re.compile(
+UNSEEN = (
     "[\x00-\x1f\x7f-\x9f\xad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb"
     "\U000e0000-\U000e007f\ud800-\udfff]"
 )
@@ -26,9 +26,9 @@ def visible(text: str, keep: str = "") -> str:
 
     The escapes are those of JSON, so that JSON text stays the same JSON.
     """
-    if not UNSEEN.search(text):
-        return text
-    return UNSEEN.sub(lambda found: found[0] if found[0] in keep else _escape(found[0]), text)
+    if (text.replace("\n", "") if "\n" in keep else text).isprintable():
+        return text  # as most are: then the pattern, a large one, need not be compiled
+    return re.sub(UNSEEN, lambda found: found[0] if found[0] in keep else _escape(found[0]), text)
 
 
 def echoed(value: object) -> str:

@@ -12,9 +12,9 @@ import inspect
 import sys
 import types
 from collections.abc import Iterator, Mapping
-from dataclasses import Field, dataclass, field, fields, replace
+from dataclasses import Field, field, fields
 from itertools import product
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
 
 from planners.system.errors import UsageError
 from planners.system.messages import named
@@ -22,8 +22,7 @@ from planners.system.messages import named
 Record = TypeVar("Record")
 
 
-@dataclass(frozen=True, slots=True)
-class Option:
+class Option(NamedTuple):
     """An option of a record.  One whose default is ``()`` may be repeated on the command line.
 
     ``help`` is a sentence for ``--help`` and docs/cli.md, ``metavar`` stands for the value there,
@@ -73,7 +72,7 @@ def option(default: object, help: str, metavar: str | None = None, **more: Any) 
 def cli_option(default: object, help: str, metavar: str | None = None, **more: Any) -> Any:
     """An `option` that only the command line has."""
     made = option(default, help, metavar, **more)
-    return field(default=default, metadata={"option": replace(made.metadata["option"], only="cli")})
+    return field(default=default, metadata={"option": made.metadata["option"]._replace(only="cli")})
 
 
 def group(record: type[object], without: str = "") -> Any:
@@ -91,14 +90,14 @@ def options_of(record: type[object]) -> Iterator[Option]:
         if "group" in each.metadata:
             for inner in options_of(each.metadata["group"]):
                 hidden = inner.name in each.metadata["without"]
-                yield replace(inner, only="python") if hidden else inner
+                yield inner._replace(only="python") if hidden else inner
         elif "option" in each.metadata:
             # Annotations are texts; what a Union names in quotes need not be imported.
             names = vars(sys.modules[kind.__module__])
             read = eval(each.type, names) if isinstance(each.type, str) else each.type
             given, described = _not_none(read), each.metadata["option"]
             more: dict[str, Any] = {"kind": given, "takes_none": given != read}
-            yield replace(described, name=each.name, default=each.default, **more)
+            yield described._replace(name=each.name, default=each.default, **more)
 
 
 def _fields(record: type[Any]) -> list[tuple[Field[Any], type[object]]]:

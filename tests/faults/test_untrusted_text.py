@@ -140,7 +140,7 @@ def corridor(bare: Make) -> World:
 
 def clean(text: str) -> bool:
     """Whether no character but newlines and tabs is one that steers, reorders or hides."""
-    return not UNSEEN.search(text.replace("\n", "").replace("\t", ""))
+    return not re.search(UNSEEN, text.replace("\n", "").replace("\t", ""))
 
 
 # ---- what is written
@@ -401,7 +401,7 @@ def test_nothing_unseen_is_left(text: str) -> None:
     shown = visible(text, keep="\n\t")
     assert clean(shown)
     assert visible(shown, keep="\n\t") == shown
-    assert UNSEEN.search(text) or shown == text
+    assert re.search(UNSEEN, text) or shown == text
     assert len(sentence(text * 100)) < 13_000
     assert clean(echoed(text))
     assert len(echoed(text * 100)) < 800
