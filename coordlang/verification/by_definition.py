@@ -147,8 +147,8 @@ def verify_candidates(
     source, parting, efforts = candidates.source, None, candidates.source.efforts
     if isinstance(source, Explored) and source.has_every_way:
         space, word = source.space, partition.word_of(source.rows)
-        ends = [space.target] * source.robots
-        parting = Parting.of(space.sources, space.target, space.labels, word, ends)
+        ends = [space.targets] * source.robots
+        parting = Parting.of(space.sources, ends[0], space.labels, word, ends)
         efforts = np.full(len(efforts), len(space.target) * source.robots / STEPS)
     portions = cut(efforts, portion)
     if len(portions) == 1 and parting is None:

@@ -28,6 +28,14 @@ T = TypeVar("T", bound=np.integer[Any])
 _MOST = 2**63 - 1
 
 
+def narrow(numbers: Numbers) -> Numbers:
+    """The same numbers, none of which is negative, in the smallest signed type.
+
+    Unsigned 64-bit numbers and signed ones would add up to floats.
+    """
+    return numbers.astype(np.min_scalar_type(-1 - int(numbers.max(initial=0))))
+
+
 def ranges(starts: Ints, counts: Ints) -> Ints:
     """``[s, s+1, .., s+c-1]`` for every pair, joined."""
     total = int(counts.sum())

@@ -19,6 +19,7 @@ from planners.joint.tables import (
     Ints,
     Rows,
     kept_runs,
+    narrow,
     packed,
     ranges,
     unique_rows,
@@ -96,7 +97,7 @@ def joined(spaces: Sequence[PlanSpace]) -> PlanSpace:
         goal=np.repeat(np.arange(len(spaces)), np.diff(node_offset)),
         layer=np.concatenate([s.layer for s in spaces]),
         first=np.concatenate([[0], *(s.first[1:] + edge_offset[k] for k, s in parts)]),
-        target=np.concatenate([s.target + node_offset[k] for k, s in parts]),
+        target=narrow(np.concatenate([s.target + node_offset[k] for k, s in parts])),
         labels=np.concatenate([s.labels for s in spaces]),
         cost=np.concatenate([s.cost for s in spaces]),
         goals=tuple(space.goals[0] for space in spaces),
@@ -218,18 +219,18 @@ def _shortest_ways(space: Space, distance: Ints, goal: Ints, state: Ints) -> Pla
         place[keys] = np.arange(len(keys))
         here = np.sort(keys[place[keys] == np.arange(len(keys))])
         place[here] = np.arange(len(here))
-        within.append(place[arriving])
+        within.append(narrow(place[arriving]))
         starts[mine] = place[begin[mine]]
         layers.append(here)
         at = here % len(space)
         counts = space.first[at + 1] - space.first[at]
         step = ranges(space.first[at], counts)
-        arriving = np.repeat(here - at, counts) + space.target[step]
+        arriving = np.repeat(here - at, counts) + space.target[step].astype(np.int64)
         after = flat[arriving]
         kept = (after >= 0) & (after < left)  # what is left after the step is never too little
         first = kept_runs(np.concatenate(([0], np.cumsum(counts))), kept)
         degrees.append(np.diff(first))
-        step_of.append(step[kept])
+        step_of.append(narrow(step[kept]))
         arriving = arriving[kept]
     sizes = np.array([len(here) for here in reversed(layers)])
     below = np.cumsum([0, *sizes])
@@ -243,7 +244,7 @@ def _shortest_ways(space: Space, distance: Ints, goal: Ints, state: Ints) -> Pla
         layer=np.repeat(np.arange(len(sizes)), sizes),
         first=np.concatenate(([0], np.cumsum(np.concatenate(degrees[::-1])))),
         # Of the layers from the lowest on, the edges out of the second lead to the first.
-        target=np.concatenate([own + below[k] for k, own in enumerate(within[::-1])]),
+        target=narrow(np.concatenate([own + below[k] for k, own in enumerate(within[::-1])])),
         labels=space.labels[step],
         cost=space.cost[step],
         goals=(),

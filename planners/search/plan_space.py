@@ -19,7 +19,7 @@ import numpy as np
 
 from planners.joint.conditions import Labels
 from planners.joint.model import Goal, JointModel
-from planners.joint.tables import Bools, Ints, Rows, kept_runs, ranges
+from planners.joint.tables import Bools, Ints, Numbers, Rows, kept_runs, narrow, ranges
 
 #: More than any sum of costs, of nodes from which no way leads to a goal.
 _NO_WAY = np.iinfo(np.int64).max // 4
@@ -68,9 +68,9 @@ class PlanSpace:
     goal: Ints
     layer: Ints
     first: Ints
-    target: Ints
+    target: Numbers
     labels: Labels
-    cost: Ints
+    cost: Numbers
     goals: tuple[Goal, ...]
     starts: Ints
     second: Ints
@@ -202,8 +202,8 @@ class PlanSpace:
 
     def targets(self, edges: Ints | None = None) -> Ints:
         """The nodes that these edges (None: all) lead to."""
-        found: Ints = self.target if edges is None else self.target[edges]
-        return found
+        found = self.target if edges is None else self.target[edges]
+        return found.astype(np.int64)
 
     def robot_labels(self, robot: int, edges: Ints | slice | None = None) -> Ints:
         """One robot's label on each of these edges (None: on all)."""
@@ -228,7 +228,7 @@ class PlanSpace:
     def _edges_of(self, low: int, high: int) -> LayerEdges:
         start, end = int(self.first[low]), int(self.first[high])
         source = np.repeat(np.arange(low, high), np.diff(self.first[low : high + 1]))
-        return LayerEdges(np.arange(start, end), source, self.target[start:end])
+        return LayerEdges(np.arange(start, end), source, self.target[start:end].astype(np.int64))
 
     def descendants(self, nodes: Ints) -> Bools:
         """Which nodes paths from these nodes reach, these included (nodes).  O(edges)."""
@@ -262,7 +262,7 @@ class PlanSpace:
         fewer = replace(self, starts=self.starts[tasks], second=self.second[tasks])
         return fewer._cut(kept).reduced()
 
-    def least_sums(self, cost: Ints) -> Ints:
+    def least_sums(self, cost: Numbers) -> Ints:
         """The least sum of the costs of edges (edges) on a way to a goal, per node; O(edges)."""
         value = np.where(self.layer == 0, 0, _NO_WAY)
         if not cost.any():
@@ -271,7 +271,7 @@ class PlanSpace:
             np.minimum.at(value, below.source, cost[below.edges] + value[below.target])
         return value
 
-    def cheapest(self, cost: Ints) -> PlanSpace:
+    def cheapest(self, cost: Numbers) -> PlanSpace:
         """The plans for which the sum of the costs of their edges (edges) is least; O(edges)."""
         value = self.least_sums(cost)
         kept = cost + value[self.target] == value[self.sources]
@@ -307,7 +307,7 @@ class PlanSpace:
             goal=self.goal[kept],
             layer=self.layer[kept],
             first=np.searchsorted(number[source[edges]], np.arange(int(kept.sum()) + 1)),
-            target=number[self.target[edges]],
+            target=narrow(number[self.target[edges]]),
             labels=self.labels[edges],
             cost=self.cost[edges],
             starts=number[self.starts],
@@ -325,7 +325,7 @@ class PlanSpace:
             goal=self.goal[order],
             layer=self.layer[order],
             first=np.concatenate(([0], np.cumsum(counts))),
-            target=number[self.target[edges]],
+            target=narrow(number[self.target[edges]]),
             labels=self.labels[edges],
             cost=self.cost[edges],
             starts=number[self.starts],
@@ -362,7 +362,7 @@ class PlanSpace:
             goal=space.goal[node],
             layer=space.layer[node],
             first=np.searchsorted(source, np.arange(len(node) + 1)),
-            target=target,
+            target=narrow(target),
             labels=space.labels[edge],
             cost=space.cost[edge],
             starts=np.array([len(node) - 1]),

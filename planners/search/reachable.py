@@ -19,6 +19,7 @@ from planners.joint.tables import (
     Numbers,
     Rows,
     find_rows,
+    narrow,
     unique_rows,
 )
 from planners.system.limits import reaching
@@ -72,18 +73,17 @@ class Space:
     model: JointModel
     rows: Rows
     first: Ints
-    target: Ints
+    target: Numbers
     labels: Labels
-    cost: Ints
+    cost: Numbers
 
     @classmethod
-    def of(
-        cls, model: JointModel, rows: Rows, source: Ints, target: Ints, labels: Labels, cost: Ints
-    ) -> Space:
+    def of(cls, model: JointModel, rows: Rows, edges: Edges) -> Space:
         """A space of joint steps that need not be sorted by the state that they lead out of."""
-        order = np.argsort(source, kind="stable")
-        first = np.searchsorted(source[order], np.arange(len(rows) + 1))
-        return cls(model, rows, first, target[order], labels[order], cost[order])
+        order = np.argsort(edges.source, kind="stable")
+        first = np.searchsorted(edges.source[order], np.arange(len(rows) + 1))
+        target, labels, cost = (column[order] for column in edges[1:])
+        return cls(model, rows, first, target, labels.astype(np.int32), cost)
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -92,6 +92,11 @@ class Space:
     def sources(self) -> Ints:
         """The state that each step leads out of."""
         return np.repeat(np.arange(len(self)), np.diff(self.first))
+
+    @property
+    def targets(self) -> Ints:
+        """The state that each step leads to."""
+        return self.target.astype(np.int64)
 
     def numbers(self, rows: Rows) -> Ints:
         """The numbers of states given as rows, -1 for those that are not reachable."""
@@ -186,7 +191,7 @@ class Edges(NamedTuple):
 
     def compact(self) -> Edges:
         """The same in as few bytes as the largest numbers need: there are many more than states."""
-        return Edges(*map(_narrow, (self.source, self.target, self.labels, self.cost)))
+        return Edges(*map(narrow, self))
 
 
 def joined_edges(parts: Sequence[Edges], robots: int) -> Edges:
@@ -196,14 +201,6 @@ def joined_edges(parts: Sequence[Edges], robots: int) -> Edges:
     if len(parts) == 1:
         return parts[0]
     return Edges(*map(np.concatenate, zip(*every, strict=True)))
-
-
-def _narrow(numbers: Numbers) -> Numbers:
-    """The same numbers, none of which is negative, in the smallest signed type.
-
-    Unsigned 64-bit numbers and signed ones would add up to floats.
-    """
-    return numbers.astype(np.min_scalar_type(-1 - int(numbers.max(initial=0))))
 
 
 class Exploration:
@@ -292,18 +289,12 @@ class Exploration:
     def space_of(self, states: Ints, parts: Sequence[Edges]) -> Space:
         """Some of the states, with those of some steps that lead to them."""
         rows, number = unique_rows(self.table.rows(states))
-        of_state = np.full(len(self.table), -1)
+        of_state = narrow(np.full(len(self.table), len(rows)))  # which stands for none of them
         of_state[states] = number
         edges = joined_edges(parts, len(self._model.robots))
-        edges = edges.only(of_state[edges.target] >= 0)
-        return Space.of(
-            self._model,
-            rows,
-            of_state[edges.source],
-            of_state[edges.target],
-            edges.labels.astype(np.int32),
-            edges.cost.astype(np.int64),
-        )
+        edges = edges.only(of_state[edges.target] < len(rows))
+        source, target = of_state[edges.source], of_state[edges.target]
+        return Space.of(self._model, rows, edges._replace(source=source, target=target))
 
 
 def explore(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> Space:
