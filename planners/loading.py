@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
-from typing import TYPE_CHECKING
+from os import PathLike
 
 from planners.grounding.actions import GroundAction, apply_network, impossible_actions
 from planners.grounding.instantiate import FEWER, ground_actions, ground_goal, idling_costs
@@ -29,9 +29,6 @@ from planners.system.errors import BadInput, Position, UsageError
 from planners.system.limits import reaching
 from planners.system.messages import echoed
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
 #: The texts of a robot's labels, idling first.
 Labels = tuple[str, ...]
 
@@ -49,7 +46,9 @@ class PlanningInstance:
 
 
 def load(
-    domain: str | Path, problems: Sequence[str | Path], options: ModelOptions | None = None
+    domain: str | PathLike[str],
+    problems: Sequence[str | PathLike[str]],
+    options: ModelOptions | None = None,
 ) -> PlanningInstance:
     """Read PDDL files; raises `BadInput`, `Unsupported` or `UsageError` with the position."""
     lifted = read_domain(domain)

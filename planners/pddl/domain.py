@@ -8,7 +8,8 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 from itertools import chain
-from typing import TYPE_CHECKING, NamedTuple
+from os import PathLike
+from typing import NamedTuple
 
 from planners.pddl.formula_tree import step_atoms
 from planners.pddl.formulas import read_effects, read_formula
@@ -37,9 +38,6 @@ from planners.system.files import require_seen
 from planners.system.limits import reaching
 from planners.system.messages import echoed
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
 #: What an action looks like.
 _FORM = "As in (:action move :parameters (?r - robot ?to - place) :precondition .. :effect ..)."
 _AGENT_FORM = "As in (:action move :agent ?r - robot :parameters (?to - place) ..)."
@@ -49,7 +47,7 @@ _PART = re.compile(
 _FIELDS = (":agent", ":parameters", ":precondition", ":effect")
 
 
-def read_domain(path: str | Path) -> Domain:
+def read_domain(path: str | PathLike[str]) -> Domain:
     """Read a domain file; see `parse_domain`."""
     with reaching(lambda: f"reading {path}", "a shorter file"):
         return parse_domain(read_source(path))

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from os import PathLike
 
 from planners.pddl.formulas import NUMBER, read_formula
 from planners.pddl.lifted import Atom, Domain, Formula, Problem
@@ -13,11 +13,8 @@ from planners.pddl.sexpr import Group, Source, Token, parse, read_source
 from planners.system.limits import reaching
 from planners.system.messages import echoed
 
-if TYPE_CHECKING:
-    from pathlib import Path
 
-
-def read_problem(path: str | Path, domain: Domain) -> Problem:
+def read_problem(path: str | PathLike[str], domain: Domain) -> Problem:
     """Read a problem file of ``domain``; see `parse_problem`."""
     with reaching(lambda: f"reading {path}", "a shorter file"):
         return parse_problem(read_source(path), domain)

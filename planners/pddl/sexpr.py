@@ -10,15 +10,12 @@ import re
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from os import PathLike
 from unicodedata import normalize
 
 from planners.system.errors import BadInput, Position, Unsupported
 from planners.system.files import not_utf8, read_stored_bytes, require_seen
 from planners.system.messages import UNSEEN, echoed
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 #: A byte that is not UTF-8, as Python's ``surrogateescape`` decodes it.
 _NOT_DECODED = re.compile("[\udc80-\udcff]")
@@ -190,7 +187,7 @@ Expression = Token | Group
 _Open = tuple[int, list[Expression], list[Token]]
 
 
-def read_source(path: str | Path) -> Source:
+def read_source(path: str | PathLike[str]) -> Source:
     """The text of a file; ``-`` is standard input.
 
     Raises `BadInput` for a file that is missing, unreadable or no text in UTF-8.

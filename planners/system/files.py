@@ -13,14 +13,12 @@ from dataclasses import dataclass
 from functools import cache
 from inspect import cleandoc
 from io import BytesIO
-from typing import IO, TYPE_CHECKING, Any, Generic, TypeVar, cast
+from os import PathLike
+from typing import IO, Any, Generic, TypeVar, cast
 
 from planners.system.errors import BadInput, OutOfMemory, Position
 from planners.system.limits import memory_left, more_memory
 from planners.system.messages import UNSEEN, echoed
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 T = TypeVar("T")
 
@@ -123,7 +121,7 @@ def _head() -> type[Any]:
     return msgspec.defstruct("Head", [("format", Any, None), ("version", Any, None)])
 
 
-def read_bytes(path: str | Path, *, most: int = MAX_TEXT) -> bytes:
+def read_bytes(path: str | PathLike[str], *, most: int = MAX_TEXT) -> bytes:
     """Read a file, or standard input for ``-``; what gzip compressed is decompressed.
 
     Raises `BadInput` for a file that is missing, cannot be read, or holds more than ``most``
@@ -146,7 +144,7 @@ def read_bytes(path: str | Path, *, most: int = MAX_TEXT) -> bytes:
         ) from None
 
 
-def read_stored_bytes(path: str | Path, *, most: int = MAX_TEXT) -> bytes:
+def read_stored_bytes(path: str | PathLike[str], *, most: int = MAX_TEXT) -> bytes:
     """Read a file as it is, or standard input for ``-``; see `read_bytes`."""
     position = Position(str(path))
     try:
@@ -184,7 +182,7 @@ def names_format(data: bytes, name: str) -> bool:
     return False
 
 
-def read_text(path: str | Path) -> str:
+def read_text(path: str | PathLike[str]) -> str:
     """Read a text in UTF-8, or standard input for ``-``.
 
     Raises `BadInput` for a file that is missing or cannot be read, or that is not UTF-8, with the
