@@ -2,13 +2,14 @@
 """The same tasks, solved by planners of others that list all optimal plans: K* and SymK.
 
     python -m benchmarks.peers [--limit SECONDS] [--kept FILE] [--cost COST] [--first N]
-                               [--python PYTHON] [ROW ..]
+                               [--python PYTHON] [--markdown] [ROW ..]
 
 Rows are those of `benchmarks.coverage`.  Each planner gets what ``coordlang export`` writes for
 planners: the joint model as plain PDDL, whose optimal plans stand one to one for the joint ones.
-Rows ``whole 4x4``, 5x5, 6x6 and 8x8 are robots that trade the corners of open grids: K* gets the
-joint-action PDDL of the grid (domains/grid-joint), and beside it coordlang is a whole process, too,
-``coordlang plans .. --count --no-cache``.
+Rows ``whole 4x4``, 5x5, 6x6 and 8x8 are robots that trade the corners of open grids: planners get
+the joint-action PDDL of the grid (domains/grid-joint).  Beside them coordlang is a whole process,
+too, ``coordlang plans .. --count --no-cache``, from the PDDL text on.  ``--markdown`` prints the
+table at the top of docs/coverage.md: CPU seconds of a few rows.
 ``--limit`` are CPU seconds (60) of each of a planner's processes, with 8 GB of address space each.
 ``--python`` is a Python that has both (``pip install '.[oracles]'``).  Columns: CPU seconds, peak
 memory and number of the optimal plans; no number where a planner did not end by itself.
@@ -25,6 +26,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -51,6 +53,8 @@ search = f"symq_bd(simple=false,{plans},quality=1.0)"
 subprocess.run([sys.executable, driver, "domain.pddl", "problem.pddl", "--search", search])
 """
 PLANNERS = {"K*": KSTAR, "SymK": SYMK}
+#: The rows of ``--markdown`` where none are asked for.
+SHOWN = ("whole 4x4", "whole 5x5", "whole 6x6", "depot/pfile1", "logistics00/probLOGISTICS-4-0")
 WHOLE = tuple(f"whole {size}" for size in ("4x4", "5x5", "6x6", "8x8"))
 
 
@@ -79,30 +83,56 @@ def asked(python: str, planner: str, folder: Path, limit: int) -> Figures:
 
 def measured(name: str, given: argparse.Namespace) -> Figures:
     """The figures of a row."""
-    from planners.classical import compile_classical
-    from planners.classical.task import to_pddl
-
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
         if name in WHOLE:
-            return {"row": name, "form": "joint actions", **whole(name.split()[1], folder, given)}
-        loaded = coverage.load(name, given.cost)
-        compiled = compile_classical(loaded.model, loaded.tasks[0])
-        for file, text in zip(("domain", "problem"), to_pddl(compiled), strict=True):
-            (folder / f"{file}.pddl").write_text(text)
+            task, cost = f"corners-{name.split()[1]}", "makespan"
+            for file, origin in (("domain", "domain"), ("problem", task)):
+                shutil.copy(DOMAINS / "grid-joint" / f"{origin}.pddl", folder / f"{file}.pddl")
+            form: Figures = {"form": "joint actions"}
+            files = tuple(DOMAINS / "grid" / f"{file}.pddl" for file in ("domain", task))
+        else:
+            form, cost = written(name, folder, given.cost), given.cost
+            files = coverage.codmap(sys.maxsize).get(name, ())
         found = {planner: asked(given.python, planner, folder, given.limit) for planner in PLANNERS}
-    return {"row": name, "form": compiled.form, "actions": len(compiled.actions), **found}
+    return {"row": name, **form, **found, "coordlang": ours(files, cost, given.limit)}
 
 
-def whole(corners: str, folder: Path, given: argparse.Namespace) -> Figures:
-    """Our process beside that of K*."""
-    files = [DOMAINS / "grid" / f"{name}.pddl" for name in ("domain", f"corners-{corners}")]
-    command = ("-m", "coordlang", "plans", *files, "--count", "--no-cache", "--json")
-    done = frame.run_python(command, cpu=given.limit)
-    ours = {"seconds": done.cpu, "memory": done.memory, "plans": int(done.data["count"])}
-    for name, file in (("domain", "domain"), ("problem", f"corners-{corners}")):
-        shutil.copy(DOMAINS / "grid-joint" / f"{file}.pddl", folder / f"{name}.pddl")
-    return {"coordlang": ours, "K*": asked(given.python, "K*", folder, given.limit)}
+def written(name: str, folder: Path, cost: str) -> Figures:
+    """The form of the plain PDDL of a row, and its actions; its files are written to a folder."""
+    from planners.classical import compile_classical
+    from planners.classical.task import to_pddl
+
+    loaded = coverage.load(name, cost)
+    compiled = compile_classical(loaded.model, loaded.tasks[0])
+    for file, text in zip(("domain", "problem"), to_pddl(compiled), strict=True):
+        (folder / f"{file}.pddl").write_text(text)
+    return {"form": compiled.form, "actions": len(compiled.actions)}
+
+
+def ours(files: tuple[Path, ...], cost: str, limit: int) -> Figures:
+    """What our process says of a domain and a problem; nothing without these."""
+    if not files:
+        return {}
+    options = ("--cost", cost, "--count", "--no-cache", "--json")
+    done = frame.run_python(("-m", "coordlang", "plans", *files, *options), cpu=limit)
+    plans = int(done.data["count"]) if done.data else None
+    return {"seconds": done.cpu, "memory": done.memory, "plans": plans}
+
+
+def print_page(rows: Sequence[Figures]) -> None:
+    """Print CPU seconds as Markdown, and in brackets those after which there was no answer."""
+    lines = []
+    for row in rows:
+        (plans,) = {row[name]["plans"] for name in ("coordlang", *PLANNERS)} - {None}
+        seconds = [
+            f"{row[name]['seconds']:.2f}"
+            if row[name]["plans"] is not None
+            else f"({row[name]['seconds']:.0f})"
+            for name in ("coordlang", *PLANNERS)
+        ]
+        lines.append([row["row"], plans, *seconds])
+    print(frame.markdown(["task", "optimal plans", "coordlang", *PLANNERS], lines))
 
 
 def main() -> None:
@@ -111,14 +141,19 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=3, metavar="N", help="problems of a domain")
     parser.add_argument("--cost", default="makespan+actions", help="of CoDMAP's tasks")
     parser.add_argument("--python", default=sys.executable, help="a Python that has the planners")
+    parser.add_argument("--markdown", action="store_true", help="the table of docs/coverage.md")
     given = parser.parse_args()
     known = KeptRows(given.kept)
+    names = asked_for([*WHOLE, *coverage.rows(given.first)], given.rows or SHOWN * given.markdown)
+    if given.markdown:
+        print_page([known.get(name, partial(measured, name, given)) for name in names])
+        return
     shown = (*PLANNERS, "coordlang")
     columns = [("row", -38), ("form", -17), ("actions", 8)]
     for planner in shown:
         columns += [(planner, 9), ("MB", 5), ("plans", 9)]
     table = PrintedTable(*columns)
-    for name in asked_for([*WHOLE, *coverage.rows(given.first)], given.rows):
+    for name in names:
         found = known.get(name, partial(measured, name, given))
         cells = [found["row"], found["form"], found.get("actions")]
         for planner in shown:
