@@ -61,6 +61,8 @@ class Traces:
         self.interfering = _interfering(stepper, tuple(map(len, model.labels)))
         self.has_ties = False
         self._results: dict[tuple[bytes, Step], Rows | None] = {}
+        self._groups: dict[Step, tuple[Block, ...]] = {}
+        self._facts: dict[Step, Rows] = {}
         self._blocks: dict[tuple[bytes, Step], tuple[Block, ...]] = {}
 
     def result(self, row: Rows, step: Step) -> Rows | None:
@@ -104,13 +106,14 @@ class Traces:
 
     def blocks(self, row: Rows, step: Step) -> tuple[Block, ...]:
         """The events of a joint step in blocks: those that interfere in their order."""
-        key = row.tobytes(), step
-        if key not in self._blocks:
-            found: list[Block] = []
-            for together in self._joined(step):
-                found += self._finest(row, step, together)
-            self._blocks[key] = tuple(found)
-        return self._blocks[key]
+        found: list[Block] = []
+        for together in self.groups(step):
+            own = alone(together, step)
+            key = (row & self.facts_of(own)).tobytes(), own
+            if key not in self._blocks:
+                self._blocks[key] = self._finest(row, own, together)
+            found += self._blocks[key]
+        return tuple(found)
 
     def events(self, row: Rows, steps: Sequence[Step]) -> list[list[Event]]:
         """Each robot's events in joint steps one after another, with what they wait for.
@@ -167,8 +170,30 @@ class Traces:
             if label and other not in block
         )
 
-    def _joined(self, step: Step) -> list[Block]:
-        """Robots whose events interfere, by way of others too, together."""
+    def facts_of(self, step: Step) -> Rows:
+        """The facts that the events of a joint step read or write, as bits of a state."""
+        if step not in self._facts:
+            self._facts[step] = self._read_or_written(step)
+        return self._facts[step]
+
+    def _read_or_written(self, step: Step) -> Rows:
+        codec = self._model.codec
+        if self._stepper is None:
+            return ~np.zeros(codec.width, np.uint64)
+        found = np.zeros(codec.width, np.uint64)
+        for own, label in zip(self._stepper.labelled, step, strict=True):
+            reads, writes, _, _ = _touches(own[label])
+            known = [codec.facts.index[atom] for atom in reads | writes if atom in codec.facts]
+            found[: codec.fact_blocks] |= codec.mask(known)
+        return found
+
+    def groups(self, step: Step) -> tuple[Block, ...]:
+        """The robots whose events in a joint step interfere, by way of others too, in groups."""
+        if step not in self._groups:
+            self._groups[step] = self._joined(step)
+        return self._groups[step]
+
+    def _joined(self, step: Step) -> tuple[Block, ...]:
         found: list[set[int]] = []
         for robot in self._robots:
             if step[robot]:
@@ -179,7 +204,7 @@ class Traces:
                     if any(tables[robot, other][step[robot], step[other]] for other in one)
                 ]
                 found = [one for one in found if one not in own] + [{robot}.union(*own)]
-        return sorted(tuple(sorted(one)) for one in found)
+        return tuple(sorted(tuple(sorted(one)) for one in found))
 
     def _finest(self, row: Rows, step: Step, together: Block) -> tuple[Block, ...]:
         if len(together) == 1 or self._stepper is None:
@@ -199,9 +224,9 @@ class Traces:
         raise AssertionError("one block is the step itself")
 
 
-def alone(block: Block, step: Step) -> Step:
-    """What some robots do in a step, while all others idle."""
-    return tuple(label if robot in block else 0 for robot, label in enumerate(step))
+def alone(block: Block, step: Step, *, others: bool = False) -> Step:
+    """What some robots do in a step, while all others idle; or what the ``others`` do."""
+    return tuple(label if (robot in block) != others else 0 for robot, label in enumerate(step))
 
 
 def ordered_partitions(robots: Block, number: int) -> Iterator[tuple[Block, ...]]:
@@ -239,7 +264,7 @@ def _interfering(stepper: Stepper, sizes: tuple[int, ...]) -> dict[tuple[int, in
 
 
 #: What an action reads and writes, the actions that it names, and itself.
-_Touched = tuple[Set[object], Set[object], Set[object], Set[object]]
+_Touched = tuple[Set[Atom], Set[Atom], Set[object], Set[object]]
 
 
 def _touches(action: GroundAction | None) -> _Touched:

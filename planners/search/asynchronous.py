@@ -72,6 +72,9 @@ class _Unfolding:
         self._space, self._robots = space, range(space.robots)
         self._traces = Traces(space.model)
         self._waits = _Waits(space, self._traces)
+        #: By facts, first and second step whether something of the second may be done sooner.
+        self._sooner: dict[tuple[bytes, Step, Step], bool] = {}
+        self._met_by: dict[tuple[Step, Step], tuple[Step, Rows]] = {}
         self._labels: list[Step] = [tuple(row) for row in space.labels.tolist()]
         self._targets: list[int] = space.targets().tolist()
         self._allowed: dict[int, tuple[int, ...]] = {}
@@ -153,25 +156,57 @@ class _Unfolding:
         return self._allowed[edge]
 
     def _is_late(self, source: int, edge: int, after: int) -> bool:
-        """Whether some events of a step may be done in the step before, and it is the same plan."""
+        """Whether some events of a step may be done in the step before, and it is the same plan.
+
+        Groups of events that do not interfere with each other do not matter to each other.
+        """
         first, second = self._labels[edge], self._labels[after]
         idle = {robot for robot in self._robots if second[robot] and not first[robot]}
-        if not idle:
-            return False
-        space, traces = self._space, self._traces
-        row, middle, end = (
-            space.rows[space.state[node]]
-            for node in (source, self._targets[edge], self._targets[after])
-        )
+        for group in self._traces.groups(second) if idle else ():
+            if not idle.isdisjoint(group):
+                own = alone(group, second)
+                if (first, own) not in self._met_by:
+                    self._met_by[first, own] = self._met(first, own)
+                before, facts = self._met_by[first, own]
+                row = self._space.rows[self._space.state[source]]
+                key = (row & facts).tobytes(), before, own
+                if key not in self._sooner:
+                    self._sooner[key] = self._may_be_sooner(row, before, own)
+                if self._sooner[key]:
+                    return True
+        return False
+
+    def _met(self, first: Step, second: Step) -> tuple[Step, Rows]:
+        """Those events of a step whose groups interfere with some of the next step.
+
+        Events of robots that act in the second step are among them.  With the facts that these and
+        those of the second step read or write.
+        """
+        robots: set[int] = set()
+        for group in self._traces.groups(first):
+            own = alone(group, first)
+            if self._traces.interfere(group, own, second) or any(alone(group, second)):
+                robots.update(group)
+        before = alone(tuple(robots), first)
+        return before, self._traces.facts_of(before) | self._traces.facts_of(second)
+
+    def _may_be_sooner(self, row: Rows, first: Step, second: Step) -> bool:
+        """Whether a block of the second of two steps from a state may be done in the first one."""
+        traces = self._traces
+        middle = traces.result(row, first)
+        assert middle is not None, "what it does not interfere with is not needed"
+        end = traces.result(middle, second)
+        assert end is not None, "nor is what the others do at the same time"
+        earlier: Step = (0,) * len(self._robots)
         for block in traces.blocks(middle, second):
-            others = tuple(robot for robot in self._robots if robot not in block)
-            own, rest = alone(block, second), alone(others, second)
-            if not (idle.issuperset(block) and any(rest) and traces.allows(row, own)):
+            own, rest = alone(block, second), alone(block, second, others=True)
+            waits = traces.interfere(block, own, earlier)
+            earlier = tuple(map(max, own, earlier))
+            if waits or any(alone(block, first)) or not traces.allows(row, own):
                 continue
             if not traces.interfere(block, own, first) and not traces.interfere(block, own, rest):
                 return True  # they commute with all of both steps
-            sooner = tuple(own[r] or first[r] for r in self._robots)
-            steps = sooner, rest
+            steps = tuple(map(max, own, first)), rest
             if traces.leads(row, steps, end) and (
                 traces.events(row, steps) == traces.events(row, (first, second))
             ):
