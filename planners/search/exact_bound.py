@@ -206,7 +206,7 @@ def _shortest(formula: PlanFormula, at_least: int, effort: int) -> FixedPlans:
                     plans.require([begins])
                     ended.pop_all()
                     return plans
-                plans.spend(_EASY + len(formula.step))
+                plans.spend(_EASY + formula.clauses)
             plans.require([-begins])
 
 

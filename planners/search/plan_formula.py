@@ -18,7 +18,7 @@ import numpy as np
 from planners.grounding.actions import GroundAction
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask
-from planners.joint.tables import Bools, Ints, Rows
+from planners.joint.tables import Bools, Ints, Rows, packed, unique_rows, unpacked
 from planners.pddl.lifted import TRUE, And, Atom, Formula, Not, Or, StepAtom, Truth
 from planners.search.goals import FactsOf
 from planners.search.graphs import csgraph
@@ -65,6 +65,8 @@ class PlanFormula:
         self._deleters: list[Literals] = [[] for _ in range(facts)]
         #: Per robot and some of its labels, as bytes, the variable that they imply.
         self._implied: dict[tuple[int, bytes], int] = {}
+        #: Clauses of labels that exclude each other, as `_flat` has them: they may be millions.
+        self._pairs: list[Ints] = []
         for variable in variables:
             self._exactly_one([fact + 1 for fact in variable.facts])
         for robot, actions in enumerate(stepper.labelled):
@@ -79,7 +81,10 @@ class PlanFormula:
         for fact in range(facts):
             self.step.append((-begins, fact + 1 if fact in true else -(fact + 1)))
         self._facts_follow()
-        self._flat_step, self._goal = _flat(self.step), _flat(self._goal_clauses(task.goal))
+        self._flat_step = np.concatenate([_flat(self.step), *self._pairs])
+        #: How many clauses a step has.
+        self.clauses = int(np.count_nonzero(self._flat_step == 0))
+        self._goal = _flat(self._goal_clauses(task.goal))
 
     def plans(self, effort: int) -> FixedPlans:
         """The plans of no step, that is, the goal, as a formula to be closed."""
@@ -165,12 +170,20 @@ class PlanFormula:
 
     def _apart(self, i: int, j: int) -> None:
         """Labels that may not share a step; those that exclude the same ones are one class."""
-        rows, row_class = np.unique(~self._stepper.tables[i, j], axis=0, return_inverse=True)
-        columns, column_class = np.unique(rows, axis=1, return_inverse=True)
-        for one, other in np.argwhere(columns).tolist():
-            mine = np.flatnonzero(row_class.reshape(-1) == one)
-            theirs = np.flatnonzero(column_class.reshape(-1) == other)
-            self.step.append((-self._one_of(i, mine), -self._one_of(j, theirs)))
+        rows, row_class = unique_rows(packed(~self._stepper.tables[i, j]))
+        apart = unpacked(rows, len(self._model.labels[j]))
+        columns, column_class = unique_rows(packed(apart.T))
+        theirs, mine = np.nonzero(unpacked(columns, len(rows)))
+        clauses = np.zeros((len(mine), 3), np.int64)
+        clauses[:, 0] = -self._of_classes(i, row_class, mine)
+        clauses[:, 1] = -self._of_classes(j, column_class, theirs)
+        self._pairs.append(clauses.reshape(-1))
+
+    def _of_classes(self, robot: int, class_of: Ints, classes: Ints) -> Ints:
+        """For each of some classes of a robot's labels the variable that these imply."""
+        known, number = np.unique(classes, return_inverse=True)
+        found = [self._one_of(robot, np.flatnonzero(class_of == one)) for one in known.tolist()]
+        return np.array(found, np.int64)[number]
 
     def _one_of(self, robot: int, labels: Ints) -> int:
         """A variable that is implied by each of a robot's labels."""
@@ -319,13 +332,16 @@ class _Ways:
             before = count
             #: (ways, facts): how often one of what a way needs excludes the fact.
             excluded = self.needs @ (~may).astype(np.float32)
+            excludes = np.ascontiguousarray(excluded.T)
             possible = self.needs.multiply(excluded).sum(axis=1) == 0
             ready = np.flatnonzero(possible[: len(self.robot)])
             for start in range(0, len(ready), block):
                 ways = ready[start : start + block]
-                apart = self.needs[ways] @ excluded.T
+                apart = self.needs[ways] @ excludes
                 both = together[ways] & (apart == 0) & possible
-                found = (self.adds[ways].T @ both.astype(np.float32)) @ self.adds > 0
+                # Of tables that are dense, those by way are multiplied without a copy.
+                added = self.adds.T @ np.ascontiguousarray(both.T, np.float32)
+                found = added @ self.adds[ways] > 0
                 may |= found | found.T
 
 
