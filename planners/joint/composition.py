@@ -206,24 +206,26 @@ class ComposingStepper(Stepper):
 
     def _apply(self, rows: Rows, source: Ints, labels: Labels) -> tuple[Rows, Ints]:
         # Joint steps that begin alike stand together: what the first robots do is the same.
-        shape = (min(1, len(source)), self._codec.fact_blocks)
-        adds, deletes = np.zeros(shape, np.uint64), np.zeros(shape, np.uint64)
-        run = np.zeros(len(source), np.int64)
+        begins, run, result = differs(source), source, rows
         cost = np.zeros(len(source), np.int64)
-        begins = differs(source)
         for i, robot in enumerate(self._robot):
             mine = labels[:, i]
             begins |= differs(mine)
             first = np.flatnonzero(begins)
-            before, run = run[first], np.cumsum(begins) - 1
-            certain = mine[first]
-            adds = adds[before] | robot.operators.adds[certain]
-            deletes = deletes[before] | robot.operators.deletes[certain]
+            result = result[run[first]]
+            run = np.cumsum(begins) - 1
+            result &= ~robot.operators.deletes[mine[first]]
+            result |= robot.operators.adds[mine[first]]
             cost += robot.cost[mine]
-        adds, deletes = adds[run], deletes[run]
-        for i, robot in enumerate(self._robot):
-            robot.operators.enter_conditional((adds, deletes), rows, source, labels[:, i], labels)
-        return (rows[source] & ~deletes) | adds, cost
+        if any(robot.operators.conditional for robot in self._robot):
+            adds = np.zeros_like(result)
+            for i, robot in enumerate(self._robot):
+                adds |= robot.operators.adds[labels[:, i]]
+            changed = adds, np.zeros_like(adds)
+            for i, robot in enumerate(self._robot):
+                robot.operators.enter_conditional(changed, rows, source, labels[:, i], labels)
+            result = (result & ~changed[1]) | changed[0]
+        return result, cost
 
 
 class _Subactions:
