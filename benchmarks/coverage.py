@@ -16,9 +16,9 @@ memory.  A row is kept with its cost and heuristic, so that one file does for al
 version of the project that it is of.
 
 ``--table`` names a table of docs/coverage.md, ``all`` prints one after the other: `codmap`,
-`makespan`, `blind` and `blind-makespan` (the first three problems of each domain), and `grids`.
-With ``--markdown`` they are printed as there, where some columns are left out, with how many rows
-are solved and the versions that they are of.
+`asynchronous` (plans up to timing), `makespan`, `blind` and `blind-makespan` (the first three
+problems of each domain), and `grids`.  With ``--markdown`` they are printed as there, where some
+columns are left out, with how many rows are solved and the versions that they are of.
 """
 
 from __future__ import annotations
@@ -63,6 +63,7 @@ class Asked:
     first: int
     cost: str
     heuristic: str = "auto"
+    asynchronous: bool = False
 
     def rows(self) -> list[str]:
         """The rows that are asked for."""
@@ -70,11 +71,13 @@ class Asked:
 
     def key(self, name: str) -> str:
         """What a row is kept as."""
-        return f"{name} ({self.cost}, {self.heuristic})"
+        kind = ", asynchronous" * self.asynchronous
+        return f"{name} ({self.cost}, {self.heuristic}{kind})"
 
 
 TABLES = {
     "codmap": Asked("CoDMAP, makespan+actions", 10, "makespan+actions"),
+    "asynchronous": Asked("CoDMAP, plans up to timing", 10, "makespan+actions", asynchronous=True),
     "makespan": Asked("CoDMAP, the first three, makespan", 3, "makespan"),
     "blind": Asked(
         "CoDMAP, the first three, makespan+actions, blind", 3, "makespan+actions", "blind"
@@ -126,7 +129,7 @@ def map_of(scenario: Path) -> Path:
     return scenario.parent / Path(name).name
 
 
-def load(name: str, cost: str) -> PlanningInstance:
+def load(name: str, cost: str, *, asynchronous: bool = False) -> PlanningInstance:
     """The joint model of a row."""
     from planners.loading import load as load_files
     from planners.pddl.model_options import ModelOptions
@@ -139,7 +142,8 @@ def load(name: str, cost: str) -> PlanningInstance:
     if name.endswith("far apart"):
         return far_apart(name)
     domain, problem = codmap(sys.maxsize)[name]
-    return load_files(domain, [problem], ModelOptions(cost=cost))  # type: ignore[arg-type]
+    options = ModelOptions(cost=cost, asynchronous=asynchronous)  # type: ignore[arg-type]
+    return load_files(domain, [problem], options)
 
 
 def scenario(name: str) -> PlanningInstance:
@@ -196,14 +200,17 @@ def on_map(path: Path, file: Path, agents: int) -> PlanningInstance:
         return load_files(Path(folder) / "domain.pddl", [Path(folder) / "problem.pddl"])
 
 
-def one(name: str, cost: str, heuristic: str) -> Figures:
+def one(name: str, asked: Asked) -> Figures:
     """The figures of a row, in this process."""
+    from planners.search.asynchronous import as_executed
     from planners.search.optimal_plans import search_with_effort
     from planners.search.plans import counts
 
-    loaded = load(name, cost)
+    loaded = load(name, asked.cost, asynchronous=asked.asynchronous)
     figures: Figures = {"load": round(process_time(), 2)}
-    space, effort = search_with_effort(loaded.model, loaded.tasks[0], heuristic=heuristic)
+    task, heuristic = loaded.tasks[0], asked.heuristic
+    space, effort = search_with_effort(loaded.model, task, heuristic=heuristic)
+    space = as_executed(space)
     makespan, second = space.cost_of(0)
     return {
         **figures,
@@ -220,7 +227,8 @@ def one(name: str, cost: str, heuristic: str) -> Figures:
 
 def measured(name: str, limit: int, asked: Asked) -> Figures:
     """The figures of a row from a process of its own."""
-    how = ("--cost", asked.cost, "--heuristic", asked.heuristic)
+    how = ["--cost", asked.cost, "--heuristic", asked.heuristic]
+    how += ["--asynchronous"] * asked.asynchronous
     arguments = ("-m", "benchmarks.coverage", "--one", name, *how)
     done = run_python(arguments, most=20 * limit, cpu=limit)
     figures = {"row": asked.key(name), "version": frame.project(), "limit": limit}
@@ -263,12 +271,14 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=10, metavar="N", help="problems of a domain")
     parser.add_argument("--cost", default="makespan+actions", help="of CoDMAP's tasks")
     parser.add_argument("--heuristic", default="auto", help="what bounds the search; or blind")
+    parser.add_argument("--asynchronous", action="store_true", help="plans up to timing")
     given = parser.parse_args()
+    own = Asked("Rows as asked for", given.first, given.cost, given.heuristic, given.asynchronous)
     if given.one:
-        print(json.dumps(one(given.one, given.cost, given.heuristic)))
+        print(json.dumps(one(given.one, own)))
         return
     known = KeptRows(given.kept)
-    for asked, names in chosen(given):
+    for asked, names in chosen(given, own):
         found = []
         table = None if given.markdown else PrintedTable(*COLUMNS)
         for name in names:
@@ -282,9 +292,8 @@ def main() -> None:
             print(f"{sum('plans' in f for _, f in found)} of {len(found)} solved")
 
 
-def chosen(given: argparse.Namespace) -> Iterator[tuple[Asked, list[str]]]:
+def chosen(given: argparse.Namespace, own: Asked) -> Iterator[tuple[Asked, list[str]]]:
     """What the arguments ask for, and the names of its rows."""
-    own = Asked("Rows as asked for", given.first, given.cost, given.heuristic)
     tables = {"all": list(TABLES.values()), None: [own]}
     for asked in tables.get(given.table) or [TABLES[given.table]]:
         names = asked.rows() if given.table else rows(given.first)
