@@ -22,7 +22,7 @@ from planners.search.state_variables import StateVariable
 from planners.system.errors import ProvedImpossible
 
 if TYPE_CHECKING:
-    from planners.search.exact_bound import ExactBound
+    from planners.search.exact_bound import ExactBound, ExactQuestion
 
 #: The layer of a state that was not met in this round.
 _NEVER = np.iinfo(np.int32).max
@@ -38,6 +38,9 @@ _FORMULA, _STEPS = 50_000, 20
 _TOO_MANY = 10
 #: As many times more joint steps may be composed to see that no solver needs to be asked.
 _TRIED = 8
+#: A solver has a part of its effort at first.  Where that is too little, so many times more joint
+#: steps are tried before it has all of it: that solves puzzles with few robots.
+_FIRST_PART, _LONGER = 50, 200
 #: How a round ended: the goal was met, or more joint steps were composed than are tried without
 #: exact bounds.
 _MET, _GROWN = -1, -2
@@ -77,14 +80,16 @@ class BoundedSearch(Exploration):
     ) -> None:
         super().__init__(model, task.init[None, :], pieces)
         self._task, self._heuristic, self._variables = task, heuristic, variables
-        self.rounds = self.bound = 0
+        #: The bound of this round, and the least makespan that is not excluded.
+        self.rounds = self.bound = self._least = 0
         #: Per state the lower bound, and the layer that it was met in, in this round.
         self._h: Ints = np.zeros(0, np.int64)
         self._depth: Ints = np.zeros(0, np.int64)
         #: What a solver says of optimal plans, once it was asked.
         self.exact: ExactBound | None = None
-        #: Whether no more joint steps may be composed than the probe says.
-        self._limited = heuristic.exact
+        self._question: ExactQuestion | None = None
+        #: Whether no more joint steps may be composed than the probe says; so many times.
+        self._limited, self._longer = heuristic.exact, 1
 
     def run(self) -> None:
         """Search, in as many rounds as it takes.
@@ -94,7 +99,7 @@ class BoundedSearch(Exploration):
         following = FAR - 1
         self._note_bounds(0)
         if self._heuristic.value:
-            following = int(self._h[0])
+            following = self._least = int(self._h[0])
         work = 0
         slow = 1
         while following < FAR:
@@ -109,6 +114,7 @@ class BoundedSearch(Exploration):
                 continue
             # Rounds that hardly grow are left out: more than needed is searched then, never less.
             slow = 2 * slow if work < 1.5 * before else 1
+            self._least = following
             following += slow - 1
         seen = np.flatnonzero(self._depth[: len(self.table)] < _NEVER)
         raise ProvedImpossible(
@@ -121,16 +127,30 @@ class BoundedSearch(Exploration):
 
     def _bounded_exactly(self) -> int:
         """Ask the solver for the optimal cost, if it may pay; what the next round is bounded by."""
-        most = _TRIED * self._probe
-        self._limited = False
-        at_least = self.bound if self.bound < FAR - 1 else 0
-        is_makespan = self._model.cost == "makespan"
-        if is_makespan and at_least and self._mostly_lead(at_least - self.depth, most):
-            return at_least
-        from planners.search.exact_bound import exact_bound
+        effort, at_least = self._pieces.effort, self._least
+        if self._question is None:
+            most = _TRIED * self._probe
+            is_makespan = self._model.cost == "makespan"
+            if is_makespan and at_least and self._mostly_lead(self.bound - self.depth, most):
+                self._limited = False
+                return self.bound
+            from planners.search.exact_bound import ExactQuestion
+            from planners.search.plan_formula import TooManyClauses
 
-        self.exact = exact_bound(self._model, self._task, self._variables, at_least, self._pieces)
-        return self.bound if self.exact is None else self.exact.makespan
+            try:
+                self._question = ExactQuestion(self._model, self._task, self._variables)
+            except TooManyClauses:
+                self._limited = False
+                return self.bound
+            effort, self._longer = effort // _FIRST_PART, _LONGER
+        else:
+            self._limited = False
+        self.exact = self._question.bound(at_least, effort, self._pieces)
+        if self.exact is None:
+            self._least = max(at_least, self._question.at_least)
+            return max(self.bound, self._least)
+        self._limited = False
+        return self.exact.makespan
 
     def _mostly_lead(self, left: int, most: int) -> bool:
         """Whether more than half of the last layer has a way to the goal in ``left`` joint steps.
@@ -170,8 +190,8 @@ class BoundedSearch(Exploration):
 
     def close(self) -> None:
         """Give the solver back."""
-        if self.exact is not None:
-            self.exact.plans.close()
+        if self._question is not None:
+            self._question.close()
 
     def _round(self) -> int:
         """Search within the bound; the least bound that was too large, `_MET` or `_GROWN`."""
@@ -211,7 +231,7 @@ class BoundedSearch(Exploration):
     @property
     def _probe(self) -> int:
         """Joint steps that may be composed, where they are limited."""
-        return probe_size(self._model, self.bound, self._pieces)
+        return self._longer * probe_size(self._model, self.bound, self._pieces)
 
     def so_far(self) -> str:
         """How far it got, for messages."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from itertools import product
 
 import numpy as np
@@ -23,15 +23,15 @@ from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, PlanningTask, products, some_options
 from planners.joint.tables import Bools, Ints
 from planners.search.goals import SMALLER, goal_facts
-from planners.search.plan_formula import PlanFormula, TooManyClauses
+from planners.search.plan_formula import PlanFormula
 from planners.search.questions import FixedPlans, Literals, OutOfEffort, Plan
 from planners.search.reachable import Edges, PieceSizes, grown
 from planners.search.state_variables import StateVariable
 from planners.system.limits import reaching
 
-#: What a refuted makespan costs in conflicts, besides the clauses of a step, however easy it is: of
-#: a task without plan there would be ever more.
-_EASY = 100
+#: What a refuted makespan costs in conflicts, however easy it is: of a task without plan there
+#: would be ever more; and the clauses of the formula that cost as much as a conflict.
+_EASY, _CLAUSES = 100, 1_000
 #: Conflicts for the least second component; without it more is searched.
 _LEAST_COST = 300_000
 #: States of a layer that are asked for first, and the share of them on optimal plans above which
@@ -159,55 +159,70 @@ class ExactBound:
         return found
 
 
-def exact_bound(
-    model: JointModel,
-    task: PlanningTask,
-    variables: Sequence[StateVariable],
-    at_least: int,
-    pieces: PieceSizes,
-) -> ExactBound | None:
-    """The bound of a task; None where it is not found with the effort that is spent.
+class ExactQuestion:
+    """The least makespan of a task, asked of a solver, which may be left and gone on with.
 
-    ``at_least`` is a lower bound on the makespan; ``pieces`` say how many conflicts of the solver
-    are spent.  Of a task without plan none is found.
+    ``at_least`` is a lower bound on it: shorter plans were refuted, or are known not to be.
     """
-    try:
-        formula = PlanFormula(model, task, variables)
-        plans = _shortest(formula, at_least, pieces.effort)
-    except (TooManyClauses, OutOfEffort):
-        return None
-    try:
+
+    def __init__(
+        self, model: JointModel, task: PlanningTask, variables: Sequence[StateVariable]
+    ) -> None:
+        """Write the formula; raises `planners.search.plan_formula.TooManyClauses`."""
+        self._model, self._task = model, task
+        self._formula = PlanFormula(model, task, variables)
+        self._plans = self._formula.plans()
+        #: The literal that says that the task begins where the plans do; 0: they were refuted.
+        self._begins = 0
+
+    @property
+    def at_least(self) -> int:
+        """A lower bound on the makespan, as far as the solver knows."""
+        return self._plans.steps + (not self._begins)
+
+    def close(self) -> None:
+        """Give the solver back."""
+        self._plans.close()
+
+    def bound(self, at_least: int, effort: int, pieces: PieceSizes) -> ExactBound | None:
+        """The bound; None where it is not found with so many conflicts more.
+
+        ``at_least`` is a lower bound on the makespan.  Of a task without plan none is found.
+        """
+        plans, model = self._plans, self._model
         with reaching(plans.so_far, SMALLER):
+            plans.left = effort
+            try:
+                self._find_shortest(at_least)
+            except OutOfEffort:
+                return None
             plan = plans.labels_chosen()
             plans.simplify()
             if max(int(costs.max(initial=0)) for costs in _label_costs(model)) == 1:
-                with suppress(OutOfEffort), plans.at_most(_LEAST_COST):
-                    cheap = _least_cost(plans, model, task)
+                plans.left = _LEAST_COST
+                with suppress(OutOfEffort):
+                    cheap = _least_cost(plans, model, self._task)
                     plan = plans.labels_chosen()
                     plans.require(cheap)
             plans.without_limit()
             used = _used(plans, model, plan, pieces.question)
             plans.simplify()
             return ExactBound(plans, used, pieces)
-    except BaseException:
-        plans.close()
-        raise
 
-
-def _shortest(formula: PlanFormula, at_least: int, effort: int) -> FixedPlans:
-    """The shortest plans, one of which was found."""
-    plans = formula.plans(effort)
-    with ExitStack() as ended, reaching(plans.so_far, SMALLER):
-        ended.callback(plans.close)
+    def _find_shortest(self, at_least: int) -> None:
+        """Let the plans be the shortest ones, one of which was found."""
+        plans = self._plans
         while True:
-            begins = formula.lengthen(plans)
-            if plans.steps >= at_least:
-                if plans.holds([begins]):
-                    plans.require([begins])
-                    ended.pop_all()
-                    return plans
-                plans.spend(_EASY + formula.clauses)
-            plans.require([-begins])
+            if not self._begins:
+                self._begins = self._formula.lengthen(plans)
+            asked = plans.steps >= at_least
+            if asked and plans.holds([self._begins]):
+                plans.require([self._begins])
+                return
+            plans.require([-self._begins])
+            self._begins = 0
+            if asked:
+                plans.spend(_EASY + plans.steps * self._formula.clauses // _CLAUSES)
 
 
 def _used(plans: FixedPlans, model: JointModel, plan: Plan, effort: int) -> list[list[Bools]]:

@@ -86,9 +86,9 @@ class PlanFormula:
         self.clauses = int(np.count_nonzero(self._flat_step == 0))
         self._goal = _flat(self._goal_clauses(task.goal))
 
-    def plans(self, effort: int) -> FixedPlans:
+    def plans(self) -> FixedPlans:
         """The plans of no step, that is, the goal, as a formula to be closed."""
-        return FixedPlans(self._goal, [len(own) for own in self._model.labels], effort)
+        return FixedPlans(self._goal, [len(own) for own in self._model.labels])
 
     def lengthen(self, plans: FixedPlans) -> int:
         """Add a step before the others; the literal that says that the task begins there.

@@ -44,10 +44,10 @@ class FixedPlans:
     effort, in conflicts of the solver, so much is ``left`` after so many ``calls``.
     """
 
-    def __init__(self, clauses: Ints, sizes: Sequence[int], effort: int) -> None:
+    def __init__(self, clauses: Ints, sizes: Sequence[int]) -> None:
         self.first: Ints = np.zeros((0, len(sizes)), np.int64)
         self._sizes = sizes
-        self.left, self.calls = effort, 0
+        self.left = self.calls = 0
         self._take(clauses)
 
     @property

@@ -52,7 +52,7 @@ class PieceSizes:
     probe: int = 100_000
     #: Conflicts that a SAT solver may spend on these bounds, and on one question about what optimal
     #: plans do.
-    effort: int = 5_000_000
+    effort: int = 2_000_000
     question: int = 20_000
     #: Joint labels of a state beyond which it is asked which robots' labels may go on there.
     joint_labels: int = 64

@@ -122,9 +122,9 @@ def test_clauses_that_are_added_at_once_say_the_same_as_one_by_one(
 ) -> None:
     none, every = (np.array(own, np.int64) for own in ((), flat(clauses)))
     with (
-        closing(FixedPlans(none, [VARIABLES], 100)) as one,
-        closing(FixedPlans(every, [VARIABLES], 100)) as many,
-        closing(FixedPlans(none, [VARIABLES], 100)) as before,
+        closing(FixedPlans(none, [VARIABLES])) as one,
+        closing(FixedPlans(every, [VARIABLES])) as many,
+        closing(FixedPlans(none, [VARIABLES])) as before,
     ):
         for clause in clauses:
             one.add(clause)

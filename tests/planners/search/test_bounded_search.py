@@ -36,6 +36,7 @@ PIECE_SIZES = (
     replace(PIECES, states=2, steps=5),
     replace(PIECES, probe=0, effort=100_000, question=0, joint_labels=0),
     replace(PIECES, probe=0, effort=300, question=0),
+    replace(PIECES, probe=1, effort=4_000),
 )
 ASKING = [pieces for pieces in PIECE_SIZES if pieces.probe == 0]
 COSTS: tuple[Cost, ...] = ("makespan", "makespan+actions", "makespan+cost")
@@ -162,6 +163,35 @@ FAMILIES: dict[str, Callable[[int], PlanningInstance | None]] = {
 def test_bounds_lose_no_optimal_plan(family: str, seeds: Sequence[int]) -> None:
     met = compared(map(FAMILIES[family], seeds))
     assert min(met["solved"], met["unsolvable"]) >= 5
+
+
+JOBS = """(define (domain jobs) (:requirements :typing) (:types robot job)
+  (:predicates (done ?j - job) (can ?r - robot ?j - job) (asleep ?r - robot))
+  (:action do :parameters (?r - robot ?j - job)
+    :precondition (and (can ?r ?j) (not (asleep ?r)) (not (done ?j))) :effect (done ?j))
+  (:action wake :parameters (?r - robot)
+    :precondition (asleep ?r) :effect (not (asleep ?r))))"""
+
+
+def test_a_bound_that_was_left_out_is_not_taken_as_refuted() -> None:
+    """Seven jobs take six steps where r2 does one of them, and must be woken for that.
+
+    Seven steps take one action less, and the round for six is left out, as rounds hardly grow.
+    """
+    jobs = [f"j{number}" for number in range(7)]
+    problem = (
+        f"(define (problem p) (:domain jobs) (:objects r1 r2 - robot {' '.join(jobs)} - job)"
+        f"(:init {' '.join(f'(can r1 {job})' for job in jobs)} (can r2 j0) (asleep r2))"
+        f"(:goal (and {' '.join(f'(done {job})' for job in jobs)})))"
+    )
+    loaded = model_of(JOBS, problem, ModelOptions(cost="makespan+actions"))
+    asked = 0
+    for probe in range(500, 5_000, 250):
+        pieces = replace(PIECES, probe=probe)
+        plans, effort = search_with_effort(loaded.model, loaded.tasks[0], pieces)
+        assert plans.cost_of(0) == (6, 8)
+        asked += "SAT" in effort.bounded_by
+    assert asked >= 10
 
 
 def test_on_open_grids_no_solver_is_asked() -> None:
