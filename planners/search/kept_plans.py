@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from planners.parallel.batch import Store, Table
 
 #: The version of the tables: those of another one are never looked at, and go in time.
-_FORM = 4
+_FORM = 5
 #: Bytes that all tables together may take.
 _MOST_BYTES = 2**30
 #: The arrays of a plan space that are kept; goals are those of the task.
