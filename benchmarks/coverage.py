@@ -12,12 +12,12 @@ Every row is a process of its own on one core with 8 GB of address space and ``-
 seconds (60).  Columns: CPU seconds to load and to search, the least makespan and the second cost
 component, the exact number of optimal plans and the nodes of their graph; the states that the
 search met, the joint steps that it composed and the bound that guided it; the process's peak
-memory.  A row is kept with its cost and heuristic, so that one file does for all, and with the
+memory.  A row is kept with its cost, so that one file does for all, and with the
 version of the project that it is of.
 
 ``--table`` names a table of docs/coverage.md, ``all`` prints one after the other: `codmap`,
-`asynchronous` (plans up to timing), `makespan`, `blind` and `blind-makespan` (the first three
-problems of each domain), and `grids`.  With ``--markdown`` they are printed as there, where some
+`asynchronous` (plans up to timing), `makespan` (the first three problems of each domain), and
+`grids`.  With ``--markdown`` they are printed as there, where some
 columns are left out, with how many rows are solved and the versions that they are of.
 """
 
@@ -57,12 +57,11 @@ SCENARIOS = SHARED / "mapf"
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """How rows are searched: the problems of each domain (0: grids), the cost, the heuristic."""
+    """How rows are searched: the problems of each domain (0: grids), and the cost."""
 
     title: str
     first: int
     cost: str
-    heuristic: str = "auto"
     asynchronous: bool = False
 
     def rows(self) -> list[str]:
@@ -72,17 +71,13 @@ class Asked:
     def key(self, name: str) -> str:
         """What a row is kept as."""
         kind = ", asynchronous" * self.asynchronous
-        return f"{name} ({self.cost}, {self.heuristic}{kind})"
+        return f"{name} ({self.cost}{kind})"
 
 
 TABLES = {
     "codmap": Asked("CoDMAP, makespan+actions", 10, "makespan+actions"),
     "asynchronous": Asked("CoDMAP, plans up to timing", 10, "makespan+actions", asynchronous=True),
     "makespan": Asked("CoDMAP, the first three, makespan", 3, "makespan"),
-    "blind": Asked(
-        "CoDMAP, the first three, makespan+actions, blind", 3, "makespan+actions", "blind"
-    ),
-    "blind-makespan": Asked("CoDMAP, the first three, makespan, blind", 3, "makespan", "blind"),
     "grids": Asked("Robots on grids, makespan", 0, "makespan"),
 }
 
@@ -208,8 +203,7 @@ def one(name: str, asked: Asked) -> Figures:
 
     loaded = load(name, asked.cost, asynchronous=asked.asynchronous)
     figures: Figures = {"load": round(process_time(), 2)}
-    task, heuristic = loaded.tasks[0], asked.heuristic
-    space, effort = search_with_effort(loaded.model, task, heuristic=heuristic)
+    space, effort = search_with_effort(loaded.model, loaded.tasks[0])
     space = as_executed(space)
     makespan, second = space.cost_of(0)
     return {
@@ -227,8 +221,7 @@ def one(name: str, asked: Asked) -> Figures:
 
 def measured(name: str, limit: int, asked: Asked) -> Figures:
     """The figures of a row from a process of its own."""
-    how = ["--cost", asked.cost, "--heuristic", asked.heuristic]
-    how += ["--asynchronous"] * asked.asynchronous
+    how = ["--cost", asked.cost, *["--asynchronous"] * asked.asynchronous]
     arguments = ("-m", "benchmarks.coverage", "--one", name, *how)
     done = run_python(arguments, most=20 * limit, cpu=limit)
     figures = {"row": asked.key(name), "version": frame.project(), "limit": limit}
@@ -270,10 +263,9 @@ def main() -> None:
     parser.add_argument("--markdown", action="store_true", help="print it as it stands there")
     parser.add_argument("--first", type=int, default=10, metavar="N", help="problems of a domain")
     parser.add_argument("--cost", default="makespan+actions", help="of CoDMAP's tasks")
-    parser.add_argument("--heuristic", default="auto", help="what bounds the search; or blind")
     parser.add_argument("--asynchronous", action="store_true", help="plans up to timing")
     given = parser.parse_args()
-    own = Asked("Rows as asked for", given.first, given.cost, given.heuristic, given.asynchronous)
+    own = Asked("Rows as asked for", given.first, given.cost, given.asynchronous)
     if given.one:
         print(json.dumps(one(given.one, own)))
         return
