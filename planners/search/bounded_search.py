@@ -40,7 +40,7 @@ _TOO_MANY = 10
 _TRIED = 8
 #: A solver has a part of its effort at first.  Where that is too little, so many times more joint
 #: steps are tried before it has all of it: that solves puzzles with few robots.
-_FIRST_PART, _LONGER = 50, 200
+_FIRST_PART, _LONGER = 32, 400
 #: How a round ended: the goal was met, or more joint steps were composed than are tried without
 #: exact bounds.
 _MET, _GROWN = -1, -2

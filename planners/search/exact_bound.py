@@ -222,7 +222,7 @@ class ExactQuestion:
             plans.require([-self._begins])
             self._begins = 0
             if asked:
-                plans.spend(_EASY + plans.steps * self._formula.clauses // _CLAUSES)
+                plans.spend(_EASY + plans.steps * len(self._formula.step) // _CLAUSES)
 
 
 def _used(plans: FixedPlans, model: JointModel, plan: Plan, effort: int) -> list[list[Bools]]:

@@ -18,7 +18,7 @@ import numpy as np
 from planners.grounding.actions import GroundAction
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask
-from planners.joint.tables import Bools, Ints, Rows, packed, unique_rows, unpacked
+from planners.joint.tables import Bools, Ints, Rows
 from planners.pddl.lifted import TRUE, And, Atom, Formula, Not, Or, StepAtom, Truth
 from planners.search.goals import FactsOf
 from planners.search.graphs import csgraph
@@ -65,8 +65,6 @@ class PlanFormula:
         self._deleters: list[Literals] = [[] for _ in range(facts)]
         #: Per robot and some of its labels, as bytes, the variable that they imply.
         self._implied: dict[tuple[int, bytes], int] = {}
-        #: Clauses of labels that exclude each other, as `_flat` has them: they may be millions.
-        self._pairs: list[Ints] = []
         for variable in variables:
             self._exactly_one([fact + 1 for fact in variable.facts])
         for robot, actions in enumerate(stepper.labelled):
@@ -81,10 +79,7 @@ class PlanFormula:
         for fact in range(facts):
             self.step.append((-begins, fact + 1 if fact in true else -(fact + 1)))
         self._facts_follow()
-        self._flat_step = np.concatenate([_flat(self.step), *self._pairs])
-        #: How many clauses a step has.
-        self.clauses = int(np.count_nonzero(self._flat_step == 0))
-        self._goal = _flat(self._goal_clauses(task.goal))
+        self._flat_step, self._goal = _flat(self.step), _flat(self._goal_clauses(task.goal))
 
     def plans(self) -> FixedPlans:
         """The plans of no step, that is, the goal, as a formula to be closed."""
@@ -170,20 +165,16 @@ class PlanFormula:
 
     def _apart(self, i: int, j: int) -> None:
         """Labels that may not share a step; those that exclude the same ones are one class."""
-        rows, row_class = unique_rows(packed(~self._stepper.tables[i, j]))
-        apart = unpacked(rows, len(self._model.labels[j]))
-        columns, column_class = unique_rows(packed(apart.T))
-        theirs, mine = np.nonzero(unpacked(columns, len(rows)))
-        clauses = np.zeros((len(mine), 3), np.int64)
-        clauses[:, 0] = -self._of_classes(i, row_class, mine)
-        clauses[:, 1] = -self._of_classes(j, column_class, theirs)
-        self._pairs.append(clauses.reshape(-1))
-
-    def _of_classes(self, robot: int, class_of: Ints, classes: Ints) -> Ints:
-        """For each of some classes of a robot's labels the variable that these imply."""
-        known, number = np.unique(classes, return_inverse=True)
-        found = [self._one_of(robot, np.flatnonzero(class_of == one)) for one in known.tolist()]
-        return np.array(found, np.int64)[number]
+        rows, row_class = _unique(~self._stepper.tables[i, j])
+        columns, column_class = _unique(rows.T)
+        theirs = [0] * len(columns)
+        for one, apart in enumerate(columns.T):
+            others = np.flatnonzero(apart).tolist()
+            mine = self._one_of(i, np.flatnonzero(row_class == one)) if others else 0
+            for other in others:
+                if not theirs[other]:
+                    theirs[other] = self._one_of(j, np.flatnonzero(column_class == other))
+                self.step.append((-mine, -theirs[other]))
 
     def _one_of(self, robot: int, labels: Ints) -> int:
         """A variable that is implied by each of a robot's labels."""
@@ -220,6 +211,16 @@ class PlanFormula:
             facts = range(len(self._adders))
             return [[fact + 1 if fact in goal.facts else -(fact + 1)] for fact in facts]
         return [sorted(clause, key=abs) for clause in self._saying(goal)]
+
+
+def _unique(table: Bools) -> tuple[Bools, Ints]:
+    """The different rows of a table, sorted, and each row's number among them."""
+    # As bytes: thousands of columns would be compared one by one.
+    wide = np.ascontiguousarray(np.packbits(table, axis=1))
+    _, first, number = np.unique(
+        wide.view(f"V{wide.shape[1]}"), return_index=True, return_inverse=True
+    )
+    return table[first], number.reshape(-1)
 
 
 def _flat(clauses: Iterable[Sequence[int]]) -> Ints:
