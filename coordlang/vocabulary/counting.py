@@ -22,8 +22,6 @@ from planners.search.plan_space import PlanSpace
 
 #: Beginnings of plans from one node that are compared at most, if more than one step is looked at.
 _BEGINNINGS = 8
-#: First steps from one node that are compared at most: some cliques are enough.
-_FIRST = 32
 #: Steps of mixtures that are looked at: half a second.
 _WORK = 200_000
 
@@ -59,8 +57,8 @@ def needs_three_words(space: PlanSpace) -> bool:
 
 
 def _beginnings(space: PlanSpace, node: int) -> list[list[int]]:
-    """Beginnings of plans from a node, as edges, with as many steps as leave them few."""
-    found = [[edge] for edge in space.out_edges(node)[:_FIRST]]
+    """All beginnings of plans from a node, as edges, with as many steps as leave them few."""
+    found = [[edge] for edge in space.out_edges(node)]
     for _ in range(int(space.layer[node]) - 1):
         ends = [(path, space.out_edges(space.target_of(path[-1]))) for path in found]
         if sum(len(edges) for _, edges in ends) > _BEGINNINGS:
