@@ -65,6 +65,8 @@ _MANY, _MERGED_SOON = 100, 30
 _VAIN = 15
 #: Plans that local search may measure for a unit of effort.
 _MEASURED = 1_000_000
+#: Pairs of the clauses that are all collected before long proofs without a common step.
+_SHORT = 3
 #: Merged words are verified once they are so many times the last ones that were.
 _FEWER = 0.9
 
@@ -183,6 +185,8 @@ class MinimalSearch:
         if not self._is_one_task:
             self._decide_between(_SOON)
         self.merge(_VAIN)
+        if self._is_asynchronous and not self._is_one_task:
+            self._know_short_clauses()
         known = self.best
         close_bounds(lambda: (self.lower, self.upper), self._narrow, lambda: self._is_spent)
         if self.best is known and not self._is_spent:
@@ -213,6 +217,11 @@ class MinimalSearch:
         if found is not None and word_count(found) < self.upper:
             self._offer(found)
             self.merge(most=_MERGED_SOON)
+
+    def _know_short_clauses(self) -> None:
+        """Add clauses that refute no partition met so far: the last proof takes half as long."""
+        if self.lower < self.upper and not self._is_spent:
+            self.languages.known.add_all(self.languages.refuter.pool.short_clauses(_SHORT))
 
     def _decide_between(self, budget: Budget) -> None:
         """Decide numbers between the bounds, as long as that is quick."""
