@@ -18,7 +18,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from coordlang.language.warping import Clause
-from coordlang.vocabulary.counting import needs_three_words
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome, word_count
 from coordlang.vocabulary.loop import (
@@ -109,7 +108,7 @@ def refuting_clauses(job: Job, size: int) -> Mapping[Clause, Evidence]:
     Not anytime: it takes as long as the proof takes.  Raises `ValueError` if there is a language
     with so few words.
     """
-    with closing(MinimalSearch(replace(job, incumbent=None, by_clauses=True))) as search:
+    with closing(MinimalSearch(replace(job, incumbent=None))) as search:
         budget = Budget()
         while not search.decide(size, budget):
             budget = budget.doubled()
@@ -179,7 +178,10 @@ class MinimalSearch:
         if self._pairs // _FIRST_PAIRS > _BEGINNING * self._most:
             return
         if self._is_one_task:
-            self._begin_with_one_task()
+            if self._is_dear and self.upper > _MANY:
+                self._begin_with_few_facts()
+            for rounds in _WHERE_DEAR if self._is_dear else _FOR_KINDS:
+                self._find_fewer_tied(rounds)
         while self.lower < self.upper and not self._is_spent and self.decide(self.lower, _SOON):
             pass
         if not self._is_one_task:
@@ -200,16 +202,6 @@ class MinimalSearch:
     @property
     def _is_one_task(self) -> bool:
         return self._job.candidates.count == 1
-
-    def _begin_with_one_task(self) -> None:
-        """Count how many sentences are needed, and look for words of a kind."""
-        (space,) = self._job.candidates.spaces
-        if not (self._job.by_clauses or self._is_asynchronous) and needs_three_words(space):
-            self.lower = max(self.lower, 3)
-        if self._is_dear and self.upper > _MANY:
-            self._begin_with_few_facts()
-        for rounds in _WHERE_DEAR if self._is_dear else _FOR_KINDS:
-            self._find_fewer_tied(rounds)
 
     def _begin_with_few_facts(self) -> None:
         """Words that say what a few facts say, merged a little: closer than a word for a state."""
@@ -387,9 +379,7 @@ class MinimalSearch:
                 "walks": languages.refuter.walks,
                 "work": self.work,
             }
-        # A bound by counting is beyond what the clauses refute.
-        refuting = self.refuting.clauses if self.refuting.size == self.lower - 1 else {}
-        return Outcome(self.best, self.lower, figures, stopped, refuting, languages)
+        return Outcome(self.best, self.lower, figures, stopped, self.refuting.clauses, languages)
 
     def close(self) -> None:
         """Give back what the solvers hold."""
