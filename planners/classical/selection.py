@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The select-then-apply form, of linear size: robots select one after another, then it is applied.
 
-What no other robot can see is applied as it is selected (`planners.classical.selection`).
+What no other robot can see is applied as it is selected (`StagedAction`).
 A step in which all selections are of this kind is over with the last of them; else something is
 left to do, in stages: all check; all undo (rarely); all apply.
 """

@@ -80,8 +80,9 @@ class BoundedSearch(Exploration):
     ) -> None:
         super().__init__(model, task.init[None, :], pieces)
         self._task, self._heuristic, self._variables = task, heuristic, variables
-        #: The bound of this round, and the least makespan that is not excluded.
-        self.rounds = self.bound = self._least = 0
+        self.rounds = self.bound = 0
+        #: The least makespan that is not refuted: where rounds are left out, ``bound`` is larger.
+        self._least = 0
         #: Per state the lower bound, and the layer that it was met in, in this round.
         self._h: Ints = np.zeros(0, np.int64)
         self._depth: Ints = np.zeros(0, np.int64)
@@ -127,30 +128,30 @@ class BoundedSearch(Exploration):
 
     def _bounded_exactly(self) -> int:
         """Ask the solver for the optimal cost, if it may pay; what the next round is bounded by."""
-        effort, at_least = self._pieces.effort, self._least
-        if self._question is None:
+        question, self._limited = self._question, False
+        if question is None:
             most = _TRIED * self._probe
             is_makespan = self._model.cost == "makespan"
-            if is_makespan and at_least and self._mostly_lead(self.bound - self.depth, most):
-                self._limited = False
+            if is_makespan and self._least and self._mostly_lead(self.bound - self.depth, most):
                 return self.bound
             from planners.search.exact_bound import ExactQuestion
             from planners.search.plan_formula import TooManyClauses
 
             try:
-                self._question = ExactQuestion(self._model, self._task, self._variables)
+                question = ExactQuestion(self._model, self._task, self._variables)
             except TooManyClauses:
-                self._limited = False
                 return self.bound
-            effort, self._longer = effort // _FIRST_PART, _LONGER
+        is_first, self._question = self._question is None, question
+        effort = self._pieces.effort // (_FIRST_PART if is_first else 1)
+        self.exact = question.bound(self._least, effort, self._pieces)
+        if self.exact is not None:
+            return self.exact.makespan
+        if is_first:
+            self._limited, self._longer = True, _LONGER
         else:
-            self._limited = False
-        self.exact = self._question.bound(at_least, effort, self._pieces)
-        if self.exact is None:
-            self._least = max(at_least, self._question.at_least)
-            return max(self.bound, self._least)
-        self._limited = False
-        return self.exact.makespan
+            question.close()  # it is not asked again, and takes memory
+        self._least = max(self._least, question.at_least)
+        return max(self.bound, self._least)
 
     def _mostly_lead(self, left: int, most: int) -> bool:
         """Whether more than half of the last layer has a way to the goal in ``left`` joint steps.

@@ -44,7 +44,7 @@ _RECENT, _NEARLY_ALL = 200, 0.95
 class ExactBound:
     """The least makespan of one task, and what its optimal plans consist of.
 
-    ``plans`` are what they satisfy, to be closed by whoever asked for the bound; ``used[k][robot]``
+    ``plans`` are what they satisfy, closed with the `ExactQuestion`; ``used[k][robot]``
     (labels) says which labels occur in step k of some optimal plan; a state is kept where the
     conflicts that ``pieces`` allow do not answer its question.
 

@@ -18,7 +18,7 @@ import numpy as np
 from planners.grounding.actions import GroundAction
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask
-from planners.joint.tables import Bools, Ints, Rows
+from planners.joint.tables import Bools, Ints, Rows, unique_rows
 from planners.pddl.lifted import TRUE, And, Atom, Formula, Not, Or, StepAtom, Truth
 from planners.search.goals import FactsOf
 from planners.search.graphs import csgraph
@@ -215,12 +215,8 @@ class PlanFormula:
 
 def _unique(table: Bools) -> tuple[Bools, Ints]:
     """The different rows of a table, sorted, and each row's number among them."""
-    # As bytes: thousands of columns would be compared one by one.
-    wide = np.ascontiguousarray(np.packbits(table, axis=1))
-    _, first, number = np.unique(
-        wide.view(f"V{wide.shape[1]}"), return_index=True, return_inverse=True
-    )
-    return table[first], number.reshape(-1)
+    found, number = unique_rows(np.packbits(table, axis=1))
+    return np.unpackbits(found, axis=1, count=table.shape[1]).astype(np.bool_), number
 
 
 def _flat(clauses: Iterable[Sequence[int]]) -> Ints:
