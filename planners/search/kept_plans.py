@@ -20,7 +20,7 @@ from planners.search.plan_space import PlanSpace
 from planners.system.errors import CoordlangError, note
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    import pathlib
 
     from planners.parallel.batch import Store, Table
 
@@ -51,14 +51,14 @@ class _Cache:
 _USED: ContextVar[_Cache | None] = ContextVar("plans that are kept", default=None)
 
 
-def plan_store(folder: Path) -> Store:
+def plan_store(folder: pathlib.Path) -> Store:
     """The store of plans in a folder, bounded."""
     from planners.parallel.batch import Store
 
     return Store(folder / f"plans-{_FORM}", _MOST_BYTES)
 
 
-def default_folder(environment: Mapping[str, str] = os.environ) -> Path | None:
+def default_folder(environment: Mapping[str, str] = os.environ) -> pathlib.Path | None:
     """Where a user's plans are; None where the user wants none, or has no home.
 
     ``$COORDLANG_CACHE`` if it is set (``off``: none), else ``coordlang`` in ``$XDG_CACHE_HOME``, or
@@ -67,14 +67,14 @@ def default_folder(environment: Mapping[str, str] = os.environ) -> Path | None:
     chosen = environment.get("COORDLANG_CACHE", "")
     if chosen.lower() == "off":
         return None
-    from pathlib import Path
+    import pathlib
 
     if chosen:
-        return Path(chosen)
+        return pathlib.Path(chosen)
     base = environment.get("XDG_CACHE_HOME", "")
     with suppress(RuntimeError):
         # By its specification a relative path is ignored.
-        caches = Path(base) if os.path.isabs(base) else Path.home() / ".cache"
+        caches = pathlib.Path(base) if os.path.isabs(base) else pathlib.Path.home() / ".cache"
         if caches.parent.is_dir():
             return caches / "coordlang"
     return None
