@@ -75,7 +75,8 @@ def build_language(
 
     ``method`` and ``way`` are as in `MethodOptions`, of which ``options`` may be given in their
     place; ``words``, ``worst`` and ``start`` as in `BuildOptions`.  A search that has a language
-    leaves the share ``reserve`` of a time limit's rest for `Built.certificate`.
+    leaves the share ``reserve`` of a time limit's rest for `Built.certificate`; with one it proves
+    bounds by clauses alone.
 
     Raises `Inseparable`, which has two plans that show it, if there is no language over states,
     `ProvedImpossible` if there is no candidate task, `OutOfMemory` where there is no language yet
@@ -109,6 +110,7 @@ def build_language(
         making.check(job.incumbent or {})
         making.note("incumbent")
         if reserve:
+            job = replace(job, by_clauses=True)
             start_clock((1 - reserve) * time_left())
     progress(f"building words ({method})")
     found = _outcome(job, options, making)

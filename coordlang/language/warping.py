@@ -54,29 +54,3 @@ def _before(best: list[list[int]], i: int, j: int) -> tuple[int, int, int]:
         best[i - 1][j] if i else _NO_PATH,
         best[i][j - 1] if j else _NO_PATH,
     )
-
-
-def short_clauses(sequences: Sequence[Sequence[int]], most: int) -> set[Clause]:
-    """The clauses of a failing tuple of plans, under any words, with at most ``most`` pairs.
-
-    Each is the non-identical pairs of some warping paths from the first to each other sequence.
-    O(length^2) sets of such clauses.
-    """
-    found: set[Clause] = {frozenset()}
-    for other in sequences[1:]:
-        paths = _short_paths(sequences[0], other, most)
-        found = {one | path for one in found for path in paths if len(one | path) <= most}
-    return found
-
-
-def _short_paths(u: Sequence[int], v: Sequence[int], most: int) -> set[Clause]:
-    """The sets of at most so many non-identical pairs that are those of a warping path."""
-    nothing: Clause = frozenset()
-    to: dict[tuple[int, int], set[Clause]] = {}
-    for i, a in enumerate(u):
-        for j, b in enumerate(v):
-            cell = nothing if a == b else frozenset([pair(a, b)])
-            earlier = (to.get(c, set()) for c in ((i - 1, j - 1), (i - 1, j), (i, j - 1)))
-            before = set().union(*earlier) if i or j else {nothing}
-            to[i, j] = {path | cell for path in before if len(path | cell) <= most}
-    return to[len(u) - 1, len(v) - 1]

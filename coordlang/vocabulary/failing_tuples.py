@@ -17,7 +17,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from coordlang.language.warping import Clause, short_clauses
+from coordlang.language.warping import Clause
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.counterexamples import Counterexamples
 from coordlang.vocabulary.job import Evidence
@@ -199,15 +199,6 @@ class FailingTuples:
                 clauses.setdefault(clause, (batch, number))
         chosen = sorted(clauses, key=lambda c: (len(c), sorted(c)))[:returned]
         return {clause: self._evidence(*clauses[clause]) for clause in chosen}
-
-    def short_clauses(self, most: int) -> dict[Clause, Evidence]:
-        """All clauses of the tuples that are kept with at most so many pairs."""
-        found: dict[Clause, Evidence] = {}
-        for _, table in sorted(self._tables.items()):
-            for states, source in zip(table.states.tolist(), table.source.tolist(), strict=True):
-                new = short_clauses(states, most) - found.keys()
-                found.update(dict.fromkeys(new, self._evidence(*source)) if new else {})
-        return found
 
     def _evidence(self, batch: int, row: int) -> Evidence:
         space, found = self._batches[batch]

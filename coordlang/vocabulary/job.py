@@ -45,7 +45,8 @@ class Job:
     ``first_differences`` says where coordination is required, and how plans that introduce RC part;
     ``incumbent`` is known to be a language: what an anytime method returns in the worst case.
     ``alpha_only`` is for `separating`: plans are separated where they part, never where they meet;
-    ``effort`` for `best`: what it may spend, in thousands of conflicts of the solver.  ``progress``
+    ``effort`` for `best`: what it may spend, in thousands of conflicts of the solver;
+    ``by_clauses``: bounds are proved by clauses alone, as a certificate needs them.  ``progress``
     is called with a line of text now and then.  ``check`` verifies a partition by definition, and
     raises if it is no language; an anytime method calls it for every better one that it finds:
     when it is stopped there is no time left.  ``workers`` do what can be done beside the method.
@@ -58,6 +59,7 @@ class Job:
     seed: int = 0
     alpha_only: bool = False
     effort: int = 0
+    by_clauses: bool = False
     progress: Callable[[str], None] = lambda _: None
     check: Callable[[Assignment], None] = lambda _: None
     workers: Workers = field(default_factory=lambda: Workers())

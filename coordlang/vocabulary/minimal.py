@@ -18,6 +18,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from coordlang.language.warping import Clause
+from coordlang.vocabulary.counting import needs_three_words
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome, word_count
 from coordlang.vocabulary.loop import (
@@ -64,8 +65,6 @@ _MANY, _MERGED_SOON = 100, 30
 _VAIN = 15
 #: Plans that local search may measure for a unit of effort.
 _MEASURED = 1_000_000
-#: Pairs of the clauses that are all collected before long proofs without a common step.
-_SHORT = 3
 #: Merged words are verified once they are so many times the last ones that were.
 _FEWER = 0.9
 
@@ -108,7 +107,7 @@ def refuting_clauses(job: Job, size: int) -> Mapping[Clause, Evidence]:
     Not anytime: it takes as long as the proof takes.  Raises `ValueError` if there is a language
     with so few words.
     """
-    with closing(MinimalSearch(replace(job, incumbent=None))) as search:
+    with closing(MinimalSearch(replace(job, incumbent=None, by_clauses=True))) as search:
         budget = Budget()
         while not search.decide(size, budget):
             budget = budget.doubled()
@@ -178,17 +177,12 @@ class MinimalSearch:
         if self._pairs // _FIRST_PAIRS > _BEGINNING * self._most:
             return
         if self._is_one_task:
-            if self._is_dear and self.upper > _MANY:
-                self._begin_with_few_facts()
-            for rounds in _WHERE_DEAR if self._is_dear else _FOR_KINDS:
-                self._find_fewer_tied(rounds)
+            self._begin_with_one_task()
         while self.lower < self.upper and not self._is_spent and self.decide(self.lower, _SOON):
             pass
         if not self._is_one_task:
             self._decide_between(_SOON)
         self.merge(_VAIN)
-        if self._is_asynchronous and not self._is_one_task:
-            self._know_short_clauses()
         known = self.best
         close_bounds(lambda: (self.lower, self.upper), self._narrow, lambda: self._is_spent)
         if self.best is known and not self._is_spent:
@@ -203,17 +197,22 @@ class MinimalSearch:
     def _is_one_task(self) -> bool:
         return self._job.candidates.count == 1
 
+    def _begin_with_one_task(self) -> None:
+        """Count how many sentences are needed, and look for words of a kind."""
+        (space,) = self._job.candidates.spaces
+        if not (self._job.by_clauses or self._is_asynchronous) and needs_three_words(space):
+            self.lower = max(self.lower, 3)
+        if self._is_dear and self.upper > _MANY:
+            self._begin_with_few_facts()
+        for rounds in _WHERE_DEAR if self._is_dear else _FOR_KINDS:
+            self._find_fewer_tied(rounds)
+
     def _begin_with_few_facts(self) -> None:
         """Words that say what a few facts say, merged a little: closer than a word for a state."""
         found = self._tied.of_facts()
         if found is not None and word_count(found) < self.upper:
             self._offer(found)
             self.merge(most=_MERGED_SOON)
-
-    def _know_short_clauses(self) -> None:
-        """Add clauses that refute no partition met so far: the last proof takes half as long."""
-        if self.lower < self.upper and not self._is_spent:
-            self.languages.known.add_all(self.languages.refuter.pool.short_clauses(_SHORT))
 
     def _decide_between(self, budget: Budget) -> None:
         """Decide numbers between the bounds, as long as that is quick."""
@@ -379,7 +378,9 @@ class MinimalSearch:
                 "walks": languages.refuter.walks,
                 "work": self.work,
             }
-        return Outcome(self.best, self.lower, figures, stopped, self.refuting.clauses, languages)
+        # A bound by counting is beyond what the clauses refute.
+        refuting = self.refuting.clauses if self.refuting.size == self.lower - 1 else {}
+        return Outcome(self.best, self.lower, figures, stopped, refuting, languages)
 
     def close(self) -> None:
         """Give back what the solvers hold."""

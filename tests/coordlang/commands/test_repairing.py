@@ -34,7 +34,7 @@ def parts(path: str) -> dict[str, Any]:
 
 def test_more_tasks(shell: Shell) -> None:
     """From one task to all: states that are new get words, and one that was there another one."""
-    build(shell, "SMALL --method minimal -o old.json")
+    build(shell, "SMALL --method separating -o old.json")
     figures = build(shell, "SMALL --tasks all --start old.json -o new.json")
     repair = figures["repair"]
     assert (figures["method"], figures["tasks"]) == ("repair", 870)
@@ -152,7 +152,7 @@ def test_fewer_pairs_than_it_serves(shell: Shell) -> None:
 
 
 def test_stopped_repairs_are_written(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
-    build(shell, "SMALL --method minimal -o old.json")
+    build(shell, "SMALL --method separating -o old.json")
 
     def late(*_: object) -> bool:
         raise OutOfTime("the time limit is over")

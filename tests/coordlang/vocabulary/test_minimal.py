@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from itertools import combinations, islice, pairwise, permutations, product
+from itertools import combinations, islice, pairwise, permutations
 from pathlib import Path
 from random import Random
 
@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates
-from coordlang.language.warping import Pair, pair, short_clauses
+from coordlang.language.warping import pair
 from coordlang.language.words import Partition
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.verification.by_definition import verify
@@ -49,26 +49,6 @@ def test_known_minima(folder: str, stem: str, words: int) -> None:
     guarantee = built.language.guarantee
     assert (guarantee.size, guarantee.lower_bound, guarantee.proved_minimal) == (words, words, True)
     assert built.verdict.holds
-
-
-SEQUENCES = st.lists(st.integers(0, 4), min_size=1, max_size=6)
-
-
-@given(st.lists(SEQUENCES, min_size=2, max_size=3), st.integers(0, 4))
-def test_short_clauses_are_those_of_all_warping_paths(plans: list[list[int]], most: int) -> None:
-    ways = [set(pairs_of_paths(plans[0], other)) for other in plans[1:]]
-    every = {frozenset().union(*paths) for paths in product(*ways)}
-    assert short_clauses(plans, most) == {clause for clause in every if len(clause) <= most}
-
-
-def pairs_of_paths(u: list[int], v: list[int]) -> Iterator[frozenset[Pair]]:
-    """The non-identical pairs of each warping path."""
-    cell = frozenset([pair(u[0], v[0])] if u[0] != v[0] else ())
-    if len(u) == len(v) == 1:
-        yield cell
-    for after in ((u[1:], v[1:]), (u[1:], v), (u, v[1:])):
-        if all(after):
-            yield from (cell | rest for rest in pairs_of_paths(*after))
 
 
 GROUPS: tuple[list[list[int]], ...] = (
