@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the program prints and writes on the shipped domains, for comparing two versions of it.
 
-    python benchmarks/outputs.py FOLDER [--program PATH] [--only PATTERN] [--jobs N]
+    python benchmarks/outputs.py FOLDER [--program PATH] [--jobs N]
 
 Runs a fixed list of commands in the current directory, a checkout, each as a process of its own.
 ``FOLDER/WORLD/COMMAND.txt`` holds the exit code and stdout of a command, beside it lie the files
 that it wrote. Versions behave alike if and only if ``diff -r`` of their folders is empty. What
 differs from run to run is left out: seconds, the ``producer`` of a file and the place of FOLDER.
 Messages on stderr are not compared.
-
-``--only`` runs the commands whose ``WORLD/COMMAND`` contains a match of the regular expression,
-and those that write the files that they read.
 """
 
 from __future__ import annotations
@@ -236,16 +233,6 @@ class Command:
         words = re.sub(r"[^\w@.+=:-]+", "_", self.line).strip("_")
         return f"{self.world}/{words.replace('@', '')}"
 
-    @property
-    def files(self) -> list[str]:
-        """The files in FOLDER that it names."""
-        return re.findall(r"@(\S+)", self.line)
-
-    @property
-    def writes(self) -> list[str]:
-        """Those of them that it writes."""
-        return re.findall(r"(?:-o|--output|--certificate|--dimacs) @(\S+)", self.line)
-
     def arguments(self, folder: Path) -> list[str]:
         """The command line, with names of files in full."""
         here = DOMAINS / self.world
@@ -276,18 +263,6 @@ def commands() -> list[Command]:
                 for line in lines.strip().splitlines()
             )
     return found
-
-
-def selected(listed: list[Command], pattern: str) -> list[Command]:
-    """The commands that match, and those that write what these read, in order."""
-    needed: set[tuple[str, str]] = set()
-    kept: list[Command] = []
-    for command in reversed(listed):
-        written = {(command.world, file) for file in command.writes}
-        if re.search(pattern, command.name) or written & needed:
-            kept.append(command)
-            needed |= {(command.world, file) for file in command.files}
-    return kept[::-1]
 
 
 def without_times(text: str, folder: Path) -> str:
@@ -336,15 +311,14 @@ def run_world(program: str, listed: list[Command], folder: Path) -> None:
 
 
 def main() -> int:
-    """Run the commands that the arguments select."""
+    """Run all commands, world by world."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, help="where the outputs go; emptied before")
     parser.add_argument("--program", default="coordlang", help="the executable of the version")
-    parser.add_argument("--only", default="", metavar="PATTERN", help="only matching commands")
     parser.add_argument("--jobs", type=int, default=1, help="worlds at the same time (default: 1)")
     options = parser.parse_args()
     folder = options.folder.resolve()
-    listed = selected(commands(), options.only)
+    listed = commands()
     shutil.rmtree(folder, ignore_errors=True)
     begin = perf_counter()
     worlds = [[*own] for _, own in groupby(listed, key=lambda command: command.world)]
