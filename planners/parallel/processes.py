@@ -156,6 +156,8 @@ def _do(job: Any) -> Outcome:
 
 
 def _asked_to_end(_signal: int, _frame: FrameType | None) -> None:
+    for number in ENDING:  # the executor asks again once another worker has ended
+        signal.signal(number, signal.SIG_IGN)
     raise _Ended(_ASKED_TO_END)
 
 

@@ -50,13 +50,14 @@ def waits(folder: str, job: int) -> Table:
 
 
 def removes(folder: str, job: int) -> Table:
-    """Half write a file, and remove it when asked to end."""
+    """Half write a file, and remove it when asked to end: job 1 takes a while for that."""
     half = Path(folder, f"half-{job}")
     half.touch()
     try:
         Path(folder, f"pid-{os.getpid()}").touch()
         time.sleep(60)
     finally:
+        time.sleep(0.3 * job)
         half.unlink()
     return {}
 
