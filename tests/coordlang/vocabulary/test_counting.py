@@ -18,11 +18,13 @@ from tests.support.candidates import MOST, listed, requiring, small_candidates
 from tests.support.texts import parsed
 
 
-@pytest.mark.parametrize("robots", [2, 3])
-def test_plans_are_apart_iff_some_mixture_of_every_two_fails(robots: int) -> None:
+@pytest.mark.parametrize(
+    ("robots", "number"), [(2, 20), (3, 10), pytest.param(3, 80, marks=pytest.mark.thorough)]
+)
+def test_plans_are_apart_iff_some_mixture_of_every_two_fails(robots: int, number: int) -> None:
     told = Counter[bool]()
     models = (c for _, c in small_candidates(robots, states=9, plans=MOST) if requiring(c))
-    for candidates in islice(models, 40):
+    for candidates in islice(models, number):
         for space, task, plans, _ in listed(candidates):
             start, apart = int(space.starts[task]), Apart(space)
             for steps in range(1, min(3, len(plans[0]) + 1)):
