@@ -136,9 +136,9 @@ def _environment(world: dict[str, Any], seed: int) -> Any:
         path.write_text(json.dumps(world))  # which is YAML, too
         with postponed_signals():  # it would print a limit's error as one of its own
             environment = simulator(str(path), headless=True, log_level="CRITICAL", seed=seed)
-    # It logs nothing from here on.  Left to the garbage collector, that may come while the next
-    # world begins to log, and both wait for the other's lock for ever.
-    environment.logger.close()
+            # It logs nothing from here on.  Left to the garbage collector, that may come while the
+            # next world begins to log, and both wait for the other's lock for ever.
+            environment.logger.close()
     return environment
 
 

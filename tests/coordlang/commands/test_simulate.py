@@ -93,6 +93,7 @@ def test_a_limit_while_the_world_is_made_is_no_line_on_stdout(
 ) -> None:
     simulate("")  # ir-sim is loaded as the command does it
     from irsim.env import env_base
+    from loguru import logger
 
     class Ringing(env_base.EnvConfig):  # type: ignore[misc]
         """The alarm rings while the file is read, where ir-sim prints what is raised."""
@@ -108,6 +109,8 @@ def test_a_limit_while_the_world_is_made_is_no_line_on_stdout(
     monkeypatch.setattr(env_base, "EnvConfig", Ringing)
     outcome = simulate("--runs 9 --time-limit 600 --json", 3)
     assert len(json.loads(outcome.out)["runs"]) == 2
+    sinks = logger._core.handlers  # type: ignore[attr-defined]
+    assert not sinks, "the collector would remove it, perhaps while the next world adds one"
 
 
 def test_an_interrupt_keeps_the_runs_that_are_done(
