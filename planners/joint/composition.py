@@ -338,8 +338,9 @@ class JointActionStepper(Stepper):
     def steps(self, rows: Rows, options: Options | None = None) -> Steps:
         """See `Stepper`; ``options`` are not looked at: no robot chooses by itself."""
         row, operator = self._operators.applicable(rows)
-        adds, deletes = self._operators.changes(rows, row, operator)
-        result = (rows[row] & ~deletes) | adds
+        changed = self._operators.adds[operator], self._operators.deletes[operator]
+        self._operators.enter_conditional(changed, rows, row, operator)
+        result = (rows[row] & ~changed[1]) | changed[0]
         labels = self._labels[operator]
         # Of joint actions with the same parts the cheapest comes first, and is kept.
         order = np.lexsort((self._cost[operator], *labels.T[::-1], row))

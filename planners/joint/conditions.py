@@ -90,45 +90,6 @@ def split_condition(
     return known, rest
 
 
-class Matcher:
-    """Finds operators by the rarest fact that they require, and tests the others one by one.
-
-    For each operator ``required`` are the numbers of the facts that must be true, ``forbidden`` is
-    the mask of those that must be false (operators x blocks).
-    """
-
-    def __init__(self, required: Sequence[frozenset[int]], forbidden: Rows) -> None:
-        self._forbidden = forbidden
-        self._has_forbidden = bool(forbidden.any())
-        frequency = Counter(fact for facts in required for fact in facts)
-        #: (operators, facts) those that each operator requires, rare ones first; -1 to fill up.
-        self._facts = np.full((len(required), max(map(len, required), default=0) + 1), -1)
-        for number, facts in enumerate(required):
-            self._facts[number, : len(facts)] = sorted(facts, key=lambda f: (frequency[f], f))
-        # By their first fact, CSR; those without any are first.
-        self._operators = np.argsort(self._facts[:, 0], kind="stable")
-        bounds = np.arange(-1, 64 * forbidden.shape[1] + 1)
-        self._first = np.searchsorted(self._facts[self._operators, 0], bounds)
-
-    def match(self, rows: Rows) -> tuple[Ints, Ints]:
-        """All pairs (row number, operator) with the operator's literals satisfied, sorted."""
-        true, every = TrueFacts.of(rows), np.arange(len(rows))
-        row = np.concatenate((every, true.row))
-        fact = np.concatenate((np.full(len(rows), -1), true.fact))
-        counts = self._first[fact + 2] - self._first[fact + 1]
-        operator = self._operators[ranges(self._first[fact + 1], counts)]
-        row = np.repeat(row, counts)
-        for place in range(1, self._facts.shape[1] - 1):
-            fact = self._facts[operator, place]
-            holds = (fact < 0) | test_bits(rows, row, fact)
-            row, operator = row[holds], operator[holds]
-        if self._has_forbidden:
-            clash = (rows[row] & self._forbidden[operator]).any(axis=1)
-            row, operator = row[~clash], operator[~clash]
-        order = np.lexsort((operator, row))
-        return row[order], operator[order]
-
-
 class Operators:
     """Ground actions, numbered as given, for whole tables of states at a time; None is idling.
 
@@ -146,20 +107,28 @@ class Operators:
         self.conditional: dict[int, list[GroundEffect]] = {}
         self.adds = np.zeros((len(actions), codec.fact_blocks), np.uint64)
         self.deletes = np.zeros_like(self.adds)
-        required, forbidden = [frozenset[int]()] * len(actions), np.zeros_like(self.adds)
-        self._forbidden, self._required = forbidden, np.zeros_like(self.adds)
+        self._required, self._forbidden = np.zeros_like(self.adds), np.zeros_like(self.adds)
+        required = [frozenset[int]()] * len(actions)
         for number, action in enumerate(actions):
             if action is None:
                 continue
             literals, rest = split_condition(action.precondition, evaluator)
-            required[number] = frozenset(fact for fact, positive in literals if positive)
+            required[number] = frozenset(fact for fact, is_true in literals if is_true)
             self._required[number] = codec.mask(required[number])
-            forbidden[number] = codec.mask(fact for fact, positive in literals if not positive)
+            self._forbidden[number] = codec.mask(fact for fact, is_true in literals if not is_true)
             for formula in rest:
                 kind = self.step_formulas if speaks_of_step(formula) else self._state_formulas
                 kind.setdefault(number, []).append(formula)
             self._enter_effects(number, action)
-        self._matcher = Matcher(required, forbidden)
+        frequency = Counter(fact for facts in required for fact in facts)
+        #: (actions, facts) those that each one requires, rare ones first; -1 to fill up.
+        self._facts = np.full((len(required), max(map(len, required), default=0) + 1), -1)
+        for number, facts in enumerate(required):
+            self._facts[number, : len(facts)] = sorted(facts, key=lambda f: (frequency[f], f))
+        # By their first fact, CSR; those without any are first.
+        self._by_fact = np.argsort(self._facts[:, 0], kind="stable")
+        bounds = np.arange(-1, 64 * codec.fact_blocks + 1)
+        self._first = np.searchsorted(self._facts[self._by_fact, 0], bounds)
 
     def _enter_effects(self, number: int, action: GroundAction) -> None:
         index = self._codec.facts.index
@@ -181,7 +150,7 @@ class Operators:
 
     def applicable(self, rows: Rows) -> tuple[Ints, Ints]:
         """Pairs (row, action) whose conditions on the state hold, sorted."""
-        row, operator = self._matcher.match(rows)
+        row, operator = self._with_literals(rows)
         keep: Bools = np.ones(len(row), np.bool_)
         for number, formulas in self._state_formulas.items():
             there = np.flatnonzero(operator == number)
@@ -189,16 +158,23 @@ class Operators:
                 keep[there] &= self._evaluator.holds(formula, rows, row[there])
         return row[keep], operator[keep]
 
-    def changes(
-        self, rows: Rows, source: Ints, chosen: Numbers, labels: Labels | None = None
-    ) -> tuple[Rows, Rows]:
-        """What the actions ``chosen[k]`` add to ``rows[source[k]]``, and what they delete.
-
-        ``labels[k]`` are what all robots do beside, where conditions may speak of that.
-        """
-        changed = self.adds[chosen], self.deletes[chosen]
-        self.enter_conditional(changed, rows, source, chosen, labels)
-        return changed
+    def _with_literals(self, rows: Rows) -> tuple[Ints, Ints]:
+        """Pairs whose literals hold, sorted: found by the rarest fact required, then tested."""
+        true, every = TrueFacts.of(rows), np.arange(len(rows))
+        row = np.concatenate((every, true.row))
+        fact = np.concatenate((np.full(len(rows), -1), true.fact))
+        counts = self._first[fact + 2] - self._first[fact + 1]
+        operator = self._by_fact[ranges(self._first[fact + 1], counts)]
+        row = np.repeat(row, counts)
+        for place in range(1, self._facts.shape[1] - 1):
+            fact = self._facts[operator, place]
+            holds = (fact < 0) | test_bits(rows, row, fact)
+            row, operator = row[holds], operator[holds]
+        if self._forbidden.any():
+            clash = (rows[row] & self._forbidden[operator]).any(axis=1)
+            row, operator = row[~clash], operator[~clash]
+        order = np.lexsort((operator, row))
+        return row[order], operator[order]
 
     def enter_conditional(
         self,
@@ -206,9 +182,12 @@ class Operators:
         rows: Rows,
         source: Ints,
         chosen: Numbers,
-        labels: Labels | None,
+        labels: Labels | None = None,
     ) -> None:
-        """Enter what actions add and delete by effects that depend on the state; see `changes`."""
+        """Enter what ``chosen[k]`` adds to ``rows[source[k]]`` and deletes by conditional effects.
+
+        ``labels[k]`` are what all robots do beside, where conditions may speak of that.
+        """
         for number, effects in self.conditional.items():
             there = np.flatnonzero(chosen == number)
             beside = None if labels is None else labels[there]

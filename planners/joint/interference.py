@@ -26,6 +26,9 @@ class Footprint(NamedTuple):
     ``partners`` are the actions that a positive literal of a precondition or effect condition or a
     network names, ``excluded`` those that its precondition as a whole forbids, ``conditional_on``
     those that the condition of an effect names; ``names`` has what formulas call the action itself.
+
+    Of all its formulas and effects, whatever fires: the atoms that it ``touched`` and those that it
+    ``writes``, and the actions ``named``, in formulas and in networks.
     """
 
     names: frozenset[StepAtom]
@@ -36,6 +39,9 @@ class Footprint(NamedTuple):
     partners: frozenset[StepAtom]
     excluded: frozenset[StepAtom]
     conditional_on: frozenset[StepAtom]
+    touched: frozenset[Atom]
+    writes: frozenset[Atom]
+    named: frozenset[StepAtom]
 
 
 def footprint(action: GroundAction, step: frozenset[StepAtom] | None = None) -> Footprint:
@@ -53,6 +59,7 @@ def footprint(action: GroundAction, step: frozenset[StepAtom] | None = None) -> 
             effects.append(effect)
             required += found
     adds = frozenset([e.atom for e in effects if e.adds])
+    writes = frozenset([e.atom for e in action.effects])
     return Footprint(
         names=frozenset((_name(action),)),
         requires_true=_leaves(Atom, required, (True,)),
@@ -62,6 +69,9 @@ def footprint(action: GroundAction, step: frozenset[StepAtom] | None = None) -> 
         partners=action.links | _leaves(StepAtom, named, (True,)),
         excluded=frozenset(forbidden_steps(action.precondition)),
         conditional_on=_leaves(StepAtom, named[len(precondition) :], (True, False)),
+        touched=writes | _leaves(Atom, named, (True, False)),
+        writes=writes,
+        named=action.links | _leaves(StepAtom, named, (True, False)),
     )
 
 
@@ -125,17 +135,14 @@ class Choices:
         self.actions = actions
         #: The labels of subactions with more than one owner.
         self.shared = [n for n, a in enumerate(actions) if a and len(a.owners) > 1]
-        self._labels: dict[str, dict[Leaf, list[int]]] = {f: {} for f in Footprint._fields}
+        #: By field of the footprint the labels in which each atom stands there.
+        self.labels: dict[str, dict[Leaf, list[int]]] = {f: {} for f in Footprint._fields}
         for number, action in enumerate(actions):
             if action:
                 own = footprint(action, frozenset((_name(action),)))
-                for field, labels in self._labels.items():
+                for field, labels in self.labels.items():
                     for leaf in getattr(own, field):
                         labels.setdefault(leaf, []).append(number)
-
-    def labels(self, field: str) -> dict[Leaf, list[int]]:
-        """The labels in whose footprint's field each atom stands."""
-        return self._labels[field]
 
 
 def compatible(left: Choices, right: Choices, i: int, j: int) -> Bools:
@@ -144,7 +151,7 @@ def compatible(left: Choices, right: Choices, i: int, j: int) -> Bools:
     A shared subaction of both goes only with itself; one that only names other robots goes with
     idling too. O(pairs that touch one atom) beside the table itself.
     """
-    meets = partial(_meeting, left, right)
+    meets = partial(meeting, left, right)
     apart = meets("requires_true", "deletes") | meets("requires_false", "adds")
     table: Bools = ~apart | meets("partners", "names")  # meant to be done together
     table &= ~(meets("adds", "deletes") | meets("excluded", "names"))
@@ -156,11 +163,11 @@ def compatible(left: Choices, right: Choices, i: int, j: int) -> Bools:
     return table
 
 
-def _meeting(left: Choices, right: Choices, one: str, other: str) -> Bools:
+def meeting(left: Choices, right: Choices, one: str, other: str) -> Bools:
     """The pairs in which something stands in the one field here and in the other there."""
     found = np.zeros((len(left.actions), len(right.actions)), np.bool_)
     for first, second in ((one, other), (other, one)):
-        rows, columns = left.labels(first), right.labels(second)
+        rows, columns = left.labels[first], right.labels[second]
         for leaf in min(rows, columns, key=len):
             if leaf in rows and leaf in columns:
                 found[np.array(rows[leaf])[:, None], columns[leaf]] = True
@@ -177,4 +184,4 @@ def _share(table: Bools, left: Choices, right: Choices, i: int, j: int) -> None:
     for number in left.shared:
         action = left.actions[number]
         if action and j in action.owners:
-            table[number, right.labels("names")[_name(action)]] = True
+            table[number, right.labels["names"][_name(action)]] = True

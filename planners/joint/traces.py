@@ -10,20 +10,17 @@ together: it is a *meeting*.  See docs/asynchronous.md.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence, Set
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache, partial
 from itertools import combinations, permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planners.grounding.actions import GroundAction
 from planners.joint.composition import ComposingStepper
+from planners.joint.interference import Choices, footprint, meeting
 from planners.joint.model import JointModel, Stepper
 from planners.joint.tables import Bools, Rows
-from planners.pddl.formula_tree import literals
-from planners.pddl.lifted import Atom, StepAtom
 
 #: The label number of each robot; 0 is idling.
 Step = tuple[int, ...]
@@ -61,8 +58,10 @@ class Traces:
         self.interfering = _interfering(stepper, tuple(map(len, model.labels)))
         self.has_ties = False
         self._results: dict[tuple[bytes, Step], Rows | None] = {}
-        self._groups: dict[Step, tuple[Block, ...]] = {}
-        self._facts: dict[Step, Rows] = {}
+        #: The robots whose events in a joint step interfere, by way of others too, in groups.
+        self.groups = cache(self._groups)
+        #: The facts that the events of a joint step read or write, as bits of a state.
+        self.facts_of = cache(self._facts_of)
         self._blocks: dict[tuple[bytes, Step], tuple[Block, ...]] = {}
 
     def result(self, row: Rows, step: Step) -> Rows | None:
@@ -135,8 +134,6 @@ class Traces:
         """The events of a joint step by robot, after those that are ``done`` by each."""
 
         def waits(robot: int, other: int) -> int:
-            if robot == other:
-                return 0
             interferes = self.interfering[robot, other][step[robot]]
             return sum(bool(interferes[event.label]) for event in done[other])
 
@@ -154,7 +151,7 @@ class Traces:
         for block in self.blocks(row, step):
             earlier = list(found)
             for robot in block:
-                counts = [waits(robot, other) for other in self._robots]
+                counts = [0 if other == robot else waits(robot, other) for other in self._robots]
                 for other in earlier:
                     counts[other] += bool(self.interfering[robot, other][step[robot], step[other]])
                 meets = tuple((other, step[other]) for other in block if other != robot)
@@ -170,30 +167,19 @@ class Traces:
             if label and other not in block
         )
 
-    def facts_of(self, step: Step) -> Rows:
-        """The facts that the events of a joint step read or write, as bits of a state."""
-        if step not in self._facts:
-            self._facts[step] = self._read_or_written(step)
-        return self._facts[step]
-
-    def _read_or_written(self, step: Step) -> Rows:
+    def _facts_of(self, step: Step) -> Rows:
         codec = self._model.codec
         if self._stepper is None:
             return ~np.zeros(codec.width, np.uint64)
         found = np.zeros(codec.width, np.uint64)
         for own, label in zip(self._stepper.labelled, step, strict=True):
-            reads, writes, _, _ = _touches(own[label])
-            known = [codec.facts.index[atom] for atom in reads | writes if atom in codec.facts]
-            found[: codec.fact_blocks] |= codec.mask(known)
+            if action := own[label]:
+                touched = footprint(action).touched
+                known = [codec.facts.index[atom] for atom in touched if atom in codec.facts]
+                found[: codec.fact_blocks] |= codec.mask(known)
         return found
 
-    def groups(self, step: Step) -> tuple[Block, ...]:
-        """The robots whose events in a joint step interfere, by way of others too, in groups."""
-        if step not in self._groups:
-            self._groups[step] = self._joined(step)
-        return self._groups[step]
-
-    def _joined(self, step: Step) -> tuple[Block, ...]:
+    def _groups(self, step: Step) -> tuple[Block, ...]:
         found: list[set[int]] = []
         for robot in self._robots:
             if step[robot]:
@@ -247,40 +233,9 @@ def _interfering(stepper: Stepper, sizes: tuple[int, ...]) -> dict[tuple[int, in
     if not isinstance(stepper, ComposingStepper):
         # Nothing says whose part of a joint action does what.
         return {(i, j): np.ones((sizes[i], sizes[j]), np.bool_) for i, j in pairs}
-    touched = [[_touches(action) for action in own] for own in stepper.labelled]
-    leaves = sorted(
-        {leaf for own in touched for one in own for part in one for leaf in part}, key=str
-    )
-    number = {leaf: n for n, leaf in enumerate(leaves)}
-    reads, writes, names, selves = (
-        [_incidence([one[part] for one in own], number) for own in touched] for part in range(4)
-    )
+    touched = [Choices(own) for own in stepper.labelled]
     found = {}
     for i, j in pairs:
-        meets = writes[i] @ (reads[j] + writes[j]).T + reads[i] @ writes[j].T
-        meets += names[i] @ selves[j].T + selves[i] @ (names[j] + selves[j]).T
-        found[i, j] = meets > 0
+        meets = partial(meeting, touched[i], touched[j])
+        found[i, j] = meets("writes", "touched") | meets("named", "names") | meets("names", "names")
     return found
-
-
-#: What an action reads and writes, the actions that it names, and itself.
-_Touched = tuple[Set[Atom], Set[Atom], Set[object], Set[object]]
-
-
-def _touches(action: GroundAction | None) -> _Touched:
-    if action is None:
-        return frozenset(), frozenset(), frozenset(), frozenset()
-    formulas = [action.precondition, *(effect.condition for effect in action.effects)]
-    found = {leaf for formula in formulas for leaf, _ in literals(formula)}
-    names = {leaf for leaf in found if isinstance(leaf, StepAtom)} | action.links
-    reads = {leaf for leaf in found if isinstance(leaf, Atom)}
-    writes = {effect.atom for effect in action.effects}
-    return reads, writes, names, {StepAtom(action.schema, action.args)}
-
-
-def _incidence(sets: Sequence[Set[object]], number: dict[object, int]) -> NDArray[np.float32]:
-    """Which sets (rows) have which members, as 0 and 1: products of such tables are fast."""
-    table = np.zeros((len(sets), len(number)), np.float32)
-    for row, own in enumerate(sets):
-        table[row, [number[leaf] for leaf in own]] = True
-    return table

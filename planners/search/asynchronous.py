@@ -308,8 +308,6 @@ class _Waits:
         """How many events of another robot a robot's event of a step waits for, of the past."""
 
         def waits(robot: int, other: int) -> int:
-            if robot == other:
-                return 0
             return int(past[self._column[robot][other][step[robot]]])
 
         return waits
