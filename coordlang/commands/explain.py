@@ -12,6 +12,7 @@ from typing import Any
 from coordlang.commands.inputs import Arguments, InTask, public, read_coordinates_of
 from coordlang.commands.records import ExplainOptions
 from coordlang.commands.terminal import covered_code, echo, warn_of_failures, working
+from coordlang.execution.best_sentence import leading_sentences
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import SentenceDemands, meaning, sentence_demands
 from coordlang.explanation.text import (
@@ -37,7 +38,6 @@ from coordlang.language.provenance import tolerance_data
 from coordlang.language.sentences import (
     Sentence,
     TaskSentence,
-    leading_sentences,
     number_of_sentences,
     task_sentences,
 )
@@ -205,7 +205,7 @@ class Explanation(InTask):
             plans = f"{counted(total, 'plan')} within slack {slack}, of at most"
         number = number_of_sentences(used.space, used.word, used.start)
         said = "too many sentences to count" if number is None else counted(number, "sentence")
-        leading = leading_sentences(used.space, used.word, used.start, SENTENCES_SHOWN)
+        leading = leading_sentences(used, SENTENCES_SHOWN)
         lines = [
             f"The task {describe(used.space, used.task)}",
             f"has {plans} {steps} in {said}.",

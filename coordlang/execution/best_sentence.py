@@ -10,6 +10,7 @@ from heapq import heapify, heappop, heappush
 from typing import Any
 
 from coordlang.execution.task_language import TaskLanguage
+from coordlang.language.sentences import Sentence
 from planners.joint.model import JointModel
 from planners.joint.states import split_atoms
 from planners.pddl.lifted import Atom
@@ -20,6 +21,8 @@ from planners.system.messages import echoed
 
 #: Bytes of one entry of a prefix's counts.
 _ENTRY_BYTES = 200
+#: Joint actions that are followed at most to find the leading sentences of a task.
+_FOLLOWED = 2_000_000
 #: In place of a word, and of a node: the plan ends, with no further word.
 _END = -1
 #: What a preference remembers of a plan's beginning.
@@ -221,6 +224,27 @@ def best_sentence(task_language: TaskLanguage, preferences: Sequence[Preference]
     raise AssertionError("a task has at least one sentence")
 
 
+def leading_sentences(task_language: TaskLanguage, number: int) -> list[tuple[Sentence, int]]:
+    """The sentences of the task that leave most plans open, and how many each leaves, exactly.
+
+    At most ``number``, those with most plans first, without a list of all: the search of
+    `best_sentence` goes on.  Fewer are found where two million joint actions do not suffice.
+    """
+    graph = _Graph(task_language, ["most-plans"])
+    words: Sentence = (graph.word[0],)
+    queue: list[Any] = [(graph.bound(words, {0: 1})[0], words, {0: 1})]
+    found: list[tuple[Sentence, int]] = []
+    while queue and len(found) < number and graph.followed < _FOLLOWED:
+        bound, words, counts = heappop(queue)
+        if words[-1] == _END:
+            found.append((words[:-1], -bound))
+            continue
+        for word, further in graph.extensions(words[-1], counts).items():
+            longer = *words, word
+            heappush(queue, (graph.bound(longer, further)[0], longer, further))
+    return found
+
+
 def grants(
     task_language: TaskLanguage, words: Sequence[int], preferences: Sequence[Preference]
 ) -> bool:
@@ -244,14 +268,14 @@ class _Graph:
     those of each point.  The rest bounds the continuations of plans from p on: ``more[p]`` is the
     least number of further words, ``grades[p]`` the least grade for each `PlanPreference`, and
     ``open[p]``, if ``most-plans`` is a preference, has for each next word how many plans from p can
-    have one sentence with it, at most.
+    have one sentence with it, at most.  So many joint actions were ``followed``.
 
     The prefix of a sentence is its words with the *counts*, how many beginnings of plans come to
     each point with the first state of the last word.  A whole sentence ends with `_END`.
     """
 
     def __init__(self, task_language: TaskLanguage, preferences: Sequence[Preference]) -> None:
-        self.preferences = tuple(preferences)
+        self.preferences, self.followed = tuple(preferences), 0
         automata = [one for one in preferences if isinstance(one, PlanPreference)]
         points, self.following = _points(task_language, automata)
         self.node = [node for node, _ in points]
@@ -287,6 +311,7 @@ class _Graph:
         heapify(todo)
         while todo:
             point = heappop(todo)
+            self.followed += len(self.following[point])
             for q, number in self.following[point]:
                 if self.word[q] == word and q not in inside:
                     heappush(todo, q)

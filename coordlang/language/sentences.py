@@ -3,11 +3,10 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from heapq import heappop, heappush
 from itertools import compress
 from typing import Any
 
@@ -25,10 +24,6 @@ Sentence = tuple[int, ...]
 
 #: More sentences than this are not listed for one task, and no more additions made to count them.
 _MOST, _ADDITIONS = 100_000, 5_000_000
-#: In place of the next word, where a sentence ends.
-_END = -1
-#: Edges that are followed at most to find the leading sentences of a task.
-_FOLLOWED = 2_000_000
 
 
 def sentence(words: Iterable[int]) -> Sentence:
@@ -85,90 +80,6 @@ def number_of_sentences(space: PlanSpace, word: Ints, start: int) -> int | None:
     with suppress(OutOfMemory):
         return len(sentence_counts(space, word, start=start, most_steps=_ADDITIONS)[start])
     return None
-
-
-def leading_sentences(
-    space: PlanSpace, word: Ints, start: int, number: int
-) -> list[tuple[Sentence, int]]:
-    """The sentences that leave most plans from a node open, and how many each leaves, exactly.
-
-    ``word`` is the word number of each node.  At most ``number``, those with most plans first,
-    without a list of all: a best-first search over beginnings of sentences, ordered by a bound on
-    the plans of the sentences that begin so.  Fewer are found where two million edges do not
-    suffice.
-    """
-    nodes = np.flatnonzero(space.descendants(np.array([start]))).tolist()
-    words = word.tolist()
-    bounds = _bounds(space, nodes, words)
-    # A beginning: minus its bound, its words, the nodes where its last word begins with the number
-    # of ways to there; of a whole sentence no nodes, and its number of plans.
-    heap: list[tuple[int, Sentence, dict[int, int]]] = []
-    heappush(heap, (-max(bounds[start].values()), (words[start],), {start: 1}))
-    found: list[tuple[Sentence, int]] = []
-    followed = 0
-    while heap and len(found) < number and followed < _FOLLOWED:
-        bound, said, ways = heappop(heap)
-        if not ways:
-            found.append((said, -bound))
-            continue
-        plans, edges, entered = _through(space, words, ways)
-        followed += edges
-        if plans:
-            heappush(heap, (-plans, said, {}))
-        for after, own in entered.items():
-            sums: Counter[int] = Counter()
-            for node, count in own.items():
-                for last, most in bounds[node].items():
-                    sums[last] += count * most
-            heappush(heap, (-max(sums.values()), (*said, after), own))
-    return found
-
-
-def _bounds(
-    space: PlanSpace, nodes: Iterable[int], words: Sequence[int]
-) -> dict[int, Counter[int]]:
-    """For each node, and each word that may come next, the most plans of one sentence from there.
-
-    At most so many: of plans with the same next word not all have one sentence.  It is `_END`
-    where the sentence ends.
-    """
-    bounds: dict[int, Counter[int]] = {}
-    for node in nodes:  # goals come first
-        bounds[node] = most = Counter() if space.layer[node] else Counter({_END: 1})
-        for target in space.successors(node):
-            if words[target] == words[node]:
-                most.update(bounds[target])
-            else:
-                most[words[target]] += max(bounds[target].values())
-    return bounds
-
-
-def _through(
-    space: PlanSpace, words: Sequence[int], ways: dict[int, int]
-) -> tuple[int, int, dict[int, dict[int, int]]]:
-    """Follow plans through their present word, from nodes with a number of ways to each.
-
-    Returns the ways that end in it, the edges followed, and for each next word the ways to the
-    nodes where it begins.
-    """
-    inside, ended, edges = dict(ways), 0, 0
-    entered: dict[int, dict[int, int]] = defaultdict(lambda: defaultdict(int))
-    waiting = [-node for node in sorted(inside, reverse=True)]
-    while waiting:  # targets have smaller numbers
-        node = -heappop(waiting)
-        count = inside[node]
-        if not space.layer[node]:
-            ended += count
-        for target in space.successors(node):
-            edges += 1
-            if words[target] != words[node]:
-                entered[words[target]][target] += count
-            elif target in inside:
-                inside[target] += count
-            else:
-                inside[target] = count
-                heappush(waiting, -target)
-    return ended, edges, entered
 
 
 def sentence_counts(

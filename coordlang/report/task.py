@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from coordlang.execution.automaton import determinise
+from coordlang.execution.best_sentence import leading_sentences
 from coordlang.execution.plan_sentence import carried_out
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.listed import goal_text
-from coordlang.language.sentences import Sentence, leading_sentences, number_of_sentences
+from coordlang.language.sentences import Sentence, number_of_sentences
 from coordlang.language.words import Partition
 from coordlang.report.layout import layer_orders
 from coordlang.report.shown import ShownTask
@@ -70,7 +71,7 @@ def task_data(shown: ShownTask, tables: Tables, seed: int) -> dict[str, Any]:
     """Return a task as JSON data, with states and labels as numbers into ``tables``."""
     language, space = shown.language, shown.language.space
     part = drawn_part(language, seed)
-    leading = leading_sentences(space, language.word, language.start, SENTENCES)
+    leading = leading_sentences(language, SENTENCES)
     verdict = _verdict(language)
     violation = verdict.witness if verdict else None  # plans of one sentence that miscoordinate
     makespan, second = space.cost_of(language.task)

@@ -90,20 +90,6 @@ class ComposingStepper(Stepper):
         pairs = zip(self._robot, labels, strict=True)
         return all(own.operators.allows(row, label) for own, label in pairs if label)
 
-    def is_fixed(self, labels: Sequence[int]) -> bool:
-        """Whether what labels do, and beside which others, depends on no state and no formula."""
-        return not any(own.depends[label] for own, label in zip(self._robot, labels, strict=True))
-
-    def fixed_step(self, row: Rows, labels: Sequence[int]) -> Rows | None:
-        """What a step leads to whose labels a state allows, and that `is_fixed`."""
-        if not all(self.tables[i, j][labels[i], labels[j]] for i, j in self._apart):
-            return None
-        adds, deletes = np.zeros_like(row), np.zeros_like(row)
-        for own, label in zip(self._robot, labels, strict=True):
-            adds |= own.operators.adds[label]
-            deletes |= own.operators.deletes[label]
-        return (row & ~deletes) | adds
-
     def most_steps(self, rows: Rows) -> int:
         """Products of the own choices."""
         products = [1] * len(rows)
@@ -252,9 +238,6 @@ class _Subactions:
             self._formulas[label] = formula, _enough(formula)
         self._asks = np.zeros(len(actions), np.bool_)
         self._asks[list(self._formulas)] = True
-        #: Which labels ask something of the step, or do what depends on the state.
-        self.depends = self._asks.copy()
-        self.depends[list(self.operators.conditional)] = True
 
     def waits(self, rows: Rows, first: Ints, label: Ints) -> Bools:
         """Which options in the states of a table (CSR) depend on what the others choose."""

@@ -81,8 +81,6 @@ class Traces:
 
     def _made(self, row: Rows, step: Step) -> Rows | None:
         model, facts = self._model, self._model.codec.facts_part(row[None, :])
-        if self._stepper is not None and self._stepper.is_fixed(step) and not model.remembers:
-            return self._stepper.fixed_step(row, step)
         only = [(np.array([0, 1]), np.array([label])) for label in step]
         found = model.stepper.steps(facts, only)
         mine = np.flatnonzero((found.labels == step).all(axis=1))  # joint actions heed no choices

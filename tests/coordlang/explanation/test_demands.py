@@ -12,12 +12,13 @@ import pytest
 
 from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.commands.building import build_language
+from coordlang.execution.best_sentence import leading_sentences
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import RobotPart, SentenceDemands, meaning, sentence_demands
 from coordlang.explanation.text import demands_text
 from coordlang.explanation.words import all_covers, mapped_states
 from coordlang.language.candidates import all_pairs, from_problems
-from coordlang.language.sentences import leading_sentences, task_sentences
+from coordlang.language.sentences import task_sentences
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
 from planners.system.errors import ProvedImpossible
@@ -209,7 +210,7 @@ def test_which_sentences_lead_and_what_they_mean_against_listed_plans() -> None:
             continue
         language = random_language(random, candidates)
         for used in list(languages_in_tasks(language, candidates))[:20]:
-            said = leading_sentences(used.space, used.word, used.start, 4)
+            said = leading_sentences(used, 4)
             every = task_sentences(used.space, used.task, used.partition, used.plans_with)
             assert said == [(used.words_of(one.words), one.plans) for one in every[:4]]
             if len(said) < 2:
