@@ -15,8 +15,8 @@ from planners.joint.interference import Choices, compatible, conflict
 from planners.joint.model import Options, Stepper, Steps, products
 from planners.joint.states import StateCodec
 from planners.joint.tables import Bools, Ints, Numbers, Rows, differs, ranges, spans
-from planners.pddl.formula_tree import conjuncts, formula_text, joined, signed, substituted
-from planners.pddl.lifted import FALSE, And, Atom, Formula, Junction, StepAtom, Truth
+from planners.pddl.formula_tree import conjuncts, formula_text, joined, signed
+from planners.pddl.lifted import FALSE, And, Atom, Formula, Junction, StepAtom
 from planners.pddl.model_options import Cost
 from planners.system.errors import BadInput, OutOfMemory, Position
 from planners.system.limits import memory_left, more_memory
@@ -234,7 +234,7 @@ class _Subactions:
         #: By label what it asks of the step, and what of the state is enough for that.
         self._formulas: dict[int, tuple[Formula, Formula]] = {}
         for label, formulas in self.operators.step_formulas.items():
-            formula = _known(And(tuple(formulas)), evaluator, robot, label)
+            formula = And(tuple(formulas))
             self._formulas[label] = formula, _enough(formula)
         self._asks = np.zeros(len(actions), np.bool_)
         self._asks[list(self._formulas)] = True
@@ -269,18 +269,6 @@ def _enough(formula: Formula) -> Formula:
     if isinstance(formula, Junction):
         return joined(type(formula), map(_enough, formula.parts))
     return FALSE if isinstance(signed(formula)[0], StepAtom) else formula
-
-
-def _known(formula: Formula, evaluator: Evaluator, robot: int, label: int) -> Formula:
-    """A formula of a robot's subaction about the step, without what is never or always so."""
-
-    def value(leaf: Atom | StepAtom) -> Formula:
-        if isinstance(leaf, Atom):
-            return leaf if leaf in evaluator.facts else FALSE
-        own = evaluator.subactions.get(leaf, (robot, -1))
-        return Truth(own[1] == label) if own[0] == robot else leaf
-
-    return substituted(formula, value)
 
 
 def _text(formula: Formula) -> str:
