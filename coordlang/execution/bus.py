@@ -51,9 +51,9 @@ def opened(text: str, run: str, robot: str, robots: Sequence[str]) -> Bus:
     kind, _, where = text.partition(":")
     if kind == "unix":
         own = Path(tempfile.gettempdir(), f"coordlang-{os.getuid()}-{run}")
-        return UnixBus(Path(where) if where else own, robot)
+        return _UnixBus(Path(where) if where else own, robot)
     if kind == "zenoh":
-        return ZenohBus(where, run, robot, robots)
+        return _ZenohBus(where, run, robot, robots)
     raise UsageError(f"--bus {text}: there is no such bus", remedy="Say unix:FOLDER or zenoh.")
 
 
@@ -62,7 +62,7 @@ def _quoted(robot: str) -> str:
     return quote(robot, safe="").replace(".", "%2E")
 
 
-class UnixBus:
+class _UnixBus:
     """Unix datagram sockets in a folder, one for each robot.
 
     Whoever comes first makes the folder, or sees that it was removed; only the user who made it may
@@ -94,7 +94,6 @@ class UnixBus:
         return lock, own
 
     def fileno(self) -> int:
-        """The file number that is ready to be read when there are messages."""
         return self._socket.fileno()
 
     def send(self, robot: str, data: bytes) -> bool:
@@ -110,7 +109,6 @@ class UnixBus:
         return True
 
     def receive(self) -> Iterator[bytes]:
-        """The messages that have come."""
         with suppress(BlockingIOError):
             while True:
                 yield self._socket.recv(_MOST)
@@ -122,7 +120,7 @@ class UnixBus:
         os.close(self._lock)
 
 
-class ZenohBus:
+class _ZenohBus:
     """Zenoh, robot to robot; every robot listens on 127.0.0.1 unless a configuration says else."""
 
     def __init__(self, config: str, run: str, robot: str, robots: Sequence[str]) -> None:
@@ -155,23 +153,19 @@ class ZenohBus:
             self._rung.send(b"1")
 
     def fileno(self) -> int:
-        """The file number that is ready to be read when there are messages."""
         return self._bell.fileno()
 
     def send(self, robot: str, data: bytes) -> bool:
-        """Send a message."""
         self._session.put(f"{self._prefix}/{_quoted(robot)}", data)
         return True
 
     def receive(self) -> Iterator[bytes]:
-        """The messages that have come."""
         with suppress(BlockingIOError):
             self._bell.recv(_MOST)
         while not self._come.empty():
             yield self._come.get()
 
     def close(self) -> None:
-        """Leave the bus."""
         self._session.close()
         self._bell.close()
         self._rung.close()

@@ -17,6 +17,7 @@ from planners.joint.model import Goal, JointModel
 from planners.joint.tables import Rows
 from planners.search.goals import FAR, Values
 from planners.search.heuristics import HEURISTICS, Bound, heuristic
+from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
 from planners.search.slack import rests
 
@@ -94,27 +95,23 @@ def plan_under_sentence(
     common step the first one.  Raises `NoPlanFits`.
     """
     space, start = task_language.space, task_language.start
+    fits = space if words is None else task_language.plans_with(words)  # raises if there is none
+    begin = start if words is None else int(fits.starts[0])
     if space.model.slack:
-        return _earliest(task_language, words)
+        return _earliest(task_language, fits, begin)
     if space.model.is_asynchronous:
-        return _first(task_language, words)
+        return _first(task_language, fits, begin)
     states = states or ExpandedStates(task_language.model, task_language.partition)
     goal, init = space.goals[space.goal[start]], space.rows[space.state[start]]
     least = heuristic(bound, task_language.model, goal, init)
-    if words is not None:
-        task_language.plans_with(words)  # raises if there is none
     found = _a_star(states, init, goal, least, words, count_words)
     assert found.cost == space.cost_of(task_language.task), "A* is optimal"
     return found
 
 
-def _first(task_language: TaskLanguage, words: Sequence[int] | None) -> GuidedPlan:
-    """The steps of the first plan, as soon as possible."""
-    space, start = task_language.space, task_language.start
-    cost = space.cost_of(task_language.task)
-    if words is not None:
-        space = task_language.plans_with(words)
-        start = int(space.starts[0])
+def _first(task_language: TaskLanguage, space: PlanSpace, start: int) -> GuidedPlan:
+    """The steps of the first plan from a node of a plan space, as soon as possible."""
+    cost = task_language.space.cost_of(task_language.task)
     path = space.first_path(start)
     states = space.state[space.nodes_on(start, path)]
     passed = task_language.partition.word_of(space.rows)[states]
@@ -122,12 +119,8 @@ def _first(task_language: TaskLanguage, words: Sequence[int] | None) -> GuidedPl
     return GuidedPlan(steps, sentence(passed.tolist()), cost, 0, 0, 0)
 
 
-def _earliest(task_language: TaskLanguage, words: Sequence[int] | None) -> GuidedPlan:
+def _earliest(task_language: TaskLanguage, space: PlanSpace, start: int) -> GuidedPlan:
     """The plan within slack that rests soonest, the first one of these in their order."""
-    space, start = task_language.space, task_language.start
-    if words is not None:
-        space = task_language.plans_with(words)
-        start = int(space.starts[0])
     resting = rests(space.labels)
     # Per node the steps until a rest that lasts to the end; per edge those with it.
     left = np.zeros(len(space), np.int64)
