@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, wraps
 from typing import Any, TypeVar
 
 import numpy as np
@@ -28,7 +28,7 @@ NONE = -1
 ANY = "_"
 
 Pair = tuple[str, str]
-Table = TypeVar("Table", Ints, Bools)
+T = TypeVar("T")
 #: What can be read of states: concepts, numbers, features.
 Readable = Callable[["States"], Any]
 
@@ -49,7 +49,7 @@ class World:
     statics: Mapping[str, Sequence[tuple[str, ...]]]
     model: JointModel
     points: Mapping[str, Point] = field(default_factory=dict)
-    known: dict[tuple[str, str], Any] = field(default_factory=dict, repr=False)
+    known: dict[object, Any] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(
@@ -96,13 +96,6 @@ class World:
             found[atom.predicate] = min(arity, found.get(atom.predicate, arity))
         return found
 
-    def once(self, name: str, relation: str, computed: Callable[[], Table]) -> Table:
-        """A table about a static relation, which is computed once."""
-        if (name, relation) not in self.known:
-            self.known[name, relation] = computed()
-        found: Table = self.known[name, relation]
-        return found
-
     @cached_property
     def relations(self) -> Mapping[str, Sequence[Pair]]:
         """The static relations between objects: their pairs, sorted."""
@@ -119,8 +112,7 @@ class States:
 
     world: World
     rows: Rows
-    known: dict[Readable, Any] = field(default_factory=dict, repr=False)
-    tables: dict[str, tuple[Ints, ...]] = field(default_factory=dict, repr=False)
+    known: dict[object, Any] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -141,11 +133,9 @@ class States:
 
         All arrays are as long as there are such atoms in all states together.
         """
-        if predicate not in self.tables:
-            self.tables[predicate] = self._atoms(predicate)
-        return self.tables[predicate]
-
-    def _atoms(self, predicate: str) -> tuple[Ints, ...]:
+        if predicate in self.known:
+            found: tuple[Ints, ...] = self.known[predicate]
+            return found
         world = self.world
         arity = world.predicates.get(predicate, 0)
         args = np.full((len(world.model.codec.facts), arity), NONE)
@@ -156,7 +146,8 @@ class States:
                 args[fact] = [world.number[name] for name in atom.args]
         chosen: Bools = mine[self.true.fact]
         own = args[self.true.fact[chosen]]
-        return (self.true.row[chosen], *(own[:, place] for place in range(arity)))
+        self.known[predicate] = self.true.row[chosen], *(own[:, place] for place in range(arity))
+        return self.atoms(predicate)
 
     def image(self, predicate: str, named: str, inverse: bool) -> Ints:
         """In each state the object x with (predicate named x), or (predicate x named) if inverse.
@@ -220,6 +211,20 @@ def _points(
 # ---- numbers of objects
 
 
+def _once(told: Callable[..., T]) -> Callable[..., T]:
+    """What a function tells of a world is computed once, and kept there."""
+
+    @wraps(told)
+    def known(world: World, *names: str) -> T:
+        if (told, names) not in world.known:
+            world.known[told, names] = told(world, *names)
+        found: T = world.known[told, names]
+        return found
+
+    return known
+
+
+@_once
 def attribute(world: World, name: str, relation: str) -> Ints:
     """The number that each object has, `NONE` where it has none: (objects).
 
@@ -227,10 +232,6 @@ def attribute(world: World, name: str, relation: str) -> Ints:
     ``position`` along a static relation whose links are paths, from each path's beginning;
     ``degree``, how many objects a static relation links a place with.
     """
-    return world.once(name, relation, lambda: _attribute(world, name, relation))
-
-
-def _attribute(world: World, name: str, relation: str) -> Ints:
     if name == "degree":
         degree = _joined(world, relation).sum(axis=1)
         return np.where(degree > 0, degree, NONE)
@@ -267,16 +268,13 @@ def positions(pairs: Sequence[Pair]) -> Mapping[str, int]:
     return found if len(found) == len(following.keys() | before.keys()) else {}
 
 
+@_once
 def links(world: World, relation: str) -> Bools:
     """(objects, objects): whether a static relation links the first object with the second."""
-
-    def linked() -> Bools:
-        table = np.zeros((len(world.objects), len(world.objects)), np.bool_)
-        for one, other in world.relations.get(relation, ()):
-            table[world.number[one], world.number[other]] = True
-        return table
-
-    return world.once("links", relation, linked)
+    table = np.zeros((len(world.objects), len(world.objects)), np.bool_)
+    for one, other in world.relations.get(relation, ()):
+        table[world.number[one], world.number[other]] = True
+    return table
 
 
 def _joined(world: World, relation: str) -> Bools:
@@ -285,15 +283,12 @@ def _joined(world: World, relation: str) -> Bools:
     return linked | linked.T
 
 
+@_once
 def distances(world: World, relation: str) -> Ints:
     """(objects, objects): links of a static relation from one to another, `NONE` without a way.
 
     What it links with nothing has no distance to itself either.
     """
-    return world.once("distance", relation, lambda: _distances(world, relation))
-
-
-def _distances(world: World, relation: str) -> Ints:
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import shortest_path
 
