@@ -28,9 +28,9 @@ from gridmap import GridMap, open_grid, path, ring, rooms_and_corridors, two_roo
 from benchmarks import frame
 from benchmarks.frame import DOMAINS, Figures, KeptRows, PrintedTable, asked_for, columns
 from coordlang.language.candidates import all_pairs
+from coordlang.lifted.features import formula
 from coordlang.lifted.language import LiftedLanguage
 from coordlang.lifted.learning import Instance, Learned, learn
-from coordlang.lifted.notation import formula
 from planners.pddl import parse_problem, read_domain
 from planners.pddl.sexpr import Source
 from planners.system.errors import CoordlangError

@@ -25,6 +25,7 @@ from coordlang.language.candidates import require_solvable
 from coordlang.language.provenance import Guarantee, provenance_of, world_sha256
 from coordlang.language.recorded import check_domain
 from coordlang.language.words import Language
+from coordlang.lifted.features import english, formula
 from coordlang.lifted.language import (
     Known,
     LiftedLanguage,
@@ -37,7 +38,6 @@ from coordlang.lifted.language import (
     write_lifted,
 )
 from coordlang.lifted.learning import Instance, Learned, learn
-from coordlang.lifted.notation import english, formula
 from coordlang.lifted.world import States, World
 from coordlang.sites.coordinates import Point
 from coordlang.verification.by_definition import verify_candidates

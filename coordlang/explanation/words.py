@@ -13,9 +13,8 @@ import numpy as np
 from coordlang.explanation.minimise import Points, minimise
 from coordlang.explanation.variables import Variable, valuation
 from coordlang.language.words import Language
-from coordlang.lifted.features import Feature
+from coordlang.lifted.features import Feature, condition, english, feature_of, formula
 from coordlang.lifted.language import LiftedLanguage, Vector, read_values, vectors
-from coordlang.lifted.notation import condition, english, feature_of, formula
 from coordlang.lifted.world import States, World
 from coordlang.sites.coordinates import Point
 from planners.joint.model import JointModel

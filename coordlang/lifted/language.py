@@ -25,8 +25,7 @@ from coordlang.language.file import (
 )
 from coordlang.language.provenance import Guarantee, Provenance, provenance_of
 from coordlang.language.words import Language, Partition
-from coordlang.lifted.features import Feature
-from coordlang.lifted.notation import LARGEST, feature_of
+from coordlang.lifted.features import LARGEST, Feature, feature_of
 from coordlang.lifted.world import States
 from planners.joint.tables import Ints
 from planners.system.errors import BadInput, Position

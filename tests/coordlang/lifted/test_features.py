@@ -35,8 +35,11 @@ from coordlang.lifted.features import (
     Size,
     Some,
     Without,
+    condition,
+    english,
+    feature_of,
+    formula,
 )
-from coordlang.lifted.notation import condition, english, feature_of, formula
 from coordlang.lifted.pool import pool_of
 from coordlang.lifted.world import States, World
 from planners.joint.tables import Rows
