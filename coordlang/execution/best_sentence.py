@@ -293,7 +293,6 @@ class _Graph:
                 self.open[at][_END] = 1
 
     def _bound_by_followers(self, point: int) -> None:
-        """The bounds at a point, from those of the points after it."""
         here, after = self.word[point], self.following[point]
         self.more[point] = min(self.more[q] + (self.word[q] != here) for q, _ in after)
         self.grades[point] = tuple(map(min, zip(*(self.grades[q] for q, _ in after), strict=True)))

@@ -222,7 +222,6 @@ class Executive:
             self._to_tell.add(name)
 
     def _has_heard_us(self, name: str) -> bool:
-        """Whether another robot has heard of this process."""
         return self._last[name].lives.get(self.robot) == self.life
 
     def _version_by(self, name: str, of: str) -> Version:
@@ -285,7 +284,6 @@ class Executive:
         )
 
     def _advance(self, now: float) -> None:
-        """Do what can be done now."""
         if self._agreement.advance():
             self._to_tell |= {*self.others}
         if self._monitor is None:
@@ -405,7 +403,6 @@ class Executive:
         )
 
     def _begins(self, monitor: EventMonitor) -> bool:
-        """Begin the chosen event, if it may start now."""
         version = self._own.version
         is_chosen = self._started == version.begun < len(self._own.events)
         if not is_chosen or self.holds_until > 0 or not self._is_free(monitor, version.begun):

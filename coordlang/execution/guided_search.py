@@ -227,7 +227,6 @@ def _found(
     cost: Cost,
     work: tuple[int, int, int],
 ) -> GuidedPlan:
-    """The path found to a node."""
     plan, passed = [], [states.word[node[0]]]
     while node in ways:
         _, node, labels = ways[node]

@@ -343,7 +343,6 @@ class Monitor:
         return state.known.get(atom, self._atoms[atom])
 
     def _check_atom(self, atom: str) -> None:
-        """Raise `MonitorError` for what is no atom of the file."""
         if atom in self._atoms:
             return
         head = _head(atom)
@@ -687,7 +686,6 @@ def _check_plain(text: Any, where: str) -> None:
 
 
 def _entry(data: Any, robot: str | None) -> Mapping[str, Any]:
-    """The choices of one robot in the data of a choices file."""
     entries: dict[str, Mapping[str, Any]] = {}
     for entry in _get(data, "choices", list, "the file"):
         name = _text(entry, "robot", "a robot's choices")

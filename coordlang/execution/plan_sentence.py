@@ -272,7 +272,6 @@ def plan_dag(task_language: TaskLanguage, words: Sequence[int], space: PlanSpace
 
 
 def _plans_through(space: PlanSpace) -> list[int]:
-    """For each node the exact number of plans through it."""
     below = counts(space)
     above = [0] * len(space)
     above[int(space.starts[0])] = 1
@@ -284,7 +283,6 @@ def _plans_through(space: PlanSpace) -> list[int]:
 
 
 def _edges(space: PlanSpace, number: dict[int, int]) -> tuple[DagEdge, ...]:
-    """Edges by pair of nodes."""
     found: dict[tuple[int, int], list[tuple[str | None, ...]]] = {}
     for node in range(len(space)):
         for edge in space.out_edges(node):

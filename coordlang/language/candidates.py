@@ -294,7 +294,6 @@ def _search_once(
 
 
 def _texts(task: ListedTask) -> tuple[str, str]:
-    """Its initial state and its goal."""
     return " ".join(task.init) or NO_FACT, " ".join(task.goal) or "(and)"
 
 

@@ -217,8 +217,8 @@ class Learned:
     sizes: tuple[tuple[int, int, int], ...]
     tried: int
     pool: int
-    rounds: int
-    taken: int
+    rounds: int = 0
+    taken: int = 0
     stopped: BaseException | None = None
 
     @property
@@ -286,20 +286,6 @@ class _Taken:
         return found.keys()
 
 
-@dataclass(frozen=True, slots=True)
-class _Words:
-    """Words over features.
-
-    ``word`` are for the values of each class, and ``of_states`` for each problem's states;
-    ``proved``: see `Learned`.
-    """
-
-    features: tuple[Feature, ...]
-    word: Mapping[Vector, int]
-    proved: bool
-    of_states: tuple[Ints, ...]
-
-
 class _Learner:
     """What was learned from; ``every`` are all problems."""
 
@@ -340,13 +326,13 @@ class _Learner:
         """Words that are verified on every problem; those that refute some are learned from."""
         while True:
             try:
-                words = self._best(prefer)
+                learned, words = self._best(prefer)
             except ProvedImpossible:
                 if self.landmarks:
                     raise
                 self.begin(landmarks=True)
                 continue
-            for own, of_states in zip(self._every, words.of_states, strict=True):
+            for own, of_states in zip(self._every, words, strict=True):
                 if not own.holds(of_states, self._workers, self._progress):
                     known = (taken.own for taken in self.taken)
                     assert own not in known, "what was learned from is a language there"
@@ -354,11 +340,11 @@ class _Learner:
                     self.begin(self.landmarks)
                     break
             else:
-                return self._learned(words)
+                return replace(learned, rounds=self.rounds, taken=len(self.taken))
 
-    def _best(self, prefer: Preference | None) -> _Words:
+    def _best(self, prefer: Preference | None) -> tuple[Learned, list[Ints]]:
         """Words over the simplest features; if words come first, over those with fewest words."""
-        found: list[_Words] = []
+        found: list[tuple[Learned, list[Ints]]] = []
         excluded: list[int] = []
         for _ in range(_TRIED if prefer == "words" else 1):
             try:
@@ -368,30 +354,18 @@ class _Learner:
                     raise
                 break
             found.append(self._words(chosen, prefer))
-            if not chosen or not any(found[-1].word.values()):
+            if not chosen or len(found[-1][0].words) <= 1:
                 break
             excluded.append(max(chosen, key=lambda k: self._pool.features[k].complexity))
-        return min(found, key=lambda words: len(set(words.word.values())))
+        return min(found, key=lambda one: len(one[0].words))
 
-    def _learned(self, words: _Words) -> Learned:
-        """What was learned."""
-        sizes = tuple(
-            (len(own.states), own.candidates.count, len(np.unique(of_states)))
-            for own, of_states in zip(self._every, words.of_states, strict=True)
-        )
-        return Learned(
-            words.features,
-            words.word,
-            words.proved,
-            sizes,
-            tried=self._pool.tried,
-            pool=len(self._pool.features),
-            rounds=self.rounds,
-            taken=len(self.taken),
-        )
+    def _words(
+        self, chosen: Sequence[int], prefer: Preference | None
+    ) -> tuple[Learned, list[Ints]]:
+        """Words over features, numbered as they come: one for each class of states, or fewer.
 
-    def _words(self, chosen: Sequence[int], prefer: Preference | None) -> _Words:
-        """Words over features, numbered as they come: one for each class of states, or fewer."""
+        With the words of each problem's states.
+        """
         every = self._every
         features = tuple(self._pool.features[k] for k in chosen)
         vectors = np.concatenate([own.vectors(features) for own in every])
@@ -405,7 +379,13 @@ class _Learner:
         renumbered = {word: k for k, word in enumerate(dict.fromkeys(words))}
         of_class = np.array([renumbered[word] for word in words], np.int64)
         word = dict(zip(map(tuple, table.tolist()), of_class.tolist(), strict=True))
-        return _Words(features, word, proved, tuple(of_class[own] for own in classes))
+        of_states = [of_class[own] for own in classes]
+        sizes = tuple(
+            (len(own.states), own.candidates.count, len(np.unique(words)))
+            for own, words in zip(every, of_states, strict=True)
+        )
+        tried, pool = self._pool.tried, len(self._pool.features)
+        return Learned(features, word, proved, sizes, tried, pool), of_states
 
     def _choose(self, excluded: Sequence[int]) -> list[int]:
         """The simplest features that nothing refutes in the problems that were taken."""

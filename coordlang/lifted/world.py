@@ -254,18 +254,15 @@ def _coordinates(world: World, axis: int) -> Mapping[str, int]:
 
 def positions(pairs: Sequence[Pair]) -> Mapping[str, int]:
     """Places on paths, from 0; empty if the links are no paths."""
-    following = dict(pairs)
-    before = {other: one for one, other in pairs}
-    if len(following) < len(pairs) or len(before) < len(pairs):
+    import networkx as nx
+
+    graph = nx.DiGraph(pairs)
+    if any(most > 1 for _, most in (*graph.in_degree(), *graph.out_degree())):
         return {}
-    found: dict[str, int] = {}
-    for start in sorted(following.keys() - before.keys()):
-        place: str | None = start
-        steps = 0
-        while place is not None:
-            found[place] = steps
-            place, steps = following.get(place), steps + 1
-    return found if len(found) == len(following.keys() | before.keys()) else {}
+    if not nx.is_directed_acyclic_graph(graph):
+        return {}
+    along = enumerate(nx.topological_generations(graph))
+    return {place: steps for steps, places in along for place in places}
 
 
 @_once

@@ -160,7 +160,6 @@ _NONE = np.uint64(2**64 - 1)
 
 
 def _among(known: Rows, rows: Rows) -> Bools:
-    """Which rows are known."""
     found: Bools = find_rows(known, rows) >= 0
     return found
 

@@ -98,30 +98,24 @@ class Scene:
             self.axes.plot([x1, x2], [y1, y2], color=_WALL, linewidth=2, solid_capstyle="round")
 
     def _draw_robot(self, number: int, name: str) -> tuple[Any, ...]:
+        """Draw the goal; the disc with a name as high as most of its radius, the front, the way."""
         from matplotlib.patches import Circle
 
-        hue, places = ROBOTS[number % len(ROBOTS)], self.record.places
+        hue, radius, places = ROBOTS[number % len(ROBOTS)], self.record.radius, self.record.places
         if (goal := self.record.goals.get(name)) in places:
             dashes: Any = (0, (3, 2))
             look: dict[str, Any] = {"fill": False, "edgecolor": hue, "linewidth": 1.5}
-            ring = Circle(places[goal], 1.25 * self.record.radius, linestyle=dashes, **look)
-            self.axes.add_patch(ring)
+            self.axes.add_patch(Circle(places[goal], 1.25 * radius, linestyle=dashes, **look))
         (way,) = self.axes.plot([], [], color=hue, linewidth=1.4, alpha=0.55, zorder=3)
         (front,) = self.axes.plot([], [], color=hue, linewidth=2.5, zorder=4)
-        return *self._disc(hue, name), front, way
-
-    def _disc(self, colour: str, name: str) -> tuple[Any, Any]:
-        """A disc with a name in it, as high as most of its radius."""
-        from matplotlib.patches import Circle
-
-        disc = self.axes.add_patch(Circle((0, 0), self.record.radius, facecolor=colour, zorder=5))
+        disc = self.axes.add_patch(Circle((0, 0), radius, facecolor=hue, zorder=5))
         low, high = _bounds(self.record)
         figure = self.axes.get_figure(root=True)
         assert figure is not None, "axes are made in a figure"
         inches = self.axes.get_position().height * figure.get_figheight()
-        points = max(2.0, 0.8 * 72 * inches / (high[1] - low[1]) * self.record.radius)
-        look: dict[str, Any] = {"color": "white", "ha": "center", "va": "center", "zorder": 7}
-        return disc, self.axes.text(0, 0, name, fontsize=points, **look)
+        points = max(2.0, 0.8 * 72 * inches / (high[1] - low[1]) * radius)
+        look = {"color": "white", "ha": "center", "va": "center", "zorder": 7}
+        return disc, self.axes.text(0, 0, name, fontsize=points, **look), front, way
 
 
 def frames(record: SimulationRecord, run: RunRecord) -> Iterator[Image]:

@@ -129,12 +129,10 @@ class _Going:
 
     @property
     def time(self) -> float:
-        """Seconds since the start."""
         return round(self.ticks * TICK, 6)
 
     @property
     def has_arrived(self) -> bool:
-        """Whether all robots have done all their steps."""
         return all(robot.finished for robot in self.robots.values())
 
     @property
@@ -165,7 +163,6 @@ class _Going:
         self.nearest = min(self.nearest, *apart, math.inf)
 
     def record(self) -> RunRecord:
-        """Return the record of the run that has ended."""
         self._keep_poses()
         steps = [
             StepRecord(name, *astuple(one))
@@ -197,7 +194,6 @@ class _Going:
         )
 
     def _sensed(self, name: str, robot: Robot, heard: tuple[Message, ...]) -> Sensed:
-        """What a robot is told now."""
         spread, random = POSITION_NOISE * self.settings.noise, self.sensing[name]
         x, y, heading = (value + random.gauss(0, spread) for value in self.simulator.pose(name))
         ahead: float | None = math.inf

@@ -143,7 +143,6 @@ def _environment(world: dict[str, Any], seed: int) -> Any:
 
 
 def _world(floor: Floor, poses: Mapping[str, Pose], settings: Settings) -> dict[str, Any]:
-    """The world as ir-sim reads it."""
     spread = settings.noise**2
     lidar = {
         "type": "lidar2d",

@@ -180,7 +180,6 @@ def _note_what_is_left_out(world: World, robots: Sequence[str], space: PlanSpace
 
 
 def _robots_in(world: World, robots: Sequence[str], state: Sequence[str]) -> dict[str, str]:
-    """The places of the robots in a state."""
     located = world.located(state)
     return {name: located[name] for name in robots if name in located}
 

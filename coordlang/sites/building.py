@@ -140,7 +140,6 @@ class _Vertex:
     name: str = ""
 
     def place(self) -> Place:
-        """The place that it is."""
         is_charger, is_parking = (_flag(self.params, n) for n in ("is_charger", "is_parking_spot"))
         groups = _groups(self.params)
         return Place(self.name, self.said, self.level, self.point, is_charger, is_parking, groups)

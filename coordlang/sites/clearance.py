@@ -139,7 +139,6 @@ def _distance(one: _Segment, other: _Segment) -> float:
 
 
 def _from(point: Point, segment: _Segment) -> float:
-    """The distance of a point from a segment."""
     (x, y), ((ax, ay), (bx, by)) = point, segment
     squared = (bx - ax) ** 2 + (by - ay) ** 2
     along = 0.0 if squared == 0 else ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / squared

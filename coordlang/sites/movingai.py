@@ -23,6 +23,8 @@ _COLUMNS = "bucket, map, width, height, start x, start y, goal x, goal y, optima
 
 #: A cell: row and column, from 0.
 Cell = tuple[int, int]
+#: Where one robot starts, and where it has to be.
+Agent = tuple[Cell, Cell]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,14 +57,6 @@ class MovingMap:
         row, column = map(int, name[1:].split("-"))
         around = ((row - 1, column), (row, column - 1), (row, column + 1), (row + 1, column))
         return [cell_name(cell) for cell in around if cell in self]
-
-
-@dataclass(frozen=True, slots=True)
-class Agent:
-    """A line of a scenario: where one robot starts, and where it has to be."""
-
-    start: Cell
-    goal: Cell
 
 
 def cell_name(cell: Cell) -> str:
@@ -114,7 +108,7 @@ def read_agents(path: Path, grid: MovingMap, agents: int) -> tuple[Agent, ...]:
     taken: dict[tuple[str, Cell], int] = {}
     for number, text in lines[:agents]:
         agent = _agent(path, number, text, grid)
-        for what, cell in (("start", agent.start), ("goal", agent.goal)):
+        for what, cell in zip(("start", "goal"), agent, strict=True):
             before = taken.setdefault((what, cell), number)
             if before != number:
                 raise _wrong(
@@ -144,8 +138,8 @@ def planning_files(map_file: Path, scenario: Path, agents: int) -> dict[str, str
         "grid",
         list(filter(None, cells)),
         grid.near,
-        [cell_name(agent.start) for agent in found],
-        [cell_name(agent.goal) for agent in found],
+        [cell_name(start) for start, _ in found],
+        [cell_name(goal) for _, goal in found],
         written_by="coordlang import",
     )
     places = (
@@ -212,7 +206,6 @@ def _adjacent(names: Iterable[str], neighbours: Callable[[str], Sequence[str]]) 
 def _wrong(
     what: str, remedy: str, path: Path, line: int | None = None, column: int = 1
 ) -> BadInput:
-    """The error of a file, in a line if there is one."""
     where = Position(str(path)) if line is None else Position(str(path), line, column)
     return BadInput(what, position=where, remedy=remedy)
 
@@ -258,8 +251,8 @@ def _agent(path: Path, line: int, text: str, grid: MovingMap) -> Agent:
         what = f"this line is for a map of width {width} and height {height}, not "
         remedy = "Give the map of this scenario, not scaled."
         raise _wrong(f"{what}{grid.width} and {grid.height}", remedy, path, line)
-    agent = Agent((start_y, start_x), (goal_y, goal_x))
-    for which, cell in (("start", agent.start), ("goal", agent.goal)):
+    agent = (start_y, start_x), (goal_y, goal_x)
+    for which, cell in zip(("start", "goal"), agent, strict=True):
         if cell not in grid:
             what = f"the {which} is no passable cell of the map: x {cell[1]}, y {cell[0]}"
             remedy = "x counts columns from the left and y rows from the top, both from 0."

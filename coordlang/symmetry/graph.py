@@ -106,7 +106,6 @@ class _ModelGraph:
         return self._arguments[name, position]
 
     def add_actions(self) -> None:
-        """Add a vertex for each ground action."""
         for action in self._model.actions:
             effects = sorted(
                 f"{e.adds} {_shape(e.atom)} {_shape(e.condition)}" for e in action.effects

@@ -175,7 +175,6 @@ def verify_candidates(
 
 
 def _job(shared: tuple[Source, Partition, Parting | None], goals: range) -> Table:
-    """The tasks of some goals."""
     verdict = _verdict(shared, goals)
     return {"holds": np.array(verdict.holds), "nodes": np.array(verdict.nodes)}
 

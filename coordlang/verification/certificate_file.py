@@ -125,7 +125,6 @@ class Cnf:
         )
 
     def _variables_explained(self, names: Mapping[int, str]) -> Iterator[str]:
-        """A comment for each variable."""
         for state, variables in self.word.items():
             for n, v in enumerate(variables):
                 yield f"c {v}: word {n} holds {names[state]}"
@@ -136,7 +135,6 @@ class Cnf:
                 yield f"c {v}: word {n} holds one of the first {states} states"
 
     def _clauses_explained(self) -> Iterator[str]:
-        """A comment for each kind of clauses, and for each reason."""
         first = 1
         for kind, count in self.kinds:
             if count:

@@ -174,7 +174,6 @@ def apply_network(
 def _keys(
     domain: Domain, members: Mapping[tuple[str, ...], Set[str]], action: GroundAction
 ) -> Iterator[_Key]:
-    """What an action matches."""
     for constraint in domain.constraints:
         for name, positions in constraint.actions:
             if name != action.schema:

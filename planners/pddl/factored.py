@@ -142,13 +142,11 @@ def _union(name: str, files: Sequence[Domain | Problem]) -> Source:
 
 
 def _agent_of(schema: Schema) -> tuple[str, ...]:
-    """The types of the acting robot."""
     assert schema.acting is not None
     return schema.acting.types
 
 
 def _with_types(schema: Schema, types: tuple[str, ...]) -> Schema:
-    """The action for agents of these types."""
     parameters = (replace(p, types=types) if p == schema.acting else p for p in schema.parameters)
     return replace(schema, parameters=tuple(parameters))
 

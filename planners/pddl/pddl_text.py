@@ -71,7 +71,6 @@ def _section(head: str, entries: Iterable[str]) -> list[str]:
 
 
 def _typed(names: Mapping[str, tuple[str, ...]]) -> list[str]:
-    """A typed list, one name a line."""
     return [f"{name} - {_types(types)}" for name, types in names.items()]
 
 

@@ -202,7 +202,6 @@ class _Kinds:
         return named or self.taken_by_all() or self.inhabited() or sorted(unary)
 
     def inhabited(self) -> list[str]:
-        """The types that have objects."""
         return [kind for kind in sorted(self.domain.types) if self.of(kind)]
 
     def is_one(self, variable: Variable, kind: str) -> bool:

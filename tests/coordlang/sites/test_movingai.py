@@ -10,7 +10,7 @@ import pytest
 
 from coordlang import import_site
 from coordlang.sites.coordinates import read_coordinates
-from coordlang.sites.movingai import Agent, planning_files, read_agents, read_map
+from coordlang.sites.movingai import planning_files, read_agents, read_map
 from planners.loading import PlanningInstance, load
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
@@ -41,7 +41,7 @@ def loaded(folder: Path, texts: dict[str, str]) -> PlanningInstance:
 def test_columns_are_x_and_rows_are_y(tmp_path: Path) -> None:
     grid, scenario = files(tmp_path, ["0 2 2 0", "3 0 0 0", "0 0 3 0"])
     agents = read_agents(scenario, read_map(grid), 2)
-    assert agents == (Agent((2, 0), (0, 2)), Agent((0, 3), (0, 0)))
+    assert agents == (((2, 0), (0, 2)), ((0, 3), (0, 0)))
     texts = planning_files(grid, scenario, 2)
     assert sorted(texts) == ["coordinates.json", "domain.pddl", "problem.pddl"]
     assert texts["domain.pddl"] == (DOMAINS / "grid" / "domain.pddl").read_text()
