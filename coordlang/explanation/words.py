@@ -302,7 +302,7 @@ def lifted_words(
     features = tuple(feature_of(text, position) for text in origin["features"])
     values = read_values(origin["values"], len(features), position)
     table = language.partition(model)
-    states = States(World.of(domain, problem, model, known), table.rows)
+    states = States(World(domain, problem, model, known), table.rows)
     lifted = LiftedLanguage(features, language.words, values, model.robots)
     given = [language.words[number] for number in table.word.tolist()]
     if lifted.words_of(states) != given:

@@ -33,54 +33,42 @@ T = TypeVar("T")
 Readable = Callable[["States"], Any]
 
 
-@dataclass(frozen=True)
 class World:
     """A problem of a domain, as features see it.
 
     All ``objects`` by name, sorted; ``robots`` in the order of the model; ``types``: each type's
     objects; ``statics``: the argument tuples of each predicate's static atoms, sorted; the joint
-    ``model`` whose states are read; ``points``: where places lie, x to the right and y down, of a
-    file, else of names such as ``c2-3``.
+    ``model`` whose states are read; ``points``: where places lie, x to the right and y down: those
+    given for objects of the problem, else of names such as ``c2-3``.
     """
 
-    objects: tuple[str, ...]
-    robots: tuple[str, ...]
-    types: Mapping[str, frozenset[str]]
-    statics: Mapping[str, Sequence[tuple[str, ...]]]
-    model: JointModel
-    points: Mapping[str, Point] = field(default_factory=dict)
-    known: dict[object, Any] = field(default_factory=dict, repr=False)
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         domain: Domain,
         problem: Problem,
         model: JointModel,
-        known: Mapping[str, Point] | None = None,
-    ) -> World:
-        """The world of a problem, with ``known`` coordinates of places if there are any."""
+        points: Mapping[str, Point] | None = None,
+    ) -> None:
+        self.model, self.robots = model, model.robots
+        self.objects = tuple(sorted(problem.objects))
         statics: dict[str, list[tuple[str, ...]]] = {}
         for atom in static_atoms(domain, problem):
             statics.setdefault(atom.predicate, []).append(atom.args)
+        self.statics = {name: sorted(own) for name, own in sorted(statics.items())}
         types: dict[str, set[str]] = {}
         for name, own in problem.objects.items():
             for kind in frozenset().union(*map(domain.supertypes, own)):
                 types.setdefault(kind, set()).add(name)
-        ordered = {name: sorted(own) for name, own in sorted(statics.items())}
-        return cls(
-            tuple(sorted(problem.objects)),
-            model.robots,
-            {kind: frozenset(own) for kind, own in sorted(types.items())},
-            ordered,
-            model,
-            _points(ordered, {n: p for n, p in (known or {}).items() if n in problem.objects}),
-        )
+        self.types = dict(sorted(types.items()))
+        given = {n: p for n, p in (points or {}).items() if n in problem.objects}
+        self.points = _points(self.statics, given)
+        #: What was told of it, see `_once`.
+        self.known: dict[object, Any] = {}
 
     @classmethod
-    def loaded(cls, loaded: PlanningInstance, known: Mapping[str, Point] | None = None) -> World:
+    def loaded(cls, loaded: PlanningInstance, points: Mapping[str, Point] | None = None) -> World:
         """The world of a loaded problem."""
-        return cls.of(loaded.domain, loaded.problems[0], loaded.model, known)
+        return cls(loaded.domain, loaded.problems[0], loaded.model, points)
 
     @cached_property
     def number(self) -> Mapping[str, int]:

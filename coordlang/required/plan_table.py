@@ -8,7 +8,6 @@ of a task which has these plans only: near the true one, and a guide for a searc
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -29,34 +28,57 @@ _MIXTURES = 3_000
 _ODD = np.uint64(0x9E37_79B9_7F4A_7C15)
 
 
-@dataclass(frozen=True, slots=True)
 class PlanTable:
     """Plans of some tasks, and the mixtures that are optimal plans.
 
-    ``tasks`` are how many there are in all, those that require no coordination included.
-    ``states`` (plans, steps) are those that each plan passes through; shorter ones repeat their
-    last.  ``first`` and ``plans`` (tasks) are the first plan of each task, and how many of it there
-    are in the table; ``count`` (tasks) how many it has.  ``parts`` (plans, robots) is what each
-    robot does in a plan, its number among the task's own sequences, of which each robot has
-    ``ways`` (tasks, robots).  ``cells`` (cells, robots) is what each robot does in a mixture that
-    is optimal, by task and by what robot 1 does: ``first_way`` (tasks) is the number of the first
-    sequence of robot 1 in each task, all tasks counted on, and ``first_cell`` (sequences + 1) the
-    first cell of each.  ``tasks_of_state`` are for each state the tasks with plans through it.
+    ``spaces`` hold all tasks, over one table of ``states`` states.  If ``mixtures`` are measured,
+    the tasks are those that require coordination, at least one, and of a task with many plans fewer
+    are drawn, by ``seed``.
+
+    ``plans`` (tasks) says how many plans of each task there are in the table, ``count`` (tasks) how
+    many it has.  ``tasks_of_state`` are for each state the tasks with plans through it.
     ``is_complete``: all plans of all tasks are listed, and the measure is exact but for rounding.
     """
 
-    tasks: int
-    states: Ints
-    first: Ints
-    plans: Ints
-    count: Floats
-    parts: Ints
-    ways: Ints
-    cells: Ints
-    first_way: Ints
-    first_cell: Ints
-    tasks_of_state: tuple[Ints, ...]
-    is_complete: bool
+    def __init__(
+        self, spaces: Sequence[PlanSpace], states: int, seed: int, *, mixtures: bool
+    ) -> None:
+        asked: list[Plans] = []
+        for space in spaces:
+            counted, starts = counts(space), space.starts
+            starts = starts[required_nodes(space)[starts]] if mixtures else starts
+            asked += [Plans(space, start, counted) for start in starts.tolist()]
+        few = len(asked) <= _TASKS
+        self.is_complete = few and all(plans.count <= _LISTED for plans in asked)
+        if not few:
+            drawn = np.random.default_rng(seed).choice(len(asked), _TASKS, replace=False)
+            asked = [asked[number] for number in np.sort(drawn).tolist()]
+        steps = 1 + max(int(plans.space.layer[plans.start]) for plans in asked)
+        entries = [_task(plans, steps, mixtures, seed) for plans in asked]
+        passed, parts, cells = (np.concatenate(column) for column in zip(*entries, strict=True))
+        #: (plans, steps) the states that each plan passes through; shorter ones repeat their last.
+        self._states = passed
+        self.plans = np.array([len(own) for own, *_ in entries])
+        #: (tasks) the first plan of each task.
+        self._first = np.cumsum(self.plans) - self.plans
+        self.count = np.array([float(min(own.count, MANY)) for own in asked])
+        #: (plans, robots) what each robot does in a plan: its number among the task's own
+        #: sequences, of which each robot has ``_ways`` (tasks, robots).
+        self._parts = parts
+        self._ways = np.array([own.max(axis=0) + 1 for _, own, _ in entries])
+        #: (tasks) the number of the first sequence of robot 1 in each task, all tasks counted on.
+        self._first_way = np.cumsum(self._ways[:, 0]) - self._ways[:, 0]
+        way = np.repeat(self._first_way, [len(own) for *_, own in entries]) + cells[:, 0]
+        order = np.argsort(way, kind="stable")
+        #: (cells, robots) what each robot does in a mixture that is optimal, by task and by what
+        #: robot 1 does, and (sequences + 1) the first cell of each of its sequences.
+        self._cells = cells[order]
+        ways = np.arange(self._ways[:, 0].sum() + 1)
+        self._first_cell = np.searchsorted(way[order], ways)
+        task = np.repeat(np.arange(len(asked)), self.plans)
+        touched = np.unique(passed * len(asked) + task[:, None])  # by state, then by task
+        of_state = np.searchsorted(touched, np.arange(1, states) * len(asked))
+        self.tasks_of_state = tuple(np.split(touched % len(asked), of_state))
 
     def __len__(self) -> int:
         """Count the tasks that are measured."""
@@ -80,24 +102,24 @@ class PlanTable:
 
         def weights(robot: int) -> tuple[Ints, Ints, Ints]:
             """Plans with each sentence and part of a robot; each sentence's first part, parts."""
-            ways = self.ways[tasks, robot][task]
+            ways = self._ways[tasks, robot][task]
             first = np.cumsum(ways) - ways
-            at = first[said] + self.parts[plans, robot]
+            at = first[said] + self._parts[plans, robot]
             return np.bincount(at, minlength=int(ways.sum())), first, ways
 
         # Robot 1 does something of the sentence in few cells: the others are not looked at.
         weight, first, ways = weights(0)
         does = np.flatnonzero(weight)
         sentence = np.repeat(np.arange(len(task)), ways)[does]
-        way = does - first[sentence] + self.first_way[tasks[task]][sentence]
-        cells = self.first_cell[way + 1] - self.first_cell[way]
-        cell = ranges(self.first_cell[way], cells)
+        way = does - first[sentence] + self._first_way[tasks[task]][sentence]
+        cells = self._first_cell[way + 1] - self._first_cell[way]
+        cell = ranges(self._first_cell[way], cells)
         sentence = np.repeat(sentence, cells)
         good = np.repeat(weight[does], cells).astype(np.float64)
-        robots = self.parts.shape[1]
+        robots = self._parts.shape[1]
         for robot in range(1, robots):
             weight, first, _ = weights(robot)
-            good *= weight[first[sentence] + self.cells[cell, robot]]
+            good *= weight[first[sentence] + self._cells[cell, robot]]
         size = sizes.astype(np.float64)
         well = np.bincount(sentence, good, minlength=len(task))
         bad = np.maximum(size**robots - well, 0) / size ** (robots - 1)
@@ -110,9 +132,9 @@ class PlanTable:
         (plans of the tasks, task of each sentence, sentence of each plan, plans of each sentence).
         They are compared by 64-bit hashes: a guide for a search, recounted by the definition.
         """
-        plans = ranges(self.first[tasks], self.plans[tasks])
+        plans = ranges(self._first[tasks], self.plans[tasks])
         task = np.repeat(np.arange(len(tasks)), self.plans[tasks])
-        words = word[self.states[plans]]
+        words = word[self._states[plans]]
         value = (words[:, 0] + 1).astype(np.uint64) * _ODD
         for step in range(1, words.shape[1]):
             changes = words[:, step] != words[:, step - 1]
@@ -126,49 +148,6 @@ class PlanTable:
             code, return_index=True, return_inverse=True, return_counts=True
         )
         return plans, task[first], inverse.reshape(-1), sizes
-
-
-def plan_table(spaces: Sequence[PlanSpace], states: int, seed: int, *, mixtures: bool) -> PlanTable:
-    """List the plans of tasks; of many tasks, and of many plans, some are drawn by ``seed``.
-
-    ``spaces`` hold all tasks, over one table of ``states`` states.  If ``mixtures`` are measured,
-    the tasks are those that require coordination, at least one, and of a task with many plans fewer
-    are drawn.
-    """
-    asked: list[Plans] = []
-    for space in spaces:
-        counted, starts = counts(space), space.starts
-        starts = starts[required_nodes(space)[starts]] if mixtures else starts
-        asked += [Plans(space, start, counted) for start in starts.tolist()]
-    is_complete = len(asked) <= _TASKS and all(plans.count <= _LISTED for plans in asked)
-    if len(asked) > _TASKS:
-        drawn = np.random.default_rng(seed).choice(len(asked), _TASKS, replace=False)
-        asked = [asked[number] for number in np.sort(drawn).tolist()]
-    steps = 1 + max(int(plans.space.layer[plans.start]) for plans in asked)
-    entries = [_task(plans, steps, mixtures, seed) for plans in asked]
-    passed, parts, cells = (np.concatenate(column) for column in zip(*entries, strict=True))
-    number = np.array([len(own) for own, *_ in entries])
-    ways = np.array([own.max(axis=0) + 1 for _, own, _ in entries])
-    first_way = np.cumsum(ways[:, 0]) - ways[:, 0]
-    way = np.repeat(first_way, [len(own) for *_, own in entries]) + cells[:, 0]
-    order = np.argsort(way, kind="stable")
-    task = np.repeat(np.arange(len(asked)), number)
-    touched = np.unique(passed * len(asked) + task[:, None])  # by state, then by task
-    of_state = np.searchsorted(touched, np.arange(1, states) * len(asked))
-    return PlanTable(
-        sum(len(space.starts) for space in spaces),
-        states=passed,
-        first=np.cumsum(number) - number,
-        plans=number,
-        count=np.array([float(min(own.count, MANY)) for own in asked]),
-        parts=parts,
-        ways=ways,
-        cells=cells[order],
-        first_way=first_way,
-        first_cell=np.searchsorted(way[order], np.arange(ways[:, 0].sum() + 1)),
-        tasks_of_state=tuple(np.split(touched % len(asked), of_state)),
-        is_complete=is_complete,
-    )
 
 
 def _task(plans: Plans, steps: int, mixtures: bool, seed: int) -> tuple[Ints, Ints, Ints]:

@@ -156,8 +156,8 @@ def checked_generators(
     proposed = automorphism_generators(candidates, largest_graph, with_tasks=with_tasks)
     if not proposed:
         return [], 0
-    check = _Check(candidates)
-    found = [(renaming, check.states_under(renaming)) for renaming in proposed]
+    itself = _renamed_model(candidates, {}, np.arange(len(candidates.rows)))
+    found = [(renaming, _states_under(renaming, candidates, itself)) for renaming in proposed]
     kept = [Symmetry(renaming, states) for renaming, states in found if states is not None]
     return kept, len(found) - len(kept)
 
@@ -199,39 +199,35 @@ def _closure(generators: Sequence[Symmetry], largest: int) -> list[Symmetry] | N
 # ---- is a renaming a symmetry?
 
 
-class _Check:
-    """The check for the model, the table of states and the tasks of ``candidates``.
+def _states_under(
+    renaming: Renaming, candidates: Candidates, itself: tuple[Hashable, ...]
+) -> Ints | None:
+    """Where the renaming takes each state number; None if it is no symmetry.
 
-    A renaming that takes states to states is a symmetry iff all that the tasks are made of is the
+    If it takes states to states, it is one iff all that the tasks are made of, ``itself``, is the
     same when it is renamed.
     """
+    rows = _images(renaming, candidates.model.codec, candidates.rows)
+    if rows is None or (states := find_rows(candidates.rows, rows)).min(initial=0) < 0:
+        return None
+    return states if _renamed_model(candidates, renaming, states) == itself else None
 
-    def __init__(self, candidates: Candidates) -> None:
-        self._model = candidates.model
-        self._rows = candidates.rows
-        # All pairs of states, the second to be reached from the first, go to such pairs.
-        self._spaces = () if candidates.kind == "all" else candidates.spaces
-        self._itself = self._under({}, np.arange(len(self._rows)))
 
-    def states_under(self, renaming: Renaming) -> Ints | None:
-        """Where the renaming takes each state number; None if it is no symmetry."""
-        rows = _images(renaming, self._model.codec, self._rows)
-        if rows is None or (states := find_rows(self._rows, rows)).min(initial=0) < 0:
-            return None
-        return states if self._under(renaming, states) == self._itself else None
-
-    def _under(self, renaming: Renaming, states: Ints) -> tuple[Hashable, ...]:
-        """Robots with their idling costs, ground actions and tasks, as renamed."""
-        model, image = self._model, _Image(renaming, self._model.codec.facts.atoms)
-        robots = list(map(image.name, model.robots))
-        kinds = model.robots if model.is_joint_action else model.idling_costs
-        actions = (image.action(action, robots) for action in model.actions)
-        tasks: set[tuple[int, Hashable]] = set()
-        for space in self._spaces:
-            goals = list(map(image.form, space.goals))
-            for node in space.starts.tolist():
-                tasks.add((int(states[space.state[node]]), goals[space.goal[node]]))
-        return frozenset(zip(robots, kinds, strict=True)), frozenset(actions), frozenset(tasks)
+def _renamed_model(
+    candidates: Candidates, renaming: Renaming, states: Ints
+) -> tuple[Hashable, ...]:
+    """Robots with their idling costs, ground actions and tasks, as renamed."""
+    model, image = candidates.model, _Image(renaming, candidates.model.codec.facts.atoms)
+    robots = list(map(image.name, model.robots))
+    kinds = model.robots if model.is_joint_action else model.idling_costs
+    actions = (image.action(action, robots) for action in model.actions)
+    tasks: set[tuple[int, Hashable]] = set()
+    # All pairs of states, the second to be reached from the first, go to such pairs.
+    for space in () if candidates.kind == "all" else candidates.spaces:
+        goals = list(map(image.form, space.goals))
+        for node in space.starts.tolist():
+            tasks.add((int(states[space.state[node]]), goals[space.goal[node]]))
+    return frozenset(zip(robots, kinds, strict=True)), frozenset(actions), frozenset(tasks)
 
 
 class _Image:

@@ -129,7 +129,7 @@ def parting_nodes(space: PlanSpace, word: Ints, *, ahead: bool = False) -> Ints:
     if ahead:
         numbers, fails = label_sequences(space)
         ends = list(numbers[targets].T)
-    parting = Parting.of(sources, targets, space.labels, word, ends)
+    parting = Parting(sources, targets, space.labels, word, ends)
     return np.flatnonzero(parting.at(space.layer[:, None])[:, 0] & fails)
 
 
@@ -148,7 +148,7 @@ def verify_candidates(
     if isinstance(source, Explored) and source.has_every_way:
         space, word = source.space, partition.word_of(source.rows)
         ends = [space.targets] * source.robots
-        parting = Parting.of(space.sources, ends[0], space.labels, word, ends)
+        parting = Parting(space.sources, ends[0], space.labels, word, ends)
         efforts = np.full(len(efforts), len(space.target) * source.robots / STEPS)
     portions = cut(efforts, portion)
     if len(portions) == 1 and parting is None:

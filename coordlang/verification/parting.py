@@ -10,7 +10,6 @@ step less to go, and all else that counts is the same for every goal.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,71 +20,59 @@ from planners.joint.tables import Bools, Ints, unique_rows
 from planners.search.plan_space import PlanSpace
 
 
-@dataclass(frozen=True, slots=True)
 class _Groups:
     """Rows of a table by the group that each belongs to, which may be none."""
 
-    order: Ints
-    counts: Ints
-
-    @classmethod
-    def of(cls, group: Ints, size: int) -> _Groups:
-        return cls(np.argsort(group, kind="stable"), np.bincount(group, minlength=size))
+    def __init__(self, group: Ints, size: int) -> None:
+        self._order = np.argsort(group, kind="stable")
+        self._counts = np.bincount(group, minlength=size)
 
     def sums(self, table: Bools) -> NDArray[np.unsignedinteger[Any]]:
         """How many of the rows of each group are true, column by column: (groups, columns)."""
-        first = np.cumsum(self.counts) - self.counts
-        most = int(self.counts.max(initial=0))
-        sums = np.zeros((len(self.counts), table.shape[1]), np.min_scalar_type(most))
+        first = np.cumsum(self._counts) - self._counts
+        most = int(self._counts.max(initial=0))
+        sums = np.zeros((len(self._counts), table.shape[1]), np.min_scalar_type(most))
         for position in range(most):
-            larger = np.flatnonzero(self.counts > position)
-            sums[larger] += table[self.order[first[larger] + position]]
+            larger = np.flatnonzero(self._counts > position)
+            sums[larger] += table[self._order[first[larger] + position]]
         return sums
 
 
-@dataclass(frozen=True, slots=True)
 class Parting:
     """The steps of a graph in classes, and as they are for each robot.
 
-    ``sources`` and ``targets`` (steps) are nodes.  ``classes`` are the steps by class, ``nodes``
-    the classes by node; ``speaks`` (classes) says whether a word is entered.  For each robot
-    ``own`` are the steps by what they are for it, and these by class.
+    ``sources`` and ``targets`` (steps) are nodes, ``labels`` (steps, robots) what is done,
+    ``word`` (nodes) the words; ``ends`` say where each step leads for each robot.
     """
 
-    sources: Ints
-    targets: Ints
-    classes: _Groups
-    nodes: _Groups
-    speaks: Bools
-    own: tuple[tuple[_Groups, _Groups], ...]
-
-    @classmethod
-    def of(
-        cls, sources: Ints, targets: Ints, labels: Labels, word: Ints, ends: Sequence[Ints]
-    ) -> Parting:
-        """``word`` (nodes) are the words, ``ends`` say where each step leads for each robot."""
+    def __init__(
+        self, sources: Ints, targets: Ints, labels: Labels, word: Ints, ends: Sequence[Ints]
+    ) -> None:
+        self._sources, self._targets = sources, targets
         said = np.where(word[targets] != word[sources], word[targets] + 1, 0)
         classes, group = _different(sources, said)
-        own = []
+        #: The steps by class, the classes by node, and whether a word is entered in each class.
+        self._classes, self._nodes = _Groups(group, len(classes)), _Groups(classes[:, 0], len(word))
+        self._speaks = classes[:, 1:] > 0
+        #: For each robot the steps by what they are for it, and these by class.
+        self._own = []
         for robot, end in enumerate(ends):
             parts, part = _different(group, labels[:, robot].astype(np.int64), end)
-            own.append((_Groups.of(part, len(parts)), _Groups.of(parts[:, 0], len(classes))))
-        by_class, by_node = _Groups.of(group, len(classes)), _Groups.of(classes[:, 0], len(word))
-        return cls(sources, targets, by_class, by_node, classes[:, 1] > 0, tuple(own))
+            self._own.append((_Groups(part, len(parts)), _Groups(parts[:, 0], len(classes))))
 
     def at(self, left: Ints) -> Bools:
         """At which nodes plans may part, by goal: (nodes, goals).
 
         ``left`` (nodes, goals) are the steps to each goal, -1 where it cannot be reached.
         """
-        taken = left[self.targets] + 1 == left[self.sources]
-        steps = self.classes.sums(taken)
+        taken = left[self._targets] + 1 == left[self._sources]
+        steps = self._classes.sums(taken)
         combinations = np.ones(steps.shape)
-        for parts, of_class in self.own:
+        for parts, of_class in self._own:
             combinations *= of_class.sums(parts.sums(taken) > 0)
-        speaks = self.speaks[:, None]
+        speaks = self._speaks
         of_classes = combinations != steps, (steps > 0) & ~speaks, (steps > 0) & speaks
-        larger, silent, speaking = (self.nodes.sums(some) > 0 for some in of_classes)
+        larger, silent, speaking = (self._nodes.sums(some) > 0 for some in of_classes)
         return (larger | silent & speaking) & (left > 0)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from coordlang.language.sentences import Floats
 from coordlang.language.warping import Clause
 from coordlang.required.failure import FailureProbability, TooManyToCount, failure_probability
-from coordlang.required.plan_table import PlanTable, plan_table
+from coordlang.required.plan_table import PlanTable
 from coordlang.symmetry.group import symmetry_group
 from coordlang.vocabulary.exhaustive import partitions
 from coordlang.vocabulary.job import Assignment, Job, Outcome, word_count
@@ -111,7 +111,7 @@ class _Search:
             self._take(job.word(language), never)
             return
         spaces, states = job.candidates.spaces, len(job.candidates.rows)
-        self.table = plan_table(spaces, states, job.seed, mixtures=True)
+        self.table = PlanTable(spaces, states, job.seed, mixtures=True)
         if self.table.is_complete and partition_count(len(job.states), self._words) <= _ALL:
             self._try_all()
         else:

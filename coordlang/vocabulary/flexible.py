@@ -20,7 +20,7 @@ import numpy as np
 from coordlang.language.sentences import MANY, Flexibility, Floats, flexibility
 from coordlang.language.warping import Clause
 from coordlang.required.divergences import required_nodes
-from coordlang.required.plan_table import PlanTable, plan_table
+from coordlang.required.plan_table import PlanTable
 from coordlang.vocabulary.job import Assignment, Job, Outcome
 from coordlang.vocabulary.local_search import WORK, LocalSearch
 from coordlang.vocabulary.loop import Languages
@@ -101,7 +101,7 @@ class _Search:
             return
         self._languages = languages = self._found.languages or Languages.of(job)
         self.clauses = languages.clauses
-        self.table = plan_table(spaces, states, job.seed, mixtures=False)
+        self.table = PlanTable(spaces, states, job.seed, mixtures=False)
         self.best_word = job.word(self.partition)
         self.best = float(self.values(self.best_word, np.arange(len(self.table))).sum())
         permutations = languages.known.group.permutations

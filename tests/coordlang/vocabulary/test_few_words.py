@@ -17,7 +17,7 @@ from coordlang.language.candidates import Candidates
 from coordlang.language.sentences import flexibility
 from coordlang.required.choices import Choices
 from coordlang.required.failure import failure_probability
-from coordlang.required.plan_table import plan_table
+from coordlang.required.plan_table import PlanTable
 from coordlang.vocabulary import few_words as module
 from coordlang.vocabulary.few_words import few_words, partition_count
 from coordlang.vocabulary.first_differences import first_differences
@@ -39,7 +39,7 @@ def test_tables_of_plans_measure_what_is_counted(robots: int, number: int) -> No
         required = Choices(space).requires[space.starts]
         if not required.any():
             continue
-        table = plan_table([space], states, seed, mixtures=True)
+        table = PlanTable([space], states, seed, mixtures=True)
         if not table.is_complete:
             continue
         word = np.random.default_rng(seed).integers(0, 3, states)
@@ -133,7 +133,7 @@ def test_plans_ruled_out_are_measured_as_they_are_defined() -> None:
     candidates = all_tasks("grid", "gw1-2x2")
     word = np.random.default_rng(2).integers(0, 3, len(candidates.rows))
     words = [word[space.state] for space in candidates.spaces]
-    table = plan_table(candidates.spaces, len(word), 0, mixtures=False)
+    table = PlanTable(candidates.spaces, len(word), 0, mixtures=False)
     measured = table.count - table.plans_ruled_out(word, np.arange(len(table)))
     assert measured == pytest.approx(flexibility(candidates.spaces, words).expected)
     assert 1 < measured.mean() < table.count.mean()
