@@ -24,7 +24,6 @@ from coordlang.execution.guided_search import ExpandedStates, GuidedPlan, plan_u
 from coordlang.execution.plan_sentence import (
     PlanDag,
     open_plans_data,
-    plan_dag,
     read_plan_file,
     sentence_of_plan,
 )
@@ -120,7 +119,7 @@ class SentencePlans(OptimalPlans, InTask):
 
     def dag(self) -> PlanDag:
         """Return the plans as the paths of a DAG."""
-        return plan_dag(self.used, self._words, self._plans.space)
+        return PlanDag(self.used, self._words, self._plans.space)
 
     def data_with(self, listed: Sequence[Sequence[Texts]], graph: PlanDag | None) -> dict[str, Any]:
         """Return a JSON plan file with sentence and guarantee, and with the DAG if one is given."""

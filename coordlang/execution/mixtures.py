@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -61,7 +60,7 @@ def walk_mixtures(
     """
     space = task_language.space
     index = EdgeIndex.of(space)
-    robots, moves = len(automata), [_moves(own) for own in automata]
+    robots, moves = len(automata), [_Moves(own) for own in automata]
     table = np.array([[0] * robots + [task_language.start]])
     layers = [table[:, robots]]
     steps: list[UnfoldingStep] = []
@@ -86,19 +85,14 @@ def walk_mixtures(
     return Mixtures(found, None, walked)
 
 
-class _Moves(NamedTuple):
+class _Moves:
     """An automaton's moves: for each state their number and the position of the first one."""
 
-    degree: Ints
-    first: Ints
-    label: Ints
-    target: Ints
-
-
-def _moves(automaton: Automaton) -> _Moves:
-    degree = np.array([len(own) for own in automaton.moves], np.int64)
-    pairs = [pair for own in automaton.moves for pair in own.items()]
-    return _Moves(degree, np.cumsum(degree) - degree, *np.array(pairs, np.int64).reshape(-1, 2).T)
+    def __init__(self, automaton: Automaton) -> None:
+        self.degree = np.array([len(own) for own in automaton.moves], np.int64)
+        self.first = np.cumsum(self.degree) - self.degree
+        pairs = [pair for own in automaton.moves for pair in own.items()]
+        self.label, self.target = np.array(pairs, np.int64).reshape(-1, 2).T
 
 
 def _together(moves: Sequence[_Moves], table: Ints) -> tuple[Ints, Labels, Ints]:

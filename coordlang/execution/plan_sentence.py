@@ -242,33 +242,31 @@ class DagEdge:
     actions: tuple[tuple[str | None, ...], ...]
 
 
-@dataclass(frozen=True, slots=True)
 class PlanDag:
     """The plans that a sentence leaves open as the paths of a layered graph.
 
-    Nodes are sorted by step, those on most plans first; edges by source and target.
+    ``space`` is `TaskLanguage.plans_with` of the sentence.  ``nodes`` are sorted by step, those on
+    most plans first; ``edges`` by source and target.
     """
 
-    sentence: tuple[str, ...]
-    nodes: tuple[DagNode, ...]
-    edges: tuple[DagEdge, ...]
-
-
-def plan_dag(task_language: TaskLanguage, words: Sequence[int], space: PlanSpace) -> PlanDag:
-    """The plans with a sentence as a DAG; ``space`` is `TaskLanguage.plans_with` of it."""
-    names, codec = task_language.partition.words, task_language.model.codec
-    word = task_language.partition.word_of(space.rows)[space.state]
-    passed = words_passed(space, word)
-    through = _plans_through(space)
-    nodes: list[DagNode] = []
-    number: dict[int, int] = {}
-    for step, span in enumerate(reversed(space.layers)):
-        for node in sorted(range(span.start, span.stop), key=lambda n: (-through[n], n)):
-            number[node] = len(nodes)
-            key = codec.key(space.rows[space.state[node]])
-            nodes.append(DagNode(step, key, names[word[node]], int(passed[node]), through[node]))
-    said = tuple(names[w] for w in words)
-    return PlanDag(said, tuple(nodes), _edges(space, number))
+    def __init__(self, task_language: TaskLanguage, words: Sequence[int], space: PlanSpace) -> None:
+        names, model = task_language.partition.words, task_language.model
+        self.sentence = tuple(names[w] for w in words)
+        word = task_language.partition.word_of(space.rows)[space.state]
+        passed, through = words_passed(space, word), _plans_through(space)
+        self.nodes: list[DagNode] = []
+        number: dict[int, int] = {}
+        for step, span in enumerate(reversed(space.layers)):
+            for node in sorted(range(span.start, span.stop), key=lambda n: (-through[n], n)):
+                number[node] = len(self.nodes)
+                key, said = model.codec.key(space.rows[space.state[node]]), int(passed[node])
+                self.nodes.append(DagNode(step, key, names[word[node]], said, through[node]))
+        found: dict[tuple[int, int], list[tuple[str | None, ...]]] = {}
+        for node in range(len(space)):
+            for edge in space.out_edges(node):
+                ends = number[node], number[space.target_of(edge)]
+                found.setdefault(ends, []).append(model.texts(space.labels_of(edge)))
+        self.edges = [DagEdge(*ends, tuple(actions)) for ends, actions in sorted(found.items())]
 
 
 def _plans_through(space: PlanSpace) -> list[int]:
@@ -280,15 +278,6 @@ def _plans_through(space: PlanSpace) -> list[int]:
         for source, target in zip(edges.source.tolist(), edges.target.tolist(), strict=True):
             above[target] += above[source]
     return [a * b for a, b in zip(above, below, strict=True)]
-
-
-def _edges(space: PlanSpace, number: dict[int, int]) -> tuple[DagEdge, ...]:
-    found: dict[tuple[int, int], list[tuple[str | None, ...]]] = {}
-    for node in range(len(space)):
-        for edge in space.out_edges(node):
-            ends = number[node], number[space.target_of(edge)]
-            found.setdefault(ends, []).append(space.model.texts(space.labels_of(edge)))
-    return tuple(DagEdge(a, b, tuple(actions)) for (a, b), actions in sorted(found.items()))
 
 
 def open_plans_data(

@@ -10,7 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations
+from itertools import combinations, permutations
 from pathlib import Path
 from statistics import fmean
 
@@ -325,16 +325,12 @@ def _rides(places: Mapping[str, Place], lanes: Sequence[Lane]) -> Iterator[Lane]
     for lane in lanes:
         graphs[lane.start].add(lane.graph)
         graphs[lane.end].add(lane.graph)
-    inside: dict[str, list[Place]] = {}
-    for place in places.values():
-        for lift in _lifts(place):
-            inside.setdefault(lift, []).append(place)
-    for one in places.values():
-        for lift in _lifts(one):
-            for other in inside[lift]:
-                if one.level != other.level:
-                    for graph in sorted(graphs[one.name] & graphs[other.name]):
-                        yield Lane(graph, one.name, other.name, frozenset({lift}))
+    inside = [place for place in places.values() if _lifts(place)]
+    for one, other in permutations(inside, 2):
+        for lift in _lifts(one) if one.level != other.level else ():
+            if lift in other.groups:
+                for graph in sorted(graphs[one.name] & graphs[other.name]):
+                    yield Lane(graph, one.name, other.name, frozenset({lift}))
 
 
 def _lifts(place: Place) -> list[str]:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import combinations, islice
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,7 +11,7 @@ from typing import Annotated, Any
 import msgspec
 
 from coordlang.language.file import refuse_duplicates
-from coordlang.language.warping import Clause, Pair
+from coordlang.language.warping import Clause
 from coordlang.vocabulary.sat import most_constrained_first
 from planners.search.sat import SolverName, sat_solver, solve_slice
 from planners.system.errors import OutOfMemory, Position
@@ -92,23 +91,45 @@ _SLICE = 10_000
 _CLAUSE, _LITERAL = 120, 48
 
 
-@dataclass(frozen=True, slots=True)
 class Cnf:
-    """A CNF: "the states can be given ``size`` words so that every clause holds".
+    """A CNF: "the states can be given ``size`` words so that every necessary clause holds".
 
-    The last of ``clauses`` are the necessary ones, in their order; those before say what words are.
-    ``word[state]`` are the variables "the state has word 0, 1, ..", ``separated[pair]`` "the two
-    have different words", and ``so_far[n]`` "one of the first n + 2 states has word 0, 1, ..".
-    ``kinds`` says of the clauses, in their order, what they say and how many do.
+    Words are interchangeable: a state may have word w only if a state before it, in the order of
+    ``word``, has word w - 1.  Any partition can be named like that, so the formula stays
+    satisfiable if it was.  The last of its ``clauses`` are the necessary ones, in their order.
+
+    Raises `OutOfMemory` for a formula that would not fit into what is left, before it is made.
     """
 
-    size: int
-    variables: int
-    clauses: tuple[tuple[int, ...], ...]
-    word: dict[int, tuple[int, ...]]
-    separated: dict[Pair, int]
-    so_far: tuple[tuple[int, ...], ...]
-    kinds: tuple[tuple[str, int], ...]
+    def __init__(self, clauses: Sequence[Clause], size: int) -> None:
+        states, pairs = states_of(clauses), sorted(set().union(*clauses))
+        _require_memory(len(states), len(pairs), clauses, size)
+        counter = iter(range(1, 2**62))
+        self.size = size
+        #: By state the variables "the state has word 0, 1, ..".
+        self.word = {state: tuple(islice(counter, size)) for state in states}
+        #: By pair of states the variable "the two have different words".
+        self._separated = dict(zip(pairs, counter, strict=False))
+        one_word = [
+            clause
+            for own in self.word.values()
+            for clause in (own, *((-a, -b) for a, b in combinations(own, 2)))
+        ]
+        apart = [
+            (-variable, -x, -y)
+            for (a, b), variable in self._separated.items()
+            for x, y in zip(self.word[a], self.word[b], strict=True)
+        ]
+        self._so_far, in_order = _words_in_order(list(self.word.values()), size, counter)
+        reasons = [tuple(self._separated[p] for p in sorted(clause)) for clause in clauses]
+        #: What the clauses say, in their order, and how many do.
+        self._kinds = (
+            ("every state has exactly one word", len(one_word)),
+            ("states with different words share none", len(apart)),
+            ("words are named in the order of the states", len(in_order)),
+        )
+        self.clauses = (*one_word, *apart, *in_order, *reasons)
+        self.variables = next(counter) - 1
 
     def dimacs(self, names: Mapping[int, str]) -> str:
         """DIMACS text.  ``names`` are the states' keys, for the comments."""
@@ -128,15 +149,15 @@ class Cnf:
         for state, variables in self.word.items():
             for n, v in enumerate(variables):
                 yield f"c {v}: word {n} holds {names[state]}"
-        for (a, b), v in self.separated.items():
+        for (a, b), v in self._separated.items():
             yield f"c {v}: {names[a]} and {names[b]} have different words"
-        for states, variables in enumerate(self.so_far, 2):
+        for states, variables in enumerate(self._so_far, 2):
             for n, v in enumerate(variables):
                 yield f"c {v}: word {n} holds one of the first {states} states"
 
     def _clauses_explained(self) -> Iterator[str]:
         first = 1
-        for kind, count in self.kinds:
+        for kind, count in self._kinds:
             if count:
                 yield f"c clauses {first} to {first + count - 1}: {kind}"
             first += count
@@ -150,41 +171,6 @@ class Cnf:
             while answer is None:
                 answer = solve_slice(sat, _SLICE)
             return answer is False
-
-
-def encode(clauses: Sequence[Clause], size: int) -> Cnf:
-    """The CNF of necessary clauses for ``size`` words.
-
-    Words are interchangeable: a state may have word w only if a state before it, in the order of
-    ``word``, has word w - 1. Any partition can be named like that, so the formula stays satisfiable
-    if it was.
-
-    Raises `OutOfMemory` for a formula that would not fit into what is left, before it is made.
-    """
-    states, pairs = states_of(clauses), sorted(set().union(*clauses))
-    _require_memory(len(states), len(pairs), clauses, size)
-    counter = iter(range(1, 2**62))
-    word = {state: tuple(islice(counter, size)) for state in states}
-    separated = dict(zip(pairs, counter, strict=False))
-    one_word = [
-        clause
-        for own in word.values()
-        for clause in (own, *((-a, -b) for a, b in combinations(own, 2)))
-    ]
-    apart = [
-        (-variable, -x, -y)
-        for (a, b), variable in separated.items()
-        for x, y in zip(word[a], word[b], strict=True)
-    ]
-    so_far, in_order = _words_in_order(list(word.values()), size, counter)
-    reasons = [tuple(separated[p] for p in sorted(clause)) for clause in clauses]
-    kinds = (
-        ("every state has exactly one word", len(one_word)),
-        ("states with different words share none", len(apart)),
-        ("words are named in the order of the states", len(in_order)),
-    )
-    cnf = (*one_word, *apart, *in_order, *reasons)
-    return Cnf(size, next(counter) - 1, cnf, word, separated, tuple(so_far), kinds)
 
 
 def _require_memory(states: int, pairs: int, clauses: Sequence[Clause], size: int) -> None:

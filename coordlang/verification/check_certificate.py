@@ -22,7 +22,6 @@ from coordlang.verification.certificate_file import (
     PlanTexts,
     Reason,
     WarpingPath,
-    encode,
     states_of,
 )
 from planners.joint.model import JointModel
@@ -99,7 +98,7 @@ def check(
     states = len(states_of(clauses))
     if certificate.refuted >= max(1, states) and all(clauses):
         raise _leaves_languages(certificate)
-    cnf = encode(clauses, certificate.refuted)
+    cnf = Cnf(clauses, certificate.refuted)
     if certificate.refuted and not cnf.refuted():
         raise _leaves_languages(certificate)
     names = {state: candidates.model.codec.key(candidates.rows[state]) for state in cnf.word}

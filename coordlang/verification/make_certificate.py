@@ -14,9 +14,9 @@ from coordlang.language.warping import Clause, pair, warping_path
 from coordlang.required.miscoordination import way_to
 from coordlang.verification.certificate_file import (
     Certificate,
+    Cnf,
     Reason,
     WarpingPath,
-    encode,
     states_of,
 )
 from coordlang.vocabulary.job import Evidence
@@ -108,7 +108,7 @@ def _in_the_way(clauses: Sequence[Clause], size: int) -> list[Clause]:
 
 def _used(clauses: Sequence[Clause], size: int) -> list[Clause]:
     """The clauses that a solver's refutation used."""
-    cnf = encode(clauses, size)
+    cnf = Cnf(clauses, size)
     rest, asked = cnf.clauses[: -len(clauses)], cnf.clauses[-len(clauses) :]
     with sat_solver("cadical153", rest) as sat:
         select = [cnf.variables + 1 + n for n in range(len(clauses))]

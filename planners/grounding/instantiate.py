@@ -279,7 +279,7 @@ class _Grounder:
             atom = Atom(f.predicate, tuple([binding.get(a, a) for a in f.args]))
             if f.predicate in self._fluents:
                 return self._literal(atom, positive)
-            return _truth((atom in self._statics) == positive)
+            return Truth((atom in self._statics) == positive)
         if isinstance(f, Not):
             return self.formula(f.part, binding, not positive, acting)
         if isinstance(f, Junction):
@@ -291,9 +291,9 @@ class _Grounder:
             return self._step_atom(f.action, values, positive, acting)
         if isinstance(f, Equal):
             same = binding.get(f.left, f.left) == binding.get(f.right, f.right)
-            return _truth(same == positive)
+            return Truth(same == positive)
         if isinstance(f, Truth):
-            return _truth(f.value == positive)
+            return Truth(f.value == positive)
         return self._quantifier(f, binding, positive, acting)
 
     def _quantifier(
@@ -332,7 +332,7 @@ class _Grounder:
     ) -> Formula:
         owners = self._owners_of(action, args)
         if owners is None:
-            return _truth(not positive)
+            return Truth(not positive)
         if not positive and not owners.isdisjoint(acting):
             return TRUE
         return self._literal(StepAtom(action, args), positive)
@@ -415,7 +415,3 @@ class _Grounder:
                 remedy="Give it a value in (:init ..), or leave out --cost makespan+cost.",
             )
         return int(value)
-
-
-def _truth(value: bool) -> Truth:
-    return TRUE if value else FALSE

@@ -66,18 +66,13 @@ class ComposingStepper(Stepper):
 
     def steps(self, rows: Rows, options: Options | None = None) -> Steps:
         """See `Stepper`."""
-        parts = [
-            (source, labels, *self._apply(rows, source, labels))
-            for source, labels in self._pieces(rows, options)
-        ]
-        return Steps(*map(np.concatenate, zip(*parts, strict=True)))
-
-    def _pieces(self, rows: Rows, options: Options | None) -> Iterator[tuple[Ints, Labels]]:
-        """At least one piece."""
         chosen = self.choices(rows) if options is None else options
         waits = [own.waits(rows, *its) for own, its in zip(self._robot, chosen, strict=True)]
+        parts = []
         for span in list(spans(products(chosen), self.piece)) or [slice(0, 0)]:
-            yield self._compose(rows, chosen, waits, span)
+            source, labels = self._compose(rows, chosen, waits, span)
+            parts.append((source, labels, *self._apply(rows, source, labels)))
+        return Steps(*map(np.concatenate, zip(*parts, strict=True)))
 
     def choices(self, rows: Rows) -> Options:
         """For each robot the labels whose conditions on the state hold, by state (CSR)."""

@@ -269,10 +269,7 @@ class JointModel:
         return self.stepper.why_not(self.codec.facts_part(row), labels)
 
     def joint_action(self, row: Rows, labels: Sequence[int]) -> str | None:
-        """The ground joint action of the domain that these labels are in a state.
-
-        None where robots' subactions are actions of their own.
-        """
+        """See `Stepper.joint_action`."""
         return self.stepper.joint_action(self.codec.facts_part(row), labels)
 
     def state_text(self, row: Rows) -> str:

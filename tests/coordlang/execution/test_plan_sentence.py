@@ -16,7 +16,6 @@ from coordlang.execution.plan_sentence import (
     NotAPlan,
     NotOptimal,
     PlanDag,
-    plan_dag,
     sentence_of_plan,
 )
 from coordlang.execution.task_language import NoPlanFits, TaskLanguage
@@ -215,7 +214,7 @@ def check_open(task_language: TaskLanguage, seed: int) -> None:
         fits = task_language.plans_with(said)
         assert Plans.of(fits).count == len(plans)
         assert set(Plans.of(fits)) == plans
-        check_dag(task_language, plan_dag(task_language, said, fits), plans)
+        check_dag(task_language, PlanDag(task_language, said, fits), plans)
     random = Random(seed)
     for _ in range(8):
         check_broken(task_language, near(task_language, random, list(groups)), groups)

@@ -19,9 +19,9 @@ from coordlang.commands.building import Built, build_language
 from coordlang.language.file import read_language
 from coordlang.verification.certificate_file import (
     Certificate,
+    Cnf,
     Reason,
     WarpingPath,
-    encode,
     read_certificate,
     write_certificate,
 )
@@ -198,8 +198,8 @@ def test_nothing_to_refute() -> None:
         refuting_clauses(built.job, 3)
     with pytest.raises(ValueError, match="leave a partition into 1 words"):
         core([], 1)
-    assert encode([frozenset({(0, 1)})], 1).refuted()
-    assert not encode([frozenset({(0, 1)})], 2).refuted()
+    assert Cnf([frozenset({(0, 1)})], 1).refuted()
+    assert not Cnf([frozenset({(0, 1)})], 2).refuted()
 
 
 @pytest.mark.parametrize(("robots", "number"), [(2, 6), (3, 3)])
