@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from benchmarks.paper.recipe import Record, Result, Settings, Unit
 from benchmarks.paper.state_orders import RANDOM_ORDERS, greedy_partitions
 from benchmarks.paper.suite import METHODS, OTHERS, QUICK_ROW, ROW, WORLDS, language_for
-from coordlang.language.sentences import Flexibility, flexibility
+from coordlang.language.sentences import Flexibility
 
 #: Tasks whose own numbers are kept in the results.
 MOST_LISTED = 1000
@@ -41,11 +41,11 @@ def compare(
         candidates, language = language_for(world, asked["method"], settings.seed)
         partition, spaces = language.partition(candidates.model), [*candidates.spaces]
         words = [partition.word_of(space.rows)[space.state] for space in spaces]
-        return {"words": len(language.words), **measures(flexibility(spaces, words))}
+        return {"words": len(language.words), **measures(Flexibility(spaces, words))}
     candidates = world.candidates()
     spaces, found = [*candidates.spaces], {}
     for name, word in greedy_partitions(candidates, asked["orders"], unit.random(settings.seed)):
-        found[name] = of_order(flexibility(spaces, [word[space.state] for space in spaces]))
+        found[name] = of_order(Flexibility(spaces, [word[space.state] for space in spaces]))
     return {"orders": found}
 
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from heapq import heappop, heappush
 
 import numpy as np
@@ -44,7 +44,6 @@ class GuidedPlan:
     generated: int
 
 
-@dataclass(frozen=True, slots=True)
 class ExpandedStates:
     """States met by searches with one language over one model, with their words and joint steps.
 
@@ -52,12 +51,11 @@ class ExpandedStates:
     states.  ``rows`` and ``word`` are the states met so far and their word numbers, by number.
     """
 
-    model: JointModel
-    partition: Partition
-    rows: list[Rows] = field(default_factory=list)
-    word: list[int] = field(default_factory=list)
-    _number: dict[bytes, int] = field(default_factory=dict)
-    _steps: dict[int, list[tuple[int, tuple[int, ...], int]]] = field(default_factory=dict)
+    def __init__(self, model: JointModel, partition: Partition) -> None:
+        self.model, self.partition = model, partition
+        self.rows, self.word = list[Rows](), list[int]()
+        self._number: dict[bytes, int] = {}
+        self._steps: dict[int, list[tuple[int, tuple[int, ...], int]]] = {}
 
     def numbers(self, rows: Rows) -> list[int]:
         """The numbers of the states of a table, which get one if they have none yet."""

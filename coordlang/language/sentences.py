@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import compress
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,7 +155,6 @@ _SENTENCE, _MOST_COUNTED = 200, 20_000_000
 MANY = 10**300
 
 
-@dataclass(frozen=True, slots=True)
 class Flexibility:
     """Measures of a partition, one entry for each candidate task of all plan spaces, in order.
 
@@ -174,14 +172,17 @@ class Flexibility:
     ``first_words``: words of a sentence, in expectation and for the first plan.  ``steps``: joint
     steps of the task's plans.  Numbers of plans are floats with a relative error below 1e-12; a
     task with more than `MANY` counts as one with so many.
+
+    ``words[k]`` holds the word number of each node of ``spaces[k]``.  Measured from the plans
+    counted with each sentence: O(edges * sentences of a node).  Raises `OutOfMemory` when there are
+    too many sentences to count.
     """
 
-    plans: tuple[int, ...]
-    expected: Floats
-    first: Floats
-    words: Floats
-    first_words: Floats
-    steps: Ints
+    def __init__(self, spaces: Sequence[PlanSpace], words: Sequence[Ints]) -> None:
+        tasks = (task for pair in zip(spaces, words, strict=True) for task in _tasks(*pair))
+        self.plans, *columns = zip(*tasks, strict=True)
+        measures: list[Floats] = list(map(np.array, columns))
+        self.expected, self.first, self.words, self.first_words, self.steps = measures
 
     @property
     def value(self) -> float:
@@ -192,18 +193,6 @@ class Flexibility:
     def saving(self) -> Floats:
         """Expected communication saving of each task's plans, against the states of a plan."""
         return 1 - self.words / (self.steps + 1)
-
-
-def flexibility(spaces: Sequence[PlanSpace], words: Sequence[Ints]) -> Flexibility:
-    """Measure a partition; ``words[k]`` holds the word number of each node of ``spaces[k]``.
-
-    From the plans counted with each sentence: O(edges * sentences of a node).  Raises `OutOfMemory`
-    when there are too many sentences to count.
-    """
-    tasks = (task for pair in zip(spaces, words, strict=True) for task in _tasks(*pair))
-    plans, *columns = zip(*tasks, strict=True)
-    measures: list[NDArray[Any]] = [np.array(column) for column in columns]
-    return Flexibility(plans, *measures)
 
 
 def _tasks(space: PlanSpace, word: Ints) -> Iterator[tuple[float, ...]]:

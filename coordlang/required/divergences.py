@@ -34,13 +34,6 @@ from planners.joint.tables import (
     unique_rows,
 )
 from planners.search.edge_index import EdgeIndex
-from planners.search.plan_space import PlanSpace
-
-
-def required_nodes(space: PlanSpace) -> Bools:
-    """Say of each node whether some plans from it introduce RC."""
-    return Choices(space).requires
-
 
 #: Rows of a table handled together.
 _CHUNK = 1_000_000

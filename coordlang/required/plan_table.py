@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 
 from coordlang.language.sentences import MANY, Floats
-from coordlang.required.divergences import required_nodes
+from coordlang.required.choices import Choices
 from planners.joint.tables import Ints, ranges
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
@@ -46,7 +46,7 @@ class PlanTable:
         asked: list[Plans] = []
         for space in spaces:
             counted, starts = counts(space), space.starts
-            starts = starts[required_nodes(space)[starts]] if mixtures else starts
+            starts = starts[Choices(space).requires[starts]] if mixtures else starts
             asked += [Plans(space, start, counted) for start in starts.tolist()]
         few = len(asked) <= _TASKS
         self.is_complete = few and all(plans.count <= _LISTED for plans in asked)

@@ -173,6 +173,7 @@ def grid_problem_text(
     """
     robots = [f"r{number}" for number in range(1, len(starts) + 1)]
     listed = ["    " + " ".join(names) for names in rows]
+    near = ((cell, neighbours(cell)) for names in rows for cell in names)
     lines = [
         f"; Written by {written_by}.",
         f"(define (problem {name})",
@@ -184,7 +185,7 @@ def grid_problem_text(
         "  )",
         "  (:init",
         f"    {_positions(robots, starts)}",
-        *filter(None, ("\n".join(_adjacent(names, neighbours)) for names in rows)),
+        *("    " + " ".join(f"(adjacent {c} {o})" for o in others) for c, others in near if others),
         "  )",
         f"  (:goal (and {_positions(robots, goals)}))",
         ")",
@@ -194,13 +195,6 @@ def grid_problem_text(
 
 def _positions(robots: Iterable[str], cells: Iterable[str]) -> str:
     return " ".join(f"(at {robot} {cell})" for robot, cell in zip(robots, cells, strict=True))
-
-
-def _adjacent(names: Iterable[str], neighbours: Callable[[str], Sequence[str]]) -> Iterator[str]:
-    """A line of atoms for each cell that has neighbours."""
-    for cell in names:
-        if near := neighbours(cell):
-            yield "    " + " ".join(f"(adjacent {cell} {other})" for other in near)
 
 
 def _wrong(

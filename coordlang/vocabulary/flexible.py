@@ -17,9 +17,9 @@ from random import Random
 
 import numpy as np
 
-from coordlang.language.sentences import MANY, Flexibility, Floats, flexibility
+from coordlang.language.sentences import MANY, Flexibility, Floats
 from coordlang.language.warping import Clause
-from coordlang.required.divergences import required_nodes
+from coordlang.required.choices import Choices
 from coordlang.required.plan_table import PlanTable
 from coordlang.vocabulary.job import Assignment, Job, Outcome
 from coordlang.vocabulary.local_search import WORK, LocalSearch
@@ -135,7 +135,7 @@ class _Search:
 
     def _measured(self, partition: Assignment) -> Flexibility:
         job = self._job
-        return flexibility(job.candidates.spaces, job.of_nodes(job.word(partition)))
+        return Flexibility(job.candidates.spaces, job.of_nodes(job.word(partition)))
 
 
 #: Plans of a task up to which its boxes are looked at, and boxes that cannot grow, of one task and
@@ -150,7 +150,7 @@ def largest_boxes(spaces: Sequence[PlanSpace]) -> Iterator[tuple[int, list[int] 
     size where there are too many boxes.
     """
     for space in spaces:
-        counted, required = counts(space), required_nodes(space)
+        counted, required = counts(space), Choices(space).requires
         for start in space.starts.tolist():
             plans = Plans(space, start, counted)
             is_unbounded = not required[start] or plans.count > _PLANS

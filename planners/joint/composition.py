@@ -80,11 +80,6 @@ class ComposingStepper(Stepper):
         every = np.arange(len(rows) + 1)
         return [(np.searchsorted(row, every), label) for row, label in found]
 
-    def allows(self, row: Rows, labels: Sequence[int]) -> bool:
-        """Whether labels are among the `choices` in a state."""
-        pairs = zip(self._robot, labels, strict=True)
-        return all(own.operators.allows(row, label) for own, label in pairs if label)
-
     def most_steps(self, rows: Rows) -> int:
         """Products of the own choices."""
         products = [1] * len(rows)

@@ -107,14 +107,13 @@ class Operators:
         self.conditional: dict[int, list[GroundEffect]] = {}
         self.adds = np.zeros((len(actions), codec.fact_blocks), np.uint64)
         self.deletes = np.zeros_like(self.adds)
-        self._required, self._forbidden = np.zeros_like(self.adds), np.zeros_like(self.adds)
+        self._forbidden = np.zeros_like(self.adds)
         required = [frozenset[int]()] * len(actions)
         for number, action in enumerate(actions):
             if action is None:
                 continue
             literals, rest = split_condition(action.precondition, evaluator)
             required[number] = frozenset(fact for fact, is_true in literals if is_true)
-            self._required[number] = codec.mask(required[number])
             self._forbidden[number] = codec.mask(fact for fact, is_true in literals if not is_true)
             for formula in rest:
                 kind = self.step_formulas if speaks_of_step(formula) else self._state_formulas
@@ -138,15 +137,6 @@ class Operators:
         self.deletes[number] = self._codec.mask(index[e.atom] for e in certain if not e.adds)
         if conditional := [effect for effect in known if effect.condition != TRUE]:
             self.conditional[number] = conditional
-
-    def allows(self, row: Rows, action: int) -> bool:
-        """Whether the conditions of an action on one state hold, as `applicable` finds many."""
-        missing, wrong = self._required[action] & ~row, self._forbidden[action] & row
-        if missing.any() or wrong.any():
-            return False
-        here = row[None, :], np.zeros(1, np.int64)
-        formulas = self._state_formulas.get(action, ())
-        return all(self._evaluator.holds(formula, *here)[0] for formula in formulas)
 
     def applicable(self, rows: Rows) -> tuple[Ints, Ints]:
         """Pairs (row, action) whose conditions on the state hold, sorted."""

@@ -133,8 +133,8 @@ class Choices:
 
     def __init__(self, actions: Sequence[GroundAction | None]) -> None:
         self.actions = actions
-        #: The labels of subactions with more than one owner.
-        self.shared = [n for n, a in enumerate(actions) if a and len(a.owners) > 1]
+        #: The subactions with more than one owner, by label.
+        self.shared = {n: a for n, a in enumerate(actions) if a and len(a.owners) > 1}
         #: By field of the footprint the labels in which each atom stands there.
         self.labels: dict[str, dict[Leaf, list[int]]] = {f: {} for f in Footprint._fields}
         for number, action in enumerate(actions):
@@ -159,7 +159,12 @@ def compatible(left: Choices, right: Choices, i: int, j: int) -> Bools:
     for row, column in np.argwhere(meets("conditional_on", "names")).tolist():
         a, b = left.actions[row], right.actions[column]
         table[row, column] = not (a and b and conflict(a, b))
-    _share(table, left, right, i, j)
+    # A subaction owned by both robots is chosen by both or by neither.
+    ours = [number for number, action in left.shared.items() if j in action.owners]
+    table[ours] = False
+    table[:, [number for number, action in right.shared.items() if i in action.owners]] = False
+    for number in ours:
+        table[number, right.labels["names"][_name(left.shared[number])]] = True
     return table
 
 
@@ -172,16 +177,3 @@ def meeting(left: Choices, right: Choices, one: str, other: str) -> Bools:
             if leaf in rows and leaf in columns:
                 found[np.array(rows[leaf])[:, None], columns[leaf]] = True
     return found
-
-
-def _share(table: Bools, left: Choices, right: Choices, i: int, j: int) -> None:
-    """A subaction owned by both robots is chosen by both or by neither."""
-    for one, robot in ((left, j), (right, i)):
-        for number in one.shared:
-            action = one.actions[number]
-            if action and robot in action.owners:
-                table[(number, slice(None)) if one is left else (slice(None), number)] = False
-    for number in left.shared:
-        action = left.actions[number]
-        if action and j in action.owners:
-            table[number, right.labels["names"][_name(action)]] = True

@@ -58,6 +58,8 @@ class Traces:
         self.interfering = _interfering(stepper, tuple(map(len, model.labels)))
         self.has_ties = False
         self._results: dict[tuple[bytes, Step], Rows | None] = {}
+        #: By state each robot's choices.
+        self._choices: dict[bytes, list[set[int]]] = {}
         #: The robots whose events in a joint step interfere, by way of others too, in groups.
         self.groups = cache(self._groups)
         #: The facts that the events of a joint step read or write, as bits of a state.
@@ -76,8 +78,14 @@ class Traces:
 
         True of joint actions: they are no subactions.
         """
-        facts = self._model.codec.facts_part(row[None, :])[0]
-        return self._stepper is None or self._stepper.allows(facts, step)
+        if self._stepper is None:
+            return True
+        facts = self._model.codec.facts_part(row[None, :])
+        own = self._choices.get(key := facts.tobytes())
+        if own is None:
+            found = self._stepper.choices(facts)
+            own = self._choices[key] = [{0, *labels.tolist()} for _, labels in found]
+        return all(label in labels for label, labels in zip(step, own, strict=True))
 
     def _made(self, row: Rows, step: Step) -> Rows | None:
         model, facts = self._model, self._model.codec.facts_part(row[None, :])

@@ -8,7 +8,7 @@ from collections.abc import Callable, Hashable, Sequence
 from coordlang.language.candidates import Candidates
 from coordlang.language.sentences import Sentence, sentence
 from coordlang.language.words import Language
-from coordlang.required.divergences import required_nodes
+from coordlang.required.choices import Choices
 from planners.search.plans import Plans
 
 #: A plan: for each step and robot the subaction's text, None for idling.
@@ -62,7 +62,7 @@ def agreement(
     figures = dict.fromkeys(("different", "told", "left"), 0)
     for space in candidates.spaces:
         word = partition.word_of(space.rows).tolist()
-        requires = required_nodes(space)[space.starts]
+        requires = Choices(space).requires[space.starts]
         for task in requires.nonzero()[0].tolist():
             plans = Plans.of(space, task)
             if plans.count <= MANY:

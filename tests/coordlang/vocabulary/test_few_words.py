@@ -14,7 +14,7 @@ import pytest
 import coordlang as library
 from coordlang.commands.building import Making, build_language, job_for_few_words
 from coordlang.language.candidates import Candidates
-from coordlang.language.sentences import flexibility
+from coordlang.language.sentences import Flexibility
 from coordlang.required.choices import Choices
 from coordlang.required.failure import failure_probability
 from coordlang.required.plan_table import PlanTable
@@ -135,7 +135,7 @@ def test_plans_ruled_out_are_measured_as_they_are_defined() -> None:
     words = [word[space.state] for space in candidates.spaces]
     table = PlanTable(candidates.spaces, len(word), 0, mixtures=False)
     measured = table.count - table.plans_ruled_out(word, np.arange(len(table)))
-    assert measured == pytest.approx(flexibility(candidates.spaces, words).expected)
+    assert measured == pytest.approx(Flexibility(candidates.spaces, words).expected)
     assert 1 < measured.mean() < table.count.mean()
 
 

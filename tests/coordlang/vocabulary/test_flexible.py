@@ -14,8 +14,8 @@ import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates
-from coordlang.language.sentences import flexibility
-from coordlang.required.divergences import required_nodes
+from coordlang.language.sentences import Flexibility
+from coordlang.required.choices import Choices
 from coordlang.vocabulary.flexible import flexibility_bounds, flexible
 from coordlang.vocabulary.job import Assignment, Outcome
 from planners.search.plans import Plan
@@ -46,7 +46,7 @@ def expected(sequences: list[tuple[int, ...]], word: list[int]) -> Fraction:
 
 def check_measures(candidates: Candidates, word: list[int]) -> int:
     """Compare with the definition; how many tasks have an E strictly between 1 and all plans."""
-    measured = flexibility(candidates.spaces, of_nodes(candidates, word))
+    measured = Flexibility(candidates.spaces, of_nodes(candidates, word))
     between = 0
     for number, (space, task, plans, sequences) in enumerate(listed(candidates)):
         said = [naive.sentence([word[s] for s in states]) for states in sequences]
@@ -86,7 +86,7 @@ def test_flexibility_against_its_definition(robots: int) -> None:
 def test_many_plans_lose_nothing() -> None:
     """10^9 plans: one word leaves all of them open; E is the number of plans by the least words."""
     candidates = own_task("grid", "corners-10x10")
-    measured = flexibility(candidates.spaces, of_nodes(candidates, [0] * len(candidates.rows)))
+    measured = Flexibility(candidates.spaces, of_nodes(candidates, [0] * len(candidates.rows)))
     assert measured.plans == (1756863020,)
     assert measured.expected[0] == pytest.approx(1756863020, rel=1e-12)
     assert measured.words[0] == pytest.approx(1)
@@ -162,7 +162,7 @@ def test_bounds_are_the_largest_sets_that_mix(robots: int) -> None:
         candidates = on_graph(seed, robots)
         if candidates is None:
             continue
-        requires = [required_nodes(space) for space in candidates.spaces]
+        requires = [Choices(space).requires for space in candidates.spaces]
         bounds = flexibility_bounds(candidates.spaces)
         for bound, (space, task, plans, _) in zip(bounds, listed(candidates), strict=True):
             if len(plans) > 8:
