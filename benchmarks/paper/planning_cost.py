@@ -95,7 +95,7 @@ def manhattan(model: JointModel, goal: Goal, _: Sequence[StateVariable]) -> Valu
     ]
 
     def value(rows: Rows) -> Ints:
-        true = TrueFacts.of(model.codec.facts_part(rows))
+        true = TrueFacts(model.codec.facts_part(rows))
         bounds: Ints = true.reduced(np.maximum, np.array(away), 0)
         return bounds
 

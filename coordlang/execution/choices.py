@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import reduce
 from operator import or_
 from typing import Annotated, Any, Literal
@@ -101,17 +101,6 @@ def choices(task_language: TaskLanguage, words: Sequence[int], most: int = MOST)
             RobotChoices(robot, exact, "exact") if exact else knowing_own(fits, robot, own)
         )
     return SentenceChoices(task_language, tuple(words), fits, tuple(robots), mixtures)
-
-
-def knowing(fits: PlanSpace, robot: int, facts: int) -> RobotChoices:
-    """A robot's subplans in some plans; of these facts (bits) it knows the values, of no others.
-
-    In all nodes that plans with the same own beginning can be in the facts have one value.
-    """
-    others = ((1 << len(fits.model.codec.facts)) - 1) & ~facts
-    found = determinise(fits, robot, [true & facts for true in facts_at_nodes(fits)])
-    known = tuple(Knowledge(true, true | others) for true, _ in found.known)
-    return RobotChoices(robot, replace(found, known=known), "own")
 
 
 def knowing_own(fits: PlanSpace, robot: int, subplans: Automaton | None = None) -> RobotChoices:

@@ -101,11 +101,6 @@ class _State:
     moves: dict[str | None, _State] = field(default_factory=dict)
     left: int = 1
 
-    def keep(self, moves: Mapping[str | None, _State]) -> None:
-        """Lead on by those of some moves that lead anywhere; without any ``left`` stays."""
-        self.moves = {text: to for text, to in moves.items() if to.left}
-        self.left = sum(to.left for to in self.moves.values()) or self.left
-
 
 class Monitor:
     """Follows one robot through its choices.
@@ -325,8 +320,9 @@ class Monitor:
                 )
         whole = (1 << len(visit) + len(do)) - 1
         for (state, made), new in reversed(found.items()):
-            new.left = int(not state.moves and made == whole)
-            new.keep(new.moves)
+            new.moves = {text: to for text, to in new.moves.items() if to.left}
+            new.left = sum(to.left for to in new.moves.values())
+            new.left += not state.moves and made == whole
         return new if new.left else None  # that of the present comes last
 
     def _done_in(self, text: str | None) -> str | None:

@@ -184,10 +184,6 @@ class Instance:
         """The states on plans of the candidate tasks."""
         return States(World.loaded(self.candidates.loaded, self.points), self.candidates.rows)
 
-    def vectors(self, chosen: Sequence[Feature]) -> Ints:
-        """The values of features: (states, features)."""
-        return vectors(chosen, self.states)
-
     def holds(
         self, words: Ints, workers: Workers | None = None, progress: Progress = lambda _: None
     ) -> bool:
@@ -368,8 +364,8 @@ class _Learner:
         """
         every = self._every
         features = tuple(self._pool.features[k] for k in chosen)
-        vectors = np.concatenate([own.vectors(features) for own in every])
-        table, number = np.unique(vectors, axis=0, return_inverse=True)
+        values = np.concatenate([vectors(features, own.states) for own in every])
+        table, number = np.unique(values, axis=0, return_inverse=True)
         ends = np.cumsum([len(own.states) for own in every])
         classes = np.split(number.reshape(-1), ends[:-1])
         words, proved = list(range(len(table))), len(table) == 1

@@ -114,7 +114,7 @@ class States:
     @cached_property
     def true(self) -> TrueFacts:
         """The true facts of each state."""
-        return TrueFacts.of(self.world.model.codec.facts_part(self.rows))
+        return TrueFacts(self.world.model.codec.facts_part(self.rows))
 
     def atoms(self, predicate: str) -> tuple[Ints, ...]:
         """The true atoms of a fluent predicate: their states, then the numbers of their arguments.

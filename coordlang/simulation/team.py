@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from coordlang.execution.automaton import determinise
-from coordlang.execution.choices import choices, knowing, knowing_own, monitor
+from coordlang.execution.choices import choices, knowing_own, monitor
 from coordlang.execution.monitor import IDLE, Monitor
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import words_passed
@@ -87,12 +87,9 @@ class Mission:
                 self.agreed_plan(seed) if agreed else self._drawn(f"{seed} plan {name}")
             )
             words = None
-            if fits.model.is_asynchronous:
-                own = knowing_own(fits, robot)
-            else:
-                own = knowing(fits, robot, self._places_of(name))
-                words = own_words(fits, self.task_language, robot) if agreed else None
-            team[name] = monitor(fits, own, ""), words
+            if agreed and not fits.model.is_asynchronous:
+                words = own_words(fits, self.task_language, robot)
+            team[name] = monitor(fits, knowing_own(fits, robot), ""), words
         return team
 
     def agreed_plan(self, seed: int) -> Plan:
@@ -132,12 +129,6 @@ class Mission:
         layers = [np.array([node]) for node in space.nodes_on(start, path)]
         steps = [UnfoldingStep(only, np.array([edge]), only) for edge in path]
         return PlanSpace.from_layers(space, layers, steps, self.task_language.task)
-
-    def _places_of(self, robot: str) -> int:
-        """The facts that say where a robot is, as bits."""
-        texts = enumerate(self.task_language.model.codec.facts.texts)
-        at = "at", robot
-        return sum(1 << fact for fact, text in texts if self.world.role(text)[:2] == at)
 
     def _drawn(self, seed: str) -> Plan:
         return self._plans.unrank(Random(seed).randrange(self._plans.count))

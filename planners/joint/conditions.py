@@ -150,7 +150,7 @@ class Operators:
 
     def _with_literals(self, rows: Rows) -> tuple[Ints, Ints]:
         """Pairs whose literals hold, sorted: found by the rarest fact required, then tested."""
-        true, every = TrueFacts.of(rows), np.arange(len(rows))
+        true, every = TrueFacts(rows), np.arange(len(rows))
         row = np.concatenate((every, true.row))
         fact = np.concatenate((np.full(len(rows), -1), true.fact))
         counts = self._first[fact + 2] - self._first[fact + 1]

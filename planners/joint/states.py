@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -234,42 +234,35 @@ def test_bits(rows: Rows, which: Ints, facts: Ints) -> Bools:
     return (blocks >> (facts % _BLOCK_BITS).astype(np.uint64) & np.uint64(1)).astype(np.bool_)
 
 
-class TrueFacts(NamedTuple):
-    """The facts that are true in each row of a table, in order, CSR."""
+class TrueFacts:
+    """The facts that are true in each row of a table that holds facts only, in order, CSR.
 
-    first: Ints
-    fact: Ints
+    O(blocks + true facts).
+    """
 
-    @property
-    def counts(self) -> Ints:
-        """How many are true in each row."""
-        return np.diff(self.first)
+    def __init__(self, rows: Rows) -> None:
+        row, block = np.nonzero(rows)
+        left = rows[row, block]
+        end = np.concatenate(([0], np.cumsum(np.bitwise_count(left), dtype=np.int64)))
+        self.first: Ints = end[np.searchsorted(row, np.arange(len(rows) + 1))]
+        self.counts = np.diff(self.first)
+        self.fact: Ints = np.empty(int(self.first[-1]), np.int64)
+        place, code = end[:-1], block * _BLOCK_BITS
+        while len(left):
+            rest = left & (left - np.uint64(1))
+            # A power of two is exact as a float.
+            self.fact[place] = code + np.frexp((left ^ rest).astype(np.float64))[1] - 1
+            more = rest != 0
+            left, place, code = rest[more], place[more] + 1, code[more]
 
     @property
     def row(self) -> Ints:
         """The row of each entry."""
-        return np.repeat(np.arange(len(self.first) - 1), self.counts)
-
-    @classmethod
-    def of(cls, rows: Rows) -> TrueFacts:
-        """Of rows that hold facts only; O(blocks + true facts)."""
-        row, block = np.nonzero(rows)
-        left = rows[row, block]
-        end = np.cumsum(np.bitwise_count(left), dtype=np.int64)
-        first = np.concatenate(([0], end))[np.searchsorted(row, np.arange(len(rows) + 1))]
-        fact = np.empty(int(first[-1]), np.int64)
-        place, code = np.concatenate(([0], end))[:-1], block * _BLOCK_BITS
-        while len(left):
-            rest = left & (left - np.uint64(1))
-            # A power of two is exact as a float.
-            fact[place] = code + np.frexp((left ^ rest).astype(np.float64))[1] - 1
-            more = rest != 0
-            left, place, code = rest[more], place[more] + 1, code[more]
-        return cls(first, fact)
+        return np.repeat(np.arange(len(self.counts)), self.counts)
 
     def reduced(self, of: np.ufunc, values: NDArray[np.generic], empty: int) -> Any:
         """Per row the values of its facts reduced by ``of``; ``empty`` where none is true."""
-        result = np.full(len(self.first) - 1, empty, values.dtype)
+        result = np.full(len(self.counts), empty, values.dtype)
         some = np.flatnonzero(self.counts)
         if len(some):
             result[some] = of.reduceat(values[self.fact], self.first[some])

@@ -229,7 +229,7 @@ class Projections:
 
     def value(self, rows: Rows) -> Ints:
         """The lower bound for each state, `FAR` where the goal cannot be reached."""
-        true = TrueFacts.of(self._codec.facts_part(rows))
+        true = TrueFacts(self._codec.facts_part(rows))
         bounds: Ints = true.reduced(np.maximum, self._of_fact, 0)
         return bounds
 
@@ -240,7 +240,7 @@ class Projections:
         """
         if not any(self._own):
             return options, FAR
-        true = TrueFacts.of(rows)
+        true = TrueFacts(rows)
         kept, beyond = list[Bools](), FAR
         for (first, label), own in zip(options, self._own, strict=True):
             state = np.repeat(np.arange(len(rows)), np.diff(first))

@@ -17,6 +17,7 @@ import pytest
 from coordlang.language.candidates import all_pairs
 from coordlang.language.words import Partition
 from coordlang.lifted.features import Feature
+from coordlang.lifted.language import vectors
 from coordlang.lifted.learning import Instance, Learned, learn, simplest_hitting
 from coordlang.lifted.pool import pool_of
 from coordlang.verification.by_definition import verify
@@ -88,7 +89,7 @@ def test_the_simplest_features_of_the_smallest_grid() -> None:
 
 
 def holds(own: Instance, chosen: Sequence[Feature]) -> bool:
-    _, classes = np.unique(own.vectors(chosen), axis=0, return_inverse=True)
+    _, classes = np.unique(vectors(chosen, own.states), axis=0, return_inverse=True)
     return holds_by_words(own, classes.reshape(-1))
 
 
@@ -121,7 +122,7 @@ def test_the_fewest_words_over_classes() -> None:
     """Against all partitions of the classes, on two problems at once."""
     known = [instance("grid", "gw1-2x2"), instance("t-map", "problem")]
     learned = learn(known, complexity=6, prefer="features")
-    every = [own.vectors(learned.features) for own in known]
+    every = [vectors(learned.features, own.states) for own in known]
     table, number = np.unique(np.concatenate(every), axis=0, return_inverse=True)
     assert learned.proved
     classes = np.split(number.reshape(-1), [len(every[0])])
@@ -148,8 +149,8 @@ def test_words_may_come_first() -> None:
 
 
 def words_in(own: Instance, learned: Learned) -> Ints:
-    vectors = map(tuple, own.vectors(learned.features).tolist())
-    return np.array([learned.word[vector] for vector in vectors])
+    values = map(tuple, vectors(learned.features, own.states).tolist())
+    return np.array([learned.word[vector] for vector in values])
 
 
 @pytest.mark.thorough
