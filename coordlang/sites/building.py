@@ -10,7 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations, permutations
+from itertools import combinations, groupby, permutations
 from pathlib import Path
 from statistics import fmean
 
@@ -69,7 +69,6 @@ class Building:
     """
 
     path: str
-    levels: tuple[str, ...]
     places: Mapping[str, Place]
     lanes: tuple[Lane, ...]
     spawning: Mapping[str, str]
@@ -78,12 +77,10 @@ class Building:
 
     def coordinates(self) -> dict[str, Point]:
         """Where places are drawn, in metres: the levels side by side."""
-        of_level: dict[str, list[Place]] = {level: [] for level in self.levels}
-        for place in self.places.values():
-            of_level[place.level].append(place)
         drawn: dict[str, Point] = {}
         shift = right = 0.0
-        for places in filter(None, of_level.values()):
+        for _, on_level in groupby(self.places.values(), lambda place: place.level):
+            places = list(on_level)
             if drawn:
                 shift = right + _BETWEEN - min(place.point[0] for place in places)
             own = {p.name: (round(p.point[0] + shift, 3), round(p.point[1], 3)) for p in places}
@@ -115,7 +112,6 @@ def read_building(path: Path) -> Building:
     lanes = [lane for level in levels for lane in level.driven()]
     return Building(
         str(path),
-        tuple(named),
         places,
         tuple(dict.fromkeys([*lanes, *_rides(places, lanes)])),
         {robot: vertex.name for robot, vertex in spawning.items()},
