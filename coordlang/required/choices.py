@@ -37,27 +37,18 @@ class LabelSets:
 
     def __init__(self) -> None:
         self._child: dict[tuple[int, int, int], int] = {}
-        self._parent: list[tuple[int, int, int]] = [(END, -1, -1)]
-        self._moves: list[dict[int, int] | None] = [{}]
+        self._moves: list[dict[int, int]] = [{}]
         self._union: dict[tuple[int, int], int] = {}
         self._within: dict[tuple[int, int], bool] = {}
         self._sizes = {END: 1}
 
     def __len__(self) -> int:
         """Count the different sets."""
-        return len(self._parent)
+        return len(self._moves)
 
     def moves(self, number: int) -> dict[int, int]:
         """Each first label of a set with the number of the set of what follows it."""
-        found = self._moves[number]
-        if found is None:
-            path = []
-            at = number
-            while at != END:
-                at, label, after = self._parent[at]
-                path.append((label, after))
-            found = self._moves[number] = dict(reversed(path))
-        return found
+        return self._moves[number]
 
     def of_moves(self, moves: dict[int, int]) -> int:
         """The number of the set with these moves."""
@@ -70,9 +61,8 @@ class LabelSets:
         key = (number, label, after)
         known = self._child.get(key)
         if known is None:
-            known = self._child[key] = len(self._parent)
-            self._parent.append(key)
-            self._moves.append(None)
+            known = self._child[key] = len(self._moves)
+            self._moves.append({**self._moves[number], label: after})
         return known
 
     def union(self, one: int, other: int) -> int:

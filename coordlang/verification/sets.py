@@ -266,10 +266,7 @@ class SetWalk:
 
     def _common(self, ahead: _Ahead) -> tuple[Words, int | None]:
         """What the robot that is ahead of all has said, and what all can say after it."""
-        said: Words = ()
-        for words, _ in ahead:
-            if len(words) > len(said):
-                said = words
+        said = max((words for words, _ in ahead), key=len)
         common: int | None = None
         for robot, (words, own) in enumerate(ahead):
             if said[: len(words)] != words:
