@@ -13,7 +13,7 @@ from pathlib import Path
 import networkx as nx
 
 from coordlang.sites.building import Building, Lane, Place, pddl_name
-from coordlang.sites.clearance import Motion, clash, excluded, motions, staying
+from coordlang.sites.clearance import clash, excluded, motions, staying
 from planners.system.errors import BadInput, Position, UsageError, note
 from planners.system.messages import counted, echoed, named, some, visible
 
@@ -142,7 +142,8 @@ def building_files(
         *_wrapped([f"(charger {p.name})" for p in places.values() if p.is_charger]),
         *_wrapped([f"(parking {p.name})" for p in places.values() if p.is_parking]),
         *_lanes(places, lanes, with_graphs=bool(graphs)),
-        *_exclusions(blocked, pairs),
+        *(f"    (keeps-clear {place} {lane.start} {lane.end})" for place, lane in blocked),
+        *(f"    (excludes {a.start} {a.end} {b.start} {b.end})" for a, b in pairs),
         "  )",
         f"  (:goal (and {' '.join(f'(at {robot} {place})' for robot, place in goals.items())}))",
         ")",
@@ -200,15 +201,6 @@ def _lanes(places: Iterable[str], lanes: Sequence[Lane], *, with_graphs: bool) -
         yield from _wrapped(list(dict.fromkeys(f"(lane {place} {lane.end})" for lane in out)))
         if with_graphs:
             yield from _wrapped([f"(on-graph {place} {n.end} {_graph(n.graph)})" for n in out])
-
-
-def _exclusions(
-    blocked: Iterable[tuple[str, Motion]], pairs: Iterable[tuple[Motion, Motion]]
-) -> Iterator[str]:
-    for place, lane in blocked:
-        yield f"    (keeps-clear {place} {lane.start} {lane.end})"
-    for one, other in pairs:
-        yield f"    (excludes {one.start} {one.end} {other.start} {other.end})"
 
 
 def _started(

@@ -24,7 +24,6 @@ from coordlang.verification.certificate_file import (
     WarpingPath,
     states_of,
 )
-from planners.joint.model import JointModel
 from planners.joint.states import split_atoms
 from planners.joint.tables import find_rows
 from planners.pddl.sexpr import Expression, Source, Token, parse
@@ -81,12 +80,12 @@ def check(
         )
     if certificate.refuted < 0:
         raise Refuted(f"the certificate speaks of {certificate.refuted} words", remedy=_REBUILD)
-    tasks = _Tasks(candidates)
+    tasks = _tasks(candidates)
     clauses: list[Clause] = []
     for number, reason in enumerate(certificate.reasons, 1):
         progress(f"checking reason {number:,} of {len(certificate.reasons):,}")
         try:
-            clauses.append(_clause(reason, tasks))
+            clauses.append(_clause(reason, candidates, tasks))
         except (Refuted, BadInput) as error:
             raise Refuted(
                 f"reason {number} of the certificate is wrong: {error.what}",
@@ -113,9 +112,17 @@ def _leaves_languages(certificate: Certificate) -> Refuted:
     )
 
 
-def _clause(reason: Reason, tasks: _Tasks) -> Clause:
+def _clause(reason: Reason, candidates: Candidates, tasks: _Tasks) -> Clause:
     """The pairs of states one of which must be separated."""
-    space, start = tasks.find(reason)
+    row = candidates.model.codec.encode(reason.init)
+    state = int(find_rows(candidates.rows, row[None, :])[0])
+    goal = _canonical(part for text in reason.goal for part in split_atoms(text))
+    if (state, goal) not in tasks:
+        raise Refuted(
+            f"{' '.join(reason.init)} -> {' '.join(reason.goal)} is no candidate task",
+            remedy=_ITS_FILES,
+        )
+    space, start = tasks[state, goal]
     robots = len(space.model.robots)
     if len(reason.plans) != robots:
         raise Refuted(f"expected a plan for each of {robots} robots", remedy=_REBUILD)
@@ -184,28 +191,17 @@ def _follow(space: PlanSpace, start: int, plan: PlanTexts) -> list[int] | None:
     return states
 
 
-class _Tasks:
-    """Finds the candidate task that a reason speaks of."""
+#: The candidate tasks by initial state and goal: a plan space with the node where each starts.
+_Tasks = dict[tuple[int, object], tuple[PlanSpace, int]]
 
-    def __init__(self, candidates: Candidates) -> None:
-        self._model: JointModel = candidates.model
-        self._rows = candidates.rows
-        self._tasks: dict[tuple[int, object], tuple[PlanSpace, int]] = {}
-        for space in candidates.spaces:
-            goals = [_canonical(split_atoms(goal_text(space.model, goal))) for goal in space.goals]
-            for node in space.starts.tolist():
-                self._tasks[int(space.state[node]), goals[space.goal[node]]] = (space, node)
 
-    def find(self, reason: Reason) -> tuple[PlanSpace, int]:
-        row = self._model.codec.encode(reason.init)
-        state = int(find_rows(self._rows, row[None, :])[0])
-        goal = _canonical(part for text in reason.goal for part in split_atoms(text))
-        if (state, goal) not in self._tasks:
-            raise Refuted(
-                f"{' '.join(reason.init)} -> {' '.join(reason.goal)} is no candidate task",
-                remedy=_ITS_FILES,
-            )
-        return self._tasks[state, goal]
+def _tasks(candidates: Candidates) -> _Tasks:
+    found: _Tasks = {}
+    for space in candidates.spaces:
+        goals = [_canonical(split_atoms(goal_text(space.model, goal))) for goal in space.goals]
+        for node in space.starts.tolist():
+            found[int(space.state[node]), goals[space.goal[node]]] = (space, node)
+    return found
 
 
 def _canonical(goal: Iterable[str]) -> object:
