@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Union, dat
 import click
 
 from planners.pddl.model_options import ModelOptions
-from planners.system.errors import UsageError, note
+from planners.system.errors import UsageError
 from planners.system.options import Record, cli_option, group, option
 
 if TYPE_CHECKING:
@@ -194,8 +194,7 @@ class Jobs:
         from planners.parallel.workers import workers
 
         scheduler = None if self.scheduler is None else fspath(self.scheduler)
-        packages = ("planners", "coordlang")  # whose code does jobs
-        return workers(self.jobs, scheduler, self.resume, packages, note)
+        return workers(self.jobs, scheduler, self.resume)
 
 
 @dataclass(frozen=True, slots=True)

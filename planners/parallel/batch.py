@@ -9,13 +9,14 @@ What is read from a store is never executed: a file holds arrays without Python 
 from __future__ import annotations
 
 import os
+import pickle
 import stat
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
@@ -55,22 +56,37 @@ class Batch:
     identity: str
     efforts: Sequence[float]
 
+    @property
+    def packages(self) -> list[str]:
+        """Whose code does the jobs."""
+        return sorted({"planners", self.function.__module__.partition(".")[0]})
+
     def keys(self) -> list[str]:
         """What each job depends on as a hash, the code among it: equal keys, equal results."""
         function = f"{self.function.__module__}.{self.function.__qualname__}"
-        packages = {"planners", self.function.__module__.partition(".")[0]}
-        code = (*map(code_hash, sorted(packages)), np.version.version)
+        code = (*map(code_hash, self.packages), np.version.version)
         return [digest(code, function, self.identity, job) for job in self.jobs]
 
 
-def attempt(work: tuple[Function, Any], job: Any) -> Outcome:
-    """Do a job with a function and what is shared: its table, or the error that it has raised."""
-    function, shared = work
-    try:
-        return function(shared, job)
-    except Exception as error:
-        error.add_note(f"in a worker:\n{traceback.format_exc()}")
-        return error.with_traceback(None)
+class Packed:
+    """The function of a batch and what its jobs share: a worker unpacks it with its first job."""
+
+    def __init__(self, batch: Batch) -> None:
+        self._bytes = pickle.dumps((batch.function, batch.shared), pickle.HIGHEST_PROTOCOL)
+
+    @cached_property
+    def _unpacked(self) -> tuple[Function, Any]:
+        found: tuple[Function, Any] = pickle.loads(self._bytes)
+        return found
+
+    def attempt(self, job: Any) -> Outcome:
+        """Do a job: its table, or the error that it has raised."""
+        function, shared = self._unpacked
+        try:
+            return function(shared, job)
+        except Exception as error:
+            error.add_note(f"in a worker:\n{traceback.format_exc()}")
+            return error.with_traceback(None)
 
 
 @cache
@@ -127,7 +143,6 @@ class Store:
 
     path: Path
     most_bytes: int | None = None
-    say: Callable[[str], None] = note
 
     def read(self, key: str) -> Table | None:
         """The table of a key; None if there is none, or none that is whole."""
@@ -166,7 +181,7 @@ class Store:
 
     def _ignore(self, path: Path, why: str) -> None:
         """Say that a file is not used, and remove it."""
-        self.say(f"{path} {why}: it is ignored, and its result is worked out again")
+        note(f"{path} {why}: it is ignored, and its result is worked out again")
         with suppress(OSError):  # it is gone already, or the folder is only read
             path.unlink()
 

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import pickle
 import platform
 import re
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -26,8 +25,8 @@ import distributed
 import msgspec
 from distributed.scheduler import KilledWorker
 
-from planners.parallel.batch import Batch, Outcome, attempt, code_hash
-from planners.system.errors import CoordlangError, OutOfMemory, UsageError
+from planners.parallel.batch import Batch, Outcome, Packed, code_hash
+from planners.system.errors import CoordlangError, Note, OutOfMemory, UsageError, note
 from planners.system.limits import time_left
 from planners.system.messages import echoed
 from planners.system.signals import postponed_signals
@@ -48,9 +47,7 @@ class ClusterFailed(CoordlangError):
 
 
 @contextmanager
-def connected(
-    where: str, packages: tuple[str, ...], note: Callable[[str], None]
-) -> Iterator[Cluster]:
+def connected(where: str) -> Iterator[Cluster]:
     """Connect to a running cluster, and leave nothing of ours on it.
 
     ``where`` is the address of its scheduler, or the file that the scheduler has written.  Raises
@@ -69,7 +66,7 @@ def connected(
                 "(docs/cluster.md).",
             ) from None
         try:
-            yield Cluster(client, where, packages, note)
+            yield Cluster(client, where)
         finally:
             with postponed_signals(), suppress(OSError, TimeoutError, RuntimeError):
                 client.close()
@@ -100,6 +97,7 @@ def _silence() -> Iterator[None]:
             logger.setLevel(logging.CRITICAL + 1)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # versions are compared below
+            warnings.simplefilter("always", Note)
             yield
     finally:
         for logger, level in levels.items():
@@ -109,12 +107,8 @@ def _silence() -> Iterator[None]:
 class Cluster:
     """The workers of a cluster, as `planners.parallel.workers.Begin`."""
 
-    def __init__(
-        self, client: Any, where: str, packages: tuple[str, ...], note: Callable[[str], None]
-    ) -> None:
-        self.client, self._where, self._note = client, where, note
-        #: What must be the same on all workers.
-        self.expected = {package: versions(package) for package in packages}
+    def __init__(self, client: Any, where: str) -> None:
+        self.client, self._where = client, where
 
     @contextmanager
     def __call__(self, batch: Batch, jobs: Sequence[Any]) -> Iterator[list[Future[Outcome]]]:
@@ -126,12 +120,12 @@ class Cluster:
         are lost in one job, `ClusterFailed` if the scheduler is gone.
         """
         name = f"coordlang-{uuid4().hex}"
-        packed = pickle.dumps((batch.function, batch.shared), pickle.HIGHEST_PROTOCOL)
+        expected = {package: versions(package) for package in batch.packages}
         executor = self.client.get_executor(pure=False, retries=0)
         try:
             self._require_workers()
-            self.client.register_plugin(_Shared(packed), name=name)
-            yield [executor.submit(_do, name, self.expected, job) for job in jobs]
+            self.client.register_plugin(_Shared(Packed(batch)), name=name)
+            yield [executor.submit(_do, name, expected, job) for job in jobs]
         except KilledWorker:
             raise OutOfMemory(
                 f"{batch.name}: several workers were lost in one job: probably there is no memory "
@@ -162,7 +156,7 @@ class Cluster:
             if self.client.status != "running":
                 raise self._gone()
             if not said:
-                self._note(f"no worker has connected to {self._where} so far: waiting for one")
+                note(f"no worker has connected to {self._where} so far: waiting for one")
                 said = True
             with suppress(TimeoutError):
                 self.client.wait_for_workers(1, timeout=_TICK)
@@ -217,20 +211,14 @@ def _other_version(worker: str, difference: str) -> UsageError:
 
 
 class _Shared(distributed.WorkerPlugin):  # type: ignore[misc]
-    """The function of a batch and what its jobs share: packed, and unpacked with the first job."""
+    """The work of a batch, on each worker."""
 
-    def __init__(self, packed: bytes) -> None:
-        self._packed = packed
-
-    def work(self) -> tuple[Any, Any]:
-        """The function, and what is shared."""
-        if not hasattr(self, "_work"):
-            self._work: tuple[Any, Any] = pickle.loads(self._packed)
-        return self._work
+    def __init__(self, work: Packed) -> None:
+        self.work = work
 
 
 def _do(name: str, expected: dict[str, tuple[str, ...]], job: Any) -> Any:
-    """One job, as a task; see `planners.parallel.batch.attempt`."""
+    """One job, as a task; see `planners.parallel.batch.Packed.attempt`."""
     worker = distributed.get_worker()
     for package, wanted in expected.items():
         for theirs, ours in zip(versions(package), wanted, strict=True):
@@ -238,4 +226,4 @@ def _do(name: str, expected: dict[str, tuple[str, ...]], job: Any) -> Any:
                 raise _other_version(
                     f"the worker {worker.address}", f"{package} has {theirs} there, {ours} here"
                 )
-    return attempt(worker.plugins[name].work(), job)
+    return worker.plugins[name].work.attempt(job)

@@ -8,12 +8,11 @@ written is removed then.
 from __future__ import annotations
 
 import os
-import pickle
 import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -23,7 +22,7 @@ from multiprocessing.context import SpawnContext, SpawnProcess
 from types import FrameType, ModuleType
 from typing import Any
 
-from planners.parallel.batch import Batch, Outcome, attempt
+from planners.parallel.batch import Batch, Outcome, Packed
 from planners.system.errors import OutOfMemory, UsageError
 from planners.system.limits import address_space, lacks_memory, limit_memory, load_libraries
 from planners.system.signals import ENDING, postponed_signals
@@ -47,8 +46,7 @@ def in_processes(
     started.
     """
     context = _Context()
-    packed = pickle.dumps((batch.function, batch.shared), pickle.HIGHEST_PROTOCOL)
-    executor = ProcessPoolExecutor(count, context, _begin, (packed, memory))
+    executor = ProcessPoolExecutor(count, context, _begin, (Packed(batch), memory))
     try:
         with _spawning():
             futures = [executor.submit(_do, job) for job in jobs]
@@ -119,20 +117,18 @@ def _spawning() -> Iterator[None]:
 
 # ---- in a worker
 
+#: Does a job of the batch that this process works on.
+_attempt: Callable[[Any], Outcome]
+
 
 class _Ended(SystemExit):
     """A signal ends the worker, wherever it is."""
 
 
-class _Worker:
-    """The batch that this process works on: packed, and unpacked with the first job."""
-
-    packed = b""
-    work: tuple[Any, Any] | None = None
-
-
-def _begin(packed: bytes, memory: int | None) -> None:
+def _begin(work: Packed, memory: int | None) -> None:
     """Prepare this process: output, signals, and so many bytes more than its libraries take."""
+    global _attempt
+    _attempt = work.attempt
     nowhere = os.open(os.devnull, os.O_RDWR)
     for standard in range(3):
         os.dup2(nowhere, standard)
@@ -143,14 +139,11 @@ def _begin(packed: bytes, memory: int | None) -> None:
     if memory is not None:
         load_libraries()
         limit_memory(address_space() + memory)
-    _Worker.packed = packed
 
 
 def _do(job: Any) -> Outcome:
     try:
-        if _Worker.work is None:
-            _Worker.work = pickle.loads(_Worker.packed)
-        return attempt(_Worker.work, job)
+        return _attempt(job)
     except _Ended:  # all has been cleaned up; the executor would send it as a result
         os._exit(_ASKED_TO_END)
 

@@ -9,12 +9,12 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 from planners.parallel.batch import Batch, Outcome, Store, Table
 from planners.system.errors import OutOfMemory, UsageError
 from planners.system.limits import has_memory_limit, memory_left
+from planners.system.writing import made_folder
 
 #: Estimated work, in nodes times robots, from which processes pay: each costs about half a second
 #: to start, in which one of them does some 100,000.
@@ -122,20 +122,16 @@ def workers(
     jobs: int | None = None,
     scheduler: str | None = None,
     resume: str | PathLike[str] | None = None,
-    packages: tuple[str, ...] = ("planners",),
-    note: Callable[[str], None] = lambda _: None,
 ) -> Iterator[Workers]:
     """Who does jobs, for the block: ``jobs`` processes at most (None: one for each core).
 
-    In place of these the cluster of a Dask ``scheduler``, given by address or file, whose code of
-    ``packages`` must be as here.  Finished jobs are kept, and found again, in the folder
-    ``resume``.  ``note`` is called with lines of text for a person: a damaged file, a cluster
-    without workers.
+    In place of these the cluster of a Dask ``scheduler``, given by address or file, whose code must
+    be as here.  Finished jobs are kept, and found again, in the folder ``resume``.
 
     Raises `UsageError` where there is no such cluster, or no such folder can be made.
     """
     with ExitStack() as stack:
-        kept = None if resume is None else Store(_made(Path(resume)), say=note)
+        kept = None if resume is None else Store(made_folder(resume))
         cluster = None
         if scheduler is not None:
             try:
@@ -145,16 +141,5 @@ def workers(
                     "--scheduler needs the package distributed, which is not installed",
                     remedy="Install it: pip install 'coordlang[cluster]'.",
                 ) from None
-            cluster = stack.enter_context(connected(scheduler, packages, note))
+            cluster = stack.enter_context(connected(scheduler))
         yield Workers(jobs or cores(), cluster, kept)
-
-
-def _made(folder: Path) -> Path:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(
-            f"{folder} cannot be made: {error.strerror}",
-            remedy="Say --resume DIR, with a folder that you may write to.",
-        ) from None
-    return folder

