@@ -53,8 +53,8 @@ def check(files: Arguments, options: CheckOptions) -> CrossCheck:
         ours: tuple[int, int] | None = search(loaded.model.without_slack, task).cost_of(0)
     except ProvedImpossible:
         ours = None
-    answer = optimal_cost(loaded.model, task)
-    return CrossCheck(ours, answer.cost, answer.form, answer.actions)
+    theirs, classical = optimal_cost(loaded.model, task)
+    return CrossCheck(ours, theirs, classical.form, len(classical.actions))
 
 
 def show_check(found: CrossCheck, options: CheckOptions) -> int:

@@ -59,12 +59,8 @@ EVENT_LEAVES = {
 }
 
 
-class _Move(NamedTuple):
-    """What a robot may do in a state of its automaton."""
-
-    state: int
-    label: int
-    target: int
+#: What a robot may do in a state of its automaton: the state, a label, and the state after it.
+_Move = tuple[int, int, int]
 
 
 def behaviour_trees(choices: SentenceChoices) -> str:
@@ -117,9 +113,7 @@ def _tree(model: JointModel, own: RobotChoices) -> ET.Element:
         if own.robot in action.owners and not action.parts
     }
     for step, states in enumerate(own.automaton.layers[:-1]):
-        moves = [
-            _Move(state, *move) for state in states for move in own.automaton.moves[state].items()
-        ]
+        moves = [(state, *move) for state in states for move in own.automaton.moves[state].items()]
         here = ET.SubElement(steps, "Sequence", name=f"{model.unit} {step}")
         if not model.is_asynchronous:
             here.append(_leaf("AwaitStep", step=str(step)))
@@ -134,12 +128,12 @@ def _choosing(model: JointModel, own: RobotChoices, moves: Sequence[_Move]) -> E
     Nothing is done here, so that an action that fails is never followed by another choice.
     """
     choose = ET.Element("Fallback", name="choose")
-    last = {move.state: number for number, move in enumerate(moves)}
-    for number, move in enumerate(moves):
+    last = {state: number for number, (state, *_) in enumerate(moves)}
+    for number, (state, label, _) in enumerate(moves):
         branch = ET.SubElement(choose, "Sequence")
-        ET.SubElement(branch, "ScriptCondition", code=f"state == {move.state}")
-        if last[move.state] != number:
-            text = model.label_text(own.robot, move.label) or IDLE
+        ET.SubElement(branch, "ScriptCondition", code=f"state == {state}")
+        if last[state] != number:
+            text = model.label_text(own.robot, label) or IDLE
             ET.SubElement(branch, "Condition", ID="Chooses", subaction=text)
         ET.SubElement(branch, "Script", code=f"move := {number}")
     return choose
@@ -154,19 +148,19 @@ def _acting(
     """Do the chosen move: of the branches only its own can succeed."""
     act = ET.Element("Fallback", name="act")
     index = model.codec.facts.index
-    for number, move in enumerate(moves):
+    for number, (state, label, target) in enumerate(moves):
         branch = ET.SubElement(act, "Sequence")
         ET.SubElement(branch, "ScriptCondition", code=f"move == {number}")
-        text = model.subaction_text(own.robot, move.label)
+        text = model.subaction_text(own.robot, label)
         if text is not None:
-            branch.extend(_awaiting(model, own.robot, move.label, text))
-            known = own.automaton.known[move.state].true
+            branch.extend(_awaiting(model, own.robot, label, text))
+            known = own.automaton.known[state].true
             needed = required_atoms(actions[text].precondition) if text in actions else ()
             numbers = {index[atom] for atom in needed if atom in index}
             for fact in sorted(model.codec.facts.texts[n] for n in numbers if known >> n & 1):
                 ET.SubElement(branch, "Condition", ID="Holds", fact=fact)
             branch.append(_action(text))
-        ET.SubElement(branch, "Script", code=f"state := {move.target}")
+        ET.SubElement(branch, "Script", code=f"state := {target}")
     return act
 
 

@@ -24,7 +24,7 @@ _TAKEN = re.compile(r"[^a-z]|true|false|last|end|tt|ff")
 
 @dataclass(frozen=True, slots=True)
 class SentenceFormula:
-    """A sentence in LTLf.
+    """A sentence as an LTLf formula over the states of a plan, the initial state first.
 
     ``formula`` is satisfied by the states of a plan exactly if the plan has the sentence, as long
     as it passes through states that the language maps, or that lie on optimal plans of the task.

@@ -33,8 +33,7 @@ from planners.classical.task import (
     Condition,
     action_names,
     to_pddl,
-    with_positive_conditions,
-    with_positive_goal,
+    with_positive_literals,
 )
 from planners.joint.model import IDLE, JointModel, PlanningTask, show
 from planners.pddl.lifted import Atom
@@ -75,9 +74,16 @@ class PddlExport:
         *,
         strips_only: bool = False,
     ) -> None:
-        _require_slack_told(task_language.model)
-        space, model = task_language.plans_with(words), task_language.model
-        self.model = model
+        self.model = model = task_language.model
+        refuse_seen_slack(model, "--to pddl")
+        if model.slack and model.cost != "makespan":
+            raise UsageError(
+                f"--to pddl counts the joint steps of plans within slack, and --cost {model.cost} "
+                "counts more",
+                remedy="Build the language with --cost makespan; `coordlang understand`, `plan` "
+                "and `choices` give its plans.",
+            )
+        space = task_language.plans_with(words)
         makespan, second = space.cost_of(0)
         steps = makespan if model.slack else None
         if model.slack:
@@ -92,9 +98,7 @@ class PddlExport:
         labels += [()] * (len(named.actions) - len(labels))
         if strips_only:
             _require_steps_counted(plain, model)
-            named = with_positive_conditions(named)
-        else:
-            named = with_positive_goal(named)
+        named = with_positive_literals(named, only_goal=not strips_only)
         self.domain, self.problem = to_pddl(named, costs=not strips_only)
         self.classical = named
         self.labels = dict(zip(action_names(named), labels, strict=True))
@@ -130,18 +134,6 @@ class PddlExport:
                         remedy="Give the whole plan that the planner wrote.",
                     )
         return tuple(tuple(step[robot] for robot in robots) for step in plan)
-
-
-def _require_slack_told(model: JointModel) -> None:
-    """Raise `UsageError` where slack cannot be said by counting joint steps."""
-    refuse_seen_slack(model, "--to pddl")
-    if model.slack and model.cost != "makespan":
-        raise UsageError(
-            f"--to pddl counts the joint steps of plans within slack, and --cost {model.cost} "
-            "counts more",
-            remedy="Build the language with --cost makespan; `coordlang understand`, `plan` and "
-            "`choices` give its plans.",
-        )
 
 
 def _require_steps_counted(plain: ClassicalTask, model: JointModel) -> None:

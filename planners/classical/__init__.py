@@ -11,21 +11,18 @@ In both forms the optimal plans stand one to one for the optimal joint plans (se
 robots' labels): cases and formulas are decided in one order, so that nothing can be done in two
 ways.
 
-This is the cross-check of `planners.joint.composition`, `planners.joint.interference` and
-`planners.joint.composition`, so it shares their input and nothing else: interference, formulas
-about the joint step and conditional effects are worked out anew here.
+This is the cross-check of `planners.joint.composition` and `planners.joint.interference`, so it
+shares their input and nothing else: interference, formulas about the joint step and conditional
+effects are worked out anew here.
 """
 
 from __future__ import annotations
 
-from contextlib import suppress
-
 from planners.classical.explicit import TooManyError, explicit
 from planners.classical.selection import select_then_apply
-from planners.classical.selectors import Selectors, selectors_of
+from planners.classical.selectors import selectors_of
 from planners.classical.task import LONGEST, ClassicalTask, Form
-from planners.classical.writer import Writer
-from planners.joint.model import Goal, JointModel, PlanningTask, show
+from planners.joint.model import JointModel, PlanningTask, show
 
 
 def compile_classical(
@@ -39,7 +36,14 @@ def compile_classical(
     """
     team = selectors_of(model)
     step_cost = team.highest_cost * longest + 1
-    out, form = _written(team, model, task.goal, step_cost, limit)
+    if model.is_joint_action and limit:
+        limit = max(limit, 4 * len(model.actions))
+    form: Form = "explicit"
+    try:
+        out = explicit(team, model, task.goal, step_cost, limit)
+    except TooManyError:
+        form = "select-then-apply"
+        out = select_then_apply(team, model, task.goal, step_cost)
     return ClassicalTask(
         name=task.name,
         form=form,
@@ -51,14 +55,3 @@ def compile_classical(
         highest_cost=team.highest_cost,
         between=out.between,
     )
-
-
-def _written(
-    team: Selectors, model: JointModel, goal: Goal, step_cost: int, limit: int
-) -> tuple[Writer, Form]:
-    if model.is_joint_action and limit:
-        limit = max(limit, 4 * len(model.actions))
-    if limit:
-        with suppress(TooManyError):
-            return explicit(team, model, goal, step_cost, limit), "explicit"
-    return select_then_apply(team, model, goal, step_cost), "select-then-apply"

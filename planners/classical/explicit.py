@@ -26,6 +26,8 @@ class TooManyError(Exception):
 def explicit(team: Selectors, model: JointModel, goal: Goal, step_cost: int, limit: int) -> Writer:
     """One action per joint action, and case of its disjunctions and conditional effects."""
     out = Writer(model.codec.facts)
+    if not limit:
+        raise TooManyError
     for step in _joint_steps(team, limit):
         for known, adds, deletes in _cases_of(team, model, step):
             cost = step_cost + team.second_cost(step)
@@ -52,21 +54,19 @@ def _joint_steps(team: Selectors, limit: int) -> list[tuple[int, ...]]:
         first = [n for n, owners in enumerate(team.owners) if owners[0] == robot]
         grown: list[tuple[int, ...]] = []
         for step in partial:
-            bound = any(robot in team.owners[n] for n in step)
-            if bound or idling is not None:
+            taken = {owner for n in step for owner in team.owners[n]}
+            if robot in taken or idling is not None:
                 grown.append(step)
-            if not bound:
-                grown += [(*step, n) for n in first if _may_join(team, n, step)]
+            if robot not in taken:
+                grown += [
+                    (*step, n)
+                    for n in first
+                    if taken.isdisjoint(team.owners[n]) and team.clashes[n].isdisjoint(step)
+                ]
             if len(grown) > limit:
                 raise TooManyError
         partial = grown
     return partial
-
-
-def _may_join(team: Selectors, number: int, step: Sequence[int]) -> bool:
-    """Whether the owners of an action are free in a step, and nothing in it clashes."""
-    taken = {owner for n in step for owner in team.owners[n]}
-    return taken.isdisjoint(team.owners[number]) and team.clashes[number].isdisjoint(step)
 
 
 def _name(team: Selectors, step: Sequence[int]) -> str:

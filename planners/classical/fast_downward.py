@@ -15,12 +15,11 @@ import subprocess
 import sys
 import tempfile
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
 from planners.classical import compile_classical
-from planners.classical.task import LONGEST, ClassicalTask, Form, action_names, to_pddl
+from planners.classical.task import LONGEST, ClassicalTask, action_names, to_pddl
 from planners.joint.model import JointModel, PlanningTask
 from planners.system.errors import CoordlangError, OutOfMemory
 from planners.system.limits import default_memory_limit, has_memory_limit, memory_left, more_memory
@@ -58,42 +57,24 @@ class FastDownwardFailed(CoordlangError):
     exit_code = 3
 
 
-@dataclass(frozen=True, slots=True)
-class FastDownwardAnswer:
-    """What Fast Downward says of a task.
-
-    Its optimal cost (makespan, second component), None if it is unsolvable.
-
-    ``actions`` is the number of classical actions that it got, in the form ``form``.
-    """
-
-    cost: tuple[int, int] | None
-    form: Form
-    actions: int
-
-
 def optimal_cost(
-    model: JointModel,
-    task: PlanningTask,
-    *,
-    limit: int = 2000,
-    longest: int = LONGEST,
-) -> FastDownwardAnswer:
-    """The optimal cost of a task according to Fast Downward.
+    model: JointModel, task: PlanningTask
+) -> tuple[tuple[int, int] | None, ClassicalTask]:
+    """The optimal cost of a task according to Fast Downward, and the classical task that it got.
 
-    It stops where the `planners.system.limits.time_limit` around is over; its translator and its
-    search may have the memory that this process may have.  No process is left behind.  For
-    ``limit`` and ``longest`` see `planners.classical.compile_classical`; where a plan turns out to
-    have more steps, it is asked again.
+    A cost is (makespan, second component), None if there is no plan.  It stops where the
+    `planners.system.limits.time_limit` around is over; its translator and its search may have the
+    memory that this process may have.  No process is left behind.
 
     Raises `FastDownwardFailed`, with the end of what it said, if it broke down.
     """
+    longest = LONGEST
     while True:
-        classical = compile_classical(model, task, limit, longest)
+        classical = compile_classical(model, task, longest=longest)
         total = total_cost(classical)
         cost = None if total is None else classical.cost(total)
         if total is None or cost is not None:
-            return FastDownwardAnswer(cost, classical.form, len(classical.actions))
+            return cost, classical
         # No optimal plan has more steps than this one seems to have, so the second round is the
         # last.
         longest = total // classical.step_cost

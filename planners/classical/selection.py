@@ -9,7 +9,7 @@ left to do, in stages: all check; all undo (rarely); all apply.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from itertools import pairwise
 
 from planners.classical.selectors import Selectors
@@ -93,24 +93,10 @@ class StagedAction:
         self.literals = None if found is None else found[0]
         self.checks = joined(And, later)
 
-    @property
-    def has_checks(self) -> bool:
-        """Whether something is checked after the selection."""
-        return self.checks != TRUE or bool(self.groups)
-
-    @property
-    def may_add(self) -> set[Atom]:
-        """The atoms that it adds in some step."""
-        return self.adds.union(*(adds for _, (adds, _) in self.groups))
-
-    @property
-    def may_delete(self) -> set[Atom]:
-        """The atoms that it deletes in some step; not those that it always adds."""
-        return self.deletes.union(*(deletes for _, (_, deletes) in self.groups)) - self.adds
-
     def has(self, stage: str) -> bool:
         """Whether there is something to do in a stage, one of `STAGES`."""
-        return {"check": self.has_checks, "undo": bool(self.early), "apply": True}[stage]
+        checks = self.checks != TRUE or bool(self.groups)
+        return {"check": checks, "undo": bool(self.early), "apply": True}[stage]
 
     def fires(self, group: int) -> Atom:
         """The fact that the condition of a group of effects holds."""
@@ -128,12 +114,13 @@ def staged_actions(
     actions = tuple(StagedAction(team, number, value) for number in range(len(team.actions)))
     adders: dict[Atom, set[int]] = defaultdict(set)
     for action in actions:
-        for atom in action.may_add:
+        for atom in action.adds.union(*(adds for _, (adds, _) in action.groups)):
             adders[atom].add(action.number)
     for action in actions:
+        may_delete = action.deletes.union(*(deletes for _, (_, deletes) in action.groups))
         action.early = frozenset(
             atom
-            for atom in action.may_delete
+            for atom in may_delete - action.adds
             if any(
                 other == action.number or actions[other].robot != action.robot
                 for other in adders[atom] - team.clashes[action.number]
@@ -158,7 +145,7 @@ def selected(team: Selectors, robot: int, label: str) -> Atom:
     return own_fact("has chosen", team.names[robot], label)
 
 
-_Readers = Mapping[Atom, Set[StagedAction]]
+_Readers = Mapping[object, Set[StagedAction]]
 
 
 def _may_be_at_once(
@@ -179,25 +166,21 @@ def _may_be_at_once(
 
 
 def _readers(actions: Sequence[StagedAction]) -> tuple[_Readers, _Readers]:
-    """For each atom the actions that read it after all have selected, or when they are selected."""
-    late: dict[Atom, set[StagedAction]] = defaultdict(set)
-    needed: dict[Atom, set[StagedAction]] = defaultdict(set)
+    """For each atom the actions that read it after all have selected, or when they are selected.
+
+    After all have selected their checks do, and what deletes it before all adds of the step.
+    """
+    late: dict[object, set[StagedAction]] = defaultdict(set)
+    needed: dict[object, set[StagedAction]] = defaultdict(set)
     for action in actions:
         if action.literals is not None:
-            for atom in _read_late(action):
-                late[atom].add(action)
+            formulas = (action.checks, *(condition for condition, _ in action.groups))
+            checked = {leaf for formula in formulas for leaf, _ in literals(formula)}
+            for leaf in checked | action.early:
+                late[leaf].add(action)
             for atom in action.literals:
                 needed[atom].add(action)
     return late, needed
-
-
-def _read_late(action: StagedAction) -> Iterator[Atom]:
-    """The atoms of its checks, and those that it deletes before all adds of the step."""
-    for formula in (action.checks, *(condition for condition, _ in action.groups)):
-        for leaf, _ in literals(formula):
-            assert isinstance(leaf, Atom), f"{leaf} in a formula on classical facts"
-            yield leaf
-    yield from action.early
 
 
 _IDLE = "idle"
@@ -214,22 +197,21 @@ def select_then_apply(team: Selectors, model: JointModel, goal: Goal, step_cost:
 
     Robots without work skip a stage, and a step without work left ends when all have selected.
     """
-    value = _of_selections(team, model)
-    form = _SelectThenApply(Writer(model.codec.facts), team, staged_actions(team, value), step_cost)
-    for robot in range(len(team.names)):
-        form.write_robot(robot)
-    form.write_goal(goal_formula(model, goal))
-    return form.out
-
-
-def _of_selections(team: Selectors, model: JointModel) -> Callable[[GroundLeaf], Formula]:
-    """Leaves on the classical facts: a subaction is done if its first owner has selected it."""
     on_state = state_reader(model)
     who = {
         StepAtom(action.schema, action.args): selected(team, owners[0], action.label)
         for action, owners in zip(team.actions, team.owners, strict=True)
     }
-    return lambda leaf: who.get(leaf, FALSE) if isinstance(leaf, StepAtom) else on_state(leaf)
+
+    def value(leaf: GroundLeaf) -> Formula:
+        """On the classical facts: a subaction is done if its first owner has selected it."""
+        return who.get(leaf, FALSE) if isinstance(leaf, StepAtom) else on_state(leaf)
+
+    form = _SelectThenApply(Writer(model.codec.facts), team, staged_actions(team, value), step_cost)
+    for robot in range(len(team.names)):
+        form.write_robot(robot)
+    form.write_goal(goal_formula(model, goal))
+    return form.out
 
 
 class _SelectThenApply:
@@ -282,8 +264,10 @@ class _SelectThenApply:
         for action in self._actions:
             if robot == action.robot:
                 self._select(action)
-            elif robot in self._team.owners[action.number]:
-                self._join(robot, action)
+            elif robot in self._team.owners[action.number]:  # it joins what the first one selected
+                known = {action.selected: True, _LEFT: True}
+                waits = {self._waits(action.robot, robot)}
+                self._choose(robot, action.label, action.robot, known, deletes=waits)
         for (stage, own), (here, after) in self._stages.items():
             if own == robot:
                 name = f"nothing to {stage} {self._team.names[robot]}"
@@ -310,7 +294,11 @@ class _SelectThenApply:
         """The first owner selects an action; what earlier robots have selected may forbid it."""
         assert action.literals is not None, "an action that can never be selected"
         team, robot = self._team, action.robot
-        known = {**action.literals, **self._not_ruled_out(action)}
+        # No earlier robot has selected what cannot share a step with it.
+        clashing = [self._all[number] for number in team.clashes[action.number]]
+        earlier = [other for other in clashing if other.robot < robot]
+        known = action.literals | {o.selected: False for o in earlier if not o.at_once}
+        known |= {other.mark: True for other in earlier if other.mark is not None}
         if action.at_once:
             adds, deletes = action.adds, action.deletes
             over = set() if action.mark is None else {action.mark}
@@ -322,19 +310,6 @@ class _SelectThenApply:
         known |= dict.fromkeys(over, True)
         cost, late = team.seconds[action.number], not action.at_once
         self._choose(robot, action.label, robot, known, adds, deletes | over, cost, late=late)
-
-    def _not_ruled_out(self, action: StagedAction) -> dict[Atom, bool]:
-        """That no earlier robot has selected what cannot share a step with the action."""
-        clashing = [self._all[number] for number in self._team.clashes[action.number]]
-        earlier = [other for other in clashing if other.robot < action.robot]
-        selected = {other.selected: False for other in earlier if not other.at_once}
-        return selected | {other.mark: True for other in earlier if other.mark is not None}
-
-    def _join(self, robot: int, action: StagedAction) -> None:
-        """Another owner selects an action that its first owner has selected, and carries out."""
-        waits = {self._waits(action.robot, robot)}
-        known = {action.selected: True, _LEFT: True}
-        self._choose(robot, action.label, action.robot, known, deletes=waits)
 
     def _choose(
         self,
@@ -353,7 +328,8 @@ class _SelectThenApply:
         ``first`` is the first owner of what is selected: robots that wait for another selection of
         this one forbid it.  ``late``: something of it is left for later stages.
         """
-        waiting = {self._waits(caller, robot): caller == first for caller in self._callers(robot)}
+        callers = sorted({own[0] for own in self._team.owners if robot in own} - {robot})
+        waiting = {self._waits(caller, robot): caller == first for caller in callers}
         name, known = f"choose {self._team.names[robot]} {label}", {**known, **waiting}
         cost += self._step_cost if robot == 0 else 0
         here, following = self._choosing[robot], self._choosing[robot + 1 :]
@@ -375,10 +351,6 @@ class _SelectThenApply:
     def _waits(self, caller: int, robot: int) -> Atom:
         """The caller has selected an action that this robot has to select too."""
         return own_fact("waits for", self._team.names[caller], self._team.names[robot])
-
-    def _callers(self, robot: int) -> list[int]:
-        owners = [own for own in self._team.owners if robot in own]
-        return sorted({own[0] for own in owners if own[0] != robot})
 
     def _none_left(self, stage: str, robot: int) -> Atom:
         return own_fact(f"nothing left to {stage}", self._team.names[robot])
@@ -408,9 +380,9 @@ class _SelectThenApply:
 
     def _carry_out(self, action: StagedAction) -> None:
         """Check, undo and apply a selected action; of a shared one the first owner does all."""
-        if action.has_checks:
+        if action.has("check"):
             self._check(action, *self._stages["check", action.robot])
-        if action.early:
+        if action.has("undo"):
             self._perform(action, *self._stages["undo", action.robot], early=True)
         self._perform(action, *self._stages["apply", action.robot], early=False)
 

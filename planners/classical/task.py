@@ -92,25 +92,15 @@ def _holds(conditions: Sequence[Condition], state: Set[int]) -> bool:
     return all((fact in state) == wanted for fact, wanted in conditions)
 
 
-def with_positive_goal(task: ClassicalTask) -> ClassicalTask:
-    """The task with a goal of positive literals only."""
-    return _with_partners(task, task.goal, only_goal=True)
+def with_positive_literals(task: ClassicalTask, *, only_goal: bool) -> ClassicalTask:
+    """The task with positive literals only, in the goal and, unless ``only_goal``, everywhere.
 
-
-def with_positive_conditions(task: ClassicalTask) -> ClassicalTask:
-    """The task with positive literals only, in the goal and in all preconditions."""
-    conditions = [condition for action in task.actions for condition in action.preconditions]
-    return _with_partners(task, (*task.goal, *conditions), only_goal=False)
-
-
-def _with_partners(
-    task: ClassicalTask, conditions: Iterable[Condition], *, only_goal: bool
-) -> ClassicalTask:
-    """The task in which each fact that a condition wants false has a partner.
-
-    The partner is true exactly where the fact is false.  Every action keeps the two apart, so plans
-    stay the same, one for one.
+    Each fact that is wanted false has a partner, which is true exactly where the fact is false.
+    Every action keeps the two apart, so plans stay the same, one for one.
     """
+    conditions = [*task.goal]
+    for action in () if only_goal else task.actions:
+        conditions += action.preconditions
     wanted = sorted({fact for fact, positive in conditions if not positive})
     partner = {fact: len(task.facts) + number for number, fact in enumerate(wanted)}
 

@@ -72,7 +72,7 @@ class Writer:
         """
         if isinstance(formula, Junction) and formula.parts:
             if isinstance(formula, And) and otherwise is None:
-                self._route_conjunction(name, formula, start, end, known, gain)
+                self._conjunction(name, formula, start, end, known, gain)
                 return
             here = start
             for left, part in zip(
@@ -87,14 +87,20 @@ class Writer:
                     self.route(name, part, here, end, known, gain, after or otherwise)
                 here = after or here
             return
-        self._test(name, formula, start, (end, *gain), known)
+        self._conjunction(name, formula, start, end, known, gain)
         if otherwise is not None:
-            self._test(name, negated(formula), start, (otherwise,), known)
+            self._conjunction(name, negated(formula), start, otherwise, known)
 
-    def _route_conjunction(
-        self, name: str, formula: And, start: Atom, end: Atom, known: Known, gain: tuple[Atom, ...]
+    def _conjunction(
+        self,
+        name: str,
+        formula: Formula,
+        start: Atom,
+        end: Atom,
+        known: Known,
+        gain: tuple[Atom, ...] = (),
     ) -> None:
-        """Of what must hold all literals are tested at once."""
+        """Of a conjunction, or one literal, all literals are tested at once."""
         found = known_literals(formula)
         if found is None or any(
             known.get(atom, value) != value for atom, value in found[0].items()
@@ -111,17 +117,6 @@ class Writer:
             after = self.phase() if left else end
             self.route(name, fork, here, after, known, () if left else gain)
             here = after
-
-    def _test(
-        self, name: str, literal: Formula, start: Atom, gain: tuple[Atom, ...], known: Known
-    ) -> None:
-        """An action that is possible exactly if a literal (or truth value) holds."""
-        found = known_literals(literal)
-        if found is None or any(
-            known.get(atom, value) != value for atom, value in found[0].items()
-        ):
-            return
-        self.action(name, {**known, **found[0], start: True}, gain, (start,))
 
 
 def known_literals(formula: Formula) -> tuple[dict[Atom, bool], list[Formula]] | None:

@@ -20,7 +20,7 @@ import pytest
 from coordlang.commands.main import COMMANDS
 from coordlang.sites.shipped import domain_names, shipped_domains
 from planners.check.rules import validate
-from planners.classical.fast_downward import FastDownwardAnswer
+from planners.classical import compile_classical
 from planners.loading import load
 from planners.pddl.model_options import ModelOptions
 from planners.pddl.robots import find_team
@@ -222,8 +222,10 @@ def test_both_prove_that_there_is_no_plan(shell: Shell) -> None:
 
 
 def test_a_disagreement_is_refuted(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
-    answer = FastDownwardAnswer((3, 0), "explicit", 1)
-    monkeypatch.setattr("coordlang.commands.check.optimal_cost", lambda *_, **__: answer)
+    monkeypatch.setattr(
+        "coordlang.commands.check.optimal_cost",
+        lambda model, task: ((3, 0), compile_classical(model, task)),
+    )
     out = shell("check T-MAP", 1, "the optimal costs differ").out
     assert "coordlang      makespan 4" in out
     assert "Fast Downward  makespan 3" in out

@@ -11,13 +11,14 @@ import tempfile
 import threading
 import time
 from contextlib import suppress
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 from planners import classical as plain_module
-from planners.classical import fast_downward
+from planners.classical import compile_classical, fast_downward
 from planners.classical.fast_downward import FastDownwardFailed, optimal_cost
 from planners.loading import PlanningInstance
 from planners.pddl.model_options import Cost
@@ -78,12 +79,16 @@ def processes(place: Path) -> set[str]:
         ("joint-action", "makespan+actions", "explicit"),
     ],
 )
-def test_fast_downward_agrees(name: str, cost: Cost, form: str) -> None:
+def test_fast_downward_agrees(
+    name: str, cost: Cost, form: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     loaded = read(*MODELS[name], cost)
-    answer = optimal_cost(loaded.model, loaded.tasks[0], limit=FORMS[form])
-    assert answer.cost == search(loaded.model, loaded.tasks[0]).cost_of(0)
-    assert answer.form == form
-    assert answer.actions > 0
+    in_form = partial(compile_classical, limit=FORMS[form])
+    monkeypatch.setattr(fast_downward, "compile_classical", in_form)
+    answer, classical = optimal_cost(loaded.model, loaded.tasks[0])
+    assert answer == search(loaded.model, loaded.tasks[0]).cost_of(0)
+    assert classical.form == form
+    assert classical.actions
 
 
 def test_a_search_that_the_system_kills_had_too_little_memory(
@@ -116,12 +121,15 @@ def test_a_wrong_model_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         plain_module.selectors, "clashes", lambda actions: (frozenset(),) * len(actions)
     )
-    assert optimal_cost(loaded.model, loaded.tasks[0], limit=0).cost == (1, 0)
+    in_form = partial(compile_classical, limit=0)
+    monkeypatch.setattr(fast_downward, "compile_classical", in_form)
+    assert optimal_cost(loaded.model, loaded.tasks[0])[0] == (1, 0)
 
 
-def test_a_step_cost_that_was_too_small_is_raised() -> None:
+def test_a_step_cost_that_was_too_small_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:
     loaded = read(*MODELS["partners"], "makespan+actions")
-    assert optimal_cost(loaded.model, loaded.tasks[0], longest=1).cost == (6, 11)
+    monkeypatch.setattr(fast_downward, "LONGEST", 1)
+    assert optimal_cost(loaded.model, loaded.tasks[0])[0] == (6, 11)
 
 
 def test_nothing_is_written_or_printed(
