@@ -6,23 +6,19 @@ from __future__ import annotations
 from coordlang.commands.inputs import Arguments, language_for, public, read_coordinates_of
 from coordlang.commands.records import ReportOptions
 from coordlang.commands.terminal import warn_of_failures, write
-from coordlang.language.provenance import Tolerance
 from coordlang.language.recorded import check_source
 from coordlang.report.page import Report, make_report
 from planners.system.messages import counted, visible
 
-#: A page, and what the language tolerates.
-Page = tuple[Report, Tolerance | None]
-
 
 @public(ReportOptions)
-def report(arguments: Arguments, options: ReportOptions) -> Page:
+def report(arguments: Arguments, options: ReportOptions) -> Report:
     """Make the page of a language: its words, and sentences and plans of tasks."""
     files = arguments.read()
     points = read_coordinates_of(options.coordinates, files.problems[0])
     read, position = language_for(arguments.needed("LANGUAGE"), files, coordinates=points)
     check_source(read, files.domain, files.problems, position)
-    page = make_report(
+    return make_report(
         read,
         files.domain,
         files.problems,
@@ -31,13 +27,12 @@ def report(arguments: Arguments, options: ReportOptions) -> Page:
         coordinates=points,
         position=position,
     )
-    return page, read.tolerance
 
 
-def show_report(found: Page, options: ReportOptions) -> None:
+def show_report(page: Report, options: ReportOptions) -> None:
     """Write the page."""
-    (page, tolerance), output = found, options.output
+    output = options.output
     shown = f"{counted(page.tasks, 'task')} of {page.candidates:,}"
     place = "stdout" if output == "-" else visible(output)
     write(page.html, output, f"{shown}, {len(page.html):,} bytes, written to {place}")
-    warn_of_failures(tolerance)
+    warn_of_failures(page.tolerance)

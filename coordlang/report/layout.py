@@ -7,13 +7,12 @@ Everything here is deterministic: the same input gives the same coordinates.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coordlang.sites.coordinates import Point, from_names
-from planners.joint.tables import Ints
 
 Floats = NDArray[np.float64]
 
@@ -23,30 +22,21 @@ _SWEEPS = 12
 _ROUND = 0.95
 
 
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """Points of named places, x to the right and y down, neighbours about 1 apart.
-
-    ``is_grid``: the places are cells of a grid, to be drawn as squares that touch.
-    """
-
-    points: Mapping[str, Point]
-    is_grid: bool
-
-
 def place_layout(
     names: Sequence[str], links: Sequence[tuple[str, str]], known: Mapping[str, Point] | None = None
-) -> Layout:
-    """Place named places: by ``known`` coordinates of all of them, else by names, else by links."""
+) -> tuple[Mapping[str, Point], bool]:
+    """Points of named places, and whether these are cells of a grid, squares that touch.
+
+    By ``known`` coordinates of all of them, else by names, else by links.  x is to the right and y
+    down, neighbours are about 1 apart.
+    """
     is_known = known is not None and all(name in known for name in names)
     if points := known if is_known else from_names(names, links):
         found = {name: points[name] for name in names}
-        return Layout(found, _is_grid(list(found.values())))
+        return found, _is_grid(list(found.values()))
     number = {name: k for k, name in enumerate(names)}
     table = graph_layout(len(names), [(number[a], number[b]) for a, b in links])
-    return Layout(
-        {name: (float(x), float(y)) for name, (x, y) in zip(names, table, strict=True)}, False
-    )
+    return {name: (float(x), float(y)) for name, (x, y) in zip(names, table, strict=True)}, False
 
 
 def _is_grid(points: Sequence[Point]) -> bool:
@@ -95,24 +85,19 @@ def _upright(points: Floats, links: Sequence[tuple[int, int]]) -> Floats:
     _, extents, axes = np.linalg.svd(points, full_matrices=False)
     points = points @ axes.T
     if extents[-1] > _ROUND * extents[0] and links:
-        points = _along_links(points, links)
+        # The most frequent direction of links, up to right angles, comes to lie along x.
+        ends = points[np.array(links)]
+        step = ends[:, 1] - ends[:, 0]
+        angle = np.arctan2(step[:, 1], step[:, 0]) % (np.pi / 2)
+        third = np.round(np.degrees(angle) / 3).astype(np.int64) % 30  # classes 3 degrees wide
+        turn = -np.median(angle[third == np.bincount(third).argmax()])
+        rotation = [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
+        points = points @ np.array(rotation)
     for axis in (0, 1):
         first = next((v for v in points[:, axis] if abs(v) > 1e-3), 0.0)
         if first > 0:
             points[:, axis] *= -1
     return points
-
-
-def _along_links(points: Floats, links: Sequence[tuple[int, int]]) -> Floats:
-    """Turn points so that the most frequent direction of links, up to right angles, is along x."""
-    ends = points[np.array(links)]
-    step = ends[:, 1] - ends[:, 0]
-    angle = np.arctan2(step[:, 1], step[:, 0]) % (np.pi / 2)
-    third = np.round(np.degrees(angle) / 3).astype(np.int64) % 30  # classes 3 degrees wide
-    turn = -np.median(angle[third == np.bincount(third).argmax()])
-    rotation = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
-    turned: Floats = points @ rotation
-    return turned
 
 
 def layer_orders(sizes: Sequence[int], edges: Sequence[tuple[int, int]]) -> list[int]:
@@ -122,35 +107,24 @@ def layer_orders(sizes: Sequence[int], edges: Sequence[tuple[int, int]]) -> list
     numbers of nodes of the layers, which are numbered layer by layer; ``edges`` lead from a layer
     to the next one.  Returns the place of each node within its layer.
     """
-    bounds = np.cumsum([0, *sizes])
-    ends = np.array(sorted(set(edges)), np.int64).reshape(-1, 2)
+    bounds = np.cumsum([0, *sizes]).tolist()
+    layers = [range(low, high) for low, high in pairwise(bounds)]
+    before: list[list[int]] = [[] for _ in range(bounds[-1])]
+    after: list[list[int]] = [[] for _ in range(bounds[-1])]
+    for source, target in sorted(set(edges)):
+        before[target].append(source)
+        after[source].append(target)
     # From 0 to 1 over the layer, so that layers of different sizes compare.
-    place = np.concatenate([np.zeros(0), *((np.arange(s) + 0.5) / max(s, 1) for s in sizes)])
-    layer_of_source = np.repeat(np.arange(len(sizes)), sizes)[ends[:, 0]]
-    below = [ends[layer_of_source == k] for k in range(len(sizes))]
+    place = [(number + 0.5) / len(layer) for layer in layers for number in range(len(layer))]
+
+    def mean(ends: Sequence[int]) -> float:
+        return round(sum(place[end] for end in ends) / len(ends), 9)
+
     for sweep in range(_SWEEPS):
-        if sweep % 2 == 0:
-            for k in range(1, len(sizes)):
-                _order_layer(place, bounds[k], bounds[k + 1], below[k - 1][:, ::-1])
-        else:
-            for k in range(len(sizes) - 2, -1, -1):
-                _order_layer(place, bounds[k], bounds[k + 1], below[k])
-    scale = np.repeat(np.array(sizes, np.float64), sizes)
-    return [round(at) for at in (place * scale - 0.5).tolist()]
-
-
-def _order_layer(place: Floats, low: int, high: int, ends: Ints) -> None:
-    """Reorder the nodes low .. high - 1 of a layer by the mean place of their neighbours.
-
-    ``ends`` (edges, 2) are pairs of a node of the layer and a neighbour; ``place`` is changed.
-    Nodes without neighbours keep their place.
-    """
-    size = high - low
-    span = slice(low, high)
-    number = ends[:, 0] - low
-    count = np.bincount(number, minlength=size)
-    total = np.bincount(number, weights=place[ends[:, 1]], minlength=size)
-    mean = np.where(count > 0, total / np.maximum(count, 1), place[span])
-    rank = np.empty(size)
-    rank[np.lexsort((place[span], np.round(mean, 9)))] = np.arange(size)
-    place[span] = (rank + 0.5) / max(size, 1)
+        ends, turn = (before, layers[1:]) if sweep % 2 == 0 else (after, layers[-2::-1])
+        for layer in turn:
+            # A node without neighbours keeps its place.
+            wanted = sorted((mean(ends[node] or [node]), place[node], node) for node in layer)
+            for number, (_, _, node) in enumerate(wanted):
+                place[node] = (number + 0.5) / len(layer)
+    return [round(place[node] * len(layer) - 0.5) for layer in layers for node in layer]

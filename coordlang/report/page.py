@@ -22,7 +22,7 @@ from coordlang.explanation.words import (
     lifted_words,
     mapped_states,
 )
-from coordlang.language.provenance import domain_sha256, percent
+from coordlang.language.provenance import Tolerance, domain_sha256, percent
 from coordlang.language.recorded import options_of
 from coordlang.language.words import Language
 from coordlang.report.layout import graph_layout, place_layout
@@ -59,12 +59,10 @@ def page_data(
     selection: Selection,
     seed: int,
     known: Mapping[str, Point] | None = None,
-    most_places: int = MOST_PLACES,
 ) -> dict[str, Any]:
     """Return the page's data for a language and the tasks to be shown.
 
-    ``seed`` is that of the plans drawn of large tasks.  ``known`` are coordinates of places from a
-    file; with more than ``most_places`` no map is drawn.
+    ``seed`` is that of the plans drawn of large tasks, ``known`` are coordinates of places.
     """
     first = selection.tasks[0].language
     model = first.model
@@ -75,7 +73,7 @@ def page_data(
     tasks = [task_data(shown, tables, seed) for shown in selection.tasks]
     states = [model.codec.decode(row) for row in tables.rows]
     world = find_world(model, states)
-    if not 1 < len(world.places) <= most_places:  # no map: atoms are text
+    if not 1 < len(world.places) <= MOST_PLACES:  # no map: atoms are text
         world = replace(world, places=(), links=(), roles={})
     number = {fact: k for k, fact in enumerate(sorted(set(chain.from_iterable(states))))}
     starts = model.codec.decode(first.space.rows[first.space.state[first.start]])
@@ -165,13 +163,13 @@ def word_rows(
 def _map(world: World, known: Mapping[str, Point] | None) -> dict[str, Any]:
     if not world.places:
         return {"places": [], "links": [], "grid": False}
-    layout = place_layout(world.places, [link.ends for link in world.links], known)
+    placed, is_grid = place_layout(world.places, [link.ends for link in world.links], known)
     number = {name: k for k, name in enumerate(world.places)}
-    points = [(name, *layout.points[name]) for name in world.places]
+    points = [(name, *placed[name]) for name in world.places]
     return {
         "places": [{"name": name, "x": x, "y": y} for name, x, y in points],
         "links": [[*(number[end] for end in link.ends), int(link.moves)] for link in world.links],
-        "grid": layout.is_grid,
+        "grid": is_grid,
     }
 
 
@@ -260,11 +258,12 @@ _FEW_WORDS = 8
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A page, and how many tasks are shown in it of how many candidate tasks."""
+    """A page, how many tasks are shown in it of how many, and what the language tolerates."""
 
     html: bytes
     tasks: int
     candidates: int
+    tolerance: Tolerance | None
 
 
 def make_report(
@@ -277,17 +276,14 @@ def make_report(
     options: ModelOptions | None = None,
     coordinates: Mapping[str, Point] | None = None,
     position: Position | None = None,
-    largest: int = LARGEST,
-    most_places: int = MOST_PLACES,
 ) -> Report:
     """Render the report of a language; the same arguments give the same bytes.
 
     It shows the problems' tasks and candidate tasks drawn with ``seed``, at most ``tasks_shown``,
-    fewer if the page would have more than ``largest`` bytes.  ``options`` say how the model is
-    built (default: as the language file says), ``coordinates`` where places are; with more than
-    ``most_places`` no map is drawn.  ``position`` is what messages name as the place of the
-    language.  Raises `OutOfMemory` if the page of a single task would be too large, and what
-    `coordlang.report.shown.select_tasks` raises.
+    fewer if the page would have more than `LARGEST` bytes.  ``options`` say how the model is built
+    (default: as the language file says), ``coordinates`` where places are.  ``position`` is what
+    messages name as the place of the language.  Raises `OutOfMemory` if the page of a single task
+    would be too large, and what `coordlang.report.shown.select_tasks` raises.
     """
     position = position or Position("the language file")
     selection = select_tasks(language, domain, problems, tasks_shown, seed, options, position)
@@ -307,17 +303,17 @@ def make_report(
     }
     heat = None
     while True:
-        data = page_data(language, selection, seed, coordinates, most_places)
+        data = page_data(language, selection, seed, coordinates)
         if heat is None and data["places"]:
             known = options or options_of(language)
             heat = heat_of(language, domain, problems, known, selection, position)
         html = _render({**shown, **drawn_plan(data, heat)}, data)
-        if len(html) <= largest:
+        if len(html) <= LARGEST:
             candidates = int(language.provenance.tasks.get("count", 0))
-            return Report(html, len(selection.tasks), candidates)
+            return Report(html, len(selection.tasks), candidates, language.tolerance)
         if len(selection.tasks) == 1:
             raise OutOfMemory(
-                f"the page of one task would have {len(html):,} bytes, more than {largest:,}",
+                f"the page of one task would have {len(html):,} bytes, more than {LARGEST:,}",
                 remedy="Give a smaller problem.",
             )
         half = selection.tasks[: len(selection.tasks) // 2]
@@ -332,6 +328,9 @@ def _render(shown: Mapping[str, Any], data: Mapping[str, Any]) -> bytes:
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
+    begin = "'use strict';\nconst DATA = JSON.parse(document.getElementById('data').textContent);"
+    scripts = [entry for entry in (here / "script").iterdir() if entry.name.endswith(".js")]
+    scripts.sort(key=lambda entry: entry.name)
     template = environment.from_string((here / "template.html").read_text("utf-8"))
     return template.render(
         version=version("coordlang"),
@@ -342,25 +341,12 @@ def _render(shown: Mapping[str, Any], data: Mapping[str, Any]) -> bytes:
         number="{:,}".format,
         percent=percent,
         css=Markup((here / "page.css").read_text("utf-8")),
-        js=Markup(_script()),
+        js=Markup("\n".join([begin, *(entry.read_text("utf-8") for entry in scripts)])),
         kept=data["kept"],
         checked=[task["verified"] for task in data["tasks"]],
         data=Markup(_json(data)),
         **shown,
     ).encode()
-
-
-def _script() -> str:
-    """The files of the folder ``script``, one after the other by name, as one script."""
-    folder = files("coordlang.report") / "script"
-    names = sorted(entry.name for entry in folder.iterdir() if entry.name.endswith(".js"))
-    return "\n".join(
-        (
-            "'use strict';",
-            "const DATA = JSON.parse(document.getElementById('data').textContent);",
-            *((folder / name).read_text("utf-8") for name in names),
-        )
-    )
 
 
 def _json(data: Mapping[str, Any]) -> str:

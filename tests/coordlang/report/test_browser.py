@@ -320,7 +320,7 @@ def test_a_place_is_chosen_on_the_floor_plan(
 
 
 @pytest.mark.thorough
-def test_odd_languages_and_tasks(open_page: Opener) -> None:
+def test_odd_languages_and_tasks(open_page: Opener, monkeypatch: pytest.MonkeyPatch) -> None:
     """No map; no state mapped; a task that is done before it begins."""
     language, domain, problem = make_language("t-map", "problem")
     bare = replace(language, states={})
@@ -328,7 +328,8 @@ def test_odd_languages_and_tasks(open_page: Opener) -> None:
         problem, goal=And(tuple(atom for atom in problem.init if atom.predicate == "at"))
     )
     for spoken, asked in [(language, problem), (bare, problem), (language, done)]:
-        opened = open_page(make_report(spoken, domain, [asked], tasks_shown=1, most_places=1).html)
+        monkeypatch.setattr("coordlang.report.page.MOST_PLACES", 1)
+        opened = open_page(make_report(spoken, domain, [asked], tasks_shown=1).html)
         assert not opened.page.is_visible("#stage")
         for mode in (-1, 0, 1):
             opened.page.click(f"[data-mode='{mode}']")

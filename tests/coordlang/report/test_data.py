@@ -158,7 +158,9 @@ def test_selection() -> None:
         select_tasks(language, domain, [problem, problem], 1, 0)
 
 
-def test_a_page_is_the_same_each_time_opens_offline_and_shows_fewer_tasks_if_too_large() -> None:
+def test_a_page_is_the_same_each_time_opens_offline_and_shows_fewer_tasks_if_too_large(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     language, domain, problem = make_language("t-map", "problem")
     one, again, other = (
         make_report(language, domain, [problem], tasks_shown=4, seed=seed).html
@@ -167,7 +169,8 @@ def test_a_page_is_the_same_each_time_opens_offline_and_shows_fewer_tasks_if_too
     assert one == again != other
     text = one.decode().replace("http://www.w3.org/2000/svg", "")
     assert [part for part in ("http:", "https:", str(Path.cwd())) if part in text] == []
-    less = make_report(language, domain, [problem], tasks_shown=4, seed=3, largest=len(one) - 1)
+    monkeypatch.setattr("coordlang.report.page.LARGEST", len(one) - 1)
+    less = make_report(language, domain, [problem], tasks_shown=4, seed=3)
     assert less.tasks == 2
     assert not data_of(less.html)["candidates"]["complete"]
 

@@ -83,10 +83,10 @@ def test_coordinates_from_a_file(tmp_path: Path) -> None:
     path.write_text('{"coordinates": {"A": [1, 0], "b": [0, 2], "c": [2.5, 2]}}')
     points = read_coordinates(path)
     assert points == {"a": (1, 0), "b": (0, 2), "c": (2.5, 2)}
-    assert place_layout(["a", "b"], [("a", "b")], points).is_grid
-    assert not place_layout(["a", "c"], [("a", "c")], points).is_grid
+    assert place_layout(["a", "b"], [("a", "b")], points)[1]
+    assert not place_layout(["a", "c"], [("a", "c")], points)[1]
     # A place without coordinates: the file does not fit, and the links are laid out.
-    assert place_layout(["a", "d"], [("a", "d")], points).points["d"] != (0, 0)
+    assert place_layout(["a", "d"], [("a", "d")], points)[0]["d"] != (0, 0)
 
 
 COORDINATES = """
