@@ -54,16 +54,6 @@ def simple(job: Job, found: Outcome) -> Outcome:
     return search.outcome(run_until_stopped(search.run))
 
 
-def formula_lengths(mapped: MappedStates) -> Lengths:
-    """The terms of the words' formulas, as `explain` finds them, and the variables limited.
-
-    Without those of the word with the longest formula, which is "every other state".
-    """
-    lengths = [(len(f.terms), sum(map(len, f.terms))) for f in all_covers(mapped).values()]
-    shorter = sorted(lengths)[:-1]
-    return sum(terms for terms, _ in shorter), sum(limits for _, limits in shorter)
-
-
 class _Search:
     """``best`` is the language with the shortest formulas, of ``lengths``, that was verified.
 
@@ -80,7 +70,10 @@ class _Search:
         names, word = np.unique(word, return_inverse=True)
         words = tuple(f"w{name}" for name in names)
         mapped = MappedStates(words, variables, value, word)
-        self._before = self.lengths = formula_lengths(mapped)
+        # The word with the longest formula is "every other state".
+        covers = all_covers(mapped).values()
+        lengths = sorted((len(f.terms), sum(map(len, f.terms))) for f in covers)[:-1]
+        self._before = self.lengths = sum(n for n, _ in lengths), sum(n for _, n in lengths)
         self.bound: Lengths = (found.size - 1, found.size - 1)  # each term limits a variable
 
     def outcome(self, stopped: BaseException | None) -> Outcome:

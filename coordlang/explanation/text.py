@@ -144,10 +144,11 @@ def demands_text(demands: SentenceDemands) -> str:
     lines = [f'"{" ".join(demands.sentence)}" leaves {counted(demands.plans, "plan")} open.']
     for part in demands.parts:
         lines += _part_lines(part, demands.unit) or [f"  {part.robot} has nothing to do."]
-    lines += [
-        f"  {change.before} -> {change.after} {_when(change)}: {_cause(change)}."
-        for change in demands.changes
-    ]
+    for change in demands.changes:
+        when = f"in step {change.earliest}"
+        if change.earliest < change.latest:
+            when = f"in steps {change.earliest} to {change.latest}"
+        lines.append(f"  {change.before} -> {change.after} {when}: {_cause(change)}.")
     return "\n".join(lines)
 
 
@@ -203,12 +204,6 @@ def _alternatives(texts: Sequence[str], between: str = " or ") -> str:
     if rest <= 1:  # "one of 1 others" would be as long as its name
         return between.join(texts)
     return between.join([*texts[:_ALTERNATIVES], f"one of {rest} others"])
-
-
-def _when(change: WordChange) -> str:
-    if change.earliest == change.latest:
-        return f"in step {change.earliest}"
-    return f"in steps {change.earliest} to {change.latest}"
 
 
 def _cause(change: WordChange) -> str:

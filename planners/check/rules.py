@@ -171,12 +171,9 @@ class Rules:
         return None
 
     def _interference(self, actions: Sequence[Instance]) -> str | None:
-        for j, second in enumerate(actions):
-            for first in actions[:j]:
-                reason = self._clash(first, second) or self._clash(second, first)
-                if reason:
-                    return reason
-        return None
+        pairs = ((one, other) for j, other in enumerate(actions) for one in actions[:j])
+        clashes = (self._clash(*pair) or self._clash(*pair[::-1]) for pair in pairs)
+        return next(filter(None, clashes), None)
 
     def _clash(self, one: Instance, other: Instance) -> str | None:
         """How the changes of ``one`` interfere with ``other``."""
