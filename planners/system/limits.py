@@ -267,18 +267,13 @@ def address_space_left() -> float:
 
 def _available() -> int:
     """Bytes that the machine, or the process's control group, has free or can free at once."""
-    return min(_machine_memory_left(), _group_memory_left())
-
-
-def _machine_memory_left() -> int:
-    """Bytes that the machine has free or can free at once."""
     with suppress(OSError):
         found = _AVAILABLE.search(_text(_MEMORY_OF_MACHINE))
         if found is not None:
-            return int(found[1]) * 2**10
+            return min(int(found[1]) * 2**10, _group_memory_left())
     import psutil
 
-    return int(psutil.virtual_memory().available)
+    return int(psutil.virtual_memory().available)  # there are no control groups
 
 
 def _group_memory_left() -> int:
