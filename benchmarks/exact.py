@@ -127,7 +127,7 @@ def measured(key: str, name: str, seed: int, given: Namespace) -> Figures:
             )
     except (OutOfTime, OutOfMemory, ProvedImpossible):
         return {"row": key, "version": frame.project(), "cells": []}
-    guarantee, listed = built.language.guarantee, built.first_differences.divergences
+    guarantee, listed = built.language.guarantee, built.job.first_differences.divergences
     words = text_of(guarantee.lower_bound, guarantee.size)
     cells = [
         "-" if listed is None else bounds.greedy or guarantee.size,

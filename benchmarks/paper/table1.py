@@ -65,8 +65,8 @@ def run(unit: Unit, settings: Settings) -> Result:
     return {
         "tasks": candidates.count,
         "states": candidates.states,
-        "divergences": len(built.first_differences.listed),
-        "requiring": built.first_differences.requiring,
+        "divergences": len(built.job.first_differences.listed),
+        "requiring": built.job.first_differences.requiring,
         "words": guarantee.size,
         "lower_bound": guarantee.lower_bound,
         "proved_minimal": guarantee.proved_minimal,

@@ -135,9 +135,9 @@ def _arguments(options: BuildOptions) -> list[str]:
 def show_build(built: Built, options: BuildOptions) -> int:
     """Write the language and its certificate, and say what was found."""
     output, certificate = options.output, options.certificate
-    for name in built.candidates.skipped:
+    for name in built.job.candidates.skipped:
         tell(f"left out, it has no plan: {name}")
-    note_single_robot(built.candidates.model.robots)
+    note_single_robot(built.job.candidates.model.robots)
     proof, stopped = _certificate(built) if certificate else (None, None)
     stop_clock()  # the work is done; from here on it is saved
     is_written = False

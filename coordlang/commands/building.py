@@ -193,7 +193,8 @@ def repair_language(making: Making, start: Language, seed: int) -> Built:
         making.verified.append((words, partition, verdict))
         # What the old file claims of fewer words is not believed: the bound is the job's.
         return making.built(job, Outcome(words, job.lower_bound), REPAIR, repaired=repaired)
-    making.partition_of = old.partition
+    model = making.candidates.model
+    making.partition_of = lambda found: old.repaired(found).partition(model)
     result = repair(job, words, len(number), number[known.default])
     making.note("repair")
     now = old.repaired(result.partition)
@@ -327,10 +328,6 @@ class _Old:
         default = old.default if sizes[old.default] else max(words, key=sizes.__getitem__)
         return replace(old, words=words, states=states, default=default)
 
-    def partition(self, assignment: Assignment) -> Partition:
-        """`repaired`, over the states of the model."""
-        return self.repaired(assignment).partition(self.candidates.model)
-
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Built(Presented):
@@ -355,11 +352,6 @@ class Built(Presented):
     shown = ("tasks", "guarantee")
 
     @property
-    def candidates(self) -> Candidates:
-        """The candidate tasks."""
-        return self.job.candidates
-
-    @property
     def figures(self) -> Mapping[str, float]:
         """The figures of the method."""
         return self.outcome.figures
@@ -382,12 +374,7 @@ class Built(Presented):
     @property
     def tasks(self) -> int:
         """The number of candidate tasks."""
-        return self.candidates.count
-
-    @property
-    def first_differences(self) -> FirstDifferences:
-        """Where coordination is required."""
-        return self.job.first_differences
+        return self.job.candidates.count
 
     def certificate(self) -> Certificate:
         """Why no partition with fewer words than the proved lower bound is a language.
@@ -399,16 +386,16 @@ class Built(Presented):
         """
         refuted = self.guarantee.lower_bound - 1
         evidence = self.outcome.refuting or (refuting_clauses(self.job, refuted) if refuted else {})
-        proof = certify(self.candidates, evidence, refuted)
+        proof = certify(self.job.candidates, evidence, refuted)
         try:
-            check_certificate(proof, self.candidates)
+            check_certificate(proof, self.job.candidates)
         except Refuted as error:
             raise AssertionError(f"the lower bound is not proved: {error.what}") from None
         return proof
 
     def data(self) -> dict[str, Any]:
         """The figures of the making as JSON data."""
-        first, guarantee = self.first_differences, self.guarantee
+        first, guarantee = self.job.first_differences, self.guarantee
         more: dict[str, Any] = {}
         if self.repaired is not None:
             more["repair"] = self.repaired.data()
@@ -416,7 +403,7 @@ class Built(Presented):
             more["tasks_requiring_coordination_with_fewest_actions"] = self.fewest
         return {
             "tasks": self.tasks,
-            "states": self.candidates.states,
+            "states": self.job.candidates.states,
             "states_on_plans": len(self.job.states),
             "tasks_requiring_coordination": first.requiring,
             "divergences": None if first.divergences is None else len(first.divergences),
@@ -450,7 +437,7 @@ class Built(Presented):
         lines = [
             f"{words} ({figures['method']}, {proof}{verified}) for {tasks}, "
             f"{figures['tasks_requiring_coordination']:,} of which require coordination",
-            f"{figures['states_on_plans']:,} states on {self.candidates.model.kept_plans}, "
+            f"{figures['states_on_plans']:,} states on {self.job.candidates.model.kept_plans}, "
             f"{divergences}, {figures['walk_nodes']:,} nodes of plans, "
             f"{sum(figures['seconds'].values()):.2f} s",
             *self._what_would_be(),
@@ -462,7 +449,7 @@ class Built(Presented):
 
     def _what_would_be(self) -> Iterator[str]:
         """What more effort might bring, and what another cost would change."""
-        guarantee, requiring = self.guarantee, self.first_differences.requiring
+        guarantee, requiring = self.guarantee, self.job.first_differences.requiring
         if guarantee.method == "best" and not guarantee.proved_minimal:
             larger = "limit" if self.stopped else f"--effort than {self.job.effort}"
             yield (

@@ -134,17 +134,12 @@ def _numbers(known: tuple[str, ...], whose: str | Sequence[str]) -> tuple[int, .
 
 
 def show_choices(found: RobotsChoices, options: ChoicesOptions) -> int:
-    """Print or write the choices."""
+    """Print or write the choices, and say on stderr what is not guaranteed."""
     if options.form == "text":
         text = _text(found, line_width())
     else:
         text = to_bytes(found.found, found.chosen).decode()
     write(text, options.output)
-    return _guarantee_code(found)
-
-
-def _guarantee_code(found: RobotsChoices) -> int:
-    """The exit code of what is guaranteed; writes to stderr what is not."""
     if found.witness is not None:
         may_fail = found.tolerance is not None and found.tolerance.may_fail
         if is_tolerated := found.covered and may_fail:

@@ -49,8 +49,9 @@ def command_of(name: str, record: type[CommandOptions]) -> click.Command:
         said = click.core.ParameterSource.COMMANDLINE
         given = {k: v for k, v in values.items() if context.get_parameter_source(k) is said}
         read = _positional(record, arguments, given, on_cli)
-        if given.get("as_json") and "form" in on_cli:
-            given["form"] = _json_form(given.get("form", "json"))
+        if given.get("as_json") and "form" in on_cli and given.setdefault("form", "json") != "json":
+            short = "--json is short for --format json"
+            raise click.UsageError(f"{short}: leave out --format {given['form']}")
         module = import_module(f"coordlang.commands.{record.module or name}")
         options = record_from(record, given, name, on_cli=True)
         is_kept = record.keeps_plans and not options.no_cache
@@ -95,14 +96,6 @@ class _Command(click.Command):
             if rows:
                 with formatter.section(title):
                     formatter.write_dl(rows)
-
-
-def _json_form(form: object) -> object:
-    """What ``--json`` makes of a ``--format``; `click.UsageError` for another one."""
-    if form != "json":
-        short = "--json is short for --format json"
-        raise click.UsageError(f"{short}: leave out --format {form}")
-    return form
 
 
 def _positional(

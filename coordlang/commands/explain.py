@@ -128,21 +128,15 @@ class Explanation(InTask):
     shown = ("formulas", "covered")
 
     @cached_property
-    def all_sentences(self) -> tuple[TaskSentence, ...]:
-        """All sentences of the task, those that leave most plans open first.
+    def sentences(self) -> tuple[TaskSentence, ...]:
+        """The sentence that was asked for, or all, those that leave most plans open first.
 
         Raises `OutOfMemory` beyond 100,000 sentences, or where it is too much work.
         """
-        used = self.used
-        return tuple(task_sentences(used.space, used.task, used.partition, used.plans_with))
-
-    @property
-    def sentences(self) -> tuple[TaskSentence, ...]:
-        """The sentences that were asked for: one, or all."""
-        if self.only is None:
-            return self.all_sentences
-        wanted = tuple(self.used.partition.words[word] for word in self.only)
-        return tuple(s for s in self.all_sentences if s.words == wanted)
+        used, words = self.used, self.used.partition.words
+        only = None if self.only is None else tuple(words[word] for word in self.only)
+        found = task_sentences(used.space, used.task, used.partition, used.plans_with)
+        return tuple(sentence for sentence in found if only in (None, sentence.words))
 
     def demands(self, sentences: Iterable[Sentence] | None = None) -> list[SentenceDemands]:
         """Return what sentences (word numbers; default: `sentences`) ask of each robot."""
@@ -150,9 +144,6 @@ class Explanation(InTask):
         if sentences is None:
             sentences = [used.words_of(own.words) for own in self.sentences]
         return [sentence_demands(used.plans_with(s), used.partition, covers) for s in sentences]
-
-    def _text(self, words: Sentence) -> str:
-        return " ".join(self.used.partition.words[word] for word in words)
 
     @property
     def formulas(self) -> dict[str, str]:
@@ -213,7 +204,7 @@ class Explanation(InTask):
         listed = [words for words, _ in leading]
         if 1 < len(listed) == number:
             meant = meaning([*map(used.plans_with, listed)])
-            lines.append(meaning_text([*map(self._text, listed)], meant))
+            lines.append(meaning_text([*map(used.text, listed)], meant))
         if self.with_demands and used.guaranteed:
             lines.append(
                 "Each robot may choose for itself: whatever the others choose, "
@@ -225,7 +216,7 @@ class Explanation(InTask):
                 lines += ["", demands_text(asks)]
         else:
             for words, open_plans in leading:
-                lines.append(f'  "{self._text(words)}" leaves {counted(open_plans, "plan")} open.')
+                lines.append(f'  "{used.text(words)}" leaves {counted(open_plans, "plan")} open.')
         if self.only is None and number != len(listed):
             lines.append(f"  .. and {'more' if number is None else number - len(listed)}")
         return "\n".join(lines)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from os import fspath
 from typing import Any
 
@@ -42,9 +42,9 @@ _SHOWN = 8
 _TASKS = "use coordlang tasks, or list tasks"
 
 
-@dataclass(frozen=True, slots=True)
-class Inspection:
-    """Everything that a user needs to see whether the domain was read as it was meant.
+@dataclass(frozen=True, slots=True, repr=False)
+class Inspected(Presented):
+    """What was understood of a domain and problem; ``print`` shows it as `coordlang inspect`.
 
     ``objects`` counts them by type, each in all its types; ``subactions[robot][schema]`` counts
     ground subactions, and ``impossible`` are the schemas that have none; ``idle[robot]`` says when
@@ -53,7 +53,8 @@ class Inspection:
     counts pairs of subactions of different robots that cannot share a step; the ``example`` is one
     that meets in a reachable state, None if no state near the start has one.  ``start`` counts the
     fluents that are true at first, ``never`` are the predicates that no state can make true.
-    ``estimate`` says how large a search for plans will be.
+    ``estimate`` says how large a search for plans will be; ``reachable``: how many joint states can
+    be reached, and joint steps in them, if counted.
     """
 
     domain: str
@@ -81,26 +82,14 @@ class Inspection:
     facts: int
     goal: str
     estimate: SearchEstimate
-
-
-@dataclass(frozen=True, slots=True, repr=False)
-class Inspected(Presented):
-    """What was understood of a domain and problem; ``print`` shows it as `coordlang inspect`.
-
-    ``reachable``: how many joint states can be reached, and joint steps in them, if counted.
-    """
-
-    inspection: Inspection
-    reachable: tuple[int, int] | None
-
-    def facts(self) -> dict[str, object]:
-        """What was read, and the robots."""
-        return {name: getattr(self.inspection, name) for name in ("domain", "problem", "robots")}
+    reachable: tuple[int, int] | None = None
+    shown = ("domain", "problem", "robots")
 
     def data(self) -> dict[str, Any]:
         """Everything as JSON data."""
-        counts = zip(("states", "joint_steps"), self.reachable or (), strict=False)
-        return asdict(self.inspection) | dict(counts)
+        data = asdict(self)
+        counts = data.pop("reachable") or ()
+        return data | dict(zip(("states", "joint_steps"), counts, strict=False))
 
     def __str__(self) -> str:
         return self.text()
@@ -110,33 +99,32 @@ class Inspected(Presented):
         return "\n".join(columns(self._lines(), width, indent=""))
 
     def _lines(self) -> list[tuple[str, str]]:
-        found = self.inspection
         none_named = {"error": "not allowed (--unowned)"}
-        fluents = f"{counted(found.facts, 'fact')}: {_counts(found.fluents)}"
-        example = f", e.g. {found.example}" if found.example else ""
-        if found.interfering and not found.example:
+        fluents = f"{counted(self.facts, 'fact')}: {_counts(self.fluents)}"
+        example = f", e.g. {self.example}" if self.example else ""
+        if self.interfering and not self.example:
             example = ", none of them possible in one state near the start"
         lines = [
-            ("domain", f"{found.domain}, problem {found.problem}"),
-            ("read as", found.style),
-            ("objects", _counts(found.objects)),
-            ("robots", f"{', '.join(found.robots)} (by {found.robots_by})"),
-            *(self._subactions(robot) for robot in found.subactions),
-            ("shared", _counts(found.shared)),
-            ("no robot named", none_named.get(found.unowned, f"--unowned {found.unowned}")),
-            ("step formulas", _counts(found.step_formulas)),
-            *(("", f"e.g. {each}") for each in found.formulas),
-            ("never possible", ", ".join(found.impossible)),
-            ("no effects", ", ".join(found.without_effects)),
-            *([("left out", f"{', '.join(found.left_out)}: idling")] if found.left_out else []),
-            ("action costs", found.costs),
-            ("interference", counted(found.interfering, "pair") + example),
-            ("fluents", fluents if found.facts else ""),
-            ("at the start", _counts(found.start) or "none is true"),
-            ("statics", _counts(found.statics)),
-            ("never true", ", ".join(found.never)),
-            ("goal", found.goal),
-            *feasibility(found.estimate),
+            ("domain", f"{self.domain}, problem {self.problem}"),
+            ("read as", self.style),
+            ("objects", _counts(self.objects)),
+            ("robots", f"{', '.join(self.robots)} (by {self.robots_by})"),
+            *(self._subactions(robot) for robot in self.subactions),
+            ("shared", _counts(self.shared)),
+            ("no robot named", none_named.get(self.unowned, f"--unowned {self.unowned}")),
+            ("step formulas", _counts(self.step_formulas)),
+            *(("", f"e.g. {each}") for each in self.formulas),
+            ("never possible", ", ".join(self.impossible)),
+            ("no effects", ", ".join(self.without_effects)),
+            *([("left out", f"{', '.join(self.left_out)}: idling")] if self.left_out else []),
+            ("action costs", self.costs),
+            ("interference", counted(self.interfering, "pair") + example),
+            ("fluents", fluents if self.facts else ""),
+            ("at the start", _counts(self.start) or "none is true"),
+            ("statics", _counts(self.statics)),
+            ("never true", ", ".join(self.never)),
+            ("goal", self.goal),
+            *feasibility(self.estimate),
         ]
         if self.reachable:
             states, steps = self.reachable
@@ -145,21 +133,20 @@ class Inspected(Presented):
         return [(name, text or "none") for name, text in lines]
 
     def _subactions(self, robot: str) -> tuple[str, str]:
-        found = self.inspection
-        schemas = found.subactions[robot]
+        schemas = self.subactions[robot]
         listed = f": {_counts(schemas)}" if schemas else ""
         number = counted(sum(schemas.values()), "subaction")
-        return f"  {robot}", f"{number}{listed}; {found.idle[robot]}"
+        return f"  {robot}", f"{number}{listed}; {self.idle[robot]}"
 
 
 @public(InspectOptions)
 def inspect(files: Arguments, options: InspectOptions) -> Inspected:
     """Show what was understood of a domain and problem."""
     loaded = files.instance()
-    size = None
+    found = inspection(loaded)
     if options.states:
-        size = count_reachable(loaded.model, loaded.tasks[0].init[None, :])
-    found = Inspected(inspection(loaded), size)
+        reachable = count_reachable(loaded.model, loaded.tasks[0].init[None, :])
+        found = replace(found, reachable=reachable)
     if options.write is not None:
         texts = domain_text(loaded.domain), problem_text(loaded.problems[0], loaded.domain)
         write_texts(fspath(options.write), dict(zip(WRITTEN, texts, strict=True)))
@@ -170,11 +157,11 @@ def show_inspect(found: Inspected, options: InspectOptions) -> None:
     """Print what was understood."""
     if options.write is not None:
         note(f"written to {fspath(options.write)}: {', '.join(WRITTEN)}")
-    note_single_robot(found.inspection.robots)
+    note_single_robot(found.robots)
     echo(json.dumps(found.data()) if options.as_json else found.text(line_width()))
 
 
-def inspection(loaded: PlanningInstance) -> Inspection:
+def inspection(loaded: PlanningInstance) -> Inspected:
     """Inspect a loaded domain and its first problem.
 
     O(pairs of subactions) for the interference count; the work in states is bounded
@@ -189,7 +176,7 @@ def inspection(loaded: PlanningInstance) -> Inspection:
     possible = {atom.predicate for atom in (*model.codec.facts, *model.statics)}
     idle = "where a joint action says so" if model.is_joint_action else "may idle in every step"
     rows = np.concatenate(layers)[:_LOOK_AT]
-    return Inspection(
+    return Inspected(
         domain=domain.name,
         problem=loaded.problems[0].name,
         style=_style(domain),

@@ -90,7 +90,7 @@ class Lifted(Presented):
             ],
         }
 
-    def facts(self) -> dict[str, object]:
+    def summary(self) -> dict[str, object]:
         """Features, the number of words, and the problems on which they were verified."""
         return {
             "features": ", ".join(map(formula, self.language.features)),
@@ -144,6 +144,13 @@ def lift(files: Arguments, options: LiftOptions) -> Lifted:
             progress=say,
             workers=workers,
         )
+    worlds = [own.candidates.loaded for own in every]
+    verified = (
+        Verified(
+            own.name, world_sha256(world.domain, world.problems[0]), own.candidates.kind, *sizes
+        )
+        for own, world, sizes in zip(every, worlds, learned.sizes, strict=True)
+    )
     provenance = provenance_of(first, Guarantee.of("lifted", len(learned.words), 1), {})
     language = LiftedLanguage(
         learned.features,
@@ -153,7 +160,7 @@ def lift(files: Arguments, options: LiftOptions) -> Lifted:
         provenance.domain,
         {key: provenance.model[key] for key in _MODEL if key in provenance.model},
         bool(first.loaded.options.names or first.loaded.options.robot_type),
-        tuple(_verified(own, sizes) for own, sizes in zip(every, learned.sizes, strict=True)),
+        tuple(verified),
         _PRODUCER | {"seed": options.seed},
     )
     return Lifted(language, learned)
@@ -165,7 +172,11 @@ def _instance(
     """A problem; that of a factored folder where none is given."""
     given = {"DOMAIN": arguments.values.get("DOMAIN"), "PROBLEM": problem}
     files = Arguments(options.source, (*given,), given).read()
-    options.require(files.source.model)
+    if files.source.model.slack:
+        raise UsageError(
+            "--slack: words over features are learned from optimal plans",
+            remedy="Build a language of this problem: `coordlang build --slack`.",
+        )
     say(f"finding all optimal plans of {files.problems[0].name}")
     points = read_coordinates_of(options.coordinates, files.problems[0])
     try:
@@ -175,13 +186,6 @@ def _instance(
         error.position = error.position or Position(files.problems[0].source.name)
         raise
     return Instance(candidates, points)
-
-
-def _verified(own: Instance, sizes: tuple[int, int, int]) -> Verified:
-    loaded = own.candidates.loaded
-    return Verified(
-        own.name, world_sha256(loaded.domain, loaded.problems[0]), own.candidates.kind, *sizes
-    )
 
 
 def show_lift(found: Lifted, options: LiftOptions) -> int:

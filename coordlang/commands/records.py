@@ -130,11 +130,6 @@ def json_option() -> Any:
     return cli_option(False, "One JSON object.", names="--json")
 
 
-def form_option(default: str, help: str) -> Any:
-    """The field of an options record for ``--format``."""
-    return cli_option(default, help, names="--format")
-
-
 def output_option(help: str, metavar: str = "FILE", default: Any = None, **more: Any) -> Any:
     """The field ``output`` of an options record for ``-o``; ``-`` is stdout."""
     return cli_option(default, help, metavar, names="-o --output", is_output=True, **more)
@@ -277,7 +272,7 @@ class PlansOptions(
     With --slack B those that take at most B steps more, too.
     """
 
-    form: Literal["ipc", "json"] = form_option("ipc", "How plans are written.")
+    form: Literal["ipc", "json"] = cli_option("ipc", "How plans are written.", names="--format")
     listing: Listing = group(Listing)
     source: Source = group(Source, without="words_see_slack")
 
@@ -415,18 +410,6 @@ class LiftOptions(
     output: str = result_option("The lifted file (.json, .json.gz)", "LIFTED")
     seed: int = option(0, "Seed of all random choices.", least=0)
 
-    def __post_init__(self) -> None:
-        self.require(self.source.model)
-
-    @staticmethod
-    def require(model: ModelOptions) -> None:
-        """Raise `UsageError` for a model whose plans teach nothing: those of `load`, too."""
-        if model.slack:
-            raise UsageError(
-                "--slack: words over features are learned from optimal plans",
-                remedy="Build a language of this problem: `coordlang build --slack`.",
-            )
-
 
 class GroundOptions(
     PlanningOptions,
@@ -471,7 +454,7 @@ class UnderstandOptions(
     """Count, list or sample the optimal plans that a SENTENCE ("w1 w0") leaves open."""
 
     listing: Listing = group(Listing)
-    form: Literal["ipc", "json"] = form_option("ipc", "json: with their graph.")
+    form: Literal["ipc", "json"] = cli_option("ipc", "json: with their graph.", names="--format")
     output: str | None = output_option("Write to this file instead of stdout.")
 
 
@@ -488,7 +471,9 @@ class PlanOptions(
     prefer: str | Sequence[str] = option(
         (), 'shortest, most-plans, first:ROBOT or avoid:"(ATOM)".', "PREFERENCE"
     )
-    form: Literal["ipc", "json", "plansys2"] = form_option("ipc", "How the plan is written.")
+    form: Literal["ipc", "json", "plansys2"] = cli_option(
+        "ipc", "How the plan is written.", names="--format"
+    )
 
 
 class ChoicesOptions(
@@ -504,7 +489,7 @@ class ChoicesOptions(
     """
 
     robot: str | Sequence[str] = option((), "Whose choices; may be repeated (default: all).", "R")
-    form: Literal["text", "json"] = form_option("text", "How they are shown.")
+    form: Literal["text", "json"] = cli_option("text", "How they are shown.", names="--format")
     output: str | None = output_option("Write to this file instead of stdout.")
 
 
@@ -665,12 +650,10 @@ class ImportOptions(
     clearance: float | None = option(
         None, "Robots of a building do not come nearer (default: 0).", "METRES"
     )
-    output: str = cli_option(
-        "",
+    output: str = output_option(
         "The folder for domain.pddl, problem.pddl, coordinates.json.",
         "DIR",
-        names="-o --output",
-        is_output=True,
+        "",
         files=(*WRITTEN, "coordinates.json"),
         required=True,
     )

@@ -73,7 +73,7 @@ class Simulated(Presented):
             "messages": sum(run.messages for run in self.runs),
         }
 
-    def facts(self) -> Mapping[str, object]:
+    def summary(self) -> Mapping[str, object]:
         """What was agreed on, and the `counts`."""
         return {"sentence": self.record.sentence, "step": self.record.step, **self.counts}
 

@@ -150,7 +150,7 @@ class Language(Presented):
 
         write_language(self, fspath(path))
 
-    def facts(self) -> dict[str, object]:
+    def summary(self) -> dict[str, object]:
         """The numbers of words and states, and what is known of them: there may be millions."""
         guarantee = self.guarantee
         return {

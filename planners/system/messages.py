@@ -62,12 +62,12 @@ class Presented:
     __slots__ = ()
     shown: ClassVar[tuple[str, ...]] = ()
 
-    def facts(self) -> Mapping[str, object]:
+    def summary(self) -> Mapping[str, object]:
         """Name -> value, in the order in which they are shown."""
         return {name: getattr(self, name) for name in self.shown}
 
     def __repr__(self) -> str:
-        shown = ", ".join(f"{name}={value!r}" for name, value in self.facts().items())
+        shown = ", ".join(f"{name}={value!r}" for name, value in self.summary().items())
         return f"{type(self).__name__}({shown})"
 
     def _repr_html_(self) -> str:
@@ -75,7 +75,7 @@ class Presented:
 
         rows = [
             f"<tr><td>{escape(name)}</td><td>{escape(_plain(value))}</td></tr>"
-            for name, value in self.facts().items()
+            for name, value in self.summary().items()
         ]
         return "\n".join(["<table>", *rows, "</table>"])
 

@@ -111,7 +111,7 @@ def test_the_table_of_languages(folder: str, row: Row) -> None:
     for method in ("greedy", "minimal"):
         built = build_language(tasks, method)
         guarantee = built.language.guarantee
-        assert built.first_differences.requiring == int(row["requiring coordination"])
+        assert built.job.first_differences.requiring == int(row["requiring coordination"])
         assert guarantee.size == int(row[f"{method} words"])
         assert guarantee.proved_minimal or method == "greedy"
         assert verify(built.language.partition(tasks.model), tasks.spaces).holds

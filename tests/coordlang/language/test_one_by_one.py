@@ -197,7 +197,7 @@ def test_a_language_is_verified_in_the_model_of_the_domain(
     assert "idle" not in json.loads(path.read_text())["model"]
     again = coordlang.build(domain, b, start=path)
     assert again.tasks == 2
-    assert again.first_differences.requiring == 2
+    assert again.job.first_differences.requiring == 2
     assert coordlang.verify(again.language, domain, a, b)
 
 
