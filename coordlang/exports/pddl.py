@@ -41,9 +41,6 @@ from planners.search.plans import Plan
 from planners.system.errors import BadInput, UsageError
 from planners.system.messages import echoed
 
-#: A robot's label in a joint step, by the numbers of both.
-RobotLabel = tuple[int, int]
-
 #: Beyond this many joint actions robots choose one after another.
 MAX_ACTIONS = 2000
 
@@ -92,16 +89,19 @@ class PddlExport:
         task = PlanningTask("task", space.rows[space.state[start]], space.goals[space.goal[start]])
         most = MAX_ACTIONS if limit is None else limit
         plain = compile_classical(model, task, most, longest=max(1, steps or makespan))
-        labels = [_labels(model, plain, action) for action in plain.actions]
         tests = exclusive_terms(task_language)
-        named = _Naming(task_language, words, plain, tests, steps).task(labels)
-        labels += [()] * (len(named.actions) - len(labels))
+        named = _Naming(task_language, words, plain, tests, steps).task()
         if strips_only:
             _require_steps_counted(plain, model)
         named = with_positive_literals(named, only_goal=not strips_only)
         self.domain, self.problem = to_pddl(named, costs=not strips_only)
         self.classical = named
-        self.labels = dict(zip(action_names(named), labels, strict=True))
+        self.labels = {
+            name: tuple(
+                (robot, model.labels[robot].index(text or IDLE)) for robot, text in own.labels
+            )
+            for name, own in zip(action_names(named), named.actions, strict=True)
+        }
         self.cost = plain.step_cost * makespan + second
         self.terms = sum(map(len, tests))
 
@@ -178,33 +178,6 @@ def plan_names(text: str) -> list[str]:
     return names
 
 
-def _labels(
-    model: JointModel, plain: ClassicalTask, action: ClassicalAction
-) -> tuple[RobotLabel, ...]:
-    """The labels that robots take in a plain action, by its name."""
-    if plain.form == "explicit":
-        if action.name == "reach the goal":
-            return ()
-        texts = re.findall(rf"{IDLE}|\([^()]*\)", action.name)
-        return _of_texts(model, [None if text == IDLE else text for text in texts])
-    if not action.name.startswith("choose "):
-        return ()
-    chooser, text = action.name.removeprefix("choose ").split(" ", 1)
-    if model.is_joint_action:
-        return _of_texts(model, next(a.parts for a in model.actions if a.label == text))
-    robot = model.robots.index(chooser)
-    label = model.label_number(robot, None if text == IDLE else text)
-    assert label is not None, action.name
-    return ((robot, label),)
-
-
-def _of_texts(model: JointModel, texts: Sequence[str | None]) -> tuple[RobotLabel, ...]:
-    """The labels of all robots."""
-    numbers = model.numbers(texts)
-    assert numbers is not None, texts
-    return tuple(enumerate(numbers))
-
-
 class _Naming:
     """The plain task in which states are named by their words and the sentence is followed.
 
@@ -240,13 +213,9 @@ class _Naming:
         self.taken = [self.add(f"(taken {n})") for n in range(steps + 1)] if steps else []
         self.init |= {*self.taken[:1]}
 
-    def task(self, labels: Sequence[Sequence[RobotLabel]]) -> ClassicalTask:
-        """The task; ``labels`` are for each action of the plain one those that robots take in it.
-
-        Its actions in their order, then those that name and follow.
-        """
-        taken = zip(self.plain.actions, labels, strict=True)
-        within = [self.within(action, chosen) for action, chosen in taken]
+    def task(self) -> ClassicalTask:
+        """The task: the actions of the plain one, then those that name and follow."""
+        within = map(self.within, self.plain.actions)
         return replace(
             self.plain,
             name=f'under "{self.sentence}"',
@@ -261,7 +230,7 @@ class _Naming:
         self.texts.append(text)
         return len(self.texts) - 1
 
-    def within(self, action: ClassicalAction, labels: Sequence[RobotLabel]) -> ClassicalAction:
+    def within(self, action: ClassicalAction) -> ClassicalAction:
         """An action of the plain task with the new facts.
 
         What ends a step leads to naming, and what is remembered is noted.
@@ -270,13 +239,13 @@ class _Naming:
         if self.explicit:
             conditions.add((self.between, True))
             deletes.add(self.between)
-            adds |= {self.naming} if labels else set()
+            adds |= {self.naming} if action.labels else set()
         elif self.between in adds:
             adds = adds - {self.between} | {self.naming}
             if (self.between, True) in conditions:  # one robot: the step ends as it begins
                 deletes.add(self.between)
-        for robot, label in labels:
-            last = Atom("last", (self.model.robots[robot], self.model.labels[robot][label]))
+        for robot, text in action.labels:
+            last = Atom("last", (self.model.robots[robot], text or IDLE))
             for atom in self.remembered:
                 if atom.args[0] == last.args[0]:
                     (adds if atom == last else deletes).add(self.number[atom])

@@ -29,9 +29,10 @@ def explicit(team: Selectors, model: JointModel, goal: Goal, step_cost: int, lim
     if not limit:
         raise TooManyError
     for step in _joint_steps(team, limit):
+        parts, cost = _parts(team, step), step_cost + team.second_cost(step)
+        name = " ".join(part or "idle" for part in parts)
         for known, adds, deletes in _cases_of(team, model, step):
-            cost = step_cost + team.second_cost(step)
-            out.action(_name(team, step), known, adds, deletes, cost)
+            out.action(name, known, adds, deletes, cost, tuple(enumerate(parts)))
             if len(out.actions) > limit:
                 raise TooManyError
     found = known_literals(wanted := goal_formula(model, goal))
@@ -69,13 +70,11 @@ def _joint_steps(team: Selectors, limit: int) -> list[tuple[int, ...]]:
     return partial
 
 
-def _name(team: Selectors, step: Sequence[int]) -> str:
-    """A joint action by its label tuple, the same for ground actions that do the same."""
+def _parts(team: Selectors, step: Sequence[int]) -> Sequence[str | None]:
+    """What each robot does in a joint action, the same for ground actions that do the same."""
     chosen = {robot: team.actions[n].label for n in step for robot in team.owners[n]}
-    parts = next((team.actions[n].parts for n in step), ()) or [
-        chosen.get(r) for r in range(len(team.names))
-    ]
-    return " ".join(part or "idle" for part in parts)
+    whole = next((team.actions[n].parts for n in step), ())
+    return whole or [chosen.get(robot) for robot in range(len(team.names))]
 
 
 def _cases_of(

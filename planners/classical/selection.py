@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence, Set
 from itertools import pairwise
 
 from planners.classical.selectors import Selectors
-from planners.classical.task import Known
+from planners.classical.task import Known, Labels
 from planners.classical.writer import (
     Writer,
     goal_formula,
@@ -233,6 +233,7 @@ class _SelectThenApply:
         self._all = actions
         self._actions = [action for action in actions if action.literals is not None]
         self._step_cost = step_cost
+        self._parts = {_IDLE: (), **{action.label: action.parts for action in team.actions}}
         #: The facts that it is a robot's turn to select.
         self._choosing = [own_fact("time to choose", name) for name in team.names]
         late = [action for action in self._actions if not action.at_once]
@@ -331,22 +332,23 @@ class _SelectThenApply:
         callers = sorted({own[0] for own in self._team.owners if robot in own} - {robot})
         waiting = {self._waits(caller, robot): caller == first for caller in callers}
         name, known = f"choose {self._team.names[robot]} {label}", {**known, **waiting}
+        whole = tuple(enumerate(self._parts[label]))  # in joint-action PDDL, where one team selects
+        labels = whole or ((robot, None if label == _IDLE else label),)
         cost += self._step_cost if robot == 0 else 0
         here, following = self._choosing[robot], self._choosing[robot + 1 :]
         if following:
             adds |= {_LEFT} if late else set()
-            self._lead(name, known, here, following[0], adds, deletes, cost)
+            self._lead(name, known, here, following[0], adds, deletes, cost, labels)
             return
         if not self._leaves:
-            self._lead(
-                name, known, here, self._first_work if late else self._first, adds, deletes, cost
-            )
+            after = self._first_work if late else self._first
+            self._lead(name, known, here, after, adds, deletes, cost, labels)
             return
         for left in (False, True):
             if known.get(_LEFT, left) == left:
                 own, over = {**known, _LEFT: left}, {_LEFT} if left else set()
                 after = self._first_work if left or late else self._first
-                self._lead(name, own, here, after, adds, deletes | over, cost)
+                self._lead(name, own, here, after, adds, deletes | over, cost, labels)
 
     def _waits(self, caller: int, robot: int) -> Atom:
         """The caller has selected an action that this robot has to select too."""
@@ -366,6 +368,7 @@ class _SelectThenApply:
         adds: Set[Atom] = frozenset(),
         deletes: Set[Atom] = frozenset(),
         cost: int = 0,
+        labels: Labels = (),
     ) -> None:
         """An action from one stage to the next; at the end of a step all of it is forgotten."""
         if after == self._first:
@@ -374,7 +377,8 @@ class _SelectThenApply:
             else:
                 deletes = deletes - self._restored
                 adds = adds | (self._restored - known.keys())
-        self.out.action(name, {**known, here: True}, adds | {after}, deletes | {here}, cost)
+        known = {**known, here: True}
+        self.out.action(name, known, adds | {after}, deletes | {here}, cost, labels)
 
     # -- check, undo, apply
 

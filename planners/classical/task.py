@@ -30,15 +30,23 @@ _RESERVED = frozenset(
 )
 
 
+#: Robots, with what they do in a joint step as text, None where they idle.
+Labels = tuple[tuple[int, str | None], ...]
+
+
 @dataclass(frozen=True, slots=True)
 class ClassicalAction:
-    """A ground STRIPS action with negative preconditions; disjoint ``adds`` and ``deletes``."""
+    """A ground STRIPS action with negative preconditions; disjoint ``adds`` and ``deletes``.
+
+    ``labels`` are those that robots take in it: all robots, one, or none.
+    """
 
     name: str
     preconditions: tuple[Condition, ...]
     adds: tuple[int, ...]
     deletes: tuple[int, ...]
     cost: int
+    labels: Labels = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from planners.classical.task import ClassicalAction, Condition, Known
+from planners.classical.task import ClassicalAction, Condition, Known, Labels
 from planners.joint.model import FullState, Goal, JointModel
 from planners.pddl.formula_tree import GroundLeaf, conjuncts, negated, signed, substituted
 from planners.pddl.lifted import FALSE, And, Atom, Formula, Junction, Not
@@ -35,14 +35,19 @@ class Writer:
         return tuple(sorted((self.fact(atom), value) for atom, value in known.items()))
 
     def action(
-        self, name: str, known: Known, adds: Iterable[Atom], deletes: Iterable[Atom], cost: int = 0
+        self,
+        name: str,
+        known: Known,
+        adds: Iterable[Atom],
+        deletes: Iterable[Atom],
+        cost: int = 0,
+        labels: Labels = (),
     ) -> None:
         """An action; an atom that it both adds and deletes is added."""
         plus = {self.fact(atom) for atom in _ordered(adds)}
         minus = {self.fact(atom) for atom in _ordered(deletes)} - plus
-        new = ClassicalAction(
-            name, self.conditions(known), tuple(sorted(plus)), tuple(sorted(minus)), cost
-        )
+        changes = tuple(sorted(plus)), tuple(sorted(minus))
+        new = ClassicalAction(name, self.conditions(known), *changes, cost, labels)
         if new not in self._seen:
             self._seen.add(new)
             self.actions.append(new)
