@@ -138,7 +138,8 @@ class Cluster:
         except _GONE:
             raise self._gone() from None
         finally:  # jobs that are not begun are dropped; those under way end by themselves, unheard
-            with postponed_signals(), suppress(RuntimeError, *_GONE):
+            # ValueError: a plugin that is not there yet.
+            with postponed_signals(), suppress(RuntimeError, ValueError, *_GONE):
                 executor.shutdown(wait=False)
                 if self.client.status == "running":
                     self.client.unregister_worker_plugin(name)

@@ -183,6 +183,18 @@ def test_a_worker_is_waited_for_and_said(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:no worker")
+def test_the_time_limit_holds_where_no_worker_comes(tmp_path: Path) -> None:
+    with (
+        running_cluster(tmp_path, 0) as cluster,
+        pytest.raises(OutOfTime),
+        time_limit(2),
+        opened(scheduler=str(cluster.file)) as found,
+    ):
+        list(found.tables(batch(jobs.squares, 1, [range(2)])))
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("begun", [True, False])
 def test_a_scheduler_that_goes_is_an_error(begun: bool, tmp_path: Path) -> None:
     def kill() -> None:
