@@ -21,6 +21,7 @@ from coordlang.language.candidates import Candidates
 from coordlang.symmetry.graph import Renaming, joined_order
 from coordlang.symmetry.group import SymmetryGroup, symmetries_of_part
 from coordlang.vocabulary.loop import Budget, Languages, Partitions, Refutation, find
+from coordlang.vocabulary.refuter import Refuter
 from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
 
@@ -55,7 +56,7 @@ class ContainedInstance:
     def languages(self) -> Languages:
         """What is known of its languages."""
         space = self._part.space
-        return Languages([space], self._part.group, len(space.rows), self._seed)
+        return Languages(Refuter([space], self._part.group, len(space.rows), self._seed))
 
     @cached_property
     def _partitions(self) -> Partitions:
@@ -67,7 +68,9 @@ class ContainedInstance:
         partitions, languages = self._partitions, self.languages
         found = find(lambda most: partitions.find(size, most), languages.holds, budget)
         partitions.drop(size)
-        return None if found is not None else Refutation.of(size, languages.known)
+        if found is not None:
+            return None
+        return Refutation(size, languages.evidence, len(languages.clauses))
 
     def close(self) -> None:
         """Give back what the solvers hold."""

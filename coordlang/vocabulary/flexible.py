@@ -104,7 +104,7 @@ class _Search:
         self.table = PlanTable(spaces, states, job.seed, mixtures=False)
         self.best_word = job.word(self.partition)
         self.best = float(self.values(self.best_word, np.arange(len(self.table))).sum())
-        permutations = languages.known.group.permutations
+        permutations = languages.group.permutations
         random = Random(job.seed)
         self._search = LocalSearch(self, job.states, words, permutations, random, work)
         self._search.run(self.best_word, job.progress)

@@ -8,7 +8,7 @@ failing plans left: it is a language.  Work is counted, never timed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -16,7 +16,7 @@ from math import isqrt
 from typing import Generic, TypeVar
 
 from coordlang.language.warping import Clause
-from coordlang.symmetry.group import SymmetryGroup, symmetry_group
+from coordlang.symmetry.group import symmetry_group
 from coordlang.vocabulary.job import Assignment, Evidence, Job, words_of_states
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import (
@@ -28,8 +28,6 @@ from coordlang.vocabulary.sat import (
     without_implied,
 )
 from planners.joint.tables import Ints
-from planners.parallel.workers import Workers
-from planners.search.plan_space import PlanSpace
 from planners.search.sat import SolverName
 
 Requirement = TypeVar("Requirement")
@@ -38,85 +36,47 @@ Requirement = TypeVar("Requirement")
 _GROWTH = 2
 
 
-class NecessaryClauses:
-    """A growing list of necessary clauses with all their images under a group of symmetries.
-
-    ``clauses`` are in the order in which they were met, ``evidence`` says why each is necessary.
-    """
-
-    def __init__(self, group: SymmetryGroup) -> None:
-        self.group = group
-        self.clauses: list[Clause] = []
-        self.evidence: dict[Clause, Evidence] = {}
-
-    def add_all(self, found: Mapping[Clause, Evidence]) -> None:
-        """Add clauses with their images; those that others of them imply are left out."""
-        for clause in without_implied(found):
-            evidence = found[clause]
-            self._add([(clause, evidence)])
-            self._add(
-                (image, replace(evidence, symmetry=symmetry))
-                for image, symmetry in self.group.images(clause)
-            )
-
-    def _add(self, clauses: Iterable[tuple[Clause, Evidence]]) -> None:
-        for clause, evidence in clauses:
-            if clause not in self.evidence:
-                self.evidence[clause] = evidence
-                self.clauses.append(clause)
-
-
 class Languages:
     """Partitions looked at one after another: each is a language, or gives clauses.
 
-    ``spaces`` are the optimal plans of the tasks, over a table of so many ``states``, and ``group``
-    their symmetries; for ``progress``, ``seed`` and ``workers`` see `Job`.  ``known`` are clauses
-    that every language satisfies, ``refuter`` tells what is wrong with a partition, and ``rounds``
-    counts the partitions looked at.
+    ``refuter`` tells what is wrong with a partition.  ``clauses`` are those that every language
+    satisfies, in the order in which they were met and with their images under the symmetries
+    ``group``: a list that only grows.  ``evidence`` says why each is necessary.  ``rounds`` counts
+    the partitions looked at.
     """
 
-    def __init__(
-        self,
-        spaces: Sequence[PlanSpace],
-        group: SymmetryGroup,
-        states: int,
-        seed: int,
-        progress: Callable[[str], None] = lambda _: None,
-        workers: Workers | None = None,
-    ) -> None:
-        self._states = states
-        self.known = NecessaryClauses(group)
-        self.refuter = Refuter(spaces, group, states, seed, progress, workers=workers)
+    def __init__(self, refuter: Refuter) -> None:
+        self.refuter, self.group = refuter, refuter.pool.group
+        self.clauses: list[Clause] = []
+        self.evidence: dict[Clause, Evidence] = {}
         self.rounds = 0
 
     @classmethod
     def of(cls, job: Job) -> Languages:
         """The languages for the candidate tasks of a job."""
-        candidates = job.candidates
-        return cls(
-            candidates.spaces,
-            symmetry_group(candidates),
-            len(candidates.rows),
-            job.seed,
-            job.progress,
-            job.workers,
-        )
-
-    @property
-    def clauses(self) -> list[Clause]:
-        """The clauses known so far, a list that only grows."""
-        return self.known.clauses
+        spaces, states = job.candidates.spaces, len(job.candidates.rows)
+        group = symmetry_group(job.candidates)
+        return cls(Refuter(spaces, group, states, job.seed, job.progress, workers=job.workers))
 
     def word(self, partition: Assignment) -> Ints:
         """(states) the word of each state number; 0 for states that need none."""
-        return words_of_states(partition, self._states)
+        return words_of_states(partition, self.refuter.pool.states)
 
     def holds(self, partition: Assignment) -> bool:
         """Whether it is a language; if not, the clauses that it violates are known afterwards."""
         self.rounds += 1
         violated = self.refuter.violated(self.word(partition))
-        self.known.add_all(violated)
+        for clause in without_implied(violated):
+            evidence = violated[clause]
+            self._add(clause, evidence)
+            for image, symmetry in self.group.images(clause):
+                self._add(image, replace(evidence, symmetry=symmetry))
         return not violated
+
+    def _add(self, clause: Clause, evidence: Evidence) -> None:
+        if clause not in self.evidence:
+            self.evidence[clause] = evidence
+            self.clauses.append(clause)
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,37 +158,42 @@ class _Kept:
 
 
 class ProblemsBySize(Generic[Requirement]):
-    """The partition problem of each number, kept as long as it is undecided.
+    """The partition problem of each number of words, kept as long as it is undecided.
 
     So a solver goes on where it stopped.
 
-    ``start``: makes a problem for a number with all requirements that are known.  ``require``: adds
-    one requirement to a problem.
+    ``known``: the requirements, a list that only grows.  ``start``: makes a problem for a number
+    with all that are known.  ``require``: adds one to a problem.  ``conflicts``: those of the
+    solvers so far.
     """
 
     def __init__(
         self,
-        start: Callable[[int, Sequence[Requirement]], PartitionProblem],
+        known: Sequence[Requirement],
+        start: Callable[[int], PartitionProblem],
         require: Callable[[PartitionProblem, Requirement], None],
     ) -> None:
-        self._start, self._require = start, require
+        self._known, self._start, self._require = known, start, require
         self._kept: dict[int, _Kept] = {}
+        self.conflicts = 0
 
-    def under(self, size: int, requirements: Sequence[Requirement]) -> PartitionProblem:
-        """The problem of a number under all requirements, a list that only grows.
+    def find(self, size: int, conflicts: int) -> dict[int, int] | None:
+        """A partition into ``size`` words, or None if there is none.
 
-        When it has grown much, the problem starts afresh: the order of its states was that of few
-        requirements.
+        Raises `Undecided` after so many ``conflicts`` of the solver.  When the requirements have
+        grown much, the problem starts afresh: the order of its states was that of few.
         """
-        kept = self._kept.get(size)
-        if kept is None or len(requirements) > _GROWTH * kept.at_start:
+        kept, number = self._kept.get(size), len(self._known)
+        if kept is None or number > _GROWTH * kept.at_start:
             self.drop(size)
-            number = len(requirements)
-            kept = self._kept[size] = _Kept(self._start(size, requirements), number, number)
-        for requirement in requirements[kept.known :]:
+            kept = self._kept[size] = _Kept(self._start(size), number, number)
+        for requirement in self._known[kept.known :]:
             self._require(kept.problem, requirement)
-        kept.known = len(requirements)
-        return kept.problem
+        kept.known, before = number, kept.problem.conflicts
+        try:
+            return kept.problem.solve(conflicts)
+        finally:
+            self.conflicts += kept.problem.conflicts - before
 
     def drop(self, size: int) -> None:
         """Forget a number that is decided."""
@@ -265,18 +230,13 @@ class Refutation:
     evidence: Mapping[Clause, Evidence]
     known: int
 
-    @classmethod
-    def of(cls, size: int, known: NecessaryClauses) -> Refutation:
-        """All clauses that are known now refute so many words."""
-        return cls(size, known.evidence, len(known.clauses))
-
     @property
     def clauses(self) -> dict[Clause, Evidence]:
         """The clauses, and why each of them is necessary."""
         return dict(islice(self.evidence.items(), self.known))
 
 
-class Partitions:
+class Partitions(ProblemsBySize[Clause]):
     """Partitions that satisfy all known clauses, by two solvers.
 
     The second one is allowed only one of symmetric partitions: proofs are ten times shorter, but
@@ -284,8 +244,7 @@ class Partitions:
 
     ``states``: the states that need words.  ``clauses``: the known clauses about these states, a
     list that only grows.  ``permutations``: where symmetries take each state; the images of every
-    clause must be clauses.  ``prover``: the second solver.  ``conflicts``: those of the solvers so
-    far.
+    clause must be clauses.  ``prover``: the second solver.
     """
 
     def __init__(
@@ -295,59 +254,30 @@ class Partitions:
         permutations: Sequence[Sequence[int]],
         prover: SolverName = "glucose42",
     ) -> None:
-        self._states, self._clauses, self._permutations = states, clauses, permutations
-        self._prover = prover
-        self.conflicts = 0
-        require = PartitionProblem.separate_one
+        super().__init__(clauses, self._started, PartitionProblem.separate_one)
+        self._states, self._permutations, self._prover = states, permutations, prover
         #: Numbers of words with which partitions are so few that the first solver finds none.
         self._hard: set[int] = set()
-        self._all = ProblemsBySize(self._start, require)
-        self._up_to_symmetry = ProblemsBySize(self._start_up_to_symmetry, require)
 
     def find(self, size: int, conflicts: int) -> dict[int, int] | None:
-        """A partition into ``size`` words, or None if there is none.
-
-        ``size``: the number of words.  ``conflicts``: conflicts of the solver that are allowed.
-        Raises `Undecided` after so many conflicts.
-        """
+        """A partition into ``size`` words, see `ProblemsBySize`."""
         if size not in self._hard:
             with suppress(Undecided):
-                return self._solved(self._all.under(size, self._clauses), _EASY)
+                return super().find(size, _EASY)
             self._hard.add(size)
-            self._all.drop(size)
-        return self._solved(self._up_to_symmetry.under(size, self._clauses), conflicts)
+            self.drop(size)
+        return super().find(size, conflicts)
 
-    def _solved(self, problem: PartitionProblem, conflicts: int) -> dict[int, int] | None:
-        before = problem.conflicts
-        try:
-            return problem.solve(conflicts)
-        finally:
-            self.conflicts += problem.conflicts - before
-
-    def drop(self, size: int) -> None:
-        """Forget a number of words that is decided."""
-        for problems in (self._all, self._up_to_symmetry):
-            problems.drop(size)
-
-    def close(self) -> None:
-        """Give back what the solvers hold."""
-        for problems in (self._all, self._up_to_symmetry):
-            problems.close()
-
-    def _start(
-        self, size: int, known: Sequence[Clause], solver: SolverName = "cadical153"
-    ) -> PartitionProblem:
-        clauses = without_implied(known, _COMPARISONS)
+    def _started(self, size: int) -> PartitionProblem:
+        clauses = without_implied(self._known, _COMPARISONS)
         # States that every language tells apart name their words first: no others are symmetric.
         first = clique(pair for clause in clauses if len(clause) == 1 for pair in clause)
         others = most_constrained_first(set(self._states).difference(first), clauses)
+        solver = self._prover if size in self._hard else "cadical153"
         problem = PartitionProblem([*first, *others], size, solver)
         for clause in clauses:
             problem.separate_one(clause)
-        return problem
-
-    def _start_up_to_symmetry(self, size: int, known: Sequence[Clause]) -> PartitionProblem:
-        problem = self._start(size, known, self._prover)
-        pairs = most_frequent_pairs(known, _COMPARED_PAIRS)
-        problem.add_lex_leaders(self._permutations, pairs)
+        if size in self._hard:
+            pairs = most_frequent_pairs(self._known, _COMPARED_PAIRS)
+            problem.add_lex_leaders(self._permutations, pairs)
         return problem

@@ -11,7 +11,7 @@ docs/concepts.md allows for symmetries.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
 from functools import cached_property
@@ -137,15 +137,15 @@ class MinimalSearch:
     def languages(self) -> Languages:
         """What is known of all languages; collecting the first failing plans takes a while."""
         languages = Languages.of(self._job)
-        self.refuting = Refutation(1, languages.known.evidence, 1)  # any clause refutes one word
+        self.refuting = Refutation(1, languages.evidence, 1)  # any clause refutes one word
         return languages
 
     @cached_property
     def _partitions(self) -> Partitions:
-        known = self.languages.known
+        languages = self.languages
         # Without a common step proofs are long, and longer with Glucose.
         prover: SolverName = "cadical195" if self._is_asynchronous else "glucose42"
-        return Partitions(self._job.states, known.clauses, known.group.permutations, prover)
+        return Partitions(self._job.states, languages.clauses, languages.group.permutations, prover)
 
     @cached_property
     def _tied(self) -> TiedWords:
@@ -155,7 +155,7 @@ class MinimalSearch:
 
     @cached_property
     def _contained(self) -> list[ContainedInstance]:
-        candidates, group = self._job.candidates, self.languages.known.group
+        candidates, group = self._job.candidates, self.languages.group
         if candidates.count == 1:  # it contains itself alone
             return []
         from coordlang.vocabulary.contained import ContainedInstance, parts, tasks_of_one_orbit
@@ -320,25 +320,19 @@ class MinimalSearch:
 
     def _refuted(self, size: int, budget: Budget) -> Refutation | None:
         """That there is no language with so few words; None, and one is offered, if there is."""
-        found = self._find_within(self._partitions.find, size, budget)
+
+        def partition(conflicts: int) -> dict[int, int] | None:
+            if self._is_spent:
+                raise Undecided
+            return self._partitions.find(size, min(conflicts, self._most - self.work))
+
+        found = find(partition, self._holds, budget)
         self._partitions.drop(size)
         if found is None:
-            return Refutation.of(size, self.languages.known)
+            return Refutation(size, self.languages.evidence, len(self.languages.clauses))
         self._offer(found)
         self.merge(_VAIN)
         return None
-
-    def _find_within(
-        self, partition: Callable[[int, int], dict[int, int] | None], size: int, budget: Budget
-    ) -> dict[int, int] | None:
-        """The first language among ``partition (size, conflicts)``, None if there is none."""
-
-        def following(conflicts: int) -> dict[int, int] | None:
-            if self._is_spent:
-                raise Undecided
-            return partition(size, min(conflicts, self._most - self.work))
-
-        return find(following, self._holds, budget)
 
     def _finds_tied(self, size: int, rounds: int) -> bool:
         """Whether a language with so many words is soon found among those of some kinds."""
@@ -373,7 +367,7 @@ class MinimalSearch:
             figures = {
                 "rounds": languages.rounds,
                 "clauses": len(languages.clauses),
-                "symmetries": len(languages.known.group.symmetries),
+                "symmetries": len(languages.group.symmetries),
                 "counterexamples": len(languages.refuter.pool),
                 "walks": languages.refuter.walks,
                 "work": self.work,

@@ -11,7 +11,7 @@ words is then looked for, as `minimal` does.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 
@@ -81,8 +81,8 @@ class _Repair:
         self._changes_bound = 0
         self._new_words_bound = 0
         self._anchors = [-1 - word for word in range(old_words)]
-        self._problems: ProblemsBySize[Clause] = ProblemsBySize(
-            self._start, PartitionProblem.separate_one
+        self._problems = ProblemsBySize(
+            self._languages.clauses, self._start, PartitionProblem.separate_one
         )
 
     def close(self) -> None:
@@ -103,7 +103,7 @@ class _Repair:
             {
                 "rounds": self._languages.rounds,
                 "clauses": len(self._languages.clauses),
-                "symmetries": len(self._languages.known.group.symmetries),
+                "symmetries": len(self._languages.group.symmetries),
             },
             stopped,
         )
@@ -229,7 +229,7 @@ class _Repair:
         size = self._old_words + new_words
 
         def partition(conflicts: int) -> dict[int, int] | None:
-            found = self._problems.under(size, self._languages.clauses).solve(conflicts)
+            found = self._problems.find(size, conflicts)
             return found and {state: found[state] for state in self._job.states}
 
         try:
@@ -243,9 +243,9 @@ class _Repair:
             self._accept(found)
         return True
 
-    def _start(self, size: int, known: Sequence[Clause]) -> PartitionProblem:
+    def _start(self, size: int) -> PartitionProblem:
         """Partitions with the fewest changes; an anchor for each old word fixes its name."""
-        clauses = without_implied(known, _COMPARISONS)
+        clauses = without_implied(self._languages.clauses, _COMPARISONS)
         states = [*self._anchors, *most_constrained_first(self._job.states, clauses)]
         problem = PartitionProblem(states, size)
         for anchor in self._anchors:

@@ -8,7 +8,7 @@ or where they meet, so a sentence can be understood without looking at whole pla
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing
 
 import numpy as np
@@ -17,7 +17,7 @@ from coordlang.language.warping import Clause, Pair, pair
 from coordlang.required.composition_walk import Difference, DifferenceWalk
 from coordlang.symmetry.group import symmetry_group
 from coordlang.vocabulary.greedy import Constraint, alternatives, greedy_partition, separations
-from coordlang.vocabulary.job import Assignment, Job, Outcome
+from coordlang.vocabulary.job import Assignment, Job, Outcome, word_count
 from coordlang.vocabulary.loop import Budget, ProblemsBySize, close_bounds, find
 from coordlang.vocabulary.sat import PartitionProblem, Undecided, clique, most_constrained_first
 from planners.system.limits import run_until_stopped
@@ -34,8 +34,7 @@ def separating(job: Job) -> Outcome:
     ``figures["separating_lower_bound"]`` is the proved bound on separating partitions; other
     languages may have fewer words.  Anytime, like `minimal`.
     """
-    source = _Alpha(job) if job.alpha_only else _AlphaOrBeta(job)
-    with closing(_Search(job, source)) as search:
+    with closing(_Alpha(job) if job.alpha_only else _AlphaOrBeta(job)) as search:
         stopped = run_until_stopped(search.run)
     if search.best is None:
         assert stopped is not None
@@ -43,77 +42,95 @@ def separating(job: Job) -> Outcome:
     return Outcome(search.best, job.lower_bound, search.figures(), stopped)
 
 
-class _Search:
-    """Closes in on the least number of words from below.
+class _Alpha:
+    """Closes in from below on the least number of words that satisfy alpha.
 
-    ``lower`` words are proved to be needed, ``best`` is separating (or the incumbent).
+    All constraints are listed: with two robots they are the edges of a graph to colour.  ``lower``
+    words are proved to be needed, ``best`` is separating (or the incumbent).
     """
 
-    def __init__(self, job: Job, source: _Alpha) -> None:
-        self._job, self._source = job, source
+    def __init__(self, job: Job) -> None:
+        self._job = job
         self.lower = job.lower_bound
         self.best: Assignment | None = job.incumbent
-        self._problems = ProblemsBySize(self._start, PartitionProblem.separate_all_of_one)
+        #: The constraints that are listed, and states that need words of their own.
+        self._known: list[Constraint] = []
+        self._apart: Sequence[int] = ()
+        self._problems = ProblemsBySize(
+            self._known, self._start, PartitionProblem.separate_all_of_one
+        )
         self._rounds = 0
 
     @property
     def upper(self) -> int:
         """The number of words known to suffice."""
-        return len(set(self.best.values())) if self.best is not None else len(self._job.states) + 1
+        return len(self._job.states) + 1 if self.best is None else word_count(self.best)
 
     def run(self) -> None:
         """Close the bounds."""
         if not self._job.first_differences.requiring:
             self.best = dict.fromkeys(self._job.states, 0)
             return
-        self._prepare()
+        partition = self._prepare()
+        if partition is not None and word_count(partition) < self.upper:
+            self._accept(partition)
         close_bounds(lambda: (self.lower, self.upper), self.decide)
 
-    def _prepare(self) -> None:
-        self._source.prepare()
-        self.lower = max(self.lower, len(self._source.apart))
-        partition = self._source.greedy_partition()
-        if partition is not None and len(set(partition.values())) < self.upper:
-            self._job.check(partition)
-            self.best = partition
+    def _prepare(self) -> Assignment | None:
+        """List the constraints; a partition that satisfies them, None if none was found."""
+        states, known = self._job.states, self._known
+        known += separations(self._job.first_differences.listed)
+        edges = {p for c in known if len(c) == 1 for p in c[0]}
+        self._apart = clique(edges)
+        self.lower = max(self.lower, len(self._apart))
+        if all(len(constraint) == 1 for constraint in known):
+            return _dsatur(states, edges)
+        return greedy_partition(most_constrained_first(states, [frozenset(edges)]), known)
 
     def decide(self, size: int, budget: Budget) -> bool:
         """Find a separating partition of a size, or prove that there is none; False: not yet."""
-        known = self._source.known
-        problems = self._problems
 
         def holds(partition: Assignment) -> bool:
             self._rounds += 1
             self._job.progress(
                 f"trying {size} words, {self.lower} to {self.upper} needed: round {self._rounds}, "
-                f"{len(known):,} constraints"
+                f"{len(self._known):,} constraints"
             )
-            broken = self._source.broken(partition)
-            known.extend(broken)
+            broken = self._broken(partition)
+            self._known.extend(broken)
             return not broken
 
         try:
-            partition = find(lambda most: problems.under(size, known).solve(most), holds, budget)
+            partition = find(lambda most: self._problems.find(size, most), holds, budget)
         except Undecided:
             return False
-        problems.drop(size)
+        self._problems.drop(size)
         if partition is None:
             self.lower = size + 1
         else:
-            self._job.check(partition)
-            self.best = partition
+            self._accept(partition)
         return True
 
-    def _start(self, size: int, known: Sequence[Constraint]) -> PartitionProblem:
+    def _accept(self, partition: Assignment) -> None:
+        self._job.check(partition)
+        self.best = partition
+
+    def _broken(self, partition: Assignment) -> list[Constraint]:
+        """Constraints that a partition breaks, none of them known yet; empty: it is separating."""
+        return []
+
+    def _start(self, size: int) -> PartitionProblem:
         # Naming the words of states that need words of their own first leaves fewest symmetries.
-        first = self._source.apart
-        order = _most_constrained_first(self._job.states, known)
-        states = [*first, *(state for state in order if state not in set(first))]
+        states = dict.fromkeys((*self._apart, *self._most_constrained_first()))
         # On these problems quicker than the other solver, by a third and more.
-        problem = PartitionProblem(states, size, "glucose4")
-        for constraint in known:
+        problem = PartitionProblem(list(states), size, "glucose4")
+        for constraint in self._known:
             problem.separate_all_of_one(constraint)
         return problem
+
+    def _most_constrained_first(self) -> list[int]:
+        pairs = (pairs for constraint in self._known for pairs in constraint)
+        return most_constrained_first(self._job.states, pairs)
 
     def close(self) -> None:
         """Give back what the solvers hold."""
@@ -124,51 +141,15 @@ class _Search:
         return {
             "separating_lower_bound": self.lower,
             "rounds": self._rounds,
-            "constraints": len(self._source.known),
-            **self._source.figures(),
+            "constraints": len(self._known),
         }
 
 
-class _Alpha:
-    """The constraints of alpha: all are listed.
-
-    With two robots they are the edges of a graph to colour.  ``known`` are the constraints that are
-    listed, ``apart`` states that need words of their own.
-    """
-
-    def __init__(self, job: Job) -> None:
-        self._job = job
-        self.known: list[Constraint] = []
-        self.apart: Sequence[int] = ()
-        self._edges: set[Pair] = set()
-
-    def prepare(self) -> None:
-        """List the constraints."""
-        self.known = separations(self._job.first_differences.listed)
-        self._edges = {p for c in self.known if len(c) == 1 for p in c[0]}
-        self.apart = clique(self._edges)
-
-    def greedy_partition(self) -> Assignment | None:
-        """A separating partition, None if none was found."""
-        if all(len(constraint) == 1 for constraint in self.known):
-            return _dsatur(self._job.states, self._edges)
-        order = most_constrained_first(self._job.states, [frozenset(self._edges)])
-        return greedy_partition(order, self.known)
-
-    def broken(self, partition: Assignment) -> list[Constraint]:
-        """Constraints that a partition breaks, none of them known yet; empty: it is separating."""
-        return []
-
-    def figures(self) -> Mapping[str, float]:
-        """The work done."""
-        return {}
-
-
 class _AlphaOrBeta(_Alpha):
-    """The constraints of alpha or beta: listed where they are few, so that proofs are short.
+    """The same for alpha or beta; the constraints are listed where they are few.
 
-    Else those that a partition breaks are found by walks, with their images under the model's
-    symmetries.
+    So proofs are short.  Else those that a partition breaks are found by walks, with their images
+    under the model's symmetries.
     """
 
     def __init__(self, job: Job) -> None:
@@ -178,30 +159,23 @@ class _AlphaOrBeta(_Alpha):
         self._permutations: list[list[int]] = []
         self._random = np.random.default_rng(job.seed)
 
-    def prepare(self) -> None:
-        """List the constraints where they are few."""
+    def _prepare(self) -> Assignment | None:
         job = self._job
         self._permutations = symmetry_group(job.candidates).permutations
         job.progress("walking to the last differences")
         self._walks = [DifferenceWalk(space) for space in job.candidates.spaces]
         for walk in self._walks:
             self._met.update(constraints(walk.every(_LISTED) or ()))
-        self.known = sorted(self._met, key=lambda c: [sorted(pairs) for pairs in c])
-
-    def greedy_partition(self) -> Assignment | None:
-        """A separating partition: constraints that the last one broke in, until it breaks none."""
-        states = self._job.states
+        self._known += sorted(self._met, key=lambda c: [sorted(pairs) for pairs in c])
         for _ in range(_GREEDY_ROUNDS):
-            order = _most_constrained_first(states, self.known)
-            partition = greedy_partition(order, self.known)
-            broken = self.broken(partition)
+            partition = greedy_partition(self._most_constrained_first(), self._known)
+            broken = self._broken(partition)
             if not broken:
                 return partition
-            self.known += broken
+            self._known += broken
         return None
 
-    def broken(self, partition: Assignment) -> list[Constraint]:
-        """See `_Alpha`; with the images of what it breaks, as far as they are new."""
+    def _broken(self, partition: Assignment) -> list[Constraint]:
         word = self._job.word(partition)
         return [
             constraint
@@ -220,16 +194,13 @@ class _AlphaOrBeta(_Alpha):
                 self._met.add(image)
                 yield image
 
-    def figures(self) -> Mapping[str, float]:
-        """The work of the walks."""
+    def figures(self) -> dict[str, float]:
+        """The work done, with that of the walks."""
         return {
+            **super().figures(),
             "walk_nodes": sum(walk.nodes for walk in self._walks),
             "walk_edges": sum(walk.edges for walk in self._walks),
         }
-
-
-def _most_constrained_first(states: Sequence[int], known: Sequence[Constraint]) -> list[int]:
-    return most_constrained_first(states, (pairs for constraint in known for pairs in constraint))
 
 
 def constraints(differences: Iterable[tuple[Difference, Difference]]) -> Iterator[Constraint]:

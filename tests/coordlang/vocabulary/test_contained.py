@@ -187,7 +187,7 @@ def test_two_labels_must_not_become_one() -> None:
 
 def proves(candidates: Candidates, instance: ContainedInstance, refuted: int) -> Checked:
     """What all clauses of a part show of the whole."""
-    reasons = [_reason(*known) for known in instance.languages.known.evidence.items()]
+    reasons = [_reason(*known) for known in instance.languages.evidence.items()]
     return check(certificate(candidates, refuted, reasons), candidates)
 
 
@@ -230,7 +230,7 @@ def test_a_forged_symmetry_of_a_part_is_refused() -> None:
     }
     to = np.array(states_under(candidates.spaces[0], forged))
     refused = 0
-    for clause, evidence in list(instance.languages.known.evidence.items())[:20]:
+    for clause, evidence in list(instance.languages.evidence.items())[:20]:
         if evidence.symmetry is None:
             image = frozenset(pair(int(to[a]), int(to[b])) for a, b in clause)
             reason = _reason(image, replace(evidence, symmetry=Symmetry(forged, to)))

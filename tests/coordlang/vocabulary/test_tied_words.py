@@ -74,7 +74,7 @@ def test_what_is_found_is_a_language_of_its_kind(stem: str, least: int) -> None:
         len({(language[s], other) for s, other in zip(job.states, tied, strict=True)})
         == len({*tied})
         for tied in (
-            *(_orbits(np.array(to))[list(job.states)] for to in languages.known.group.permutations),
+            *(_orbits(np.array(to))[list(job.states)] for to in languages.group.permutations),
             *(a[list(job.states)] for a in abstractions(candidates, job.states)),
         )
     ), "the word does not change with the state's image, or an abstraction says the word"
