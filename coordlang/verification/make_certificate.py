@@ -45,16 +45,15 @@ def certify(candidates: Candidates, evidence: Mapping[Clause, Evidence], size: i
 
 def _reason(clause: Clause, evidence: Evidence) -> Reason:
     """The plans behind a clause, from a candidate task's start on, with their warping paths."""
-    space, example, symmetry = evidence.space, evidence.example, evidence.symmetry
+    space, symmetry = evidence.space, evidence.symmetry
     model = space.model
-    start, prefix = way_to(space, example.start)
-    before = space.state[space.nodes_on(start, prefix)[:-1]].tolist()
+    start, prefix = way_to(space, evidence.start)
     init = model.codec.decode(space.rows[space.state[start]])
     goal = split_atoms(goal_text(model, space.goals[space.goal[start]]))
     robots = list(range(space.robots))
-    edges = [[*prefix, *(step[robot] for step in example.edges)] for robot in robots]
+    edges = [[*prefix, *(step[robot] for step in evidence.edges)] for robot in robots]
     plans = [[list(model.texts(space.labels_of(edge))) for edge in own] for own in edges]
-    states = [[*before, *own] for own in example.states]
+    states = [space.state[space.nodes_on(start, own)].tolist() for own in edges]
     if symmetry is not None:
         init, goal = (sorted(map(symmetry.text, texts)) for texts in (init, goal))
         plans = [[list(symmetry.joint_action(model.robots, s)) for s in plan] for plan in plans]

@@ -14,7 +14,9 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby, takewhile
 from random import Random
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +25,7 @@ from coordlang.vocabulary.sat import Undecided
 from coordlang.vocabulary.spoken_choices import NOTHING, SpokenChoices, Words
 from planners.joint.tables import Ints
 from planners.search.edge_index import EdgeTrees
+from planners.search.plan_space import PlanSpace
 
 #: Ways to a failing step that are taken from one node at most, beside the first.
 _RANDOM_WAYS = 40
@@ -34,7 +37,7 @@ _EFFORT = 5
 _Ahead = tuple[tuple[Words, int], ...]
 #: A step that a robot can make: its label, its code, where the robot is then, and all sentences of
 #: plans that go on so, with those words that others have not said yet.
-_Option = tuple[int, Words, tuple[Words, int], int]
+_Option = tuple[int, int, tuple[Words, int], int]
 #: Plans of which a mixture is made, as edges.
 _Plans = tuple[tuple[int, ...], ...]
 #: Draws in a row that bring nothing new, after which a node is left.
@@ -44,98 +47,26 @@ _Failing = tuple[list[list[int]], Words]
 
 
 @dataclass(frozen=True, slots=True)
-class Counterexample:
-    """A failing tuple of plans with one sentence, from a node that they share.
-
-    ``start``: the node of the plan space.  ``edges``: step by step, the edge of each plan.
-    ``states``: the state numbers of each plan, that of ``start`` first.
-    """
-
-    start: int
-    edges: tuple[tuple[int, ...], ...]
-    states: tuple[tuple[int, ...], ...]
-
-
-@dataclass(frozen=True, slots=True)
 class Counterexamples:
-    """Many failing tuples of plans, all with equally many steps.
+    """Failing tuples of plans with one sentence, all with equally many steps.
 
-    ``start``: (tuples) the node that the plans of each share.  ``edges``: (tuples, steps, robots)
-    step by step the edge of each plan.  ``states``: (tuples, robots, steps + 1) the state numbers
-    of each plan.
+    ``start``: (tuples) the node of the plan space that the plans of each share.  ``edges``:
+    (tuples, steps, robots) step by step the edge of each plan.
     """
 
     start: Ints
     edges: Ints
-    states: Ints
 
     def __len__(self) -> int:
         """Count the tuples."""
         return len(self.start)
 
-    def one(self, row: int) -> Counterexample:
-        """One of them."""
-        return Counterexample(
-            int(self.start[row]),
-            tuple(map(tuple, self.edges[row].tolist())),
-            tuple(map(tuple, self.states[row].tolist())),
-        )
-
-    def some(self, rows: Ints) -> Counterexamples:
-        """Those of these rows."""
-        return Counterexamples(self.start[rows], self.edges[rows], self.states[rows])
-
-
-def many_counterexamples(
-    mixtures: Mixtures, word: Ints, most: int, ways: int = 1, steps: int = sys.maxsize
-) -> list[Counterexamples]:
-    """Failing tuples of plans with one sentence, one table for each number of steps.
-
-    For each node that requires coordination, the rest of plans that begin alike; those with fewer
-    steps to go first.
-
-    ``mixtures``: those of the plan space.  ``word``: (nodes) the word of each node of the plan
-    space.  ``most``: about how many are wanted.  If there is none at all, ``word`` is a language
-    for the tasks.  ``ways``: so many times as many are wanted from each node: it stands for so many
-    images.  ``steps``: steps of robots that may be looked at.  Raises `Undecided` after so many
-    steps.
-    """
-    choices, space = mixtures.choices, mixtures.choices.space
-    if not choices.requires[space.starts].any():
-        return []
-    mixtures.say(word, steps)
-    nodes = np.flatnonzero(choices.requires & space.descendants(space.starts)).tolist()
-    random = Random(0)  # always the same ones
-    found: dict[int, list[_Plans]] = {}
-    effort = sys.maxsize
-    for node in nodes:
-        failing = mixtures.failing(node)
-        if failing is not None:
-            found[node] = [mixtures.near_plans(node, failing, random)]
-            effort = min(effort, mixtures.visited + _EFFORT * most)
-        if len(found) >= most or mixtures.visited > effort:
-            break
-    effort = mixtures.visited + _EFFORT * most
-    for node, plans in found.items():
-        if mixtures.visited > effort:
-            break
-        wanted = min(ways * _RANDOM_WAYS, most // len(found) - 1)
-        plans += sorted(mixtures.others(node, wanted, random))
-    by_steps: dict[int, list[tuple[int, _Plans]]] = {}
-    for node, listed in found.items():
-        by_steps.setdefault(int(space.layer[node]), []).extend((node, own) for own in listed)
-    return [_table(choices, by_steps[steps]) for steps in sorted(by_steps)]
-
-
-def _table(choices: Choices, found: Sequence[tuple[int, _Plans]]) -> Counterexamples:
-    """Tuples as a table: the node of each, and the edges of its plans."""
-    space = choices.space
-    start = np.array([node for node, _ in found], np.int64)
-    edges = np.array([plans for _, plans in found], np.int64)  # tuples, robots, steps
-    states = np.empty((*edges.shape[:2], edges.shape[2] + 1), np.int64)
-    states[:, :, 0] = space.state[start][:, None]
-    states[:, :, 1:] = space.state[space.targets(edges)]
-    return Counterexamples(start, edges.transpose(0, 2, 1), states)
+    def states(self, space: PlanSpace) -> Ints:
+        """(tuples, robots, steps + 1) the state numbers of each plan, that of ``start`` first."""
+        first = np.repeat(self.start[:, None, None], space.robots, axis=1)
+        following = space.targets(self.edges).transpose(0, 2, 1)
+        states: Ints = space.state[np.concatenate((first, following), axis=2)]
+        return states
 
 
 class Mixtures:
@@ -155,23 +86,56 @@ class Mixtures:
         self._safe: set[tuple[int, _Ahead]] = set()
         self._shared: dict[_Ahead, tuple[Words, int]] = {}
         self._options: dict[tuple[Words, int], list[_Option]] = {}
-        #: How often the next steps of a mixture were looked at.
-        self.visited = 0
-        self._steps_left = sys.maxsize
 
-    @property
-    def choices(self) -> Choices:
-        """The robots' choices without words."""
-        return self._choices
+    def failing(
+        self, word: Ints, most: int, ways: int = 1, steps: int = sys.maxsize
+    ) -> list[Counterexamples]:
+        """Failing tuples of plans with one sentence, one table for each number of steps.
 
-    def say(self, word: Ints, steps: int = sys.maxsize) -> None:
-        """Set the word of each node (nodes), and how many steps of robots may be looked at."""
+        For each node that requires coordination, the rest of plans that begin alike; those with
+        fewer steps to go first.
+
+        ``word``: (nodes) the word of each node of the plan space.  ``most``: about how many are
+        wanted.  If there is none at all, ``word`` is a language for the tasks.  ``ways``: so many
+        times as many are wanted from each node: it stands for so many images.  ``steps``: steps of
+        robots that may be looked at.  Raises `Undecided` after so many steps.
+        """
+        requires, space = self._choices.requires, self._space
+        if not requires[space.starts].any():
+            return []
         if len(self._shared) + len(self._safe) + len(self._options) + len(self._spoken) > _KEPT:
             self._forget()
         self._spoken.say(word)
-        self.visited, self._steps_left = 0, steps
+        #: How often the next steps of a mixture were looked at, and steps of robots that may be.
+        self._visited, self._steps_left = 0, steps
+        random = Random(0)  # always the same ones
+        found: dict[int, list[_Plans]] = {}
+        effort = sys.maxsize
+        for node in np.flatnonzero(requires & space.descendants(space.starts)).tolist():
+            failing = self._of_node(node)
+            if failing is not None:
+                found[node] = [self._near_plans(node, failing, random)]
+                effort = min(effort, self._visited + _EFFORT * most)
+            if len(found) >= most or self._visited > effort:
+                break
+        effort = self._visited + _EFFORT * most
+        for node, plans in found.items():
+            if self._visited > effort:
+                break
+            wanted = min(ways * _RANDOM_WAYS, most // len(found) - 1)
+            plans += sorted(self._others(node, wanted, random))
+        return [
+            self._table([(node, plans) for node in nodes for plans in found[node]])
+            for _, nodes in groupby(found, key=lambda node: int(space.layer[node]))
+        ]
 
-    def failing(self, node: int, random: Random | None = None) -> _Failing | None:
+    def _table(self, found: Sequence[tuple[int, _Plans]]) -> Counterexamples:
+        """Tuples as a table: the node of each, and the edges of its plans."""
+        start = np.array([node for node, _ in found], np.int64)
+        edges = np.array([plans for _, plans in found], np.int64)  # tuples, robots, steps
+        return Counterexamples(start, edges.transpose(0, 2, 1))
+
+    def _of_node(self, node: int, random: Random | None = None) -> _Failing | None:
         """A mixture of plans from a node that fails while all of them have one sentence.
 
         The first one, found soon as many nodes lead to the same mixtures, or one that is drawn.
@@ -210,11 +174,12 @@ class Mixtures:
 
     def _after_step(self, node: int, ahead: _Ahead, random: Random | None) -> _Failing | None:
         """The mixture that fails after one of the next steps, or by it."""
-        self.visited += 1
-        for codes, following, target in self._moves(node, ahead, random):
+        self._visited += 1
+        for codes, following, target in self._moves(self._edges.of(node), ahead, random):
             if target is None:
-                return [[*own] for own in codes], self._one_sentence(following, random)
-            said = len(_begin([words for words, _ in following]))
+                return codes, self._one_sentence(following, random)
+            together = zip(*(words for words, _ in following), strict=False)
+            said = len(list(takewhile(lambda words: len(set(words)) == 1, together)))
             below = tuple((words[said:], own) for words, own in following)
             found = self._failing(target, below, random)
             if found is not None:
@@ -224,45 +189,37 @@ class Mixtures:
         return None
 
     def _moves(
-        self, node: int, ahead: _Ahead, random: Random | None
-    ) -> Iterator[tuple[list[Words], _Ahead, int | None]]:
+        self,
+        edges: dict[int, Any],
+        ahead: _Ahead,
+        random: Random | None,
+        chosen: tuple[_Option, ...] = (),
+        left: int = -1,
+    ) -> Iterator[tuple[list[list[int]], _Ahead, int | None]]:
         """Steps of the mixture after which the robots have a sentence in common.
 
         Before them each can say what all can say: only robots that have made theirs restrict it.
 
-        Each robot's code, where they are then, and the node that the mixture reaches: None where it
-        fails, whatever robots do that have no code yet.
+        ``edges``: those of the node with the steps ``chosen`` so far, which leave the sentences
+        ``left``.  Each robot's code, where they are then, and the node that the mixture reaches:
+        None where it fails, whatever robots do that have no code yet.
         """
-        robots, words = len(ahead), self._spoken.words
-
-        def drawn(robot: int) -> Iterator[_Option]:
-            options = self._options_of(ahead[robot])
-            return iter(options if random is None else random.sample(options, len(options)))
-
-        chosen: list[_Option] = []
-        open_steps = [(drawn(0), -1, self._edges.of(node))]
-        while open_steps:
-            options, left, prefixes = open_steps[-1]
-            robot = len(open_steps) - 1
-            del chosen[robot:]
-            option = next(options, None)
-            if option is None:
-                open_steps.pop()
-                continue
+        options = self._options_of(ahead[len(chosen)])
+        for option in options if random is None else random.sample(options, len(options)):
             self._steps_left -= 1
             if self._steps_left < 0:
                 raise Undecided
             label, _, _, said = option
-            left = said if left < 0 else words.common(left, said)
-            if left == NOTHING:
+            common = said if left < 0 else self._spoken.words.common(left, said)
+            if common == NOTHING:
                 continue
-            chosen.append(option)
-            below = prefixes.get(label)
-            if below is None or len(chosen) == robots:
-                codes = [code for _, code, _, _ in chosen] + [()] * (robots - len(chosen))
-                yield codes, (*(at for _, _, at, _ in chosen), *ahead[len(chosen) :]), below
-            else:
-                open_steps.append((drawn(robot + 1), left, below))
+            now, below = (*chosen, option), edges.get(label)
+            if below is not None and len(now) < len(ahead):
+                yield from self._moves(below, ahead, random, now, common)
+                continue
+            codes = [[code] for _, code, _, _ in now]
+            codes += [[] for _ in ahead[len(now) :]]
+            yield codes, (*(at for _, _, at, _ in now), *ahead[len(now) :]), below
 
     def _options_of(self, ahead: tuple[Words, int]) -> list[_Option]:
         """The next steps of a robot that has said some words and has a set."""
@@ -270,11 +227,10 @@ class Mixtures:
         if known is None:
             spoken, (words, own) = self._spoken, ahead
             known = self._options[ahead] = []
-            for step in spoken.steps(own):
-                label, entered, after = step
+            for code, label, entered, after in spoken.steps(own):
                 said = words + entered
                 sentences = spoken.words.before(said, spoken.sentences(after))
-                known.append((label, (spoken.code_of(step),), (said, after), sentences))
+                known.append((label, code, (said, after), sentences))
         return known
 
     def _common(self, ahead: _Ahead) -> tuple[Words, int]:
@@ -298,7 +254,7 @@ class Mixtures:
 
     # ---- plans of a mixture
 
-    def near_plans(self, node: int, failing: _Failing, random: Random) -> _Plans:
+    def _near_plans(self, node: int, failing: _Failing, random: Random) -> _Plans:
         """Plans of which a failing mixture is made, near to each other.
 
         Each is made to go where the one before goes as far as it can, and then the first one where
@@ -310,12 +266,12 @@ class Mixtures:
             plans.append(self._plan(node, robot, codes[robot], sentence, plans[-1], random))
         return (plans[-1], *plans[2:-1])
 
-    def others(self, node: int, most: int, random: Random) -> set[_Plans]:
+    def _others(self, node: int, most: int, random: Random) -> set[_Plans]:
         """More plans of mixtures from a node of which one fails, drawn at random."""
         found: set[_Plans] = set()
         familiar = 0
         while len(found) < most and familiar < _FAMILIAR:
-            failing = self.failing(node, random)
+            failing = self._of_node(node, random)
             assert failing is not None, "some mixture fails"
             codes, said = failing
             plans = tuple(
@@ -363,11 +319,3 @@ class Mixtures:
         said = tuple(word for code in codes for word in spoken.entered_by(code))
         rest = sentence[len(said) :]
         return sentence[: len(said)] == said and spoken.words.has(spoken.sentences(after), rest)
-
-
-def _begin(said: Sequence[Words]) -> Words:
-    """The words with which all of them begin."""
-    shared = min(said, key=len)
-    while any(words[: len(shared)] != shared for words in said):
-        shared = shared[:-1]
-    return shared

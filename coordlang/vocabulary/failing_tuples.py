@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
@@ -48,77 +48,45 @@ class Agreeing:
     rows: Ints
 
 
-@dataclass(frozen=True, slots=True)
-class _Table:
-    """Tuples of one length: ``states`` (tuples, robots, length), and where each comes from.
-
-    ``by_step``: (length, robots, tuples) the states: what is looked at together lies together.
-    ``source``: (tuples, 2) the number of a batch and the row in it.
-    """
-
-    states: Ints
-    by_step: Ints
-    source: Ints
-
-    @classmethod
-    def of(cls, states: Ints, source: Ints) -> _Table:
-        """The table of some tuples."""
-        return cls(states, np.ascontiguousarray(states.transpose(2, 1, 0)), source)
-
-
-@dataclass(slots=True)
 class FailingTuples:
     """A pool of failing tuples, closed under a group of symmetries.
 
     ``group``: the symmetries of the tasks.  ``states``: the number of states in the table of
-    states.
+    states.  ``images``: where the identity and each symmetry take every state.  ``by_length``: the
+    states (length, robots, tuples) of the tuples of each length, old ones first: what is looked at
+    together lies together.
     """
 
-    group: SymmetryGroup
-    states: int
-    _tables: dict[int, _Table] = field(default_factory=dict)
-    _batches: list[tuple[PlanSpace, Counterexamples]] = field(default_factory=list)
-    _keys: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    _images: list[Ints] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        self._images = [np.arange(self.states), *(s.states for s in self.group.symmetries)]
+    def __init__(self, group: SymmetryGroup, states: int) -> None:
+        self.group, self.states = group, states
+        self.images: list[Ints] = [np.arange(states), *(s.states for s in group.symmetries)]
+        self.by_length: dict[int, Ints] = {}
+        #: Where the tuples of each length come from (tuples, 2): number of a batch, row in it.
+        self._sources: dict[int, Ints] = {}
+        self._batches: list[tuple[PlanSpace, Counterexamples]] = []
+        self._keys = np.zeros(0, np.int64)
 
     def __len__(self) -> int:
         """Count the tuples, one for all their images."""
-        return sum(len(table.states) for table in self._tables.values())
-
-    @property
-    def images(self) -> Sequence[Ints]:
-        """Where the identity and each symmetry take every state."""
-        return self._images
-
-    def by_length(self) -> Iterator[tuple[int, Ints]]:
-        """Each length with the states (length, robots, tuples) of its tuples, old ones first."""
-        for length, table in sorted(self._tables.items()):
-            yield length, table.by_step
-
-    def numbers(self) -> dict[int, int]:
-        """How many tuples there are of each length."""
-        return {length: len(table.states) for length, table in self._tables.items()}
+        return sum(by_step.shape[2] for by_step in self.by_length.values())
 
     def add(self, found: Counterexamples, space: PlanSpace) -> int:
         """Add failing tuples of plans; how many of them are new."""
-        low, high = _different_part(found.states)
-        batch: list[Ints] = []
-        kept = 0
+        states = found.states(space)
+        low, high = _different_part(states)
+        batch, kept = [np.zeros(0, np.int64)], 0
         for length in np.unique(high - low).tolist():
             rows = np.flatnonzero(high - low == length)
             cells = low[rows, None] + np.arange(length)
-            states = np.take_along_axis(found.states[rows], cells[:, None, :], axis=2)
-            fresh = self._new(states)
+            different = np.take_along_axis(states[rows], cells[:, None, :], axis=2)
+            fresh = self._new(different)
             here = np.arange(kept, kept + len(fresh))
             kept += len(fresh)
             batch.append(rows[fresh])
             source = np.column_stack((np.full(len(fresh), len(self._batches)), here))
-            self._append(length, states[fresh], source)
-        if kept:
-            self._batches.append((space, found.some(np.concatenate(batch))))
+            self._append(length, different[fresh], source)
+        rows = np.concatenate(batch)
+        self._batches.append((space, Counterexamples(found.start[rows], found.edges[rows])))
         return kept
 
     def agreeing(
@@ -131,11 +99,11 @@ class FailingTuples:
         so many.
         """
         found: list[Agreeing] = []
-        for length, table in sorted(self._tables.items()):
+        for length, by_step in sorted(self.by_length.items()):
             if sum(len(shorter.rows) for shorter in found) >= enough:
                 break
-            for to in self._images if images is None else images:
-                rows = np.flatnonzero(agree(word[to], table.by_step))
+            for to in self.images if images is None else images:
+                rows = np.flatnonzero(agree(word[to], by_step))
                 if len(rows):
                     found.append(Agreeing(length, to, rows))
         return found
@@ -168,7 +136,7 @@ class FailingTuples:
 
     def sequences(self, agreeing: Agreeing, rows: Ints) -> Ints:
         """The state sequences (rows, robots, length) of images of tuples."""
-        found: Ints = agreeing.to[self._tables[agreeing.length].states[rows]]
+        found: Ints = agreeing.to[self.by_length[agreeing.length][:, :, rows].transpose(2, 1, 0)]
         return found
 
     def clauses(
@@ -179,7 +147,7 @@ class FailingTuples:
         They are those of the tuples that are kept; the images of each are necessary as well, and
         it is one of these images that the partition violates.
         """
-        returned = max(_LEAST, _RETURNED // len(self._images))
+        returned = max(_LEAST, _RETURNED // len(self.images))
         most = _WARPED * returned
         total = sum(len(found.rows) for found in agreeing)
         clauses: dict[Clause, tuple[int, int]] = {}
@@ -191,23 +159,22 @@ class FailingTuples:
             if share < len(rows):
                 drawn = random.permutation(len(rows))[:share]
                 rows, image = rows[drawn], image[drawn]
-            table = self._tables[length]
             words = np.stack([word[found.to] for found in groups])
-            states = table.states[rows]
+            states = self.by_length[length][:, :, rows].transpose(2, 1, 0)
             for row, clause in _clauses(states, words[image[:, None, None], states], self.states):
-                batch, number = table.source[rows[row]].tolist()
+                batch, number = self._sources[length][rows[row]].tolist()
                 clauses.setdefault(clause, (batch, number))
         chosen = sorted(clauses, key=lambda c: (len(c), sorted(c)))[:returned]
         return {clause: self._evidence(*clauses[clause]) for clause in chosen}
 
     def _evidence(self, batch: int, row: int) -> Evidence:
         space, found = self._batches[batch]
-        return Evidence(space, found.one(row), None)
+        return Evidence(space, int(found.start[row]), found.edges[row].tolist(), None)
 
     def _new(self, states: Ints) -> Ints:
         """The rows that no earlier row, and no tuple that is kept, is an image of."""
         keys = np.full(len(states), np.iinfo(np.int64).max)
-        for to in self._images:
+        for to in self.images:
             np.minimum(keys, _keys(to[states]), out=keys)
         keys, first = np.unique(keys, return_index=True)
         fresh = ~np.isin(keys, self._keys, assume_unique=True)
@@ -217,10 +184,11 @@ class FailingTuples:
     def _append(self, length: int, states: Ints, source: Ints) -> None:
         if not len(states):
             return
-        if (known := self._tables.get(length)) is not None:
-            states = np.concatenate((known.states, states))
-            source = np.concatenate((known.source, source))
-        self._tables[length] = _Table.of(states, source)
+        by_step = states.transpose(2, 1, 0)
+        if length in self.by_length:
+            by_step = np.concatenate((self.by_length[length], by_step), axis=2)
+            source = np.concatenate((self._sources[length], source))
+        self.by_length[length], self._sources[length] = np.ascontiguousarray(by_step), source
 
 
 def _different_part(states: Ints) -> tuple[Ints, Ints]:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,6 @@ import numpy as np
 from coordlang.language.candidates import Candidates
 from coordlang.language.warping import Clause
 from coordlang.symmetry.group import Symmetry
-from coordlang.vocabulary.counterexamples import Counterexample
 from coordlang.vocabulary.first_differences import FirstDifferences
 from planners.joint.tables import Ints
 from planners.parallel.workers import Workers
@@ -86,12 +85,14 @@ class Job:
 class Evidence:
     """Why a clause is necessary.
 
-    ``space``: the plan space of the plans.  ``example``: plans whose mixture fails.  ``symmetry``:
-    the clause is that of the plans' images under it; None: of the plans themselves.
+    There are plans whose mixture fails, from the node ``start`` of a ``space`` on; ``edges`` are
+    step by step the edge of each plan.  ``symmetry``: the clause is that of the plans' images under
+    it; None: of the plans themselves.
     """
 
     space: PlanSpace
-    example: Counterexample
+    start: int
+    edges: Sequence[Sequence[int]]
     symmetry: Symmetry | None
 
 

@@ -54,7 +54,7 @@ def merged(
                 return
             closed, left, steps = forbidden_merges(pool, word), False, 2 * steps
             continue
-        known = pool.numbers()
+        known = {length: own.shape[2] for length, own in pool.by_length.items()}
         try:
             holds = not refuter.agreeing(trial, None, 1, steps)
         except Undecided:
@@ -80,7 +80,7 @@ def forbidden_merges(
     ``known`` says how many tuples of each length are not asked.
     """
     forbidden = np.eye(int(word.max()) + 1, dtype=np.bool_)
-    for length, by_step in pool.by_length():
+    for length, by_step in sorted(pool.by_length.items()):
         for first in range(known.get(length, 0), by_step.shape[2], _TOGETHER):
             some = by_step[:, :, first : first + _TOGETHER]
             for to in pool.images:

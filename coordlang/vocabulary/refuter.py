@@ -18,7 +18,7 @@ from coordlang.language.warping import Clause
 from coordlang.required.choices import Choices
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.counterexample_walk import CounterexampleWalk
-from coordlang.vocabulary.counterexamples import Counterexamples, Mixtures, many_counterexamples
+from coordlang.vocabulary.counterexamples import Counterexamples, Mixtures
 from coordlang.vocabulary.failing_tuples import Agreeing, FailingTuples
 from coordlang.vocabulary.job import Evidence
 from planners.joint.model import FullState
@@ -33,11 +33,9 @@ _LEAST_PARTS = 8
 _TASKS_OF_A_PART = 1_500
 #: Failing tuples of a part that are collected at the beginning, and later at a time.
 _AT_FIRST, _LATER = 4_000, 100
-#: So many failing tuples are always wanted of a walk, which finds many in one go.
-_OF_WALK = 20_000
 #: Longer tuples are left out of what is looked at once there are so many.
 _ENOUGH = 2_000
-_COLUMNS = ("start", "edges", "states")
+_COLUMNS = ("start", "edges")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,15 +59,8 @@ class _Walked:
         return cls(part, kind(Choices(part)), images)
 
     def failing(self, word: Ints, most: int, steps: int = sys.maxsize) -> list[Counterexamples]:
-        """Failing tuples of plans with one sentence, about ``most``, as tables.
-
-        None only if ``word`` (states) is a language for these tasks.  Raises `Undecided` after so
-        many steps of robots, where sets are searched.
-        """
-        nodes, ways = word[self.space.state], len(self.images)
-        if isinstance(self.finder, CounterexampleWalk):
-            return self.finder.failing(nodes, max(most, _OF_WALK), ways)
-        return many_counterexamples(self.finder, nodes, most, ways, steps)
+        """Failing tuples of plans by the word of each state (states), see `Mixtures.failing`."""
+        return self.finder.failing(word[self.space.state], most, len(self.images), steps)
 
     @property
     def effort(self) -> float:

@@ -81,8 +81,8 @@ class SentenceSets(LabelSets):
         return _MARK in self.moves(self.after(sentence, number))
 
 
-#: One step of a robot: its label, the word that is entered, if one is, and the set of what follows.
-Step = tuple[int, Words, int]
+#: A step of a robot: its code, its label, the word that is entered, if any, and what may follow.
+Step = tuple[int, int, Words, int]
 
 
 class SpokenChoices:
@@ -158,7 +158,7 @@ class SpokenChoices:
         if found is None:
             found = self._steps[number] = []
             for code, after in self._sets.moves(number).items():
-                found.append((code // self._spoken, self.entered_by(code), after))
+                found.append((code, code // self._spoken, self.entered_by(code), after))
         return found
 
     def after(self, number: int, codes: list[int]) -> int | None:
@@ -175,17 +175,12 @@ class SpokenChoices:
         entered = code % self._spoken
         return (entered - 1,) if entered else ()
 
-    def code_of(self, step: Step) -> int:
-        """`code` of a step."""
-        label, entered, _ = step
-        return label * self._spoken + (entered[0] + 1 if entered else 0)
-
     def label_set(self, number: int) -> int:
         """The label sequences of a set, without what is said, in the sets of the choices."""
         known = self._projection.get(number)
         if known is None:
             moves: dict[int, int] = {}
-            for label, _, after in self.steps(number):
+            for _, label, _, after in self.steps(number):
                 below = self.label_set(after)
                 moves[label] = self._choices.sets.union(moves.get(label, below), below)
             known = self._projection[number] = self._choices.sets.of_moves(moves)
@@ -196,7 +191,7 @@ class SpokenChoices:
         known = self._sentences.get(number)
         if known is None:
             known = NOTHING
-            for _, entered, after in self.steps(number):
+            for _, _, entered, after in self.steps(number):
                 said = self.words.before(entered, self.sentences(after))
                 known = self.words.union(known, said)
             self._sentences[number] = known
@@ -210,12 +205,11 @@ class SpokenChoices:
         known = self._saying.get(key)
         if known is None:
             moves = {}
-            for step in self.steps(number):
-                _, entered, after = step
+            for code, _, entered, after in self.steps(number):
                 said = self.words.common(
                     self.words.after(entered, sentences), self.sentences(after)
                 )
                 if said != NOTHING:
-                    moves[self.code_of(step)] = self.saying(after, said)
+                    moves[code] = self.saying(after, said)
             known = self._saying[key] = self._sets.of_moves(moves)
         return known

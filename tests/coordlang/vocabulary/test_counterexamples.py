@@ -16,7 +16,7 @@ from coordlang.language.sentences import sentence
 from coordlang.required.choices import Choices
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.vocabulary.counterexample_walk import CounterexampleWalk
-from coordlang.vocabulary.counterexamples import Counterexample, Mixtures, many_counterexamples
+from coordlang.vocabulary.counterexamples import Mixtures
 from coordlang.vocabulary.failing_tuples import FailingTuples
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import BadInput, ProvedImpossible, UsageError
@@ -55,30 +55,29 @@ def compared(spaces: Iterator[PlanSpace], random: Random) -> Counter[bool]:
             except naive.TooLarge:
                 break
             nodes = np.array(word)[space.state]
-            found = many_counterexamples(mixtures, nodes, 20)
+            found = mixtures.failing(nodes, 20)
             if space.robots == 2:
                 assert bool(walk.failing(nodes, 20)) != holds
                 found += walk.failing(nodes, 20)
             assert bool(found) != holds
             for table in found:
                 for row in range(len(table)):
-                    check(space, table.one(row), word)
+                    check(space, int(table.start[row]), table.edges[row].tolist(), word)
             answers[holds] += 1
     return answers
 
 
-def check(space: PlanSpace, example: Counterexample, word: list[int]) -> None:
+def check(space: PlanSpace, start: int, steps: list[list[int]], word: list[int]) -> None:
     """They are plans from one node with one sentence, and their mixture is none."""
     sentences = set()
-    for edges, states in zip(zip(*example.edges, strict=True), example.states, strict=True):
-        nodes = space.nodes_on(example.start, edges)
+    for edges in zip(*steps, strict=True):
+        nodes = space.nodes_on(start, edges)
         assert all(edge in space.out_edges(node) for node, edge in zip(nodes, edges, strict=False))
         assert space.layer[nodes[-1]] == 0
-        assert tuple(space.state[nodes].tolist()) == states
-        sentences.add(naive.sentence([word[state] for state in states]))
+        sentences.add(naive.sentence([word[state] for state in space.state[nodes].tolist()]))
     assert len(sentences) == 1
-    mixed = [[space.labels_of(e)[r] for r, e in enumerate(step)] for step in example.edges]
-    assert space.path_with(example.start, mixed) is None
+    mixed = [[space.labels_of(e)[r] for r, e in enumerate(step)] for step in steps]
+    assert space.path_with(start, mixed) is None
 
 
 @pytest.mark.parametrize(("robots", "seeds"), runs(50, 15, 15))
@@ -96,12 +95,12 @@ def test_plans_within_slack_are_refuted_like_optimal_ones() -> None:
 def filled(space: PlanSpace, group: SymmetryGroup) -> tuple[FailingTuples, list[list[list[int]]]]:
     """A pool with the failing plans of a plan space, and the sequences of states of all of them."""
     silence = np.zeros(len(space), np.int64)
-    found = many_counterexamples(Mixtures(Choices(space)), silence, 300)
+    found = Mixtures(Choices(space)).failing(silence, 300)
     pool = FailingTuples(group, len(space.rows))
     new = sum([pool.add(table, space) for table in found])
     assert new == len(pool)
     assert sum([pool.add(table, space) for table in found]) == 0, "known by now"
-    return pool, [plans for table in found for plans in table.states.tolist()]
+    return pool, [plans for table in found for plans in table.states(space).tolist()]
 
 
 def has_one_sentence(plans: list[list[int]], word: list[int]) -> bool:
@@ -127,7 +126,10 @@ def test_tuples_agree_iff_their_plans_have_one_sentence(robots: int | None, seed
             shortest = [n for n in lengths if n]
             for clause, evidence in clauses.items():
                 assert all(word[a] == word[b] for a, b in clause)
-                assert has_one_sentence([list(s) for s in evidence.example.states], word)
+                plans = [
+                    space.nodes_on(evidence.start, e) for e in zip(*evidence.edges, strict=True)
+                ]
+                assert has_one_sentence([space.state[plan].tolist() for plan in plans], word)
             if clauses:
                 assert min(map(len, clauses)) == shortest[0]
             answers[bool(agreeing)] += 1
