@@ -22,7 +22,7 @@ import numpy as np
 
 from coordlang.language.candidates import Candidates
 from planners.joint.model import JointModel
-from planners.joint.tables import Bools, Ints
+from planners.joint.tables import Bools, Ints, unique_rows
 from planners.search.state_variables import StateVariable, state_variables
 
 #: Variables that are looked at, and values of one for which distances are taken, at most.
@@ -113,11 +113,10 @@ def abstractions(candidates: Candidates, states: Sequence[int]) -> list[Ints]:
     mine = np.array(states)
     found: dict[bytes, Ints] = {}
     for columns in _chosen(variables):
-        classes = _numbered(columns)
-        here = _numbered(classes[None, mine])
-        if 0 < here.max() < len(mine) - 1:
-            found.setdefault(here.tobytes(), classes)
-    return sorted(found.values(), key=lambda classes: int(classes[mine].max()))
+        classes = unique_rows(np.column_stack(columns).astype(np.int64) + 1)[1]
+        if 1 < len(np.unique(classes[mine])) < len(mine):
+            found.setdefault(_as_key(classes[mine]), classes)
+    return sorted(found.values(), key=lambda classes: len(np.unique(classes[mine])))
 
 
 def up_to_symmetry(classes: Sequence[Ints], images: Sequence[Ints]) -> list[Ints]:
@@ -129,9 +128,9 @@ def up_to_symmetry(classes: Sequence[Ints], images: Sequence[Ints]) -> list[Ints
     met: set[bytes] = set()
     chosen = []
     for abstract in classes:
-        if _numbered(abstract[None]).tobytes() not in met:
+        if _as_key(abstract) not in met:
             chosen.append(abstract)
-            met.update(_numbered(abstract[None, to]).tobytes() for to in images)
+            met.update(_as_key(abstract[to]) for to in images)
     return chosen
 
 
@@ -175,14 +174,7 @@ def _seen_from(
     yield [*base, *(np.where(close, at, -1) for close, at in zip(near, seen, strict=True))]
 
 
-def _numbered(columns: Sequence[Ints | Bools] | Ints | Bools) -> Ints:
-    """(n) a number for each position of some columns (n): equal ones alike, in order of meeting."""
-    number = np.zeros(len(columns[0]), np.int64)
-    for column in columns:
-        own, values = column.astype(np.int64), int(column.max()) + 2
-        _, number = np.unique(number * values + own + 1, return_inverse=True)
-    _, first, number = np.unique(number, return_index=True, return_inverse=True)
-    rank = np.empty(len(first), np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
-    found: Ints = rank[number]
-    return found
+def _as_key(classes: Ints) -> bytes:
+    """The same for the same partition, whatever the numbers of its classes (n) are."""
+    _, first, number = np.unique(classes, return_index=True, return_inverse=True)
+    return first[number].tobytes()

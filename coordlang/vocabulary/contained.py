@@ -8,7 +8,7 @@ the whole one does.  It is small, and may have symmetries that the whole has not
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, islice
@@ -18,10 +18,12 @@ import numpy as np
 from networkx.algorithms.isomorphism import GraphMatcher
 
 from coordlang.language.candidates import Candidates
+from coordlang.language.warping import Clause
 from coordlang.symmetry.graph import Renaming, joined_order
 from coordlang.symmetry.group import SymmetryGroup, symmetries_of_part
-from coordlang.vocabulary.loop import Budget, Languages, Partitions, Refutation, find
-from coordlang.vocabulary.refuter import Refuter
+from coordlang.vocabulary.job import Evidence
+from coordlang.vocabulary.loop import Budget, Languages, Partitions, find
+from coordlang.vocabulary.refuter import Refuter, ends
 from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
 
@@ -33,9 +35,9 @@ _RENAMINGS = 64
 _OBJECTS = 100
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
-    """A contained instance.
+@dataclass(frozen=True)
+class ContainedInstance:
+    """The loop of the exact method for a part alone, as far as it is a matter of lower bounds.
 
     ``space``: the optimal plans of the candidate tasks that stay in it.  ``group``: its own
     symmetries: there may be more of them than of the whole.
@@ -43,34 +45,29 @@ class Part:
 
     space: PlanSpace
     group: SymmetryGroup
+    seed: int
 
-
-class ContainedInstance:
-    """The loop of the exact method for a part alone, as far as it is a matter of lower bounds."""
-
-    def __init__(self, part: Part, seed: int) -> None:
-        self._part, self._seed = part, seed
-        self.states: list[int] = np.unique(part.space.state).tolist()
+    @cached_property
+    def states(self) -> list[int]:
+        """The states on its plans."""
+        found: list[int] = np.unique(self.space.state).tolist()
+        return found
 
     @cached_property
     def languages(self) -> Languages:
         """What is known of its languages."""
-        space = self._part.space
-        return Languages(Refuter([space], self._part.group, len(space.rows), self._seed))
+        return Languages(Refuter([self.space], self.group, len(self.space.rows), self.seed))
 
     @cached_property
     def _partitions(self) -> Partitions:
-        permutations = self._part.group.permutations
-        return Partitions(self.states, self.languages.clauses, permutations)
+        return Partitions(self.states, self.languages.clauses, self.group.permutations)
 
-    def refute(self, size: int, budget: Budget) -> Refutation | None:
-        """That so many words do not suffice; None: they do here.  Raises `Undecided`."""
+    def refute(self, size: int, budget: Budget) -> Mapping[Clause, Evidence] | None:
+        """Clauses that refute so many words; None: they suffice here.  Raises `Undecided`."""
         partitions, languages = self._partitions, self.languages
         found = find(lambda most: partitions.find(size, most), languages.holds, budget)
         partitions.drop(size)
-        if found is not None:
-            return None
-        return Refutation(size, languages.evidence, len(languages.clauses))
+        return None if found is not None else dict(languages.evidence)
 
     def close(self) -> None:
         """Give back what the solvers hold."""
@@ -78,7 +75,7 @@ class ContainedInstance:
             self._partitions.close()
 
 
-def parts(candidates: Candidates, group: SymmetryGroup) -> list[Part]:
+def parts(candidates: Candidates, group: SymmetryGroup, seed: int = 0) -> list[ContainedInstance]:
     """The contained instances, of those that look alike one, small ones first.
 
     Objects that are named together by a ground action, robots apart, are neighbours.  For two
@@ -96,7 +93,7 @@ def parts(candidates: Candidates, group: SymmetryGroup) -> list[Part]:
         return []
     space = candidates.spaces[0]
     graph, named = _neighbours(candidates), _named(candidates)
-    end = _ends(space)
+    end = ends(space)
     nowhere = np.zeros(len(space.rows), np.bool_)
     found: dict[tuple[int, ...], tuple[frozenset[str], PlanSpace]] = {}
     for objects in _convex(graph):
@@ -107,15 +104,17 @@ def parts(candidates: Candidates, group: SymmetryGroup) -> list[Part]:
             sizes = np.bincount(part.layer).tolist()
             alike = (len(np.unique(part.state)), len(part), len(part.target), *sizes)
             found.setdefault(alike, (objects, part))
-    chosen = [found[alike] for alike in sorted(found)[:_INSTANCES]]
-    names = joined_order(candidates)
-    return [
-        Part(part, symmetries_of_part(part, end, _renamings(graph.subgraph(objects), names, group)))
-        for objects, part in chosen
-    ]
+    chosen, names = [], joined_order(candidates)
+    for alike in sorted(found)[:_INSTANCES]:
+        objects, part = found[alike]
+        renamings = _renamings(graph.subgraph(objects), names, group)
+        chosen.append(ContainedInstance(part, symmetries_of_part(part, end, renamings), seed))
+    return chosen
 
 
-def tasks_of_one_orbit(candidates: Candidates, group: SymmetryGroup) -> list[Part]:
+def tasks_of_one_orbit(
+    candidates: Candidates, group: SymmetryGroup, seed: int = 0
+) -> list[ContainedInstance]:
     """Tasks whose plans pass through images of one state alone, orbit by orbit, small ones first.
 
     A plan has two steps at least, or there is nothing to agree on.  No optimal plan is left out, so
@@ -134,7 +133,7 @@ def tasks_of_one_orbit(candidates: Candidates, group: SymmetryGroup) -> list[Par
             tasks = of_plans == number
             part = space.with_tasks(space.starts[tasks], space.second[tasks])
             if (part.out_degrees > 1).any():
-                found.append(Part(part, group))
+                found.append(ContainedInstance(part, group, seed))
     return sorted(found, key=lambda part: len(part.space))[:_INSTANCES]
 
 
@@ -163,14 +162,6 @@ def part_of(space: PlanSpace, inside: Bools, end: Ints) -> PlanSpace | None:
         labels, used = space.robot_labels(robot), part.robot_labels(robot)
         own &= np.bincount(used, minlength=int(labels.max(initial=0)) + 1)[labels] > 0
     return part if nodes[space.target[own]].all() else None
-
-
-def _ends(space: PlanSpace) -> Ints:
-    """The state that each goal is."""
-    goals = np.flatnonzero(space.layer == 0)
-    end = np.full(len(space.goals), -1)
-    end[space.goal[goals]] = space.state[goals]
-    return end
 
 
 def _renamings(

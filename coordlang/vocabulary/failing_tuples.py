@@ -10,7 +10,7 @@ under a symmetry one is kept, and all images are tested.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -103,7 +103,7 @@ class FailingTuples:
             if sum(len(shorter.rows) for shorter in found) >= enough:
                 break
             for to in self.images if images is None else images:
-                rows = np.flatnonzero(agree(word[to], by_step))
+                rows = np.flatnonzero(sequences_agree(word[to].take(by_step)))
                 if len(rows):
                     found.append(Agreeing(length, to, rows))
         return found
@@ -161,7 +161,10 @@ class FailingTuples:
                 rows, image = rows[drawn], image[drawn]
             words = np.stack([word[found.to] for found in groups])
             states = self.by_length[length][:, :, rows].transpose(2, 1, 0)
-            for row, clause in _clauses(states, words[image[:, None, None], states], self.states):
+            pairs = _pairs(states, words[image[:, None, None], states], self.states)
+            for row in np.flatnonzero((pairs != -2).all(axis=1)).tolist():
+                codes = {*pairs[row].tolist()} - {-1}
+                clause = frozenset(divmod(code, self.states) for code in codes)
                 batch, number = self._sources[length][rows[row]].tolist()
                 clauses.setdefault(clause, (batch, number))
         chosen = sorted(clauses, key=lambda c: (len(c), sorted(c)))[:returned]
@@ -212,17 +215,11 @@ def _keys(states: Ints) -> Ints:
     return key
 
 
-def agree(word: Ints, by_step: Ints) -> Bools:
+def sequences_agree(words: Ints) -> Bools:
     """(tuples) whether all sequences of each have one sentence; rarely true where they have not.
 
-    ``word``: (states) the word of each state number.  ``by_step``: (length, robots, tuples) the
-    states.
+    ``words``: (length, robots, tuples) the words of the states.
     """
-    return sequences_agree(word.take(by_step))
-
-
-def sequences_agree(words: Ints) -> Bools:
-    """(tuples) `agree` by the words (length, robots, tuples) of the states."""
     named = words.astype(np.uint64) + np.uint64(1)
     before = named[0]
     code = before.copy()
@@ -244,14 +241,6 @@ def _pairs(sequences: Ints, words: Ints, states: int) -> Ints:
         _cells(sequences[:, [0, other]], words[:, [0, other]], states) for other in range(1, robots)
     ]
     return np.concatenate(cells, axis=1)
-
-
-def _clauses(sequences: Ints, words: Ints, states: int) -> Iterator[tuple[int, Clause]]:
-    """The clause of each tuple of one sentence, with its row; see `_pairs`."""
-    pairs = _pairs(sequences, words, states)
-    for row in np.flatnonzero((pairs != -2).all(axis=1)).tolist():
-        codes = set(pairs[row].tolist()) - {-1}
-        yield row, frozenset(divmod(code, states) for code in codes)
 
 
 def _cells(two: Ints, words: Ints, states: int) -> Ints:

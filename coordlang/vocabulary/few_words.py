@@ -9,15 +9,12 @@ measured on tables of plans, and the best ones are counted exactly.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import closing, suppress
 from fractions import Fraction
-from random import Random
 
 import numpy as np
 
 from coordlang.language.sentences import Floats
-from coordlang.language.warping import Clause
 from coordlang.required.failure import FailureProbability, TooManyToCount, failure_probability
 from coordlang.required.plan_table import PlanTable
 from coordlang.symmetry.group import symmetry_group
@@ -68,14 +65,12 @@ def few_words(
     return search.outcome(stopped), search.failures
 
 
-class _Search:
-    """The best partition that was counted exactly: the objective of a local search."""
-
-    table: PlanTable
-    clauses: Sequence[Clause] = ()
+class _Search(LocalSearch):
+    """The best partition that was counted exactly."""
 
     def __init__(self, job: Job, words: int, worst: bool) -> None:
-        self._job, self._words, self._worst = job, words, worst
+        super().__init__(job, words)
+        self._worst = worst
         self.norm = _NORM if worst else 1
         self._measured = self._counted = 0
         self._is_best = words == 1
@@ -139,16 +134,14 @@ class _Search:
 
     def _search_locally(self, begin: Assignment | None, work: int) -> None:
         """Begin with a partition made of ``begin``, or of single states, by merging words."""
-        job, random = self._job, Random(self._job.seed)
+        job = self._job
         begin = begin or {state: state for state in job.states}
         into = {word: n for n, word in enumerate(sorted(set(begin.values())))}
         if len(into) > self._words:
-            into = {word: random.randrange(self._words) for word in into}
-        permutations = symmetry_group(job.candidates).permutations
-        search = LocalSearch(self, job.states, self._words, permutations, random, work)
+            into = {word: self._random.randrange(self._words) for word in into}
         word = job.word({state: into[begin[state]] for state in job.states})
         self._look_at(word)
-        search.run(word, job.progress)
+        self.anneal(word, symmetry_group(job.candidates).permutations, work)
 
     def _look_at(self, word: Ints) -> None:
         self.offer(word, self.values(word, np.arange(len(self.table))))

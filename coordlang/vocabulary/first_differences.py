@@ -66,7 +66,7 @@ def first_differences(spaces: Iterable[PlanSpace], *, most: float = inf) -> Firs
     Divergences are not listed for which more than ``most`` mixtures were to be looked at: 0 for
     spaces with inseparable plans, and where states hide slack.
     """
-    return _together([_found(space, most) for space in spaces])
+    return _read(_merged([_found(space, most) for space in spaces]))
 
 
 def differences(
@@ -111,7 +111,12 @@ def differences(
             if rows > _ROWS:  # most of them are found again and again
                 found, rows = [_merged(found)], 0
             progress(f"looking where coordination is required: {so_far()}")
-    return _together(found, goals)
+    merged = _merged(found)
+    if goals is not None:  # the figures are those of all already
+        merged["states"] = goals.images_of_states(merged["states"])
+        if "divergences" in merged:
+            merged["divergences"] = minimal(goals.images_of_rows(merged["divergences"]))
+    return _read(merged)
 
 
 def _of_goals(shared: tuple[Source, Ints | None, float], goals: range) -> Table:
@@ -147,17 +152,10 @@ def _found(space: PlanSpace, most: float, times: Ints | None = None) -> Table:
     }
 
 
-def _together(found: Sequence[Table], goals: SymmetricGoals | None = None) -> FirstDifferences:
-    """What jobs found as one: sets and mixtures are counted anew in each.
-
-    Where the ``goals`` are some that speak for all, the other figures are those of all already.
-    """
-    table = _merged(found)
-    rows, states = table.get("divergences"), table["states"]
-    if goals is not None:
-        states = goals.images_of_states(states)
-        rows = None if rows is None else minimal(goals.images_of_rows(rows))
-    return FirstDifferences(rows, states, *table["figures"].tolist())
+def _read(table: Table) -> FirstDifferences:
+    """What the jobs found; sets and mixtures are counted anew in each."""
+    figures = table["figures"].tolist()
+    return FirstDifferences(table.get("divergences"), table["states"], *figures)
 
 
 def _merged(found: Sequence[Table]) -> Table:
@@ -190,15 +188,6 @@ class SymmetricGoals:
 
     generators: tuple[Ints, ...]
     representative: Ints
-
-    @classmethod
-    def of(cls, generators: Sequence[Ints], states: int) -> SymmetricGoals:
-        """Find the orbits of the group that permutations of state numbers generate."""
-        here = np.tile(np.arange(states), len(generators))
-        count, orbit = parts_of_graph(states, here, np.concatenate(generators))
-        least = np.full(count, states)
-        np.minimum.at(least, orbit, np.arange(states))
-        return cls(tuple(generators), least[orbit])
 
     @property
     def chosen(self) -> Ints:
@@ -247,4 +236,10 @@ def symmetric_goals(
         return None
     found, _ = checked_generators(candidates, with_tasks=False)
     generators = [s.states for s in found if (s.states != np.arange(states)).any()]
-    return SymmetricGoals.of(generators, states) if generators else None
+    if not generators:
+        return None
+    here = np.tile(np.arange(states), len(generators))
+    count, orbit = parts_of_graph(states, here, np.concatenate(generators))
+    first = np.full(count, states)
+    np.minimum.at(first, orbit, np.arange(states))
+    return SymmetricGoals(tuple(generators), first[orbit])

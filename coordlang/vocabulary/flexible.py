@@ -13,12 +13,10 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from random import Random
 
 import numpy as np
 
 from coordlang.language.sentences import MANY, Flexibility, Floats
-from coordlang.language.warping import Clause
 from coordlang.required.choices import Choices
 from coordlang.required.plan_table import PlanTable
 from coordlang.vocabulary.job import Assignment, Job, Outcome
@@ -50,27 +48,21 @@ def flexible(job: Job, found: Outcome, work: int = WORK) -> Outcome:
     return search.outcome(stopped)
 
 
-class _Search:
-    """``partition`` is the most flexible one that was verified; the objective of a local search."""
-
-    norm = 1
-    table: PlanTable
-    clauses: Sequence[Clause]
-    best: float
-    best_word: Ints
+class _Search(LocalSearch):
+    """``partition`` is the most flexible one that was verified."""
 
     def __init__(self, job: Job, found: Outcome) -> None:
-        self._job, self._found = job, found
+        super().__init__(job, found.size)
+        self._found = found
         self.partition: Assignment = found.partition
         self._bound: float | None = None
         self._pending = False
-        self._search: LocalSearch | None = None
         self._improvements = 0
 
     def outcome(self, stopped: BaseException | None) -> Outcome:
         """The best language, with what is known of it."""
-        moves = self._search.moves if self._search else 0
-        figures = {**self._found.figures, "moves": moves, "improvements": self._improvements}
+        improved = {"moves": self.moves, "improvements": self._improvements}
+        figures = {**self._found.figures, **improved}
         with suppress(OutOfMemory):
             figures |= self._measures()
         return replace(self._found, partition=self.partition, figures=figures, stopped=stopped)
@@ -94,20 +86,17 @@ class _Search:
 
     def run(self, work: int) -> None:
         """Search until the bound is reached, or it does not pay any more."""
-        job, words = self._job, self._found.size
+        job = self._job
         spaces, states = job.candidates.spaces, len(job.candidates.rows)
         self._bound = float(flexibility_bounds(spaces).mean())
-        if words < 2 or self._is_met:
+        if self._words < 2 or self._is_met:
             return
         self._languages = languages = self._found.languages or Languages.of(job)
         self.clauses = languages.clauses
         self.table = PlanTable(spaces, states, job.seed, mixtures=False)
         self.best_word = job.word(self.partition)
         self.best = float(self.values(self.best_word, np.arange(len(self.table))).sum())
-        permutations = languages.group.permutations
-        random = Random(job.seed)
-        self._search = LocalSearch(self, job.states, words, permutations, random, work)
-        self._search.run(self.best_word, job.progress)
+        self.anneal(self.best_word, languages.group.permutations, work)
 
     def values(self, word: Ints, tasks: Ints) -> Floats:
         """How many plans of some tasks are not left open."""

@@ -7,6 +7,7 @@ docs/concepts.md).
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
 from coordlang.language.warping import Clause, pair
@@ -63,14 +64,10 @@ def greedy_partition(states: Sequence[int], constraints: Sequence[Constraint]) -
     O(words * (states + constraints)).
     """
     clashes: dict[int, set[int]] = {state: set() for state in states}
-    alternatives_left = _Alternatives()
-    for alternatives in constraints:
-        if len(alternatives) == 1:
-            for a, b in alternatives[0]:
-                clashes[a].add(b)
-                clashes[b].add(a)
-        else:
-            alternatives_left.add(alternatives)
+    for a, b in {states for own in constraints if len(own) == 1 for states in own[0]}:
+        clashes[a].add(b)
+        clashes[b].add(a)
+    several = _Alternatives([own for own in constraints if len(own) > 1])
     words: dict[int, int] = {}
     waiting = list(states)
     number = 0
@@ -79,7 +76,7 @@ def greedy_partition(states: Sequence[int], constraints: Sequence[Constraint]) -
         blocked: set[int] = set()
         left = []
         for state in waiting:
-            if state in blocked or not alternatives_left.merge(state, members):
+            if state in blocked or not several.merge(state, members):
                 left.append(state)
                 continue
             words[state] = number
@@ -97,19 +94,14 @@ class _Alternatives:
     pair of states the alternatives (with their constraints' numbers) that separate it.
     """
 
-    def __init__(self) -> None:
-        self._left: list[set[Clause]] = []
-        self._ruled_out_by: dict[tuple[int, int], list[tuple[int, Clause]]] = {}
-        self._states: set[int] = set()
-
-    def add(self, alternatives: Constraint) -> None:
-        """Add a constraint."""
-        number = len(self._left)
-        self._left.append(set(alternatives))
-        for separation in alternatives:
-            for states in separation:
-                self._ruled_out_by.setdefault(states, []).append((number, separation))
-                self._states.update(states)
+    def __init__(self, constraints: Sequence[Constraint]) -> None:
+        self._left = list(map(set, constraints))
+        self._ruled_out_by: dict[tuple[int, int], list[tuple[int, Clause]]] = defaultdict(list)
+        for number, alternatives in enumerate(constraints):
+            for separation in alternatives:
+                for states in separation:
+                    self._ruled_out_by[states].append((number, separation))
+        self._states = {state for states in self._ruled_out_by for state in states}
 
     def merge(self, state: int, members: Sequence[int]) -> bool:
         """Put ``state`` into a word with ``members`` if every constraint keeps an alternative."""

@@ -2,23 +2,24 @@
 """Local search over partitions into a given number of words: simulated annealing.
 
 A move gives one state another word, or one word to all states that a symmetry takes it to.  What is
-minimised is an `Objective`: how many plans sentences rule out (`coordlang.vocabulary.flexible`), or
-how often robots fail (`coordlang.vocabulary.few_words`).  Necessary clauses may be constraints: a
-partition may violate some on the way, at a price.
+minimised is how many plans sentences rule out (`coordlang.vocabulary.flexible`), or how often
+robots fail (`coordlang.vocabulary.few_words`).  Necessary clauses may be constraints: a partition
+may violate some on the way, at a price.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from math import log
 from random import Random
-from typing import Protocol
 
 import numpy as np
 
 from coordlang.language.sentences import Floats
 from coordlang.language.warping import Clause
 from coordlang.required.plan_table import PlanTable
+from coordlang.vocabulary.job import Job
 from planners.joint.tables import Ints
 
 #: Share of the moves that change the words of an orbit.
@@ -39,77 +40,67 @@ _EQUAL = 1e-9
 WORK, _MOVE = 60_000_000, 2_000
 
 
-class Objective(Protocol):
-    """What a local search minimises, and what becomes of the partitions that it finds.
+class LocalSearch(ABC):
+    """A partition of a job's states into ``words`` words, two or more, on its way.
 
-    ``table``: the plans by which partitions are measured.  ``norm``: minimised is this norm of the
-    values of all tasks: 1 for their sum, more for the worst.  ``clauses``: what must be separated,
-    a list that only grows.  ``best`` and ``best_word``: the value of the best partition so far, by
-    which a cooling pays or not, and the word of each state in it, from which the next one begins.
+    A subclass says what is minimised, and what becomes of the partitions that are found.  It sets
+    the ``table`` of plans by which partitions are measured; ``best`` and ``best_word``, the value
+    of the best partition so far, by which a cooling pays or not, and the word of each state in it,
+    from which the next one begins; perhaps ``clauses``, what must be separated, a list that only
+    grows; and ``norm``: minimised is this norm of the values of all tasks, 1 for their sum, more
+    for the worst.  ``moves`` counts the moves so far.
     """
 
     table: PlanTable
-    norm: int
-    clauses: Sequence[Clause]
     best: float
     best_word: Ints
+    clauses: Sequence[Clause] = ()
+    norm = 1
 
+    def __init__(self, job: Job, words: int) -> None:
+        self._job, self._words, self._random = job, words, Random(job.seed)
+        self.moves = 0
+
+    @abstractmethod
     def values(self, word: Ints, tasks: Ints) -> Floats:
         """The value of some tasks, 0 or more, under the word of each state."""
 
+    @abstractmethod
     def offer(self, word: Ints, values: Floats) -> None:
         """Look at a partition that violates no clause; it may turn out to violate new ones."""
 
+    @abstractmethod
     def settle(self) -> bool:
         """Decide after a cooling which partition is the best; whether none can be better."""
 
+    def anneal(self, word: Ints, permutations: Sequence[Sequence[int]], work: int) -> None:
+        """Cool again and again, first from these words, until that does not pay any more.
 
-class LocalSearch:
-    """A partition into some number of words on its way.
-
-    The ``objective`` is minimised over partitions of the ``states`` into ``words`` words, two or
-    more.  ``permutations`` are where symmetries take each state; ``random`` draws, ``work`` plans
-    may be measured, and ``moves`` counts the moves so far.
-    """
-
-    def __init__(
-        self,
-        objective: Objective,
-        states: Sequence[int],
-        words: int,
-        permutations: Sequence[Sequence[int]],
-        random: Random,
-        work: int,
-    ) -> None:
-        self._objective, self._words, self._most = objective, words, work
-        self._random, self._permutations = random, permutations
-        self._tasks_of_state = objective.table.tasks_of_state
-        self._movable = [state for state in states if len(self._tasks_of_state[state])]
+        ``permutations`` are where symmetries take each state; ``work`` plans may be measured.
+        """
+        self._permutations, self._most, self._work = permutations, work, 0
+        self._tasks_of_state = self.table.tasks_of_state
+        self._movable = [state for state in self._job.states if len(self._tasks_of_state[state])]
         #: The pairs of states of all clauses, one after another, and the first of each clause.
         self._pairs, self._first = np.zeros((0, 2), np.int64), np.zeros(0, np.int64)
-        self._violated = self.moves = self._work = 0
-        self._unit, self._price = 0.0, _PRICE
-
-    def run(self, word: Ints, progress: Callable[[str], None]) -> None:
-        """Cool again and again, first from these words, until that does not pay any more."""
-        objective, in_vain = self._objective, 0
+        self._unit, self._price, in_vain = 0.0, _PRICE, 0
         moves = max(_LEAST_MOVES, _MOVES * len(self._movable) * self._words)
         while in_vain < _PATIENCE and self._work < self._most and self._movable:
             self._begin(word)
-            before = objective.best
-            self._cool(moves, progress)
-            if objective.settle():
+            before = self.best
+            self._cool(moves)
+            if self.settle():
                 return
-            word, in_vain = objective.best_word, in_vain + 1
-            if objective.best < before - _EQUAL:
+            word, in_vain = self.best_word, in_vain + 1
+            if self.best < before - _EQUAL:
                 moves, in_vain = moves + moves // 2, 0
 
     def _begin(self, word: Ints) -> None:
-        self._word, self._values = word, self._measured(word, np.arange(len(self._objective.table)))
+        self._word, self._values = word, self._valued(word, np.arange(len(self.table)))
         self._energy = self._norm(self._values)
         self._violated = self._learn_clauses()
 
-    def _cool(self, moves: int, progress: Callable[[str], None]) -> None:
+    def _cool(self, moves: int) -> None:
         """Cool once, in so many moves."""
         for number in range(moves):
             if self._work >= self._most:
@@ -117,7 +108,7 @@ class LocalSearch:
             self._move(_HOT * (_COLD / _HOT) ** (number / moves))
             self._price *= _DEARER if self._violated else 1 / _DEARER
             if number % 50 == 0:
-                progress(f"annealing: {number:,} of {moves:,} moves")
+                self._job.progress(f"annealing: {number:,} of {moves:,} moves")
 
     def _move(self, heat: float) -> None:
         """Try a random change, and keep it if its energy and the price of its clauses allow."""
@@ -132,14 +123,14 @@ class LocalSearch:
             return
         tasks = np.unique(np.concatenate([self._tasks_of_state[state] for state in states]))
         values = self._values.copy()
-        values[tasks] = self._measured(word, tasks)
+        values[tasks] = self._valued(word, tasks)
         energy = self._norm(values)
         self._unit += (abs(energy - self._energy) - self._unit) / min(self.moves, _LAST)
         if energy <= most:
             self._word, self._values, self._energy = word, values, energy
             self._violated = violated
             if not violated:
-                self._objective.offer(word, values)
+                self.offer(word, values)
                 self._violated = self._learn_clauses()
 
     def _changed(self) -> tuple[list[int], Ints]:
@@ -160,7 +151,7 @@ class LocalSearch:
 
     def _learn_clauses(self) -> int:
         """Know the clauses that are new; how many of all are violated."""
-        if new := [sorted(clause) for clause in self._objective.clauses[len(self._first) :]]:
+        if new := [sorted(clause) for clause in self.clauses[len(self._first) :]]:
             sizes = np.array(list(map(len, new)))
             first = len(self._pairs) + np.cumsum(sizes) - sizes
             self._first = np.concatenate((self._first, first))
@@ -173,9 +164,9 @@ class LocalSearch:
         separated = np.logical_or.reduceat(first != second, self._first)
         return len(self._first) - int(separated.sum())
 
-    def _measured(self, word: Ints, tasks: Ints) -> Floats:
-        self._work += _MOVE + int(self._objective.table.plans[tasks].sum())
-        return self._objective.values(word, tasks)
+    def _valued(self, word: Ints, tasks: Ints) -> Floats:
+        self._work += _MOVE + int(self.table.plans[tasks].sum())
+        return self.values(word, tasks)
 
     def _norm(self, values: Floats) -> float:
-        return float(np.linalg.norm(values, self._objective.norm))
+        return float(np.linalg.norm(values, self.norm))

@@ -8,10 +8,9 @@ failing plans left: it is a language.  Work is counted, never timed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import islice
 from math import isqrt
 from typing import Generic, TypeVar
 
@@ -27,7 +26,6 @@ from coordlang.vocabulary.sat import (
     most_frequent_pairs,
     without_implied,
 )
-from planners.joint.tables import Ints
 from planners.search.sat import SolverName
 
 Requirement = TypeVar("Requirement")
@@ -58,14 +56,10 @@ class Languages:
         group = symmetry_group(job.candidates)
         return cls(Refuter(spaces, group, states, job.seed, job.progress, workers=job.workers))
 
-    def word(self, partition: Assignment) -> Ints:
-        """(states) the word of each state number; 0 for states that need none."""
-        return words_of_states(partition, self.refuter.pool.states)
-
     def holds(self, partition: Assignment) -> bool:
         """Whether it is a language; if not, the clauses that it violates are known afterwards."""
         self.rounds += 1
-        violated = self.refuter.violated(self.word(partition))
+        violated = self.refuter.violated(words_of_states(partition, self.refuter.pool.states))
         for clause in without_implied(violated):
             evidence = violated[clause]
             self._add(clause, evidence)
@@ -216,24 +210,6 @@ _EASY = 1_000
 _COMPARISONS = 1_000_000
 #: Pairs of states by which symmetric partitions are compared: enough to tell most apart.
 _COMPARED_PAIRS = 100
-
-
-@dataclass(frozen=True, slots=True)
-class Refutation:
-    """Among all partitions into ``size`` words none satisfies the first ``known`` clauses.
-
-    ``evidence`` are necessary clauses in their order, to which more are added later.  Nothing but
-    this raises a lower bound.  Searches of some partitions only have none to give.
-    """
-
-    size: int
-    evidence: Mapping[Clause, Evidence]
-    known: int
-
-    @property
-    def clauses(self) -> dict[Clause, Evidence]:
-        """The clauses, and why each of them is necessary."""
-        return dict(islice(self.evidence.items(), self.known))
 
 
 class Partitions(ProblemsBySize[Clause]):

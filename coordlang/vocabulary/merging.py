@@ -10,12 +10,11 @@ them forbids.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from types import MappingProxyType
 
 import numpy as np
 
 from coordlang.vocabulary.failing_tuples import FailingTuples, sequences_agree
-from coordlang.vocabulary.job import Assignment
+from coordlang.vocabulary.job import Assignment, words_of_states
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import Undecided
 from planners.joint.tables import Bools, Ints
@@ -40,8 +39,9 @@ def merged(
     tells what is wrong with a partition.
     """
     mine, pool = np.array(states), refuter.pool
-    word = _numbered(language, mine, pool.states)
-    closed, left = forbidden_merges(pool, word), False
+    word = words_of_states(language, pool.states)
+    _, word[mine] = np.unique(word[mine], return_inverse=True)
+    closed, left = forbidden_merges(pool, word, {}), False
     merges, steps = 1, _STEPS
     while True:
         trial, of_trial, pair = word, closed, None
@@ -52,7 +52,7 @@ def merged(
         if trial is word:
             if not left:
                 return
-            closed, left, steps = forbidden_merges(pool, word), False, 2 * steps
+            closed, left, steps = forbidden_merges(pool, word, {}), False, 2 * steps
             continue
         known = {length: own.shape[2] for length, own in pool.by_length.items()}
         try:
@@ -63,16 +63,14 @@ def merged(
                 closed[pair] = closed[pair[::-1]] = left = True
         if holds:
             word, merges = trial, 2 * merges
-            closed = of_trial | forbidden_merges(pool, word)
+            closed = of_trial | forbidden_merges(pool, word, {})
         else:
             merges = max(1, merges // 2)
             closed |= forbidden_merges(pool, word, known)
         yield {state: int(word[state]) for state in states}
 
 
-def forbidden_merges(
-    pool: FailingTuples, word: Ints, known: Mapping[int, int] = MappingProxyType({})
-) -> Bools:
+def forbidden_merges(pool: FailingTuples, word: Ints, known: Mapping[int, int]) -> Bools:
     """(words, words) the pairs of words of a language that some failing tuple forbids to merge.
 
     Those after whose merge all its sequences have one sentence.  Of two sentences the words that
@@ -126,10 +124,3 @@ def _merge(word: Ints, forbidden: Bools, pair: tuple[int, int]) -> tuple[Ints, B
     forbidden[:, into] |= forbidden[:, gone]
     left = np.delete(np.delete(forbidden, gone, axis=0), gone, axis=1)
     return word - (word > gone), left
-
-
-def _numbered(language: Assignment, states: Ints, rows: int) -> Ints:
-    """The word of each state number, words from 0 on without gaps."""
-    word = np.zeros(rows, np.int64)
-    _, word[states] = np.unique([language[s] for s in states.tolist()], return_inverse=True)
-    return word

@@ -15,6 +15,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
 from functools import cached_property
+from itertools import islice
 from typing import TYPE_CHECKING
 
 from coordlang.language.warping import Clause
@@ -25,7 +26,6 @@ from coordlang.vocabulary.loop import (
     Budget,
     Languages,
     Partitions,
-    Refutation,
     between,
     close_bounds,
     find,
@@ -113,32 +113,37 @@ def refuting_clauses(job: Job, size: int) -> Mapping[Clause, Evidence]:
             budget = budget.doubled()
         if search.lower <= size:
             raise ValueError(f"there is a language with {size} words")
-    return search.refuting.clauses
+    return search.refuting
 
 
 class MinimalSearch:
     """Closes in on the least number of words.
 
-    ``lower`` words are proved to be needed, and ``refuting`` says why; ``best`` is the language
-    with the fewest words so far, None before there is one.
+    ``lower`` words are proved to be needed; ``refuting`` are the clauses that refuted a number of
+    words last.  ``best`` is the language with the fewest words so far, None before there is one.
     """
 
     def __init__(self, job: Job, effort: int | None = None) -> None:
         """Begin; the search ends after ``effort``, in thousands of ``work``, None: by its proof."""
         self._job = job
         self._most = sys.maxsize if effort is None else effort * _UNIT
+        candidates = job.candidates
+        self._is_one_task = candidates.count == 1
+        self._is_asynchronous = candidates.model.is_asynchronous
+        #: Pairs of edges that leave one node: what a walk through all tasks goes over.
+        degrees = (space.out_degrees.astype(float) for space in candidates.spaces)
+        self._pairs = sum(int((degree**2).sum()) for degree in degrees)
+        self._is_dear = self._pairs > _DEAR
         self._merges = 0
         self._merging: tuple[Assignment, Iterator[Assignment]] | None = None
         self.lower = job.lower_bound
         self.best: Assignment | None = job.incumbent
-        self.refuting = Refutation(1, {}, 0)
+        self.refuting: Mapping[Clause, Evidence] = {}
 
     @cached_property
     def languages(self) -> Languages:
         """What is known of all languages; collecting the first failing plans takes a while."""
-        languages = Languages.of(self._job)
-        self.refuting = Refutation(1, languages.evidence, 1)  # any clause refutes one word
-        return languages
+        return Languages.of(self._job)
 
     @cached_property
     def _partitions(self) -> Partitions:
@@ -156,13 +161,15 @@ class MinimalSearch:
     @cached_property
     def _contained(self) -> list[ContainedInstance]:
         candidates, group = self._job.candidates, self.languages.group
-        if candidates.count == 1:  # it contains itself alone
+        if self._is_one_task:  # it contains itself alone
             return []
-        from coordlang.vocabulary.contained import ContainedInstance, parts, tasks_of_one_orbit
+        from coordlang.vocabulary.contained import parts, tasks_of_one_orbit
 
-        found = [*tasks_of_one_orbit(candidates, group), *parts(candidates, group)]
-        instances = [ContainedInstance(part, self._job.seed) for part in found]
-        return sorted(instances, key=lambda instance: len(instance.states))
+        found = [
+            *tasks_of_one_orbit(candidates, group, self._job.seed),
+            *parts(candidates, group, self._job.seed),
+        ]
+        return sorted(found, key=lambda instance: len(instance.states))
 
     @property
     def upper(self) -> int:
@@ -178,24 +185,17 @@ class MinimalSearch:
             return
         if self._is_one_task:
             self._begin_with_one_task()
-        while self.lower < self.upper and not self._is_spent and self.decide(self.lower, _SOON):
+        while self._is_open and self.decide(self.lower, _SOON):
             pass
-        if not self._is_one_task:
-            self._decide_between(_SOON)
+        while self._is_open and not self._is_one_task:
+            if not self.decide(between(self.lower, self.upper), _SOON):
+                break
         self.merge(_VAIN)
         known = self.best
         close_bounds(lambda: (self.lower, self.upper), self._narrow, lambda: self._is_spent)
         if self.best is known and not self._is_spent:
             # Merged words tell more states apart than a language must: fewer leave more plans open.
             self.decide(self.lower, Budget())
-
-    @property
-    def _is_asynchronous(self) -> bool:
-        return self._job.candidates.model.is_asynchronous
-
-    @property
-    def _is_one_task(self) -> bool:
-        return self._job.candidates.count == 1
 
     def _begin_with_one_task(self) -> None:
         """Count how many sentences are needed, and look for words of a kind."""
@@ -214,12 +214,6 @@ class MinimalSearch:
             self._offer(found)
             self.merge(most=_MERGED_SOON)
 
-    def _decide_between(self, budget: Budget) -> None:
-        """Decide numbers between the bounds, as long as that is quick."""
-        while self.lower < self.upper and not self._is_spent:
-            if not self.decide(between(self.lower, self.upper), budget):
-                return
-
     def _find_fewer_tied(self, rounds: int) -> None:
         """Look for a language of some kind with fewer words than the best one.
 
@@ -237,16 +231,6 @@ class MinimalSearch:
             if not self._finds_tied(size, rounds):
                 least = size + 1
 
-    @cached_property
-    def _pairs(self) -> int:
-        """Pairs of edges that leave one node: what a walk through all tasks goes over."""
-        degrees = (space.out_degrees.astype(float) for space in self._job.candidates.spaces)
-        return sum(int((degree**2).sum()) for degree in degrees)
-
-    @property
-    def _is_dear(self) -> bool:
-        return self._pairs > _DEAR
-
     @property
     def work(self) -> int:
         """What was done so far: the conflicts of the solver, refuted partitions counted as some."""
@@ -255,6 +239,10 @@ class MinimalSearch:
         rounds = self.languages.rounds + self._merges // _MERGES
         tied = self._tied.conflicts if "_tied" in self.__dict__ else 0
         return self._partitions.conflicts + tied + rounds * (_ROUND + self._pairs // _PAIRS)
+
+    @property
+    def _is_open(self) -> bool:
+        return self.lower < self.upper and not self._is_spent
 
     @property
     def _is_spent(self) -> bool:
@@ -309,17 +297,17 @@ class MinimalSearch:
     def _find_or_refute(self, size: int, budget: Budget) -> bool:
         """`decide` among all partitions."""
         try:
-            refuted = self._refuted_within(size, budget) or self._refuted(size, budget)
+            refuting = self._refuted_within(size, budget) or self._refuted(size, budget)
         except Undecided:
             return False
-        if refuted is not None:
+        if refuting is not None:
             # In this order: a signal in between leaves clauses that refute too much.
-            self.refuting = refuted
+            self.refuting = refuting
             self.lower = size + 1
         return True
 
-    def _refuted(self, size: int, budget: Budget) -> Refutation | None:
-        """That there is no language with so few words; None, and one is offered, if there is."""
+    def _refuted(self, size: int, budget: Budget) -> Mapping[Clause, Evidence] | None:
+        """The clauses that refute so few words; None, and a language is offered, if none do."""
 
         def partition(conflicts: int) -> dict[int, int] | None:
             if self._is_spent:
@@ -329,7 +317,7 @@ class MinimalSearch:
         found = find(partition, self._holds, budget)
         self._partitions.drop(size)
         if found is None:
-            return Refutation(size, self.languages.evidence, len(self.languages.clauses))
+            return dict(self.languages.evidence)
         self._offer(found)
         self.merge(_VAIN)
         return None
@@ -344,14 +332,14 @@ class MinimalSearch:
             self._offer(found)
         return found is not None
 
-    def _refuted_within(self, size: int, budget: Budget) -> Refutation | None:
+    def _refuted_within(self, size: int, budget: Budget) -> Mapping[Clause, Evidence] | None:
         """A proof by an instance that this one contains, the smallest that has one."""
         while size == self.lower and self._contained:
             instance = self._contained[0]
             self._report(f"trying {size} words for {len(instance.states):,} of the states")
-            refuted = instance.refute(size, budget)
-            if refuted is not None:
-                return refuted
+            refuting = instance.refute(size, budget)
+            if refuting is not None:
+                return refuting
             # So many words suffice for it, and more will.
             self._contained.pop(0).close()
         return None
@@ -362,7 +350,7 @@ class MinimalSearch:
             assert stopped is not None
             raise stopped
         figures: dict[str, float] = {}
-        languages = self.__dict__.get("languages")
+        refuting, languages = self.refuting, self.__dict__.get("languages")
         if languages is not None:
             figures = {
                 "rounds": languages.rounds,
@@ -372,8 +360,8 @@ class MinimalSearch:
                 "walks": languages.refuter.walks,
                 "work": self.work,
             }
-        # A bound by counting is beyond what the clauses refute.
-        refuting = self.refuting.clauses if self.refuting.size == self.lower - 1 else {}
+            if self.lower == 2:  # any clause refutes one word
+                refuting = dict(islice(languages.evidence.items(), 1))
         return Outcome(self.best, self.lower, figures, stopped, refuting, languages)
 
     def close(self) -> None:

@@ -195,12 +195,17 @@ def _goals_by_images(space: PlanSpace, images: Sequence[Ints]) -> dict[tuple[int
     if not all(isinstance(goal, FullState) for goal in space.goals):
         chosen[0,] = list(range(len(space.goals)))
         return chosen
-    nodes = np.flatnonzero(space.layer == 0)
-    end = np.zeros(len(space.goals), np.int64)
-    end[space.goal[nodes]] = space.state[nodes]
-    for goal, state in enumerate(end.tolist()):
+    for goal, state in enumerate(ends(space).tolist()):
         reached = np.array([to[state] for to in images])
         if reached.min() == state:
             _, first = np.unique(reached, return_index=True)
             chosen.setdefault(tuple(sorted(first.tolist())), []).append(goal)
     return chosen
+
+
+def ends(space: PlanSpace) -> Ints:
+    """(goals) the state that each goal is, 0 for goals without tasks."""
+    nodes = np.flatnonzero(space.layer == 0)
+    end = np.zeros(len(space.goals), np.int64)
+    end[space.goal[nodes]] = space.state[nodes]
+    return end

@@ -112,15 +112,11 @@ class _Repair:
         """A language soon, then the fewest changes, then the fewest new words."""
         self._join_words(self._hit_greedily())
         self._join_words(self._hit_least())
-        close_bounds(lambda: (self._new_words_bound, self._upper), self._decide)
+        close_bounds(lambda: (self._new_words_bound, self._distance(self.best)[1]), self._decide)
 
-    @property
-    def _upper(self) -> int:
-        assert self.best is not None
-        return self._distance(self.best)[1]
-
-    def _distance(self, partition: Assignment) -> tuple[int, int]:
+    def _distance(self, partition: Assignment | None) -> tuple[int, int]:
         """How many states change their word, and how many words are new."""
+        assert partition is not None
         changes = sum(partition[state] != word for state, word in self._kept.items())
         return changes, len({word for word in partition.values() if word >= self._old_words})
 
@@ -176,20 +172,16 @@ class _Repair:
         States with a word of their own take the first word that violates no known clause, until
         there is no counterexample.
         """
-        best = self._apart(changed)
-        if self._is_better(best):
-            self._accept(best)
+        self._offer(self._apart(changed))
         while not self._holds(partition := self._first_fit(changed)):
             pass
-        if self._is_better(partition):
-            self._accept(partition)
+        self._offer(partition)
 
-    def _is_better(self, partition: Assignment) -> bool:
-        return self.best is None or self._distance(partition) < self._distance(self.best)
-
-    def _accept(self, partition: dict[int, int]) -> None:
-        self._job.check(partition)
-        self.best = partition
+    def _offer(self, partition: dict[int, int]) -> None:
+        """Verify a language, and keep it, if it is better than the best."""
+        if self.best is None or self._distance(partition) < self._distance(self.best):
+            self._job.check(partition)
+            self.best = partition
 
     def _first_fit(self, changed: set[int]) -> dict[int, int]:
         partition = self._apart(changed)
@@ -207,7 +199,8 @@ class _Repair:
             words = sorted(range(used), key=lambda word: (word != first, word))
             for word in words:
                 partition[state] = word
-                if not any(_joins(clause, partition) for clause in of_state.get(state, ())):
+                clauses_left = of_state.get(state, ())
+                if all(any(partition[a] != partition[b] for a, b in c) for c in clauses_left):
                     break
             else:
                 partition[state] = used
@@ -240,7 +233,7 @@ class _Repair:
         if found is None:
             self._new_words_bound = new_words + 1
         else:
-            self._accept(found)
+            self._offer(found)
         return True
 
     def _start(self, size: int) -> PartitionProblem:
@@ -255,8 +248,3 @@ class _Repair:
         for clause in clauses:
             problem.separate_one(clause)
         return problem
-
-
-def _joins(clause: Clause, word: Assignment) -> bool:
-    """Whether a partition separates no pair of a clause."""
-    return all(word[a] == word[b] for a, b in clause)

@@ -15,14 +15,14 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import islice, pairwise
+from itertools import islice, pairwise, tee
 
 import numpy as np
 
 from coordlang.language.candidates import Candidates
 from coordlang.language.warping import Pair, pair
 from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
-from coordlang.vocabulary.job import Assignment, Job
+from coordlang.vocabulary.job import Assignment, Job, words_of_states
 from coordlang.vocabulary.loop import Budget, Languages, find
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
@@ -71,13 +71,16 @@ class TiedWords:
         self._images = languages.refuter.pool.images
         self._is_one_task = job.candidates.count == 1
         self._first = _OF_ONE if self._is_one_task else _OF_MANY
-        self._tied: list[_Ties] = []
-        self._untied = self._classes(job)
+        #: What there may be in common, kind by kind; each size goes through a copy of it.
+        self._tied = self._classes(job)
         #: Those of the solvers so far on kinds that stayed undecided.
         self.conflicts = 0
-        #: Of each number of words the kinds that are undecided, and how many were looked at.
-        self._kinds: dict[int, deque[_Kind]] = {}
-        self._begun: dict[int, int] = {}
+        #: Of each number of words the kinds that were not looked at, and those that are undecided.
+        self._kinds: dict[int, tuple[Iterator[_Kind], deque[_Kind]]] = {}
+
+    def _every(self) -> Iterator[_Ties]:
+        self._tied, every = tee(self._tied)
+        return every
 
     def _classes(self, job: Job) -> Iterator[_Ties]:
         """Which states share a word, kind by kind: those with few classes first.
@@ -96,10 +99,10 @@ class TiedWords:
 
     def of_facts(self) -> Assignment | None:
         """Of one task the language that says the steps to go and a few facts, if there is one."""
-        self._tied += islice(self._untied, max(0, 2 - len(self._tied)))
-        if len(self._tied) < 2:
+        ties = next(islice(self._every(), 1, None), None)
+        if ties is None:
             return None
-        classes = self._tied[1].classes[self._states]
+        classes = ties.classes[self._states]
         return dict(zip(self._states.tolist(), classes.tolist(), strict=True))
 
     def find(self, size: int, rounds: int) -> Assignment | None:
@@ -107,9 +110,13 @@ class TiedWords:
 
         The next call with this size goes on, and spends more on what was looked at before.
         """
-        kinds, until = self._kinds.setdefault(size, deque()), self._spent + _TOGETHER * rounds
+        if size not in self._kinds:
+            self._kinds[size] = self._new_kinds(size), deque()
+        new, undecided = self._kinds[size]
+        until = self._spent + _TOGETHER * rounds
         while self._spent < until:
-            if (kind := self._next_kind(size)) is None:
+            kind = next(new, None) or (undecided.popleft() if undecided else None)
+            if kind is None:
                 return None
             before = kind.problem.conflicts
             try:
@@ -117,7 +124,7 @@ class TiedWords:
             except Undecided:
                 self.conflicts += kind.problem.conflicts - before
                 kind.effort = kind.effort.doubled()
-                kinds.append(kind)
+                undecided.append(kind)
                 continue
             kind.problem.close()
             if found is not None:
@@ -125,19 +132,12 @@ class TiedWords:
                 return found
         return None
 
-    def _next_kind(self, size: int) -> _Kind | None:
-        """One that was not looked at with so many words yet, or else one that is undecided."""
-        begun = self._begun.get(size, 0)
-        if begun == len(self._tied):
-            self._tied += islice(self._untied, 1)
-        if begun < len(self._tied):
-            self._begun[size] = begun + 1
+    def _new_kinds(self, size: int) -> Iterator[_Kind]:
+        for ties in self._every():
             # With many tasks what other numbers met slows the solver: open 3x4 by a third.
-            own = self._tied[begun] if self._is_one_task else _Ties(self._tied[begun].classes)
+            own = ties if self._is_one_task else _Ties(ties.classes)
             first = _STUTTER_FREE if own.stutter_free is not None else self._first
-            return _Kind(self._states, own, size, self._images, first)
-        kinds = self._kinds[size]
-        return kinds.popleft() if kinds else None
+            yield _Kind(self._states, own, size, self._images, first)
 
     @property
     def _spent(self) -> int:
@@ -145,7 +145,8 @@ class TiedWords:
 
     def drop(self, size: int) -> None:
         """Forget a number of words that is decided."""
-        for kind in self._kinds.pop(size, ()):
+        _, undecided = self._kinds.pop(size, ((), ()))
+        for kind in undecided:
             kind.problem.close()
 
     def close(self) -> None:
@@ -157,7 +158,7 @@ class TiedWords:
         """A language of one kind; None if there is none.  Raises `Undecided`, and can go on."""
 
         def holds(partition: Assignment) -> bool:
-            word = self._languages.word(partition)[kind.first]
+            word = words_of_states(partition, len(kind.first))[kind.first]
             agreeing = self._refuter.agreeing(word, kind.images, _ENOUGH)
             if agreeing:
                 kind.rounds += 1

@@ -21,12 +21,12 @@ from coordlang.verification.check_certificate import Checked, check
 from coordlang.verification.make_certificate import _reason
 from coordlang.vocabulary.contained import (
     ContainedInstance,
-    _ends,
     part_of,
     parts,
     tasks_of_one_orbit,
 )
 from coordlang.vocabulary.loop import Budget
+from coordlang.vocabulary.refuter import ends
 from planners.joint.tables import Bools
 from planners.pddl import parse_problem
 from planners.pddl.sexpr import Source
@@ -55,7 +55,7 @@ def without(candidates: Candidates, *names: str) -> Bools:
 
 def plans_by_task(space: PlanSpace, most: int = MOST) -> Iterator[tuple[int, int, int, list[Plan]]]:
     """Each task: its number, the states at its two ends, and its plans."""
-    end = _ends(space)
+    end = ends(space)
     for task, node in enumerate(space.starts.tolist()):
         plans = naive.listed(space, task, most)
         yield task, int(space.state[node]), int(end[space.goal[node]]), plans
@@ -76,7 +76,7 @@ def test_mixtures_of_plans_in_a_part_fail_in_the_part_iff_in_the_whole(number: i
         tasks = list(plans_by_task(space))
         for share in (0.6, 0.8, 0.9, 0.9):
             inside = np.array([random.random() < share for _ in candidates.rows])
-            part = part_of(space, inside, _ends(space))
+            part = part_of(space, inside, ends(space))
             escapes = wrong = 0
             staying = {}
             for task, start, end, plans in tasks:
@@ -105,7 +105,7 @@ def renamed(text: str, renaming: dict[str, str]) -> str:
 
 def edges_of(space: PlanSpace, renaming: dict[str, str]) -> set[object]:
     """The edges as texts, under a renaming of objects."""
-    codec, robots, end = space.model.codec, space.model.robots, _ends(space)
+    codec, robots, end = space.model.codec, space.model.robots, ends(space)
     order = sorted(range(len(robots)), key=lambda n: renaming.get(robots[n], robots[n]))
     keys = [frozenset(renamed(a, renaming) for a in codec.decode(row)) for row in space.rows]
     found: set[object] = set()
@@ -137,7 +137,7 @@ def test_symmetries_of_a_part_are_the_renamings_that_keep_its_edges(seeds: int) 
         space, last = candidates.spaces[0], f"c{cells - 1}"
         if len(candidates.rows) < cells * (cells - 1):
             continue
-        part = part_of(space, without(candidates, last), _ends(space))
+        part = part_of(space, without(candidates, last), ends(space))
         assert part is not None, "who enters the last cell leaves the part"
         if not len(part.target):
             continue
@@ -151,14 +151,14 @@ def test_symmetries_of_a_part_are_the_renamings_that_keep_its_edges(seeds: int) 
         for own in (space, part):
             plain, found = edges_of(own, {}), set()
             for renaming in proposed[1:]:
-                accepted = symmetries_of_part(own, _ends(space), [renaming]).symmetries
+                accepted = symmetries_of_part(own, ends(space), [renaming]).symmetries
                 assert bool(accepted) == (edges_of(own, renaming) == plain)
                 if accepted:
                     to = states_under(space, renaming)
                     first = next(s for s in accepted if s.renaming == renaming)
                     assert [first.states[s] for s in here] == [to[s] for s in here]
                     found.add(tuple(first.states.tolist()))
-        group = symmetries_of_part(part, _ends(space), proposed)
+        group = symmetries_of_part(part, ends(space), proposed)
         assert {tuple(s.states.tolist()) for s in group.symmetries} == found
         more += len(found) > len(symmetry_group(candidates).symmetries)
         fewer += len(found) < len(proposed) - 1
@@ -182,7 +182,7 @@ def test_two_labels_must_not_become_one() -> None:
         ({"slow": "slower"}, False),
     ):
         renaming = {"r1": "r2", "r2": "r1", **ways}
-        assert bool(symmetries_of_part(space, _ends(space), [renaming]).symmetries) == holds
+        assert bool(symmetries_of_part(space, ends(space), [renaming]).symmetries) == holds
 
 
 def proves(candidates: Candidates, instance: ContainedInstance, refuted: int) -> Checked:
@@ -199,15 +199,15 @@ def certificate(candidates: Candidates, refuted: int, reasons: list[Reason]) -> 
 def test_a_bound_of_a_part_holds_with_every_clause_checked_in_the_whole() -> None:
     """The square in the 2x3 grid needs three words; all that is said about it holds in the grid."""
     candidates = all_tasks("grid", "gw2-2x3")
-    row, square = [ContainedInstance(p, 0) for p in parts(candidates, symmetry_group(candidates))]
+    row, square = parts(candidates, symmetry_group(candidates))
     assert row.refute(1, Budget()) is None
     refuted = square.refute(2, Budget())
     assert refuted is not None
     whole = symmetry_group(candidates).symmetries
-    own = [e.symmetry for e in refuted.clauses.values() if e.symmetry is not None]
+    own = [e.symmetry for e in refuted.values() if e.symmetry is not None]
     assert any(all((s.states != w.states).any() for w in whole) for s in own)
     answer = proves(candidates, square, 2)
-    assert (answer.lower_bound, answer.reasons) == (3, len(refuted.clauses))
+    assert (answer.lower_bound, answer.reasons) == (3, len(refuted))
     assert square.refute(3, Budget()) is None
     for instance in (row, square):
         instance.close()
@@ -216,11 +216,12 @@ def test_a_bound_of_a_part_holds_with_every_clause_checked_in_the_whole() -> Non
 def test_a_forged_symmetry_of_a_part_is_refused() -> None:
     """The clause of what would be the image: its plans are no optimal plans of the whole."""
     candidates = all_tasks("grid", "gw2-2x3")
-    square = parts(candidates, symmetry_group(candidates))[-1]
-    instance = ContainedInstance(square, 0)
+    instance = parts(candidates, symmetry_group(candidates))[-1]
     instance.refute(2, Budget())
     instance.close()
-    moved = {name for s in square.group.symmetries for name, to in s.renaming.items() if name != to}
+    moved = {
+        name for s in instance.group.symmetries for name, to in s.renaming.items() if name != to
+    }
     one, other, *others = sorted(moved - set(candidates.model.robots))
     # Two neighbours change names, and all others stay: no symmetry of any part with them.
     forged = {
@@ -281,14 +282,11 @@ def test_tasks_of_one_orbit_are_those_whose_plans_pass_through_images_of_one_sta
 def test_two_words_are_too_few_on_a_ring_and_states_of_one_distance_show_it(cells: int) -> None:
     """As a proof by hand says of every ring. Each clause is checked in the whole."""
     candidates = on_graph(cells, ring(cells))
-    found = tasks_of_one_orbit(candidates, symmetry_group(candidates))
-    instance = ContainedInstance(found[0], 0)
+    instance = tasks_of_one_orbit(candidates, symmetry_group(candidates))[0]
     refuted = instance.refute(2, Budget())
     instance.close()
     assert refuted is not None
-    assert {s for clause in refuted.clauses for states in clause for s in states} <= set(
-        instance.states
-    )
+    assert {s for clause in refuted for states in clause for s in states} <= set(instance.states)
     assert len(instance.states) <= 2 * cells
     assert proves(candidates, instance, 2).lower_bound == 3
     built = build_language(candidates, "minimal")
