@@ -24,7 +24,6 @@ from coordlang.vocabulary.loop import Budget, Languages, close_bounds
 from coordlang.vocabulary.sat import (
     PartitionProblem,
     Undecided,
-    at_most,
     most_constrained_first,
     without_implied,
 )
@@ -175,10 +174,7 @@ class FormulaProblem(PartitionProblem):
                 for word, of_term in zip(words, own, strict=True):
                     self._solver.add_clause([-in_term, -of_term, word])
         if limits is not None:
-            variables = [variable for row in self._limits for variable in row]
-            clauses, self._last = at_most(variables, limits, self._last)
-            for clause in clauses:
-                self._solver.add_clause(clause)
+            self._at_most([variable for row in self._limits for variable in row], limits)
 
     def lengths(self) -> tuple[int, int]:
         """The number of terms of the partition found last, and of the variables that they limit."""

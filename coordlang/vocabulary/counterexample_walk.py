@@ -18,7 +18,6 @@ import numpy as np
 
 from coordlang.required.choices import Choices
 from coordlang.required.composition_walk import can_fail, layered, moves
-from coordlang.vocabulary.counterexamples import Counterexamples
 from coordlang.vocabulary.spoken_choices import Words
 from planners.joint.tables import Ints, unique_rows
 from planners.search.edge_index import EdgeIndex
@@ -82,9 +81,7 @@ class CounterexampleWalk:
         self._choices, self._space = choices, choices.space
         self._index = EdgeIndex.of(choices.space)
 
-    def failing(
-        self, word: Ints, most: int, ways: int = 1, steps: int = sys.maxsize
-    ) -> list[Counterexamples]:
+    def failing(self, word: Ints, most: int, ways: int = 1, steps: int = sys.maxsize) -> list[Ints]:
         """See `Mixtures.failing`: the fewest differences, and drawn ones, whatever ``steps``."""
         if not self._choices.requires[self._space.starts].any():
             return []
@@ -144,15 +141,14 @@ class CounterexampleWalk:
 
     def _follow(
         self, layers: Sequence[_Layer], rows: Ints, random: np.random.Generator | None
-    ) -> Counterexamples:
+    ) -> Ints:
         """Ways from nodes of the first layer on: the best, or at each node any move of a way."""
-        start = layers[0].nodes[rows, 0]
         edges = np.empty((len(rows), len(layers), 2), np.int64)
         for step, layer in enumerate(layers):
             move = layer.moves(rows, random)
             edges[:, step] = layer.edges[move]
             rows = layer.child[move]
-        return Counterexamples(start, edges)
+        return edges
 
 
 class _Leads:

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import groupby, takewhile
 from random import Random
 from typing import Any
@@ -25,7 +24,6 @@ from coordlang.vocabulary.sat import Undecided
 from coordlang.vocabulary.spoken_choices import NOTHING, SpokenChoices, Words
 from planners.joint.tables import Ints
 from planners.search.edge_index import EdgeTrees
-from planners.search.plan_space import PlanSpace
 
 #: Ways to a failing step that are taken from one node at most, beside the first.
 _RANDOM_WAYS = 40
@@ -46,29 +44,6 @@ _FAMILIAR = 4
 _Failing = tuple[list[list[int]], Words]
 
 
-@dataclass(frozen=True, slots=True)
-class Counterexamples:
-    """Failing tuples of plans with one sentence, all with equally many steps.
-
-    ``start``: (tuples) the node of the plan space that the plans of each share.  ``edges``:
-    (tuples, steps, robots) step by step the edge of each plan.
-    """
-
-    start: Ints
-    edges: Ints
-
-    def __len__(self) -> int:
-        """Count the tuples."""
-        return len(self.start)
-
-    def states(self, space: PlanSpace) -> Ints:
-        """(tuples, robots, steps + 1) the state numbers of each plan, that of ``start`` first."""
-        first = np.repeat(self.start[:, None, None], space.robots, axis=1)
-        following = space.targets(self.edges).transpose(0, 2, 1)
-        states: Ints = space.state[np.concatenate((first, following), axis=2)]
-        return states
-
-
 class Mixtures:
     """Mixtures of plans that fail and have one sentence, by node of a plan space.
 
@@ -87,11 +62,10 @@ class Mixtures:
         self._shared: dict[_Ahead, tuple[Words, int]] = {}
         self._options: dict[tuple[Words, int], list[_Option]] = {}
 
-    def failing(
-        self, word: Ints, most: int, ways: int = 1, steps: int = sys.maxsize
-    ) -> list[Counterexamples]:
+    def failing(self, word: Ints, most: int, ways: int = 1, steps: int = sys.maxsize) -> list[Ints]:
         """Failing tuples of plans with one sentence, one table for each number of steps.
 
+        A table (tuples, steps, robots) has step by step the edge of each plan.
         For each node that requires coordination, the rest of plans that begin alike; those with
         fewer steps to go first.
 
@@ -124,16 +98,9 @@ class Mixtures:
                 break
             wanted = min(ways * _RANDOM_WAYS, most // len(found) - 1)
             plans += sorted(self._others(node, wanted, random))
-        return [
-            self._table([(node, plans) for node in nodes for plans in found[node]])
-            for _, nodes in groupby(found, key=lambda node: int(space.layer[node]))
-        ]
-
-    def _table(self, found: Sequence[tuple[int, _Plans]]) -> Counterexamples:
-        """Tuples as a table: the node of each, and the edges of its plans."""
-        start = np.array([node for node, _ in found], np.int64)
-        edges = np.array([plans for _, plans in found], np.int64)  # tuples, robots, steps
-        return Counterexamples(start, edges.transpose(0, 2, 1))
+        by_steps = groupby(found, key=lambda node: int(space.layer[node]))
+        plans_by_steps = ([own for node in nodes for own in found[node]] for _, nodes in by_steps)
+        return [np.array(plans, np.int64).transpose(0, 2, 1) for plans in plans_by_steps]
 
     def _of_node(self, node: int, random: Random | None = None) -> _Failing | None:
         """A mixture of plans from a node that fails while all of them have one sentence.
@@ -240,9 +207,6 @@ class Mixtures:
             said = max((words for words, _ in ahead), key=len)
             sets, common = self._spoken.words, -1
             for words, own in ahead:
-                if said[: len(words)] != words:
-                    common = NOTHING
-                    break
                 rest = sets.after(said[len(words) :], self._spoken.sentences(own))
                 common = rest if common < 0 else sets.common(common, rest)
             known = self._shared[ahead] = said, common

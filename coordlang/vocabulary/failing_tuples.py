@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from coordlang.language.warping import Clause
 from coordlang.symmetry.group import SymmetryGroup
-from coordlang.vocabulary.counterexamples import Counterexamples
 from coordlang.vocabulary.job import Evidence
 from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
@@ -63,16 +62,16 @@ class FailingTuples:
         self.by_length: dict[int, Ints] = {}
         #: Where the tuples of each length come from (tuples, 2): number of a batch, row in it.
         self._sources: dict[int, Ints] = {}
-        self._batches: list[tuple[PlanSpace, Counterexamples]] = []
+        self._batches: list[tuple[PlanSpace, Ints]] = []
         self._keys = np.zeros(0, np.int64)
 
     def __len__(self) -> int:
         """Count the tuples, one for all their images."""
         return sum(by_step.shape[2] for by_step in self.by_length.values())
 
-    def add(self, found: Counterexamples, space: PlanSpace) -> int:
-        """Add failing tuples of plans; how many of them are new."""
-        states = found.states(space)
+    def add(self, edges: Ints, space: PlanSpace) -> int:
+        """Add failing tuples of plans, by their edges; how many of them are new."""
+        states = plan_states(space, edges)
         low, high = _different_part(states)
         batch, kept = [np.zeros(0, np.int64)], 0
         for length in np.unique(high - low).tolist():
@@ -85,8 +84,7 @@ class FailingTuples:
             batch.append(rows[fresh])
             source = np.column_stack((np.full(len(fresh), len(self._batches)), here))
             self._append(length, different[fresh], source)
-        rows = np.concatenate(batch)
-        self._batches.append((space, Counterexamples(found.start[rows], found.edges[rows])))
+        self._batches.append((space, edges[np.concatenate(batch)]))
         return kept
 
     def agreeing(
@@ -150,7 +148,7 @@ class FailingTuples:
         returned = max(_LEAST, _RETURNED // len(self.images))
         most = _WARPED * returned
         total = sum(len(found.rows) for found in agreeing)
-        clauses: dict[Clause, tuple[int, int]] = {}
+        clauses: dict[Clause, Ints] = {}
         for length, together in groupby(agreeing, key=lambda found: found.length):
             groups = list(together)
             rows = np.concatenate([found.rows for found in groups])
@@ -165,14 +163,13 @@ class FailingTuples:
             for row in np.flatnonzero((pairs != -2).all(axis=1)).tolist():
                 codes = {*pairs[row].tolist()} - {-1}
                 clause = frozenset(divmod(code, self.states) for code in codes)
-                batch, number = self._sources[length][rows[row]].tolist()
-                clauses.setdefault(clause, (batch, number))
+                clauses.setdefault(clause, self._sources[length][rows[row]])
         chosen = sorted(clauses, key=lambda c: (len(c), sorted(c)))[:returned]
-        return {clause: self._evidence(*clauses[clause]) for clause in chosen}
+        return {clause: self._evidence(*clauses[clause].tolist()) for clause in chosen}
 
     def _evidence(self, batch: int, row: int) -> Evidence:
-        space, found = self._batches[batch]
-        return Evidence(space, int(found.start[row]), found.edges[row].tolist(), None)
+        space, edges = self._batches[batch]
+        return Evidence(space, edges[row].tolist(), None)
 
     def _new(self, states: Ints) -> Ints:
         """The rows that no earlier row, and no tuple that is kept, is an image of."""
@@ -192,6 +189,13 @@ class FailingTuples:
             by_step = np.concatenate((self.by_length[length], by_step), axis=2)
             source = np.concatenate((self._sources[length], source))
         self.by_length[length], self._sources[length] = np.ascontiguousarray(by_step), source
+
+
+def plan_states(space: PlanSpace, edges: Ints) -> Ints:
+    """(tuples, robots, steps + 1) the states of plans, by their edges (tuples, steps, robots)."""
+    nodes = np.concatenate((space.sources[edges[:, :1]], space.targets(edges)), axis=1)
+    states: Ints = space.state[nodes].transpose(0, 2, 1)
+    return states
 
 
 def _different_part(states: Ints) -> tuple[Ints, Ints]:

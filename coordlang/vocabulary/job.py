@@ -85,13 +85,12 @@ class Job:
 class Evidence:
     """Why a clause is necessary.
 
-    There are plans whose mixture fails, from the node ``start`` of a ``space`` on; ``edges`` are
-    step by step the edge of each plan.  ``symmetry``: the clause is that of the plans' images under
+    There are plans of a ``space`` whose mixture fails, all from one node on; ``edges`` are step by
+    step the edge of each plan.  ``symmetry``: the clause is that of the plans' images under
     it; None: of the plans themselves.
     """
 
     space: PlanSpace
-    start: int
     edges: Sequence[Sequence[int]]
     symmetry: Symmetry | None
 

@@ -18,7 +18,7 @@ from coordlang.language.warping import Clause
 from coordlang.required.choices import Choices
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.counterexample_walk import CounterexampleWalk
-from coordlang.vocabulary.counterexamples import Counterexamples, Mixtures
+from coordlang.vocabulary.counterexamples import Mixtures
 from coordlang.vocabulary.failing_tuples import Agreeing, FailingTuples
 from coordlang.vocabulary.job import Evidence
 from planners.joint.model import FullState
@@ -35,7 +35,6 @@ _TASKS_OF_A_PART = 1_500
 _AT_FIRST, _LATER = 4_000, 100
 #: Longer tuples are left out of what is looked at once there are so many.
 _ENOUGH = 2_000
-_COLUMNS = ("start", "edges")
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +57,7 @@ class _Walked:
         kind = CounterexampleWalk if space.robots == 2 else Mixtures
         return cls(part, kind(Choices(part)), images)
 
-    def failing(self, word: Ints, most: int, steps: int = sys.maxsize) -> list[Counterexamples]:
+    def failing(self, word: Ints, most: int, steps: int = sys.maxsize) -> list[Ints]:
         """Failing tuples of plans by the word of each state (states), see `Mixtures.failing`."""
         return self.finder.failing(word[self.space.state], most, len(self.images), steps)
 
@@ -113,7 +112,7 @@ class Refuter:
         with closing((workers or Workers()).tables(batch)) as tables:
             progress("collecting plans whose mixture fails")
             for walked, table in zip(self._parts, tables, strict=True):
-                self._add(walked, _read(table))
+                self._add(walked, [table[str(n)] for n in range(len(table))])
                 progress(f"collecting plans whose mixture fails: {len(self.pool):,}")
 
     def agreeing(
@@ -148,7 +147,7 @@ class Refuter:
         """Necessary clauses of which a partition violates some image; none if it is a language."""
         return self.pool.clauses(word, self.agreeing(word, enough=_ENOUGH), self._random)
 
-    def _add(self, walked: _Walked, found: Sequence[Counterexamples]) -> bool:
+    def _add(self, walked: _Walked, found: Sequence[Ints]) -> bool:
         """Add what a walk has found; whether that is anything."""
         self.walks += 1
         for table in found:
@@ -159,14 +158,8 @@ class Refuter:
 def _walk_alone(shared: tuple[Sequence[_Walked], Ints], number: int) -> Table:
     """One job: the failing plans of one part under a partition."""
     parts, word = shared
-    found = enumerate(parts[number].failing(word, _AT_FIRST))
-    return {f"{name} {n}": getattr(table, name) for n, table in found for name in _COLUMNS}
-
-
-def _read(table: Table) -> list[Counterexamples]:
-    """What `_walk_alone` has found."""
-    count = len(table) // len(_COLUMNS)
-    return [Counterexamples(*(table[f"{name} {n}"] for name in _COLUMNS)) for n in range(count)]
+    found = parts[number].failing(word, _AT_FIRST)
+    return {str(n): edges for n, edges in enumerate(found)}
 
 
 def _parts(spaces: Sequence[PlanSpace], images: Sequence[Ints], random: Random) -> list[_Walked]:

@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
+from itertools import count
 
 from coordlang.language.warping import Clause
 from coordlang.vocabulary.job import Assignment, Job
@@ -62,7 +63,8 @@ def repair(job: Job, kept: Assignment, old_words: int, default: int) -> Repair:
     there are new: whatever word they get, they do not change it.  ``default`` is the old word that
     a new state gets where any will do.
     """
-    with closing(_Repair(job, kept, old_words, default)) as search:
+    search = _Repair(job, kept, old_words, default)
+    with closing(search.problems):
         stopped = run_until_stopped(search.run)
     if search.best is None:
         assert stopped is not None
@@ -80,14 +82,9 @@ class _Repair:
         self._languages = Languages.of(job)
         self._changes_bound = 0
         self._new_words_bound = 0
-        self._anchors = [-1 - word for word in range(old_words)]
-        self._problems = ProblemsBySize(
+        self.problems = ProblemsBySize(
             self._languages.clauses, self._start, PartitionProblem.separate_one
         )
-
-    def close(self) -> None:
-        """Give back what the solvers hold."""
-        self._problems.close()
 
     def result(self, stopped: BaseException | None) -> Repair:
         """The best language, with what is proved of it."""
@@ -126,8 +123,8 @@ class _Repair:
         while not self._holds(self._apart(changed)):
             left = [states for states in self._violated_sets() if not states & changed]
             while left:
-                count = Counter(state for states in left for state in states)
-                chosen = min(count, key=lambda state: (-count[state], state))
+                number = Counter(state for states in left for state in states)
+                chosen = min(number, key=lambda state: (-number[state], state))
                 changed.add(chosen)
                 left = [states for states in left if chosen not in states]
         return changed
@@ -153,18 +150,10 @@ class _Repair:
             if all(a in kept and b in kept and kept[a] == kept[b] for a, b in clause):
                 yield frozenset(state for states in clause for state in states)
 
-    def _apart(self, changed: Iterable[int]) -> dict[int, int]:
+    def _apart(self, changed: set[int]) -> dict[int, int]:
         """The old words, changed and new states each in a word of its own."""
-        own = set(changed)
-        partition = {}
-        fresh = self._old_words
-        for state in self._job.states:
-            if state in self._kept and state not in own:
-                partition[state] = self._kept[state]
-            else:
-                partition[state] = fresh
-                fresh += 1
-        return partition
+        kept, fresh = self._kept.keys() - changed, count(self._old_words)
+        return {s: self._kept[s] if s in kept else next(fresh) for s in self._job.states}
 
     def _join_words(self, changed: set[int]) -> None:
         """Where only these states change: a language with few new words, by first fit.
@@ -196,15 +185,12 @@ class _Repair:
         partition |= {state: -1 - state for state in own}
         for state in most_constrained_first(own, clauses):
             first = self._kept.get(state, self._default)
-            words = sorted(range(used), key=lambda word: (word != first, word))
-            for word in words:
+            for word in (first, *range(used + 1)):
                 partition[state] = word
-                clauses_left = of_state.get(state, ())
-                if all(any(partition[a] != partition[b] for a, b in c) for c in clauses_left):
+                mine = of_state.get(state, ())
+                if all(any(partition[a] != partition[b] for a, b in c) for c in mine):
                     break
-            else:
-                partition[state] = used
-                used += 1
+            used = max(used, partition[state] + 1)
         return partition
 
     def _holds(self, partition: Assignment) -> bool:
@@ -222,14 +208,14 @@ class _Repair:
         size = self._old_words + new_words
 
         def partition(conflicts: int) -> dict[int, int] | None:
-            found = self._problems.find(size, conflicts)
+            found = self.problems.find(size, conflicts)
             return found and {state: found[state] for state in self._job.states}
 
         try:
             found = find(partition, self._holds, budget)
         except Undecided:
             return False
-        self._problems.drop(size)
+        self.problems.drop(size)
         if found is None:
             self._new_words_bound = new_words + 1
         else:
@@ -239,10 +225,11 @@ class _Repair:
     def _start(self, size: int) -> PartitionProblem:
         """Partitions with the fewest changes; an anchor for each old word fixes its name."""
         clauses = without_implied(self._languages.clauses, _COMPARISONS)
-        states = [*self._anchors, *most_constrained_first(self._job.states, clauses)]
+        anchors = [-1 - word for word in range(self._old_words)]
+        states = [*anchors, *most_constrained_first(self._job.states, clauses)]
         problem = PartitionProblem(states, size)
-        for anchor in self._anchors:
-            for other in self._anchors[: -1 - anchor]:
+        for number, anchor in enumerate(anchors):
+            for other in anchors[:number]:
                 problem.separate_one([(anchor, other)])
         problem.keep_words(self._kept, self._changes_bound)
         for clause in clauses:

@@ -141,9 +141,7 @@ class PartitionProblem:
     def keep_words(self, kept: Mapping[int, int], changes: int) -> None:
         """Require that at most so many states have another word than ``kept`` gives them."""
         changed = [-self._word[state][word] for state, word in sorted(kept.items())]
-        clauses, self._last = at_most(changed, changes, self._last)
-        for clause in clauses:
-            self._solver.add_clause(clause)
+        self._at_most(changed, changes)
 
     def add_lex_leaders(self, symmetries: Sequence[Sequence[int]], pairs: Sequence[Pair]) -> None:
         """Of partitions that are images of each other, allow the lexicographic leader.
@@ -226,6 +224,17 @@ class PartitionProblem:
                 self._solver.add_clause([-variable, self._separate(states)])
         return self._all_separated[pairs]
 
+    def _at_most(self, literals: Sequence[int], number: int) -> None:
+        """Allow at most so many literals to be true, by a sequential counter."""
+        from pysat.card import CardEnc, EncType
+
+        if number < len(literals):
+            counter = EncType.seqcounter
+            encoded = CardEnc.atmost(literals, number, top_id=self._last, encoding=counter)
+            self._last = max(self._last, encoded.nv)
+            for clause in encoded.clauses:
+                self._solver.add_clause(clause)
+
     def _name_words_in_order(self) -> None:
         used: list[int] = []  # used[w]: a state before has word w
         for own in self._word.values():
@@ -246,19 +255,6 @@ class PartitionProblem:
         self._solver.add_clause([variable, -first])
         self._solver.add_clause([variable, -second])
         return variable
-
-
-def at_most(literals: Sequence[int], number: int, last: int) -> tuple[list[list[int]], int]:
-    """Clauses by which at most so many literals are true, as a sequential counter.
-
-    With them the greatest variable that is in use then; ``last`` is the greatest one before.
-    """
-    from pysat.card import CardEnc, EncType
-
-    if number >= len(literals):
-        return [], last
-    encoded = CardEnc.atmost(literals, number, top_id=last, encoding=EncType.seqcounter)
-    return [list(clause) for clause in encoded.clauses], max(last, encoded.nv)
 
 
 class Undecided(Exception):

@@ -34,7 +34,8 @@ def separating(job: Job) -> Outcome:
     ``figures["separating_lower_bound"]`` is the proved bound on separating partitions; other
     languages may have fewer words.  Anytime, like `minimal`.
     """
-    with closing(_Alpha(job) if job.alpha_only else _AlphaOrBeta(job)) as search:
+    search = _Alpha(job) if job.alpha_only else _AlphaOrBeta(job)
+    with closing(search.problems):
         stopped = run_until_stopped(search.run)
     if search.best is None:
         assert stopped is not None
@@ -56,7 +57,7 @@ class _Alpha:
         #: The constraints that are listed, and states that need words of their own.
         self._known: list[Constraint] = []
         self._apart: Sequence[int] = ()
-        self._problems = ProblemsBySize(
+        self.problems = ProblemsBySize(
             self._known, self._start, PartitionProblem.separate_all_of_one
         )
         self._rounds = 0
@@ -101,10 +102,10 @@ class _Alpha:
             return not broken
 
         try:
-            partition = find(lambda most: self._problems.find(size, most), holds, budget)
+            partition = find(lambda most: self.problems.find(size, most), holds, budget)
         except Undecided:
             return False
-        self._problems.drop(size)
+        self.problems.drop(size)
         if partition is None:
             self.lower = size + 1
         else:
@@ -131,10 +132,6 @@ class _Alpha:
     def _most_constrained_first(self) -> list[int]:
         pairs = (pairs for constraint in self._known for pairs in constraint)
         return most_constrained_first(self._job.states, pairs)
-
-    def close(self) -> None:
-        """Give back what the solvers hold."""
-        self._problems.close()
 
     def figures(self) -> dict[str, float]:
         """The work done."""

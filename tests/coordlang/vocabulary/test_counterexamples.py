@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from random import Random
 
@@ -17,7 +17,7 @@ from coordlang.required.choices import Choices
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
 from coordlang.vocabulary.counterexample_walk import CounterexampleWalk
 from coordlang.vocabulary.counterexamples import Mixtures
-from coordlang.vocabulary.failing_tuples import FailingTuples
+from coordlang.vocabulary.failing_tuples import FailingTuples, plan_states
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import BadInput, ProvedImpossible, UsageError
 from tests.support import naive
@@ -61,15 +61,15 @@ def compared(spaces: Iterator[PlanSpace], random: Random) -> Counter[bool]:
                 found += walk.failing(nodes, 20)
             assert bool(found) != holds
             for table in found:
-                for row in range(len(table)):
-                    check(space, int(table.start[row]), table.edges[row].tolist(), word)
+                for steps in table.tolist():
+                    check(space, steps, word)
             answers[holds] += 1
     return answers
 
 
-def check(space: PlanSpace, start: int, steps: list[list[int]], word: list[int]) -> None:
+def check(space: PlanSpace, steps: Sequence[Sequence[int]], word: list[int]) -> None:
     """They are plans from one node with one sentence, and their mixture is none."""
-    sentences = set()
+    start, sentences = int(space.sources[steps[0][0]]), set()
     for edges in zip(*steps, strict=True):
         nodes = space.nodes_on(start, edges)
         assert all(edge in space.out_edges(node) for node, edge in zip(nodes, edges, strict=False))
@@ -100,7 +100,7 @@ def filled(space: PlanSpace, group: SymmetryGroup) -> tuple[FailingTuples, list[
     new = sum([pool.add(table, space) for table in found])
     assert new == len(pool)
     assert sum([pool.add(table, space) for table in found]) == 0, "known by now"
-    return pool, [plans for table in found for plans in table.states(space).tolist()]
+    return pool, [plans for table in found for plans in plan_states(space, table).tolist()]
 
 
 def has_one_sentence(plans: list[list[int]], word: list[int]) -> bool:
@@ -126,10 +126,8 @@ def test_tuples_agree_iff_their_plans_have_one_sentence(robots: int | None, seed
             shortest = [n for n in lengths if n]
             for clause, evidence in clauses.items():
                 assert all(word[a] == word[b] for a, b in clause)
-                plans = [
-                    space.nodes_on(evidence.start, e) for e in zip(*evidence.edges, strict=True)
-                ]
-                assert has_one_sentence([space.state[plan].tolist() for plan in plans], word)
+                states = plan_states(space, np.array([evidence.edges]))[0]
+                assert has_one_sentence(states.tolist(), word)
             if clauses:
                 assert min(map(len, clauses)) == shortest[0]
             answers[bool(agreeing)] += 1

@@ -225,8 +225,7 @@ def test_first_walks_find_the_same_in_other_processes_and_from_kept_jobs(tmp_pat
         assert other.walks == here.walks == jobs
         assert len(other.pool) == len(here.pool) > 20
     violated = [
-        [(c, e.start, e.edges) for c, e in found.violated(halves).items()]
-        for found in (here, *others)
+        [(c, e.edges) for c, e in found.violated(halves).items()] for found in (here, *others)
     ]
     assert violated[0]
     assert all(found == violated[0] for found in violated[1:])
