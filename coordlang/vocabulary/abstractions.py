@@ -153,25 +153,17 @@ def _chosen(variables: Sequence[_Values]) -> Iterator[Sequence[Ints | Bools]]:
         own = told.of_state
         yield [own]
         yield [own, *colours]
-        yield from _seen_from(told, others, colours)
+        # Of others that have values in common with the variable that is told.
+        seen = [at for values in others if (at := told.of_other(values)) is not None]
+        if seen:
+            base, near = [own, *colours], [told.is_near(at) for at in seen]
+            yield [*base, *near]
+            yield [*base, *(np.where(close, at, -1) for close, at in zip(near, seen, strict=True))]
     if len(variables) > 2:
         for one, other in combinations(variables, 2):
             rest = [v.colours for v in variables if v is not one and v is not other]
             yield [one.of_state, other.of_state]
             yield [one.of_state, other.of_state, *rest]
-
-
-def _seen_from(
-    told: _Values, others: Sequence[_Values], colours: Sequence[Ints]
-) -> Iterator[Sequence[Ints | Bools]]:
-    """What is looked at of others that have values in common with the variable that is told."""
-    seen = [at for values in others if (at := told.of_other(values)) is not None]
-    if not seen:
-        return
-    base = [told.of_state, *colours]
-    near = [told.is_near(at) for at in seen]
-    yield [*base, *near]
-    yield [*base, *(np.where(close, at, -1) for close, at in zip(near, seen, strict=True))]
 
 
 def _as_key(classes: Ints) -> bytes:

@@ -42,7 +42,7 @@ def needs_three_words(space: PlanSpace) -> bool:
     relevant = Choices(space).requires & space.descendants(space.starts)
     one_end = len(np.unique(space.state[space.layer == 0])) == 1
     apart, plans = [1] * len(space), Apart(space)
-    for node in np.flatnonzero(relevant)[np.argsort(space.layer[relevant], kind="stable")].tolist():
+    for node in np.flatnonzero(relevant).tolist():
         beginnings = _beginnings(space, node)
         numbers = [apart[space.target_of(path[-1])] for path in beginnings]
         two = combinations(range(len(numbers)), 2)

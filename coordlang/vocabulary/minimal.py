@@ -203,16 +203,13 @@ class MinimalSearch:
         if not (self._job.by_clauses or self._is_asynchronous) and needs_three_words(space):
             self.lower = max(self.lower, 3)
         if self._is_dear and self.upper > _MANY:
-            self._begin_with_few_facts()
+            # Words that say what a few facts say, merged a little: closer than a word for a state.
+            found = self._tied.of_facts()
+            if found is not None and word_count(found) < self.upper:
+                self._offer(found)
+                self.merge(most=_MERGED_SOON)
         for rounds in _WHERE_DEAR if self._is_dear else _FOR_KINDS:
             self._find_fewer_tied(rounds)
-
-    def _begin_with_few_facts(self) -> None:
-        """Words that say what a few facts say, merged a little: closer than a word for a state."""
-        found = self._tied.of_facts()
-        if found is not None and word_count(found) < self.upper:
-            self._offer(found)
-            self.merge(most=_MERGED_SOON)
 
     def _find_fewer_tied(self, rounds: int) -> None:
         """Look for a language of some kind with fewer words than the best one.

@@ -9,7 +9,6 @@ fewer of them differ than plans.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import reduce
 from random import Random
 
 import numpy as np
@@ -124,22 +123,14 @@ class SpokenChoices:
 
     def of_node(self, wanted: int) -> tuple[int, ...]:
         """For a node the number of each robot's set; found from the goals up, as far as asked."""
-        robots = range(self.space.robots)
         for node in range(len(self._of_node), wanted + 1):
-            moves: list[dict[int, set[int]]] = [{} for _ in robots]
+            moves: list[dict[int, int]] = [{} for _ in range(self.space.robots)]
             for edge in self.space.out_edges(node):
                 below = self._of_node[self.targets[edge]]
-                for robot in robots:
-                    code = self.code(robot, edge, node)
-                    moves[robot].setdefault(code, set()).add(below[robot])
-            self._of_node.append(
-                tuple(
-                    self._sets.of_moves(
-                        {code: reduce(self._sets.union, sorted(sets)) for code, sets in own.items()}
-                    )
-                    for own in moves
-                )
-            )
+                for robot, own in enumerate(moves):
+                    code, after = self.code(robot, edge, node), below[robot]
+                    own[code] = self._sets.union(own.get(code, after), after)
+            self._of_node.append(tuple(map(self._sets.of_moves, moves)))
         return self._of_node[wanted]
 
     def entered(self, edge: int, node: int) -> Words:
