@@ -53,14 +53,12 @@ class SentenceSets(LabelSets):
         known = self._common.get(key)
         if known is None:
             mine, theirs = self.moves(one), self.moves(other)
-            both = {
-                word: self.common(rest, theirs[word])
-                for word, rest in mine.items()
-                if word in theirs
-            }
-            known = self._common[key] = self.of_moves(
-                {word: rest for word, rest in both.items() if word == _MARK or rest != NOTHING}
-            )
+            both = {}
+            for word in mine.keys() & theirs.keys():
+                rest = self.common(mine[word], theirs[word])
+                if word == _MARK or rest != NOTHING:
+                    both[word] = rest
+            known = self._common[key] = self.of_moves(both)
         return known
 
     def drawn(self, number: int, random: Random) -> Words:
@@ -102,7 +100,6 @@ class SpokenChoices:
         self._spoken = len(self.space.rows) + 1
         self._sentences = {END: SILENCE}
         self._projection = {END: END}
-        self._steps: dict[int, list[Step]] = {}
         self._saying: dict[tuple[int, int], int] = {}
 
     def __len__(self) -> int:
@@ -145,12 +142,10 @@ class SpokenChoices:
 
     def steps(self, number: int) -> list[Step]:
         """The first steps of a set."""
-        found = self._steps.get(number)
-        if found is None:
-            found = self._steps[number] = []
-            for code, after in self._sets.moves(number).items():
-                found.append((code, code // self._spoken, self.entered_by(code), after))
-        return found
+        return [
+            (code, code // self._spoken, self.entered_by(code), after)
+            for code, after in self._sets.moves(number).items()
+        ]
 
     def after(self, number: int, codes: list[int]) -> int | None:
         """What may follow some steps of a set; None if it has no sequence that begins so."""
