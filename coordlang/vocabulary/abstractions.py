@@ -21,7 +21,6 @@ import networkx as nx
 import numpy as np
 
 from coordlang.language.candidates import Candidates
-from planners.joint.model import JointModel
 from planners.joint.tables import Bools, Ints, unique_rows
 from planners.search.state_variables import StateVariable, state_variables
 
@@ -77,13 +76,9 @@ class _Values:
     @cached_property
     def colours(self) -> Ints:
         """(states) two colours: whether the first value, or a part's, is an odd number away."""
-        colour = np.zeros(len(self.names) + 1, np.int64)  # the last: no value
-        for part in nx.connected_components(self.graph):
-            for value, length in nx.single_source_shortest_path_length(
-                self.graph, min(part)
-            ).items():
-                colour[value] = length % 2
-        found: Ints = colour[self.of_state]
+        first = (self.away < _FAR).argmax(axis=1)
+        colour = self.away[first, np.arange(len(first))] % 2
+        found: Ints = np.append(colour, 0)[self.of_state]  # the last: no value
         return found
 
     def of_other(self, other: _Values) -> Ints | None:
@@ -99,7 +94,7 @@ class _Values:
 
 
 def abstractions(candidates: Candidates, states: Sequence[int]) -> list[Ints]:
-    """Abstractions of the states, those with few abstract states first.
+    """Abstractions of the states.
 
     In each one variable is told, or a second one besides; and of the others colours, with nearness
     as seen from the first one.
@@ -116,7 +111,7 @@ def abstractions(candidates: Candidates, states: Sequence[int]) -> list[Ints]:
         classes = unique_rows(np.column_stack(columns).astype(np.int64) + 1)[1]
         if 1 < len(np.unique(classes[mine])) < len(mine):
             found.setdefault(_as_key(classes[mine]), classes)
-    return sorted(found.values(), key=lambda classes: len(np.unique(classes[mine])))
+    return list(found.values())
 
 
 def up_to_symmetry(classes: Sequence[Ints], images: Sequence[Ints]) -> list[Ints]:
@@ -136,10 +131,9 @@ def up_to_symmetry(classes: Sequence[Ints], images: Sequence[Ints]) -> list[Ints
 
 def _variables(candidates: Candidates) -> list[_Values]:
     """The variables that change, those with many values first."""
-    model: JointModel = candidates.model
     found = [
         _Values.of(variable, candidates)
-        for variable in state_variables(model, candidates.rows[0])
+        for variable in state_variables(candidates.model, candidates.rows[0])
         if len(variable.facts) <= _VALUES
     ]
     return [values for values in found if np.ptp(values.of_state)][:_VARIABLES]
