@@ -288,8 +288,9 @@ def classes_by_facts(candidates: Candidates, refuter: Refuter) -> Iterator[Ints]
     ``candidates``: one task.  ``refuter``: tells what is wrong with a partition.
     """
     (space,) = candidates.spaces
-    steps = _steps_to_go(space)
-    if steps is None:
+    steps = np.full(len(space.rows), -1)
+    steps[space.state] = space.layer
+    if (steps[space.state] != space.layer).any():
         return
     facts, chosen = _changing_facts(candidates), list[int]()
     left = np.ones(len(facts), np.bool_)
@@ -329,13 +330,6 @@ def _changing_facts(candidates: Candidates) -> Bools:
     codec = candidates.model.codec
     columns = [codec.column(candidates.rows, fact) for fact in range(len(codec.facts))]
     return np.array([column for column in columns if column.any() and not column.all()], np.bool_)
-
-
-def _steps_to_go(space: PlanSpace) -> Ints | None:
-    """(states) how many steps are to go, -1 where no plan passes; None: several numbers for one."""
-    steps = np.full(len(space.rows), -1)
-    steps[space.state] = space.layer
-    return steps if (steps[space.state] == space.layer).all() else None
 
 
 def _classes(steps: Ints, facts: Bools) -> Ints:
