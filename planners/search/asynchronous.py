@@ -26,6 +26,8 @@ from planners.system.limits import reaching
 
 #: The events that robots have said they will do and have not done: for each robot some, in order.
 _Queues = tuple[tuple[int, ...], ...]
+#: The edges out of a node: labels, then target and cost.
+_Edges = tuple[tuple[Step, tuple[int, int]], ...]
 
 
 def as_executed(space: PlanSpace) -> PlanSpace:
@@ -80,7 +82,7 @@ class _Unfolding:
         self._allowed: dict[int, tuple[int, ...]] = {}
         self.events: list[dict[Event, int]] = [{} for _ in self._robots]
         self._layers: list[dict[object, _Node]] = [{} for _ in space.layers]
-        self._graph = _Graph(space.robots)
+        self._graph = _Graph()
         self._nothing: _Queues = ((),) * space.robots
 
     def so_far(self) -> str:
@@ -387,43 +389,32 @@ class Timing:
 class _Graph:
     """A plan space in the making, from the goals up: nodes with the same edges are one."""
 
-    def __init__(self, robots: int) -> None:
-        self._robots = robots
-        self._nodes: dict[object, int] = {}
-        self._state: list[int] = []
-        self._goal: list[int] = []
-        self._layer: list[int] = []
-        self._edges: list[list[tuple[Step, tuple[int, int]]]] = []
+    def __init__(self) -> None:
+        #: State, goal, layer and edges, with the number.
+        self._nodes: dict[tuple[int, int, int, _Edges], int] = {}
 
     def __len__(self) -> int:
         """Count the nodes."""
-        return len(self._state)
+        return len(self._nodes)
 
     def node(self, state: int, goal: int, layer: int, moves: Mapping[Step, tuple[int, int]]) -> int:
         """The number of a node with these edges: labels, then target and cost."""
-        edges = sorted(moves.items())
-        key = state, goal, layer, tuple(edges)
-        if key not in self._nodes:
-            self._nodes[key] = len(self._state)
-            self._state.append(state)
-            self._goal.append(goal)
-            self._layer.append(layer)
-            self._edges.append(edges)
-        return self._nodes[key]
+        key = state, goal, layer, tuple(sorted(moves.items()))
+        return self._nodes.setdefault(key, len(self._nodes))
 
     def space(self, old: PlanSpace, starts: Sequence[int]) -> PlanSpace:
         """The plan space of what paths from the starts pass through."""
-        edges = [edge for own in self._edges for edge in own]
-        degrees = [len(own) for own in self._edges]
-        table = np.array([step for step, _ in edges], np.int32).reshape(len(edges), self._robots)
+        columns = np.array([node[:3] for node in self._nodes], np.int64).reshape(-1, 3).T.copy()
+        own = [node[3] for node in self._nodes]
+        edges = [edge for some in own for edge in some]
         found = replace(
             old,
-            state=np.array(self._state, np.int64),
-            goal=np.array(self._goal, np.int64),
-            layer=np.array(self._layer, np.int64),
-            first=np.concatenate(([0], np.cumsum(degrees))).astype(np.int64),
+            state=columns[0],
+            goal=columns[1],
+            layer=columns[2],
+            first=np.cumsum([0, *map(len, own)]),
             target=np.array([target for _, (target, _) in edges], np.int64),
-            labels=table,
+            labels=np.array([step for step, _ in edges], np.int32).reshape(-1, old.robots),
             cost=np.array([cost for _, (_, cost) in edges], np.int64),
             starts=np.array(starts, np.int64),
         )

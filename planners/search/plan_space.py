@@ -165,24 +165,15 @@ class PlanSpace:
         ``steps`` are their labels, step by step.  None if there is no such plan.  It goes on with
         first edges to a goal.  O(edges).
         """
-        layers: list[dict[int, tuple[int, int]]] = [{node: (-1, -1)}]  # node -> (before, edge)
+        paths: dict[int, list[int]] = {node: []}  # a path to each node that is reached
         for labels in steps:
-            reached: dict[int, tuple[int, int]] = {}
-            for before in layers[-1]:
-                edges = self.out_edges(before)
-                own = self.labels[edges.start : edges.stop][:, list(robots)]
-                for position in np.flatnonzero((own == np.asarray(labels)).all(axis=1)).tolist():
-                    edge = edges.start + position
-                    reached.setdefault(self.target_of(edge), (before, edge))
-            layers.append(reached)
-        if not layers[-1]:
-            return None
-        end = at = next(iter(layers[-1]))
-        path: list[int] = []
-        for layer in reversed(layers[1:]):
-            at, edge = layer[at]
-            path.append(edge)
-        return [*reversed(path), *self.first_path(end)]
+            before, paths = paths, {}
+            for source, path in before.items():
+                edges = np.array(self.out_edges(source))
+                own = self.labels[edges][:, list(robots)]
+                for edge in edges[(own == np.asarray(labels)).all(axis=1)].tolist():
+                    paths.setdefault(self.target_of(edge), [*path, edge])
+        return next(([*path, *self.first_path(end)] for end, path in paths.items()), None)
 
     def nodes_on(self, node: int, path: Sequence[int]) -> list[int]:
         """The nodes that a path passes through: the one that it starts from, then its targets."""
@@ -200,7 +191,7 @@ class PlanSpace:
         """The number of edges out of each node."""
         return np.diff(self.first)
 
-    def targets(self, edges: Ints | None = None) -> Ints:
+    def targets(self, edges: Ints | slice | None = None) -> Ints:
         """The nodes that these edges (None: all) lead to."""
         found = self.target if edges is None else self.target[edges]
         return found.astype(np.int64)
@@ -217,25 +208,21 @@ class PlanSpace:
 
     def layer_edges(self, layer: int) -> LayerEdges:
         """The edges out of the nodes of a layer, by its number (0: the goals, which have none)."""
-        low, high = np.searchsorted(self.layer, (layer, layer + 1))
-        return self._edges_of(int(low), int(high))
+        low, high = np.searchsorted(self.layer, (layer, layer + 1)).tolist()
+        edges = np.arange(self.first[low], self.first[high])
+        source = np.repeat(np.arange(low, high), np.diff(self.first[low : high + 1]))
+        return LayerEdges(edges, source, self.targets(slice(self.first[low], self.first[high])))
 
     def edges_by_layer(self) -> Iterator[LayerEdges]:
         """`layer_edges` of every layer above the goals, the lowest first."""
-        for nodes in self.layers[1:]:
-            yield self._edges_of(nodes.start, nodes.stop)
-
-    def _edges_of(self, low: int, high: int) -> LayerEdges:
-        start, end = int(self.first[low]), int(self.first[high])
-        source = np.repeat(np.arange(low, high), np.diff(self.first[low : high + 1]))
-        return LayerEdges(np.arange(start, end), source, self.target[start:end].astype(np.int64))
+        return map(self.layer_edges, range(1, int(self.layer.max(initial=0)) + 1))
 
     def descendants(self, nodes: Ints) -> Bools:
         """Which nodes paths from these nodes reach, these included (nodes).  O(edges)."""
         reached = np.zeros(len(self), np.bool_)
         reached[nodes] = True
-        for span in reversed(self.layers[1:]):
-            below = self._edges_of(span.start, span.stop)
+        for layer in range(int(self.layer.max(initial=0)), 0, -1):
+            below = self.layer_edges(layer)
             reached[below.target[reached[below.source]]] = True
         return reached
 
@@ -296,35 +283,22 @@ class PlanSpace:
 
     def _cut(self, kept: Bools) -> PlanSpace:
         """The nodes of a mask with the edges between them; all starts are among them."""
-        if kept.all():
-            return self
-        number = np.cumsum(kept) - 1
-        source = self.sources
-        edges = kept[source] & kept[self.target]
-        return replace(
-            self,
-            state=self.state[kept],
-            goal=self.goal[kept],
-            layer=self.layer[kept],
-            first=np.searchsorted(number[source[edges]], np.arange(int(kept.sum()) + 1)),
-            target=narrow(number[self.target[edges]]),
-            labels=self.labels[edges],
-            cost=self.cost[edges],
-            starts=number[self.starts],
-        )
+        return self if kept.all() else self.reordered(np.flatnonzero(kept))
 
     def reordered(self, order: Ints) -> PlanSpace:
-        """The same graph with its nodes in another order: new node k is old node ``order[k]``."""
-        number = np.empty(len(order), np.int64)
+        """The graph of some nodes, all starts among them: new node k is old node ``order[k]``."""
+        number = np.full(len(self), -1)
         number[order] = np.arange(len(order))
-        counts = np.diff(self.first)[order]
+        counts = self.out_degrees[order]
         edges = ranges(self.first[order], counts)
+        kept = number[self.target[edges]] >= 0
+        edges = edges[kept]
         return replace(
             self,
             state=self.state[order],
             goal=self.goal[order],
             layer=self.layer[order],
-            first=np.concatenate(([0], np.cumsum(counts))),
+            first=kept_runs(np.concatenate(([0], np.cumsum(counts))), kept),
             target=narrow(number[self.target[edges]]),
             labels=self.labels[edges],
             cost=self.cost[edges],

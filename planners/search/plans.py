@@ -96,27 +96,17 @@ class Plans:
         return self._timing.labels(self.start, steps) if self._timing else self.padded(steps)
 
     def __iter__(self) -> Iterator[Plan]:
-        """All plans, lazily: memory is one plan."""
-        plan: list[tuple[int, ...]] = []
-        # One iterator of edges for each step of the current plan.
-        open_edges = [iter(self.space.out_edges(self.start))]
-        if self.space.layer[self.start] == 0:
-            yield ()
-            return
-        while open_edges:
-            edge = next(open_edges[-1], None)
-            if edge is None:
-                open_edges.pop()
-                if plan:
-                    plan.pop()
-                continue
-            plan.append(self.space.labels_of(edge))
-            target = self.space.target_of(edge)
-            if self.space.layer[target] == 0:
-                yield tuple(plan)
-                plan.pop()
-            else:
-                open_edges.append(iter(self.space.out_edges(target)))
+        """All plans, lazily: memory is one plan, with the edges beside it."""
+        space = self.space
+        begun: list[tuple[int, Plan]] = [(self.start, ())]
+        while begun:
+            node, plan = begun.pop()
+            if space.layer[node] == 0:
+                yield plan
+            begun.extend(
+                (space.target_of(edge), (*plan, space.labels_of(edge)))
+                for edge in reversed(space.out_edges(node))
+            )
 
     def unrank(self, rank: int) -> Plan:
         """The plan at a position of the order; raises `IndexError` outside ``0 .. count - 1``."""
@@ -139,17 +129,14 @@ class Plans:
         """The position of a plan, or None if it is not an optimal plan of the task."""
         if len(plan) != self.space.layer[self.start]:
             return None
-        rank, node = 0, self.start
-        for step in plan:
-            for edge in self.space.out_edges(node):
-                target = self.space.target_of(edge)
-                if self.space.labels_of(edge) == tuple(step):
-                    break
-                rank += self.counted[target]
-            else:
-                return None
-            node = target
-        return rank
+        path = self.space.path_with(self.start, plan)
+        if path is None:
+            return None
+        before = [
+            range(self.space.out_edges(node).start, edge)
+            for node, edge in zip(self.space.nodes_on(self.start, path), path, strict=False)
+        ]
+        return sum(self.counted[self.space.target_of(e)] for edges in before for e in edges)
 
     def padded(self, plan: Plan) -> Plan | None:
         """A plan within slack that is given without its rest at the end, with it.
