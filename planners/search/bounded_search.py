@@ -41,9 +41,6 @@ _TRIED = 8
 #: A solver has a part of its effort at first.  Where that is too little, so many times more joint
 #: steps are tried before it has all of it: that solves puzzles with few robots.
 _FIRST_PART, _LONGER = 32, 400
-#: How a round ended: the goal was met, or more joint steps were composed than are tried without
-#: exact bounds.
-_MET, _GROWN = -1, -2
 #: States from which ways are tried, the ways that are followed from each, and the share of them
 #: that has to lead to the goal.
 _SAMPLED, _WAYS, _MOST = 50, 8, 0.5
@@ -106,17 +103,19 @@ class BoundedSearch(Exploration):
         while following < FAR:
             self.bound, before = following, work
             done = self.composed
-            following = self._round()
-            work = self.composed - done
-            if following == _MET:
-                return
-            if following == _GROWN:
+            try:
+                beyond = self._round()
+            except _GrownError:
+                work = self.composed - done
                 following = self._bounded_exactly()
                 continue
+            if beyond is None:
+                return
+            work = self.composed - done
             # Rounds that hardly grow are left out: more than needed is searched then, never less.
             slow = 2 * slow if work < 1.5 * before else 1
-            self._least = following
-            following += slow - 1
+            self._least = beyond
+            following = beyond + slow - 1
         seen = np.flatnonzero(self._depth[: len(self.table)] < _NEVER)
         raise ProvedImpossible(
             f"task {self._task.name}: the goal cannot be reached",
@@ -135,12 +134,8 @@ class BoundedSearch(Exploration):
             if is_makespan and self._least and self._mostly_lead(self.bound - self.depth, most):
                 return self.bound
             from planners.search.exact_bound import ExactQuestion
-            from planners.search.plan_formula import TooManyClauses
 
-            try:
-                question = ExactQuestion(self._model, self._task, self._variables)
-            except TooManyClauses:
-                return self.bound
+            question = ExactQuestion(self._model, self._task, self._variables)
         is_first, self._question = self._question is None, question
         effort = self._pieces.effort // (_FIRST_PART if is_first else 1)
         self.exact = question.bound(self._least, effort, self._pieces)
@@ -194,8 +189,8 @@ class BoundedSearch(Exploration):
         if self._question is not None:
             self._question.close()
 
-    def _round(self) -> int:
-        """Search within the bound; the least bound that was too large, `_MET` or `_GROWN`."""
+    def _round(self) -> int | None:
+        """Search within the bound; the least that was too large, None once the goal is met."""
         self.rounds += 1
         self._depth[:] = _NEVER
         self._depth[0] = 0
@@ -203,10 +198,7 @@ class BoundedSearch(Exploration):
         beyond = FAR
         while not self._model.holds(self._task.goal, self.layer).any():
             depth = len(self.layers)
-            try:
-                edges, low = self._within_bound(depth)
-            except _GrownError:
-                return _GROWN
+            edges, low = self._within_bound(depth)
             beyond = min(beyond, low)
             if self.exact is not None:
                 self._depth[self.exact.left_out(edges, depth, len(self.table))] = _LEFT_OUT
@@ -216,7 +208,7 @@ class BoundedSearch(Exploration):
                 return beyond
             self.edges.append(edges)
             self.enter(new)
-        return _MET
+        return None
 
     def space(self) -> Space:
         """The states of the last round that lead to the goal, with the joint steps between them."""

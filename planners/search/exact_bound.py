@@ -132,9 +132,9 @@ class ExactBound:
         return passes
 
     def _unless_refuted(self, literals: Literals) -> bool:
+        self.plans.left = self._pieces.question
         try:
-            with self.plans.at_most(self._pieces.question):
-                return self.plans.holds(literals)
+            return self.plans.holds(literals)
         except OutOfEffort:
             return True
 
@@ -168,7 +168,6 @@ class ExactQuestion:
     def __init__(
         self, model: JointModel, task: PlanningTask, variables: Sequence[StateVariable]
     ) -> None:
-        """Write the formula; raises `planners.search.plan_formula.TooManyClauses`."""
         self._model, self._task = model, task
         self._formula = PlanFormula(model, task, variables)
         self._plans = self._formula.plans()
@@ -204,7 +203,6 @@ class ExactQuestion:
                     cheap = _least_cost(plans, model, self._task)
                     plan = plans.labels_chosen()
                     plans.require(cheap)
-            plans.without_limit()
             used = _used(plans, model, plan, pieces.question)
             plans.simplify()
             return ExactBound(plans, used, pieces)
@@ -242,9 +240,9 @@ def _used(plans: FixedPlans, model: JointModel, plan: Plan, effort: int) -> list
         used = found[step][robot]
         while len(unknown := np.flatnonzero(~used)):
             others = [plans.label(step, robot, label) for label in unknown.tolist()]
+            plans.left = effort
             try:
-                with plans.at_most(effort):
-                    holds = plans.holds([plans.some_of(others)])
+                holds = plans.holds([plans.some_of(others)])
             except OutOfEffort:
                 used[:] = True
                 break

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import combinations, product
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +19,8 @@ from planners.grounding.actions import GroundAction
 from planners.joint.composition import ComposingStepper
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask
 from planners.joint.tables import Bools, Ints, Rows, unique_rows
-from planners.pddl.lifted import TRUE, And, Atom, Formula, Not, Or, StepAtom, Truth
+from planners.pddl.formula_tree import conjuncts, negated, signed, substituted
+from planners.pddl.lifted import FALSE, TRUE, And, Atom, Formula, Or, StepAtom, Truth
 from planners.search.goals import FactsOf
 from planners.search.graphs import csgraph
 from planners.search.questions import FixedPlans, Literals
@@ -29,15 +30,6 @@ from planners.system.errors import OutOfMemory
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-#: Literals in the clauses of one condition at most.
-_MOST = 4_000
-
-Clause = frozenset[int]
-
-
-class TooManyClauses(Exception):
-    """A condition of the model has too many clauses to be part of a formula."""
-
 
 class PlanFormula:
     """The clauses of one ``step`` of a plan of a task, and of its goal.
@@ -46,8 +38,6 @@ class PlanFormula:
     robot by robot, then helping variables; ``size`` is how many there are.  ``size + k`` is
     variable k of the next step.  States have one value of each of the state variables.  The last
     variable implies that the task begins in the state before the step.
-
-    Raises `TooManyClauses`.
     """
 
     def __init__(
@@ -75,11 +65,12 @@ class PlanFormula:
         for i, j in combinations(range(len(model.robots)), 2):
             self._apart(i, j)
         self._never_together(variables, task.init)
+        goal = self._goal_clauses(task.goal)
         begins, true = self._fresh(), set(model.codec.true_facts(task.init))
         for fact in range(facts):
             self.step.append((-begins, fact + 1 if fact in true else -(fact + 1)))
         self._facts_follow()
-        self._flat_step, self._goal = _flat(self.step), _flat(self._goal_clauses(task.goal))
+        self._flat_step, self._goal = _flat(self.step), _flat(goal)
 
     def plans(self) -> FixedPlans:
         """The plans of no step, that is, the goal, as a formula to be closed."""
@@ -114,35 +105,45 @@ class PlanFormula:
             self.step += [(-before, so_far), (-variable, so_far)]
             before = so_far
 
-    def _saying(
-        self, formula: Formula, robot: int = 0, label: int = 0, *, wanted: bool = True
-    ) -> list[Clause]:
-        """The clauses that say that a condition has this value, where a robot has this label.
+    def _saying(self, formula: Formula, robot: int = 0, label: int = 0) -> list[Literals]:
+        """The clauses that say that a condition holds, where a robot has this label."""
+        facts, subactions = self._model.codec.facts, self._model.evaluator.subactions
 
-        No clause: it has.  An empty one: it has not.
-        """
-        value, variable = isinstance(formula, Truth) and formula.value, 0
-        match formula:
-            case Not(part):
-                return self._saying(part, robot, label, wanted=not wanted)
-            case And(parts) | Or(parts):
-                every = [self._saying(part, robot, label, wanted=wanted) for part in parts]
-                return _all(every) if isinstance(formula, And) == wanted else _any(every)
-            case Atom():
-                variable = self._model.codec.facts.index.get(formula, -1) + 1
-            case StepAtom() if (known := self._model.evaluator.subactions.get(formula)) is not None:
-                value = known == (robot, label)
-                variable = 0 if known[0] == robot else self._label(*known)
-        if variable:
-            return [frozenset({variable if wanted else -variable})]
-        return [] if value == wanted else [frozenset()]
+        def value(leaf: Atom | StepAtom) -> Formula:
+            if isinstance(leaf, Atom):
+                return leaf if leaf in facts else FALSE
+            known = subactions.get(leaf)
+            if known is None or known[0] == robot:
+                return Truth(known == (robot, label))
+            return leaf
+
+        return self._clauses(substituted(formula, value))
+
+    def _clauses(self, formula: Formula) -> list[Literals]:
+        """The clauses of a simplified condition; a conjunction in it gets a variable."""
+        found = []
+        for part in conjuncts(formula):
+            clause = []
+            for way in part.parts if isinstance(part, Or) else (part,) if part != FALSE else ():
+                if isinstance(way, And):
+                    clause.append(self._fresh())
+                    found += [[-clause[-1], *said] for said in self._clauses(way)]
+                else:
+                    clause.append(self._literal(*signed(way)))
+            found.append(sorted(clause, key=abs))
+        return found
+
+    def _literal(self, leaf: Formula, wanted: bool) -> int:
+        if isinstance(leaf, StepAtom):
+            variable = self._label(*self._model.evaluator.subactions[leaf])
+        else:
+            assert isinstance(leaf, Atom)
+            variable = self._model.codec.facts.index[leaf] + 1
+        return variable if wanted else -variable
 
     def _action(self, robot: int, label: int, action: GroundAction) -> None:
         chosen = self._label(robot, label)
-        self.step += [
-            (-chosen, *sorted(said, key=abs))
-            for said in self._saying(action.precondition, robot, label)
-        ]
+        self.step += [(-chosen, *said) for said in self._saying(action.precondition, robot, label)]
         index = self._model.codec.facts.index
         for effect in action.effects:
             if effect.atom not in index:
@@ -156,11 +157,9 @@ class PlanFormula:
         """A variable for: the label is chosen, and the condition of an effect holds."""
         chosen, fires = self._label(robot, label), self._fresh()
         self.step.append((-fires, chosen))
-        self.step += [
-            (-fires, *sorted(said, key=abs)) for said in self._saying(condition, robot, label)
-        ]
-        otherwise = self._saying(condition, robot, label, wanted=False)
-        self.step += [(fires, -chosen, *sorted(said, key=abs)) for said in otherwise]
+        self.step += [(-fires, *said) for said in self._saying(condition, robot, label)]
+        otherwise = self._saying(negated(condition), robot, label)
+        self.step += [(fires, -chosen, *said) for said in otherwise]
         return fires
 
     def _apart(self, i: int, j: int) -> None:
@@ -210,7 +209,7 @@ class PlanFormula:
         if isinstance(goal, FullState):
             facts = range(len(self._adders))
             return [[fact + 1 if fact in goal.facts else -(fact + 1)] for fact in facts]
-        return [sorted(clause, key=abs) for clause in self._saying(goal)]
+        return self._saying(goal)
 
 
 def _unique(table: Bools) -> tuple[Bools, Ints]:
@@ -222,32 +221,6 @@ def _unique(table: Bools) -> tuple[Bools, Ints]:
 def _flat(clauses: Iterable[Sequence[int]]) -> Ints:
     """Clauses one after another, each followed by 0."""
     return np.array([literal for clause in clauses for literal in (*clause, 0)], np.int64)
-
-
-def _all(parts: Iterable[list[Clause]]) -> list[Clause]:
-    return _few(clause for part in parts for clause in part)
-
-
-def _any(parts: Sequence[list[Clause]]) -> list[Clause]:
-    if [] in parts:
-        return []
-    found: list[Clause] = [frozenset()]
-    for part in parts:
-        if len(found) * len(part) > _MOST:
-            raise TooManyClauses
-        joined = (one | other for one, other in product(found, part))
-        found = _few(
-            clause for clause in joined if not any(-literal in clause for literal in clause)
-        )
-    return found
-
-
-def _few(clauses: Iterable[Clause]) -> list[Clause]:
-    """Different clauses; raises `TooManyClauses`."""
-    found = list(dict.fromkeys(clauses))
-    if sum(map(len, found)) > _MOST:
-        raise TooManyClauses
-    return found
 
 
 #: Ways to make facts true, beyond which nothing is looked for.

@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-import sys
 from array import array
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from itertools import chain
 
 import numpy as np
@@ -194,18 +192,3 @@ class FixedPlans:
         self.left -= effort
         if self.left < 0:
             raise OutOfEffort
-
-    def without_limit(self) -> None:
-        """Answer every question from now on, however long it takes."""
-        self.left = sys.maxsize
-
-    @contextmanager
-    def at_most(self, effort: int) -> Iterator[None]:
-        """Spend no more than this inside, of what is left."""
-        before = self.left
-        self.left = min(effort, before)
-        given = self.left
-        try:
-            yield
-        finally:
-            self.left = before - (given - self.left)
