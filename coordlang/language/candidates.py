@@ -203,7 +203,7 @@ def explored_if_small(model: JointModel, inits: Rows) -> Space | None:
         left -= model.stepper.most_steps(model.codec.facts_part(found.layer))
         if left < 0:
             return None
-        found.enter(found.expand())
+        found.layers.append(found.expand())
     return found.space()
 
 

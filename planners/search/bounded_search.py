@@ -207,7 +207,7 @@ class BoundedSearch(Exploration):
             if not len(new):
                 return beyond
             self.edges.append(edges)
-            self.enter(new)
+            self.layers.append(new)
         return None
 
     def space(self) -> Space:

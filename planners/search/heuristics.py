@@ -131,8 +131,9 @@ def relaxed(model: JointModel, goal: Goal) -> Values:
 class _RelaxedReach(NamedTuple):
     """The ways in which facts that a goal needs come true, sorted by that fact.
 
-    Way k needs ``need[first_need[k] : first_need[k + 1]]``; fact ``made[m]`` has the ways from
-    ``first_way[m]`` on.
+    Way k needs the facts ``need`` from ``first_need[k]`` on; fact ``made[m]`` has the ways from
+    ``first_way[m]`` on.  Where nothing is needed or ``wanted``, a fact that is always true is: the
+    last one.
     """
 
     model: JointModel
@@ -154,14 +155,19 @@ class _RelaxedReach(NamedTuple):
             below = {n for needs in ways.get(todo.pop(), ()) for n in needs} - relevant
             relevant |= below
             todo += below
-        kept = [(needs, fact) for fact in sorted(relevant) for needs in sorted(ways.get(fact, ()))]
+        always = (len(model.codec.facts),)
+        kept = [
+            (needs or always, fact)
+            for fact in sorted(relevant)
+            for needs in sorted(ways.get(fact, ()))
+        ]
         facts = np.array([fact for _, fact in kept], np.int64)
         made, first_way = np.unique(facts, return_index=True)
         return cls(
             model,
-            np.array(sorted(wanted), np.int64),
+            np.array(sorted(wanted or always), np.int64),
             np.array([n for needs, _ in kept for n in needs], np.int64),
-            np.cumsum([0, *(len(needs) for needs, _ in kept)]),
+            np.cumsum([0, *(len(needs) for needs, _ in kept[:-1])]),
             made,
             first_way,
         )
@@ -169,16 +175,13 @@ class _RelaxedReach(NamedTuple):
     def steps(self, rows: Rows) -> Ints:
         """For each state the steps until the wanted facts have been true, `FAR` if never."""
         bits = packed(self.model.codec.truth(rows).T)  # (facts, blocks of 64 states)
+        bits = np.vstack((bits, np.full(bits.shape[1], ~np.uint64(0))))
         result = np.full(len(rows), FAR)
         result[self._there(bits, len(rows))] = 0
-        free = np.diff(self.first_need) == 0
         steps = 0
         while len(self.made) and (result == FAR).any():
             steps += 1
-            ways = np.full((len(free), bits.shape[1]), ~np.uint64(0))
-            if not free.all():
-                needed = self.first_need[:-1][~free]
-                ways[~free] = np.bitwise_and.reduceat(bits[self.need], needed, axis=0)
+            ways = np.bitwise_and.reduceat(bits[self.need], self.first_need, axis=0)
             before = bits[self.made]
             after = before | np.bitwise_or.reduceat(ways, self.first_way, axis=0)
             if (after == before).all():
@@ -189,8 +192,6 @@ class _RelaxedReach(NamedTuple):
 
     def _there(self, bits: Rows, count: int) -> Bools:
         """In which states all wanted facts have been true."""
-        if not len(self.wanted):
-            return np.ones(count, np.bool_)
         there: Bools = unpacked(np.bitwise_and.reduce(bits[self.wanted])[None], count)[0]
         return there
 

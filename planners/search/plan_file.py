@@ -235,22 +235,19 @@ def _put(
     own: list[str | None], step: int, action: str, model: JointModel, position: Position
 ) -> None:
     """Enter an action for the robots that it belongs to."""
+    ground = next((a for a in model.actions if a.label == action), None)
+    if ground is None:
+        raise NoSuchAction(action, step, position)
     if model.is_joint_action:
-        parts = next((a.parts for a in model.actions if a.label == action), None)
-        if parts is None:
-            raise NoSuchAction(action, step, position)
         if any(own):
             raise BadInput(
                 f"two joint actions in one step: {action} is the second",
                 position=position,
                 remedy="Each line of a joint-action plan is a step of its own.",
             )
-        own[:] = parts
+        own[:] = ground.parts
         return
-    owners = next((a.owners for a in model.actions if a.label == action), None)
-    if owners is None:
-        raise NoSuchAction(action, step, position)
-    for robot in owners:
+    for robot in ground.owners:
         if own[robot] is not None:
             raise BadInput(
                 f"{model.robots[robot]} does two things in one step: {own[robot]} and {action}",

@@ -3,11 +3,9 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import accumulate
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -115,14 +113,12 @@ class Plans:
         plan = []
         node = self.start
         while self.space.layer[node] > 0:
-            edges = self.space.out_edges(node)
-            sums = list(
-                accumulate((self.counted[self.space.target_of(e)] for e in edges), initial=0)
-            )
-            position = bisect_right(sums, rank) - 1
-            rank -= sums[position]
-            plan.append(self.space.labels_of(edges[position]))
-            node = self.space.target_of(edges[position])
+            edge = self.space.out_edges(node).start
+            while rank >= (below := self.counted[self.space.target_of(edge)]):
+                rank -= below
+                edge += 1
+            plan.append(self.space.labels_of(edge))
+            node = self.space.target_of(edge)
         return tuple(plan)
 
     def rank(self, plan: Plan) -> int | None:
@@ -143,19 +139,17 @@ class Plans:
 
         None if there is none, or it is too long.
         """
-        left = int(self.space.layer[self.start]) - len(plan)
-        path = self.space.path_with(self.start, plan) if left >= 0 else None
+        path = self.space.path_with(self.start, plan)
         if path is None:
             return None
         node = self.space.nodes_on(self.start, path)[-1]
-        rest: list[tuple[int, ...]] = []
-        for _ in range(left):
+        while self.space.layer[node] > 0:
             edge = self._rest(node)
             if edge is None:
                 return None
-            rest.append(self.space.labels_of(edge))
+            plan = (*plan, self.space.labels_of(edge))
             node = self.space.target_of(edge)
-        return (*plan, *rest)
+        return plan
 
     def without_rest(self, plan: Plan) -> Plan:
         """A plan without the rest at its end that `padded` adds.
@@ -166,12 +160,9 @@ class Plans:
         path = self.space.path_with(self.start, plan) if self.space.model.slack else None
         if path is None:
             return plan
+        nodes = self.space.nodes_on(self.start, path)
         length = len(plan)
-        for edge, node in zip(
-            reversed(path), reversed(self.space.nodes_on(self.start, path)[:-1]), strict=True
-        ):
-            if edge != self._rest(node):
-                break
+        while length and path[length - 1] == self._rest(nodes[length - 1]):
             length -= 1
         return plan[:length]
 

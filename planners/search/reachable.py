@@ -77,14 +77,6 @@ class Space:
     labels: Labels
     cost: Numbers
 
-    @classmethod
-    def of(cls, model: JointModel, rows: Rows, edges: Edges) -> Space:
-        """A space of joint steps that need not be sorted by the state that they lead out of."""
-        order = np.argsort(edges.source, kind="stable")
-        first = np.searchsorted(edges.source[order], np.arange(len(rows) + 1))
-        target, labels, cost = (column[order] for column in edges[1:])
-        return cls(model, rows, first, target, labels.astype(np.int32), cost)
-
     def __len__(self) -> int:
         return len(self.rows)
 
@@ -270,10 +262,6 @@ class Exploration:
                 self.edges.append(edges.compact())
         return np.arange(before, len(self.table))
 
-    def enter(self, new: Ints) -> None:
-        """Let these states be the next layer."""
-        self.layers.append(new)
-
     def so_far(self) -> str:
         """How far it got, for messages."""
         return (
@@ -293,8 +281,11 @@ class Exploration:
         of_state[states] = number
         edges = joined_edges(parts, len(self._model.robots))
         edges = edges.only(of_state[edges.target] < len(rows))
-        source, target = of_state[edges.source], of_state[edges.target]
-        return Space.of(self._model, rows, edges._replace(source=source, target=target))
+        source = of_state[edges.source]
+        order = np.argsort(source, kind="stable")
+        first = np.searchsorted(source[order], np.arange(len(rows) + 1))
+        target, labels, cost = (column[order] for column in edges[1:])
+        return Space(self._model, rows, first, of_state[target], labels.astype(np.int32), cost)
 
 
 def explore(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> Space:
@@ -305,7 +296,7 @@ def explore(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> Spac
     found = Exploration(model, inits, pieces)
     with reaching(found.so_far, FEWER):
         while len(found.layers[-1]):
-            found.enter(found.expand())
+            found.layers.append(found.expand())
         return found.space()
 
 
@@ -317,5 +308,5 @@ def count(model: JointModel, inits: Rows, pieces: PieceSizes = PIECES) -> tuple[
     found = Exploration(model, inits, pieces)
     with reaching(found.so_far, FEWER):
         while len(found.layers[-1]):
-            found.enter(found.expand(keep=False))
+            found.layers.append(found.expand(keep=False))
     return found.states, found.composed

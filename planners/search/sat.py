@@ -30,7 +30,9 @@ def sat_solver(name: SolverName, clauses: Iterable[Sequence[int]] = ()) -> Any:
 
     It has some clauses; it is a context manager, and is given back by ``delete()``.
     """
-    solver = _solver_class()(name=name)
+    from pysat.solvers import Solver
+
+    solver = whole(Solver)(name=name)
     for clause in clauses:
         solver.add_clause(clause)
     return solver
@@ -74,13 +76,6 @@ def split_clauses(clauses: array[int] | Ints, block: int = _BLOCK) -> Iterator[l
         for end in some.tolist():
             yield listed[begin - first : end - first]
             begin = end + 1
-
-
-@cache
-def _solver_class() -> Any:
-    from pysat.solvers import Solver
-
-    return whole(Solver)
 
 
 @cache

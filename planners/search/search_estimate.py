@@ -129,7 +129,7 @@ def _layers(model: JointModel, start: Rows, steps: int, states: int) -> list[Row
         if most > steps or found.states > states:
             break
         steps -= most
-        found.enter(found.expand(keep=False))
+        found.layers.append(found.expand(keep=False))
         layers.append(unique_rows(found.layer)[0])
     return layers
 

@@ -19,7 +19,6 @@ import numpy as np
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, PlanningTask
 from planners.joint.tables import Bools, Ints, Rows, find_rows, unique_rows
-from planners.search.goals import FAR
 from planners.search.heuristics import search_heuristic
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, Exploration, PieceSizes, Space
@@ -51,8 +50,8 @@ def explore_within(
             new = found.expand(only)
             if heuristic.value is not None:
                 bound = heuristic.value(found.table.rows(new))
-                new = new[(bound < FAR) & (found.depth + 1 + bound <= steps)]
-            found.enter(new)
+                new = new[found.depth + 1 + bound <= steps]
+            found.layers.append(new)
         found.expand()  # goal states that are met in the last layer rest there, as do others
         return found.space()
 

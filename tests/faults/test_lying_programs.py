@@ -12,6 +12,7 @@ from typing import Any
 
 import msgspec
 import pytest
+from pysat.solvers import Solver
 
 from coordlang.commands.inputs import load
 from coordlang.verification.certificate_file import Certificate
@@ -37,11 +38,13 @@ def files(world: str) -> tuple[Path, Path]:
 
 # ---- a SAT solver
 
+_WHOLE = sat.whole
+
 
 def _lying(random: Random) -> type:
     """A class of solvers that answer "unsatisfiable" to 30 % of all satisfiable questions."""
 
-    class Lying(sat._solver_class()):  # type: ignore[misc]
+    class Lying(_WHOLE(Solver)):  # type: ignore[misc]
         def __init__(self, name: str, **arguments: Any) -> None:
             super().__init__(name=name, **arguments)
             self.is_honest = name == _CHECKS
@@ -70,7 +73,9 @@ def test_a_false_refutation_is_not_told(
         proof.write_text("old proof")
         with monkeypatch.context() as patched:
             liar = _lying(Random(seed))
-            patched.setattr(sat, "_solver_class", lambda liar=liar: liar)
+            patched.setattr(
+                sat, "whole", lambda kind, liar=liar: liar if kind is Solver else _WHOLE(kind)
+            )
             codes.append(coordlang(*build).code)
         if codes[-1] != 0:
             assert codes[-1] == _INTERNAL
