@@ -8,10 +8,9 @@ only where an effect changes it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -228,10 +227,10 @@ _MOST = 8_000
 #: Ways that are compared with all others at a time.
 _BLOCK = 512
 
-Pair = tuple[int, int]
 
-
-def mutexes(model: JointModel, init: Rows, most: int = _MOST, block: int = _BLOCK) -> list[Pair]:
+def mutexes(
+    model: JointModel, init: Rows, most: int = _MOST, block: int = _BLOCK
+) -> list[tuple[int, int]]:
     """Pairs (p, q), p < q, of which no state that is reachable from ``init`` has both; sorted.
 
     (p, p) where fact p is never true; such facts are in no other pair.  The joint steps must be
@@ -242,101 +241,76 @@ def mutexes(model: JointModel, init: Rows, most: int = _MOST, block: int = _BLOC
         csgraph()  # scipy is loaded only where it fits
     except OutOfMemory:
         return []
-    ways = _Ways.of(model)
-    facts = len(model.codec.facts)
-    if len(ways.robot) > most or not facts:
+    facts, ways = len(model.codec.facts), list(_ways(model))
+    if len(ways) > most or not facts:
         return []
     true = model.codec.true_facts(model.codec.facts_part(init))
     may = np.zeros((facts, facts), np.bool_)
     may[np.ix_(true, true)] = True
-    ways.close(may, _together(model, ways), block)
+    # The ways of labels, then those of facts that stay true.
+    staying = [frozenset((fact,)) for fact in range(facts)]
+    needs = _table([*(way.needs for way in ways), *staying], facts)
+    adds = _table([*(way.adds for way in ways), *staying], facts)
+    together = _together(model, ways)
+    before = -1
+    while (count := int(may.sum())) != before:  # pairs that may be true are added
+        before = count
+        #: (ways, facts): how often one of what a way needs excludes the fact.
+        excluded = needs @ (~may).astype(np.float32)
+        excludes = np.ascontiguousarray(excluded.T)
+        possible = needs.multiply(excluded).sum(axis=1) == 0
+        ready = np.flatnonzero(possible[: len(ways)])
+        for start in range(0, len(ready), block):
+            some = ready[start : start + block]
+            both = together[some] & (needs[some] @ excludes == 0) & possible
+            # Of tables that are dense, those by way are multiplied without a copy.
+            added = adds.T @ np.ascontiguousarray(both.T, np.float32)
+            found = added @ adds[some] > 0
+            may |= found | found.T
     never = ~may.diagonal()
     apart = np.triu(~may, 1) & ~never[:, None] & ~never
     np.fill_diagonal(apart, never)
     return [(int(p), int(q)) for p, q in np.argwhere(apart)]
 
 
-@dataclass(frozen=True, slots=True)
-class _Ways:
-    """How facts become true: ways are labels' effects under one condition, then facts that stay.
+class _Way(NamedTuple):
+    """How a robot's label makes facts true, and what it deletes in any case."""
 
-    ``needs`` and ``adds`` (ways, facts).  ``robot`` and ``label`` are those of the first ways;
-    ``deletes`` (these, facts) is what the label deletes in any case.
-    """
-
-    robot: Ints
-    label: Ints
-    needs: csr_array
-    adds: csr_array
-    deletes: Bools
-
-    @classmethod
-    def of(cls, model: JointModel) -> _Ways:
-        stepper = model.stepper
-        assert isinstance(stepper, ComposingStepper)
-        who: list[Pair] = []
-        found: list[tuple[list[int], list[int], list[int]]] = []
-        for robot, own in enumerate(stepper.labelled):
-            for label, action in enumerate(own):
-                if action is not None:
-                    read = FactsOf.of(model, action)
-                    for needs, adds in read.ways():
-                        found.append((sorted(needs), sorted(adds), sorted(read.deletes)))
-                        who.append((robot, label))
-        facts = len(model.codec.facts)
-        needed, added, deleted = ([way[k] for way in found] for k in range(3))
-        staying = [[fact] for fact in range(facts)]
-        owners = np.array(who, np.int64).reshape(-1, 2)
-        return cls(
-            owners[:, 0],
-            owners[:, 1],
-            _table(needed + staying, facts),
-            _table(added + staying, facts),
-            _table(deleted, facts).toarray() > 0,
-        )
-
-    def close(self, may: Bools, together: Bools, block: int) -> None:
-        """Add to the pairs of facts that may be true together, until nothing follows."""
-        before = -1
-        while (count := int(may.sum())) != before:
-            before = count
-            #: (ways, facts): how often one of what a way needs excludes the fact.
-            excluded = self.needs @ (~may).astype(np.float32)
-            excludes = np.ascontiguousarray(excluded.T)
-            possible = self.needs.multiply(excluded).sum(axis=1) == 0
-            ready = np.flatnonzero(possible[: len(self.robot)])
-            for start in range(0, len(ready), block):
-                ways = ready[start : start + block]
-                apart = self.needs[ways] @ excludes
-                both = together[ways] & (apart == 0) & possible
-                # Of tables that are dense, those by way are multiplied without a copy.
-                added = self.adds.T @ np.ascontiguousarray(both.T, np.float32)
-                found = added @ self.adds[ways] > 0
-                may |= found | found.T
+    robot: int
+    label: int
+    needs: frozenset[int]
+    adds: frozenset[int]
+    deletes: frozenset[int]
 
 
-def _together(model: JointModel, ways: _Ways) -> Bools:
-    """Which ways may share a step: (ways of robots, all ways)."""
-    stepper = model.stepper
-    assert isinstance(stepper, ComposingStepper)
-    count = len(ways.robot)
-    found = np.zeros((count, count + ways.deletes.shape[1]), np.bool_)
-    members = [np.flatnonzero(ways.robot == robot) for robot in range(len(model.robots))]
-    for robot, own in enumerate(members):
-        found[np.ix_(own, own)] = ways.label[own][:, None] == ways.label[own]
-        for other in range(robot + 1, len(members)):
-            theirs = members[other]
-            fits = stepper.tables[robot, other][np.ix_(ways.label[own], ways.label[theirs])]
-            found[np.ix_(own, theirs)] = fits
-            found[np.ix_(theirs, own)] = fits.T
-    found[:, count:] = ~ways.deletes
-    return found
+def _ways(model: JointModel) -> Iterator[_Way]:
+    """Labels' effects under one condition each."""
+    assert isinstance(model.stepper, ComposingStepper)
+    for robot, own in enumerate(model.stepper.labelled):
+        for label, action in enumerate(own):
+            if action is not None:
+                read = FactsOf.of(model, action)
+                for needs, adds in read.ways():
+                    yield _Way(robot, label, needs, adds, read.deletes)
 
 
-def _table(listed: list[list[int]], width: int) -> csr_array:
+def _together(model: JointModel, ways: Sequence[_Way]) -> Bools:
+    """Which ways may share a step: (ways of labels, all ways)."""
+    assert isinstance(model.stepper, ComposingStepper)
+    robot, label = (np.array([way[k] for way in ways], np.int64) for k in range(2))
+    fits = (robot[:, None] == robot) & (label[:, None] == label)
+    for (i, j), table in model.stepper.tables.items():
+        mine, theirs = np.flatnonzero(robot == i), np.flatnonzero(robot == j)
+        fits[np.ix_(mine, theirs)] = table[np.ix_(label[mine], label[theirs])]
+    deletes = _table([way.deletes for way in ways], len(model.codec.facts))
+    return np.hstack((fits | fits.T, deletes.toarray() == 0))
+
+
+def _table(sets: Sequence[frozenset[int]], width: int) -> csr_array:
+    """Sets as the rows of a table of 0 and 1."""
     from scipy.sparse import csr_array
 
-    first = np.cumsum([0, *map(len, listed)])
-    entries = np.array([entry for own in listed for entry in own], np.int64)
+    first = np.cumsum([0, *map(len, sets)])
+    entries = np.array([entry for own in sets for entry in sorted(own)], np.int64)
     ones = np.ones(len(entries), np.float32)
-    return csr_array((ones, entries, first), shape=(len(listed), width))
+    return csr_array((ones, entries, first), shape=(len(sets), width))
