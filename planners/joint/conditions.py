@@ -107,18 +107,20 @@ class Operators:
         self.conditional: dict[int, list[GroundEffect]] = {}
         self.adds = np.zeros((len(actions), codec.fact_blocks), np.uint64)
         self.deletes = np.zeros_like(self.adds)
-        self._forbidden = np.zeros_like(self.adds)
+        self._required, self._forbidden = np.zeros_like(self.adds), np.zeros_like(self.adds)
         required = [frozenset[int]()] * len(actions)
         for number, action in enumerate(actions):
             if action is None:
                 continue
             literals, rest = split_condition(action.precondition, evaluator)
             required[number] = frozenset(fact for fact, is_true in literals if is_true)
+            self._required[number] = codec.mask(required[number])
             self._forbidden[number] = codec.mask(fact for fact, is_true in literals if not is_true)
             for formula in rest:
                 kind = self.step_formulas if speaks_of_step(formula) else self._state_formulas
                 kind.setdefault(number, []).append(formula)
             self._enter_effects(number, action)
+        self._has_forbidden = bool(self._forbidden.any())
         frequency = Counter(fact for facts in required for fact in facts)
         #: (actions, facts) those that each one requires, rare ones first; -1 to fill up.
         self._facts = np.full((len(required), max(map(len, required), default=0) + 1), -1)
@@ -137,6 +139,15 @@ class Operators:
         self.deletes[number] = self._codec.mask(index[e.atom] for e in certain if not e.adds)
         if conditional := [effect for effect in known if effect.condition != TRUE]:
             self.conditional[number] = conditional
+
+    def allows(self, row: Rows, action: int) -> bool:
+        """Whether the conditions of an action on one state hold, as `applicable` finds many."""
+        missing, wrong = self._required[action] & ~row, self._forbidden[action] & row
+        if missing.any() or wrong.any():
+            return False
+        here = row[None, :], np.zeros(1, np.int64)
+        formulas = self._state_formulas.get(action, ())
+        return all(self._evaluator.holds(formula, *here)[0] for formula in formulas)
 
     def applicable(self, rows: Rows) -> tuple[Ints, Ints]:
         """Pairs (row, action) whose conditions on the state hold, sorted."""
@@ -160,7 +171,7 @@ class Operators:
             fact = self._facts[operator, place]
             holds = (fact < 0) | test_bits(rows, row, fact)
             row, operator = row[holds], operator[holds]
-        if self._forbidden.any():
+        if self._has_forbidden:
             clash = (rows[row] & self._forbidden[operator]).any(axis=1)
             row, operator = row[~clash], operator[~clash]
         order = np.lexsort((operator, row))

@@ -58,8 +58,6 @@ class Traces:
         self.interfering = _interfering(stepper, tuple(map(len, model.labels)))
         self.has_ties = False
         self._results: dict[tuple[bytes, Step], Rows | None] = {}
-        #: By state each robot's choices.
-        self._choices: dict[bytes, list[set[int]]] = {}
         #: The robots whose events in a joint step interfere, by way of others too, in groups.
         self.groups = cache(self._groups)
         #: The facts that the events of a joint step read or write, as bits of a state.
@@ -78,17 +76,13 @@ class Traces:
 
         True of joint actions: they are no subactions.
         """
-        if self._stepper is None:
-            return True
-        facts = self._model.codec.facts_part(row[None, :])
-        own = self._choices.get(key := facts.tobytes())
-        if own is None:
-            found = self._stepper.choices(facts)
-            own = self._choices[key] = [{0, *labels.tolist()} for _, labels in found]
-        return all(label in labels for label, labels in zip(step, own, strict=True))
+        facts = self._model.codec.facts_part(row[None, :])[0]
+        return self._stepper is None or self._stepper.allows(facts, step)
 
     def _made(self, row: Rows, step: Step) -> Rows | None:
         model, facts = self._model, self._model.codec.facts_part(row[None, :])
+        if self._stepper is not None and self._stepper.is_fixed(step) and not model.remembers:
+            return self._stepper.fixed_step(row, step)
         only = [(np.array([0, 1]), np.array([label])) for label in step]
         found = model.stepper.steps(facts, only)
         mine = np.flatnonzero((found.labels == step).all(axis=1))  # joint actions heed no choices
