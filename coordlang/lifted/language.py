@@ -33,6 +33,9 @@ from planners.system.files import FileFormat, doc, read_bytes, require_seen
 from planners.system.messages import echoed
 from planners.system.writing import write_compressed
 
+#: Entries of tables (states, objects) that are filled at a time.
+_ENTRIES = 20_000_000
+
 #: What to do about a file that was changed or damaged.
 LIFT_AGAIN = "Copy the file again, or learn the language again: `coordlang lift`."
 
@@ -41,9 +44,15 @@ Vector = tuple[int, ...]
 
 
 def vectors(features: Sequence[Feature], states: States) -> Ints:
-    """The features' values: (states, features)."""
-    columns = [states.get(feature) for feature in features]
-    return np.array(columns, np.int64).reshape(len(columns), len(states)).T
+    """The features' values: (states, features).  So many states at a time as fit."""
+    if len(states) <= (some := max(1, _ENTRIES // max(1, len(states.world.objects)))):
+        columns = [states.get(feature) for feature in features]
+        return np.array(columns, np.int64).reshape(len(columns), len(states)).T
+    parts = (
+        States(states.world, states.rows[first : first + some])
+        for first in range(0, len(states), some)
+    )
+    return np.concatenate([vectors(features, part) for part in parts])
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,7 +37,9 @@ class LabelSets:
 
     def __init__(self) -> None:
         self._child: dict[tuple[int, int, int], int] = {}
-        self._moves: list[dict[int, int]] = [{}]
+        self._parent: list[tuple[int, int, int]] = [(END, -1, -1)]
+        #: Made when it is asked for: those of all beginnings would grow by the square.
+        self._moves: list[dict[int, int] | None] = [{}]
         self._union: dict[tuple[int, int], int] = {}
         self._within: dict[tuple[int, int], bool] = {}
         self._sizes = {END: 1}
@@ -48,7 +50,15 @@ class LabelSets:
 
     def moves(self, number: int) -> dict[int, int]:
         """Each first label of a set with the number of the set of what follows it."""
-        return self._moves[number]
+        found = self._moves[number]
+        if found is None:
+            path = []
+            at = number
+            while at != END:
+                at, label, after = self._parent[at]
+                path.append((label, after))
+            found = self._moves[number] = dict(reversed(path))
+        return found
 
     def of_moves(self, moves: dict[int, int]) -> int:
         """The number of the set with these moves."""
@@ -61,8 +71,9 @@ class LabelSets:
         key = (number, label, after)
         known = self._child.get(key)
         if known is None:
-            known = self._child[key] = len(self._moves)
-            self._moves.append({**self._moves[number], label: after})
+            known = self._child[key] = len(self._parent)
+            self._parent.append(key)
+            self._moves.append(None)
         return known
 
     def union(self, one: int, other: int) -> int:

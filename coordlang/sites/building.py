@@ -10,7 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations, groupby, permutations
+from itertools import combinations, groupby
 from pathlib import Path
 from statistics import fmean
 
@@ -321,12 +321,16 @@ def _rides(places: Mapping[str, Place], lanes: Sequence[Lane]) -> Iterator[Lane]
     for lane in lanes:
         graphs[lane.start].add(lane.graph)
         graphs[lane.end].add(lane.graph)
-    inside = [place for place in places.values() if _lifts(place)]
-    for one, other in permutations(inside, 2):
-        for lift in _lifts(one) if one.level != other.level else ():
-            if lift in other.groups:
-                for graph in sorted(graphs[one.name] & graphs[other.name]):
-                    yield Lane(graph, one.name, other.name, frozenset({lift}))
+    inside: dict[str, list[Place]] = {}
+    for place in places.values():
+        for lift in _lifts(place):
+            inside.setdefault(lift, []).append(place)
+    for one in places.values():
+        for lift in _lifts(one):
+            for other in inside[lift]:
+                if one.level != other.level:
+                    for graph in sorted(graphs[one.name] & graphs[other.name]):
+                        yield Lane(graph, one.name, other.name, frozenset({lift}))
 
 
 def _lifts(place: Place) -> list[str]:
