@@ -236,7 +236,7 @@ def _change(
 ) -> WordChange:
     """The change out of the nodes ``before`` (a mask) into the next word."""
     edges = np.flatnonzero(before[space.sources] & ~before[space.targets()])
-    node = space.sources[edges]
+    node = space.sources_of(edges)
     step = space.cost_of(0)[0] - space.layer[node] + 1
     robots = _deciding(space, partition, np.unique(space.state[node]), pair[1], order)
     ways: dict[tuple[str | None, ...], set[int]] = defaultdict(set)

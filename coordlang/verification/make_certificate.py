@@ -47,7 +47,7 @@ def _reason(clause: Clause, evidence: Evidence) -> Reason:
     """The plans behind a clause, from a candidate task's start on, with their warping paths."""
     space, symmetry = evidence.space, evidence.symmetry
     model = space.model
-    start, prefix = way_to(space, int(space.sources[evidence.edges[0][0]]))
+    start, prefix = way_to(space, int(space.sources_of(np.array(evidence.edges[0][0]))))
     init = model.codec.decode(space.rows[space.state[start]])
     goal = split_atoms(goal_text(model, space.goals[space.goal[start]]))
     robots = list(range(space.robots))

@@ -193,7 +193,7 @@ class FailingTuples:
 
 def plan_states(space: PlanSpace, edges: Ints) -> Ints:
     """(tuples, robots, steps + 1) the states of plans, by their edges (tuples, steps, robots)."""
-    nodes = np.concatenate((space.sources[edges[:, :1]], space.targets(edges)), axis=1)
+    nodes = np.concatenate((space.sources_of(edges[:, :1]), space.targets(edges)), axis=1)
     states: Ints = space.state[nodes].transpose(0, 2, 1)
     return states
 

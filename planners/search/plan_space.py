@@ -163,13 +163,14 @@ class PlanSpace:
         """The edges of a plan from a node that begins with these labels of some robots.
 
         ``steps`` are their labels, step by step.  None if there is no such plan.  It goes on with
-        first edges to a goal.  O(edges).
+        first edges to a goal.  O(edges * steps).
         """
         paths: dict[int, list[int]] = {node: []}  # a path to each node that is reached
         for labels in steps:
             before, paths = paths, {}
             for source, path in before.items():
-                edges = np.array(self.out_edges(source))
+                leaving = self.out_edges(source)
+                edges = np.arange(leaving.start, leaving.stop)
                 own = self.labels[edges][:, list(robots)]
                 for edge in edges[(own == np.asarray(labels)).all(axis=1)].tolist():
                     paths.setdefault(self.target_of(edge), [*path, edge])
@@ -185,6 +186,11 @@ class PlanSpace:
     def sources(self) -> Ints:
         """The source node of each edge."""
         return np.repeat(np.arange(len(self)), np.diff(self.first))
+
+    def sources_of(self, edges: Ints) -> Ints:
+        """The source nodes of some edges: for few of them without a table of all."""
+        found: Ints = np.searchsorted(self.first, edges, side="right") - 1
+        return found
 
     @property
     def out_degrees(self) -> Ints:

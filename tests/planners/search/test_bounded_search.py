@@ -199,3 +199,14 @@ def test_on_open_grids_no_solver_is_asked() -> None:
     plans, effort = search_with_effort(task.model, task.tasks[0], replace(PIECES, probe=400))
     assert (counts(plans)[int(plans.starts[0])], effort.rounds) == (8_383_608, 2)
     assert "SAT" not in effort.bounded_by
+
+
+def test_no_plan_goes_on_beyond_the_goal() -> None:
+    task = world_of("grid", "corners-3x3").loaded
+    plans = search(task.model, task.tasks[0])
+    start = int(plans.starts[0])
+    own = [plans.labels_of(edge)[1:] for edge in plans.first_path(start)]
+    path = plans.path_of_robots(start, [1], own)
+    assert path is not None
+    assert [plans.labels_of(edge)[1:] for edge in path] == own
+    assert plans.path_of_robots(start, [1], [*own, own[0]]) is None
