@@ -280,9 +280,9 @@ def symmetries_of_part(space: PlanSpace, end: Ints, proposed: Iterable[Renaming]
 
     Each is checked on the edges of the part themselves (Proposition 20 of docs/concepts.md).
 
-    ``end`` (goals) is the state that each goal is, -1 for a goal of the whole that the part does
-    not have.  The ``proposed`` renamings have the same names.  Of a group with more than
-    `LARGEST_GROUP` elements a subgroup is taken.  States outside the part stay.
+    ``end`` (goals) is the state that each goal of the part is.  The ``proposed`` renamings have the
+    same names.  Of a group with more than `LARGEST_GROUP` elements a subgroup is taken.  States
+    outside the part stay.
     """
     part = _Part(space, end)
     checked = (part.symmetry(renaming) for renaming in proposed)

@@ -75,10 +75,8 @@ class Writer:
         right, as in a programming language, so that there is one way in every state, and the size
         is linear.
         """
-        if isinstance(formula, Junction) and formula.parts:
-            if isinstance(formula, And) and otherwise is None:
-                self._conjunction(name, formula, start, end, known, gain)
-                return
+        is_conjunction = isinstance(formula, And) and otherwise is None
+        if isinstance(formula, Junction) and formula.parts and not is_conjunction:
             here = start
             for left, part in zip(
                 range(len(formula.parts) - 1, -1, -1), formula.parts, strict=True

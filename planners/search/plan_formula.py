@@ -123,11 +123,11 @@ class PlanFormula:
         found = []
         for part in conjuncts(formula):
             clause = []
-            for way in part.parts if isinstance(part, Or) else (part,) if part != FALSE else ():
+            for way in part.parts if isinstance(part, Or) else (part,):
                 if isinstance(way, And):
                     clause.append(self._fresh())
                     found += [[-clause[-1], *said] for said in self._clauses(way)]
-                else:
+                elif way != FALSE:
                     clause.append(self._literal(*signed(way)))
             found.append(sorted(clause, key=abs))
         return found

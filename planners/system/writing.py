@@ -103,8 +103,9 @@ def made_folder(path: str | PathLike[str]) -> Path:
 
 def write_texts(folder: str | Path, texts: Mapping[str, str]) -> None:
     """Write text files, by their names, into a folder; raises `UsageError` where that fails."""
+    place = made_folder(folder)
     for name, text in texts.items():
-        write_atomically(made_folder(folder) / name, text.encode())
+        write_atomically(place / name, text.encode())
 
 
 def copy_folders(folders: Sequence[str | Path], target: str | Path) -> None:
