@@ -183,6 +183,7 @@ def test_jobs_give_what_the_whole_gives(
     assert answers[False] >= 3
 
 
+@pytest.mark.filterwarnings("error")
 def test_processes_and_kept_jobs_change_nothing(tmp_path: Path) -> None:
     candidates = all_tasks("grid", "gw1-2x2")
     whole = differences(candidates, HERE, portion=60.0)

@@ -207,6 +207,7 @@ def test_walks_of_goals_up_to_symmetry_refute_what_is_no_language(folder: str, s
     assert min(answers.values()) >= 5, answers
 
 
+@pytest.mark.filterwarnings("error")
 def test_first_walks_find_the_same_in_other_processes_and_from_kept_jobs(tmp_path: Path) -> None:
     """The same plans in the same order, so the same clauses for the same reasons."""
     candidates = all_tasks("grid", "gw2-2x3")
