@@ -99,7 +99,10 @@ class Mixtures:
             wanted = min(ways * _RANDOM_WAYS, most // len(found) - 1)
             plans += sorted(self._others(node, wanted, random))
         by_steps = groupby(found, key=lambda node: int(space.layer[node]))
-        plans_by_steps = ([own for node in nodes for own in found[node]] for _, nodes in by_steps)
+        plans_by_steps = (
+            [self._with_fewest(node, own) for node in nodes for own in found[node]]
+            for _, nodes in by_steps
+        )
         return [np.array(plans, np.int64).transpose(0, 2, 1) for plans in plans_by_steps]
 
     def _of_node(self, node: int, random: Random | None = None) -> _Failing | None:
@@ -229,6 +232,30 @@ class Mixtures:
         for robot in (*range(len(codes)), 0):
             plans.append(self._plan(node, robot, codes[robot], sentence, plans[-1], random))
         return (plans[-1], *plans[2:-1])
+
+    def _with_fewest(self, node: int, plans: _Plans) -> _Plans:
+        """The same mixture with fewer different plans, if some of them suffice for one that fails.
+
+        Fewer plans differ in less: what tells them apart is a stronger clause.
+        """
+        for one in sorted(set(plans), key=lambda plan: (plans.count(plan), plan)):
+            for other in sorted(set(plans) - {one}, key=lambda plan: (-plans.count(plan), plan)):
+                fewer = tuple(other if plan == one else plan for plan in plans)
+                if self._fails(node, fewer):
+                    plans = fewer
+                    break
+        return plans
+
+    def _fails(self, node: int, plans: _Plans) -> bool:
+        """Whether the mixture of each robot's part of its plan fails."""
+        for edges in zip(*plans, strict=True):
+            tree: Any = self._edges.of(node)
+            for robot, edge in enumerate(edges):
+                tree = tree.get(self._space.labels_of(edge)[robot])
+                if tree is None:
+                    return True
+            node = tree
+        return False
 
     def _others(self, node: int, most: int, random: Random) -> set[_Plans]:
         """More plans of mixtures from a node of which one fails, drawn at random."""

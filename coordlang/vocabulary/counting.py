@@ -10,14 +10,13 @@ the pigeonhole principle.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations, product
-from typing import Any
+from itertools import combinations
 
 import numpy as np
 
 from coordlang.required.choices import Choices
+from coordlang.vocabulary.plan_pairs import Mixed, PlanPairs
 from coordlang.vocabulary.sat import Undecided, clique
-from planners.search.edge_index import EdgeTrees
 from planners.search.plan_space import PlanSpace
 
 #: Beginnings of plans from one node that are compared at most, if more than one step is looked at.
@@ -26,10 +25,6 @@ _BEGINNINGS = 8
 _FIRST = 32
 #: Steps of mixtures that are looked at: half a second.
 _WORK = 200_000
-
-#: Two plans on their way: for each set of robots, as bits, the node that is reached where these
-#: follow the second plan and the others the first one; only robots that the plans tell apart.
-_Mixed = dict[int, int]
 
 
 def needs_three_words(space: PlanSpace) -> bool:
@@ -73,48 +68,25 @@ class Apart:
     """Which plans of a space are apart."""
 
     def __init__(self, space: PlanSpace) -> None:
-        self._space, self._edges = space, EdgeTrees(space)
+        self._space, self._pairs = space, PlanPairs(space, _WORK)
         self._known: dict[frozenset[tuple[int, int]], bool] = {}
-        self._work = 0
 
     def always(self, node: int, one: Sequence[int], other: Sequence[int]) -> bool:
         """Whether plans from a node with these beginnings are apart, whatever follows.
 
         ``one`` and ``other``: equally many edges.  Raises `Undecided` where that takes long.
         """
-        mixed: _Mixed | None = {0: node}
+        mixed: Mixed | None = {0: node}
         for edges in zip(one, other, strict=True):
-            mixed = self._after(mixed, *edges) if mixed else None
+            mixed = self._pairs.after(mixed, *edges) if mixed else None
         return mixed is None or not self._mix(mixed)
 
-    def _mix(self, mixed: _Mixed) -> bool:
+    def _mix(self, mixed: Mixed) -> bool:
         """Whether two plans can go on so that no mixture fails."""
-        space = self._space
-        if len(set(mixed.values())) == 1 or not space.layer[mixed[0]]:
+        if len(set(mixed.values())) == 1 or not self._space.layer[mixed[0]]:
             return True
         key = frozenset(mixed.items())
         if key not in self._known:
-            ways = product(*(space.out_edges(mixed[robots]) for robots in (0, max(mixed))))
-            following = (self._after(mixed, *edges) for edges in ways)
+            following = (self._pairs.after(mixed, *edges) for edges in self._pairs.edges(mixed))
             self._known[key] = any(after and self._mix(after) for after in following)
         return self._known[key]
-
-    def _after(self, mixed: _Mixed, one: int, other: int) -> _Mixed | None:
-        """What becomes of two plans after an edge of each; None if a mixture fails."""
-        two = self._space.labels_of(one), self._space.labels_of(other)
-        following = dict(mixed)
-        for robot, (mine, theirs) in enumerate(zip(*two, strict=True)):
-            bit = 1 << robot
-            if mine != theirs and not max(mixed) & bit:
-                following |= {robots | bit: node for robots, node in following.items()}
-        self._work += len(following)
-        if self._work > _WORK:
-            raise Undecided
-        for robots, node in following.items():
-            tree: Any = self._edges.of(node)
-            for robot, labels in enumerate(zip(*two, strict=True)):
-                tree = tree.get(labels[robots >> robot & 1])
-                if tree is None:
-                    return None
-            following[robots] = tree  # at its end, the target
-        return following

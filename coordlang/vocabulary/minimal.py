@@ -49,6 +49,8 @@ _MERGES = 5
 _PAIRS, _FIRST_PAIRS = 1_000, 30
 #: Effort that is not enough for a tenth of the first failing plans is not begun with.
 _BEGINNING = 10
+#: Nodes of mixtures of two plans that are looked at: some seconds, and fewer for less effort.
+_MIXTURES, _MIXTURES_FOR_UNIT = 300_000, 10
 #: What may be spent on each number at first.
 _SOON = Budget(rounds=10, conflicts=2_000)
 #: Rounds are dear where there are more pairs of edges that leave one node.
@@ -156,7 +158,8 @@ class MinimalSearch:
     def _tied(self) -> TiedWords:
         from coordlang.vocabulary.tied_words import TiedWords
 
-        return TiedWords(self._job, self.languages)
+        mixtures = min(_MIXTURES, _MIXTURES_FOR_UNIT * self._most)
+        return TiedWords(self._job, self.languages, mixtures)
 
     @cached_property
     def _contained(self) -> list[ContainedInstance]:

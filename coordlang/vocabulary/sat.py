@@ -7,9 +7,9 @@ A clause with fewer pairs asks for more, and implies every clause that holds its
 from __future__ import annotations
 
 import sys
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from coordlang.language.warping import Clause, Pair, pair
 from planners.search.sat import SolverName, sat_solver, solve_slice
@@ -84,6 +84,22 @@ def clique(edges: Iterable[Pair], weights: Sequence[int] | None = None) -> list[
 _SLICE = 2_000
 
 
+class PairStep(NamedTuple):
+    """A step of two plans that fail together, from one place of a graph to another.
+
+    ``states`` are those that the plans enter, None if both enter the same.  Place 0 is where plans
+    begin to differ, ``END`` where both end.
+    """
+
+    before: int
+    states: Pair | None
+    after: int
+
+
+#: The place where two plans that fail together have ended.
+END = -1
+
+
 class PartitionProblem:
     """An incremental SAT problem: give each state a word so that every clause holds.
 
@@ -120,12 +136,6 @@ class PartitionProblem:
         if named:
             self._name_words_in_order()
 
-    def prefer(self, kept: Mapping[int, int]) -> None:
-        """Try first to give these states these words; not with CaDiCaL."""
-        wanted = {self._word[state][word] for state, word in kept.items()}
-        every = (variable for own in self._word.values() for variable in own)
-        self._solver.set_phases([v if v in wanted else -v for v in every])
-
     def separate_one(self, clause: Iterable[Pair]) -> None:
         """Require that one of these pairs of states lies in different words."""
         self._solver.add_clause([self._separate(p) for p in sorted(clause)])
@@ -137,6 +147,15 @@ class PartitionProblem:
                 self.separate_one([states])
             return
         self._solver.add_clause([self._separate_all(pairs) for pairs in alternatives])
+
+    def separate_on_paths(self, steps: Iterable[PairStep]) -> None:
+        """Require of each path through a graph of pairs that one of them is in different words."""
+        reached = defaultdict[int, int](self._new)
+        for before, states, after in steps:
+            clause = [-reached[before]] if before else []
+            clause += [self._separate(states)] if states is not None else []
+            clause += [reached[after]] if after != END else []
+            self._solver.add_clause(clause)
 
     def keep_words(self, kept: Mapping[int, int], changes: int) -> None:
         """Require that at most so many states have another word than ``kept`` gives them."""

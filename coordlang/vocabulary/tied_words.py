@@ -14,18 +14,21 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import islice, pairwise, tee
+from itertools import islice, tee
 
 import numpy as np
 
 from coordlang.language.candidates import Candidates
 from coordlang.language.warping import Pair, pair
+from coordlang.required.choices import Choices
 from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
 from coordlang.vocabulary.job import Assignment, Job, words_of_states
 from coordlang.vocabulary.loop import Budget, Languages, find
+from coordlang.vocabulary.plan_pairs import failing_pairs
 from coordlang.vocabulary.refuter import Refuter
-from coordlang.vocabulary.sat import PartitionProblem, Undecided
+from coordlang.vocabulary.sat import PairStep, PartitionProblem, Undecided
 from planners.joint.tables import Bools, Ints, unique_rows
 from planners.search.plan_space import PlanSpace
 from planners.search.sat import whole
@@ -36,9 +39,6 @@ _AT_ONCE, _ENOUGH = 100, 300
 #: What may be spent on each kind of one task, and of many, at first; then twice as much each time.
 _OF_ONE, _OF_MANY = Budget(rounds=25, conflicts=2_000), Budget(rounds=50, conflicts=2_000)
 _STUTTER_FREE = Budget(rounds=8, conflicts=2_000)
-#: In the order of words for a state: to be in the word of a state before costs more than any number
-#: of states beside it.
-_FORBIDDEN = 1 << 30
 #: Failing tuples of one length, under one symmetry, that are looked at for what they differ in, and
 #: after which longer ones are not.
 _ENOUGH_FOR_FACTS = 500
@@ -50,21 +50,24 @@ _TOGETHER, _CONFLICTS = 8, 250
 class _Ties:
     """What the words of a kind have in common.
 
-    ``classes`` (states): those of one class share a word.  ``stutter_free``: the plans of the one
-    task whose steps all enter other words, None if they need not.  ``clauses``: those of refuted
-    partitions, of one task whatever the number of words: (clauses, pairs) codes ``a * states + b``,
-    -1 for no pair.
+    ``classes`` (states): those of one class share a word.  ``joined``: pairs that some step joins,
+    if words are stutter-free.  ``failing``: the pairs of plans of one task that fail, to be told
+    apart step by step, if they are not too many.  ``clauses``: those of refuted partitions, of one
+    task whatever the number of words: (clauses, pairs) codes ``a * states + b``, -1 for no pair.
     """
 
     classes: Ints
-    stutter_free: PlanSpace | None = None
+    joined: Sequence[Pair] = ()
+    failing: Sequence[PairStep] = ()
     clauses: list[Ints] = field(default_factory=list)
 
 
 class TiedWords:
     """Looks for languages among such partitions, with effort that grows from call to call."""
 
-    def __init__(self, job: Job, languages: Languages) -> None:
+    def __init__(self, job: Job, languages: Languages, most: int) -> None:
+        """Begin; ``most`` nodes of mixtures of two plans may be looked at before any solver."""
+        self._most = most
         self._states, self._languages = np.array(job.states), languages
         self._refuter = languages.refuter
         self._random = np.random.default_rng(job.seed)
@@ -90,12 +93,18 @@ class TiedWords:
         """
         if self._is_one_task:
             found = classes_by_facts(job.candidates, self._refuter)
-            yield _Ties(np.arange(len(self._images[0])), job.candidates.spaces[0])
+            yield self._stutter_free(job.candidates.spaces[0])
         else:
             tied = [*abstractions(job.candidates, job.states), *map(_orbits, self._images[1:])]
             tied.sort(key=lambda classes: len(np.unique(classes[self._states])))
             found = iter(up_to_symmetry(tied, self._images))
         yield from map(_Ties, found)
+
+    def _stutter_free(self, space: PlanSpace) -> _Ties:
+        failing: list[PairStep] = []
+        with suppress(Undecided):
+            failing = failing_pairs(Choices(space), self._most)
+        return _Ties(np.arange(len(self._images[0])), _joined(space), failing)
 
     def of_facts(self) -> Assignment | None:
         """Of one task the language that says the steps to go and a few facts, if there is one."""
@@ -136,7 +145,7 @@ class TiedWords:
         for ties in self._every():
             # With many tasks what other numbers met slows the solver: open 3x4 by a third.
             own = ties if self._is_one_task else _Ties(ties.classes)
-            first = _STUTTER_FREE if own.stutter_free is not None else self._first
+            first = _STUTTER_FREE if own.joined else self._first
             yield _Kind(self._states, own, size, self._images, first)
 
     @property
@@ -203,10 +212,9 @@ class _Kind:
         free = np.unique(self.first[states]).tolist()
         # A solver that is quick on many easy problems with many solutions.
         self.problem = PartitionProblem(free, size, "minisat22", named=False)
-        if ties.stutter_free is not None:
-            for states_of_step in _joined(ties.stutter_free):
-                self.problem.separate_one([states_of_step])
-            self.problem.prefer(_preferred(ties.stutter_free, size))
+        for states_of_step in ties.joined:
+            self.problem.separate_one([states_of_step])
+        self.problem.separate_on_paths(ties.failing)
         self.effort, self.rounds, self._required = effort, 0, 0
 
     def require_clauses(self) -> None:
@@ -245,30 +253,6 @@ def _joined(space: PlanSpace) -> list[Pair]:
     before, after = space.state[space.sources], space.state[space.targets()]
     joined = np.unique(np.column_stack((before, after))[before != after], axis=0)
     return sorted({pair(a, b) for a, b in joined.tolist()})
-
-
-def _preferred(space: PlanSpace, size: int) -> dict[int, int]:
-    """For each state the word, of ``size``, that tells it apart best from those beside it.
-
-    Beside a state are those that a step leads to from a state before it.  From the start on,
-    each state gets the word that fewest of them have, and of these the one that was used least.
-    """
-    targets = space.targets()
-    below = [targets[a:b].tolist() for a, b in pairwise(space.first.tolist())]
-    above: list[list[int]] = [[] for _ in below]
-    for node, following in enumerate(below):
-        for target in following:
-            above[target].append(node)
-    word = np.full(len(space), size)
-    beside = np.zeros((len(space), size + 1), np.int64)  # by node the words of what follows it
-    used = np.zeros(size, np.int64)
-    for node in np.argsort(-space.layer, kind="stable").tolist():
-        taken = beside[above[node]].sum(axis=0)
-        np.add.at(taken, word[above[node]], _FORBIDDEN)
-        word[node] = np.lexsort((used, taken[:size]))[0]
-        used[word[node]] += 1
-        np.add.at(beside, (above[node], word[node]), 1)
-    return dict(zip(space.state.tolist(), word.tolist(), strict=True))
 
 
 # ---- few facts that decide the words of one task

@@ -3,15 +3,20 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
 from itertools import combinations, islice, product
 
+import numpy as np
 import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates, from_problems
+from coordlang.language.warping import Pair, pair
+from coordlang.required.choices import Choices
 from coordlang.vocabulary.counting import Apart, needs_three_words
+from coordlang.vocabulary.plan_pairs import failing_pairs
+from coordlang.vocabulary.sat import END, PairStep, Undecided
 from planners.system.limits import time_limit
 from tests.support import naive
 from tests.support.candidates import MOST, listed, requiring, small_candidates
@@ -39,6 +44,44 @@ def test_plans_are_apart_iff_some_mixture_of_every_two_fails(robots: int, number
                     assert apart.always(start, *paths) == fails
                     told[fails] += 1
     assert min(told[True], told[False]) >= 20, told
+
+
+@pytest.mark.parametrize(
+    ("robots", "number"), [(2, 20), (3, 10), pytest.param(3, 80, marks=pytest.mark.thorough)]
+)
+def test_pairs_of_plans_that_fail_are_the_paths_of_a_graph(robots: int, number: int) -> None:
+    models = (c for _, c in small_candidates(robots, states=9, plans=MOST) if requiring(c))
+    told = 0
+    for candidates in islice(models, number):
+        failing = defaultdict[int, set[tuple[Pair | None, ...]]](set)
+        for space, task, plans, _ in listed(candidates):
+            start = int(space.starts[task])
+            for one, other in combinations(plans, 2):
+                if any(naive.mixture(w) not in plans for w in product((one, other), repeat=robots)):
+                    same = next(
+                        n for n, two in enumerate(zip(one, other, strict=True)) if two[0] != two[1]
+                    )
+                    entered = [
+                        space.state[space.targets(np.array(space.path_with(start, plan)))][same:]
+                        for plan in (one, other)
+                    ]
+                    two = zip(*(states.tolist() for states in entered), strict=True)
+                    failing[id(space)].add(tuple(pair(a, b) if a != b else None for a, b in two))
+        for space in candidates.spaces:
+            steps = failing_pairs(Choices(space), 10**6)
+            assert set(paths_of(steps)) == failing[id(space)]
+            told += len(failing[id(space)])
+            with pytest.raises(Undecided):
+                failing_pairs(Choices(space), 0)
+    assert told >= 2 * number, told
+
+
+def paths_of(steps: Sequence[PairStep], place: int = 0) -> Iterator[tuple[Pair | None, ...]]:
+    """What the plans enter on each path from a place to the end."""
+    for before, states, after in steps:
+        if before == place:
+            rest = [()] if after == END else paths_of(steps, after)
+            yield from ((states, *following) for following in rest)
 
 
 BELLS = """(define (domain bells)

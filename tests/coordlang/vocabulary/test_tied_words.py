@@ -38,7 +38,7 @@ from tests.support.domains import all_tasks, own_task
 def found(candidates: Candidates, size: int) -> tuple[Job, Languages, Assignment | None]:
     job = build_language(candidates, "greedy").job
     languages = Languages.of(job)
-    search = TiedWords(job, languages)
+    search = TiedWords(job, languages, 10**6)
     try:
         return job, languages, search.find(size, 60)
     finally:
