@@ -12,7 +12,7 @@ of what was found only then.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import groupby, takewhile
 from random import Random
 from typing import Any
@@ -88,7 +88,7 @@ class Mixtures:
         for node in np.flatnonzero(requires & space.descendants(space.starts)).tolist():
             failing = self._of_node(node)
             if failing is not None:
-                found[node] = [self._near_plans(node, failing, random)]
+                found[node] = [self._plans(node, failing, random)]
                 effort = min(effort, self._visited + _EFFORT * most)
             if len(found) >= most or self._visited > effort:
                 break
@@ -99,10 +99,7 @@ class Mixtures:
             wanted = min(ways * _RANDOM_WAYS, most // len(found) - 1)
             plans += sorted(self._others(node, wanted, random))
         by_steps = groupby(found, key=lambda node: int(space.layer[node]))
-        plans_by_steps = (
-            [self._with_fewest(node, own) for node in nodes for own in found[node]]
-            for _, nodes in by_steps
-        )
+        plans_by_steps = ([own for node in nodes for own in found[node]] for _, nodes in by_steps)
         return [np.array(plans, np.int64).transpose(0, 2, 1) for plans in plans_by_steps]
 
     def _of_node(self, node: int, random: Random | None = None) -> _Failing | None:
@@ -221,23 +218,14 @@ class Mixtures:
 
     # ---- plans of a mixture
 
-    def _near_plans(self, node: int, failing: _Failing, random: Random) -> _Plans:
-        """Plans of which a failing mixture is made, near to each other.
+    def _plans(self, node: int, failing: _Failing, random: Random) -> _Plans:
+        """Plans of which a failing mixture is made, drawn at random.
 
-        Each is made to go where the one before goes as far as it can, and then the first one where
-        the last goes.
+        If some of them suffice for one that fails, only these: fewer plans differ in less, and
+        their clause is stronger.  Mostly two are left.
         """
-        codes, sentence = failing
-        plans: list[tuple[int, ...]] = [()]
-        for robot in (*range(len(codes)), 0):
-            plans.append(self._plan(node, robot, codes[robot], sentence, plans[-1], random))
-        return (plans[-1], *plans[2:-1])
-
-    def _with_fewest(self, node: int, plans: _Plans) -> _Plans:
-        """The same mixture with fewer different plans, if some of them suffice for one that fails.
-
-        Fewer plans differ in less: what tells them apart is a stronger clause.
-        """
+        codes, said = failing
+        plans = tuple(self._plan(node, robot, own, said, random) for robot, own in enumerate(codes))
         for one in sorted(set(plans), key=lambda plan: (plans.count(plan), plan)):
             for other in sorted(set(plans) - {one}, key=lambda plan: (-plans.count(plan), plan)):
                 fewer = tuple(other if plan == one else plan for plan in plans)
@@ -264,24 +252,15 @@ class Mixtures:
         while len(found) < most and familiar < _FAMILIAR:
             failing = self._of_node(node, random)
             assert failing is not None, "some mixture fails"
-            codes, said = failing
-            plans = tuple(
-                self._plan(node, robot, own, said, (), random) for robot, own in enumerate(codes)
-            )
+            plans = self._plans(node, failing, random)
             familiar = familiar + 1 if plans in found else 0
             found.add(plans)
         return found
 
     def _plan(
-        self,
-        node: int,
-        robot: int,
-        codes: list[int],
-        sentence: Words,
-        near: Sequence[int],
-        random: Random,
+        self, node: int, robot: int, codes: list[int], sentence: Words, random: Random
     ) -> tuple[int, ...]:
-        """A plan with a robot's first steps and a sentence, drawn, or ``near`` another plan."""
+        """A plan with a robot's first steps and a sentence, drawn at random."""
         spoken = self._spoken
         path: list[int] = []
         for step in range(int(self._space.layer[node])):
@@ -294,8 +273,7 @@ class Mixtures:
                     target, robot, codes[step + 1 :], sentence[len(entered) :]
                 ):
                     options.append(edge)
-            same = [e for e in options if near and spoken.targets[e] == spoken.targets[near[step]]]
-            edge = random.choice(same or options)
+            edge = random.choice(options)
             sentence = sentence[len(spoken.entered(edge, node)) :]
             path.append(edge)
             node = spoken.targets[edge]
