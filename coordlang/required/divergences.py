@@ -17,7 +17,7 @@ where the mixed step leads, decides nearly all sets, and only the others are loo
 
 from __future__ import annotations
 
-from itertools import combinations, product
+from itertools import combinations, islice, product
 from math import inf
 
 import numpy as np
@@ -37,6 +37,8 @@ from planners.search.edge_index import EdgeIndex
 
 #: Rows of a table handled together.
 _CHUNK = 1_000_000
+#: Ways to mix next steps that are handled together at most, where sets are few.
+_AT_ONCE = 50_000
 
 
 class TooManyDivergences(Exception):
@@ -208,18 +210,20 @@ class _Mixing:
         """Which of ``count`` sets of states fail in some way; ``number`` says which each set is."""
         fails = np.zeros(count, np.bool_)
         size, robots = sets.shape[1], self._space.robots
-        for assigned in product(range(size), repeat=robots):
-            if len(set(assigned)) < size:
-                continue
-            rows = np.flatnonzero(~fails[number])
+        ways = (a for a in product(range(size), repeat=robots) if len(set(a)) == size)
+        at_once = 1  # most sets that fail do so in the first ways
+        while (assigned := list(islice(ways, at_once))) and not fails.all():
+            rows = np.repeat(np.flatnonzero(~fails[number]), len(assigned))
             self.looked_at += len(rows)
             if self.looked_at > self._most:
                 raise TooManyDivergences
-            row, nodes, missing = self._mixed(sets[rows][:, assigned])
+            given = sets[rows[:: len(assigned)]][:, assigned].reshape(-1, robots)
+            row, nodes, missing = self._mixed(given)
             fails[number[rows[missing]]] = True
             which = number[rows[row]]
             left = np.flatnonzero(~fails[which])
             fails[which[left[self._choices.fails_each(nodes[left])]]] = True
+            at_once = max(1, min(2 * at_once, _AT_ONCE // len(sets)))
         return fails
 
     def _mixed(self, ways: Ints) -> tuple[Ints, Ints, Ints]:
