@@ -23,10 +23,16 @@ Mixed = dict[int, int]
 
 
 class PlanPairs:
-    """Pairs of plans of a space; ``most`` nodes of mixtures may be looked at."""
+    """Pairs of plans of a space; ``most`` nodes of them and their mixtures may be looked at."""
 
     def __init__(self, space: PlanSpace, most: int) -> None:
         self.space, self._edges, self._left = space, EdgeTrees(space), most
+
+    def spend(self, nodes: int) -> None:
+        """Look at so many nodes.  Raises `Undecided` after too many."""
+        self._left -= nodes
+        if self._left < 0:
+            raise Undecided
 
     def edges(self, mixed: Mixed) -> Iterator[tuple[int, int]]:
         """The next edges of the two plans, in all ways."""
@@ -44,9 +50,7 @@ class PlanPairs:
             bit = 1 << robot
             if mine != theirs and not max(mixed) & bit:
                 following |= {robots | bit: node for robots, node in following.items()}
-        self._left -= len(following)
-        if self._left < 0:
-            raise Undecided
+        self.spend(len(following))
         for robots, node in following.items():
             tree: Any = self._edges.of(node)
             for robot, labels in enumerate(zip(*two, strict=True)):
@@ -120,6 +124,7 @@ class _FailingPairs:
                 self.step(number, place, *edges)
         else:
             one, other = ({space.target_of(edge) for edge in space.out_edges(n)} for n in place)
+            self._pairs.spend(len(one) * len(other))
             for nodes in product(one, other):
                 self._enter(number, nodes, nodes)
 
