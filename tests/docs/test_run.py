@@ -184,8 +184,7 @@ def test_reader_needs_the_standard_library_only() -> None:
     assert imported <= sys.stdlib_module_names
 
 
-@pytest.mark.parametrize("flags", [[], ["--remember-actions"]], ids=["states", "actions"])
-@pytest.mark.parametrize("ending", [".json", ".json.gz"])
+@pytest.mark.parametrize(("flags", "ending"), [([], ".json.gz"), (["--remember-actions"], ".json")])
 def test_reader_says_the_same(
     flags: list[str], ending: str, reader: dict[str, Any], tmp_path: Path
 ) -> None:

@@ -44,7 +44,8 @@ def written(name: str, folder: Path, *, unfactored: bool = False) -> Path:
 @pytest.mark.parametrize(
     "name",
     [
-        *UNIFIED,
+        *UNIFIED[1:],
+        pytest.param(UNIFIED[0], marks=pytest.mark.thorough),
         "hall",
         pytest.param(
             "driverlog",

@@ -49,6 +49,17 @@ EITHER_WAY_BOTH = """(define (problem p) (:domain either) (:objects r1 r2 - robo
 ONLY_R1 = EITHER_WAY_BOTH.replace("(and (there r1) (there r2))", "(there r1)")
 
 
+def executive(data: dict[str, Any], name: str, life: int) -> Executive:
+    """That of a robot with these choices, whose sentence is given."""
+    others = [one["robot"] for one in data["choices"] if one["robot"] != name]
+    words = data["sentence"]
+    agreement = Agreement(name, others, words, (), lambda _: words, lambda *_: True)
+    choices = lambda _: EventMonitor(data, name)  # noqa: E731
+    own = Executive(name, others, "run", agreement, choices, SILENT_AFTER)
+    own.life = life
+    return own
+
+
 class Fleet:
     """Executives, their drivers, and what is on its way between them.
 
@@ -89,17 +100,8 @@ class Fleet:
 
     def starter(self, name: str) -> Callable[[], None]:
         def start() -> None:
-            others = [other for other in self.names if other != name]
-            words = self.data["sentence"]
-            self.at[name] = Executive(
-                name,
-                others,
-                "this run",
-                Agreement(name, others, words, (), lambda _: words, lambda *_: True),
-                lambda _: EventMonitor(self.data, name),
-                SILENT_AFTER,
-            )
-            self.at[name].life, self.at[name].random = self.random.getrandbits(40), self.random
+            self.at[name] = executive(self.data, name, self.random.getrandbits(40))
+            self.at[name].random = self.random
             self.after(name, lambda own: own.tick(self.now))
 
         return start
@@ -217,8 +219,8 @@ class Fleet:
         return tuple(self.logs[name] for name in self.names)
 
 
-RUNS = [(2, range(40)), (3, range(20))]
-THOROUGH = [(2, range(40, 400)), (3, range(20, 200)), (4, range(40))]
+RUNS = [(2, range(26)), (3, range(14))]
+THOROUGH = [(2, range(26, 400)), (3, range(14, 200)), (4, range(40))]
 SEEDS = [*RUNS, *(pytest.param(*run, marks=pytest.mark.thorough) for run in THOROUGH)]
 
 
@@ -260,14 +262,7 @@ class Pair:
             self.join(name, 1)
 
     def join(self, name: str, life: int) -> None:
-        others = [one["robot"] for one in self.data["choices"] if one["robot"] != name]
-        words = self.data["sentence"]
-        agreement = Agreement(name, others, words, (), lambda _: words, lambda *_: True)
-        own = Executive(name, others, "run", agreement, self.monitor(name), SILENT_AFTER)
-        own.life, self.at[name] = life, own
-
-    def monitor(self, name: str) -> Callable[[str], EventMonitor]:
-        return lambda _: EventMonitor(self.data, name)
+        self.at[name] = executive(self.data, name, life)
 
     def tick(self, now: float) -> None:
         """All tick, and hear each other until nobody says anything."""

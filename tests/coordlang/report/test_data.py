@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from math import prod
 from pathlib import Path
@@ -21,6 +22,7 @@ from coordlang.report import task as page_task
 from coordlang.report.page import make_report, page_data
 from coordlang.report.shown import select_tasks
 from coordlang.required.miscoordination import Inseparable
+from planners.search.kept_plans import keeping_plans, plan_store
 from planners.search.plans import Plans
 from planners.system.errors import ProvedImpossible, UsageError
 from tests.coordlang.report.conftest import (
@@ -43,6 +45,15 @@ MORE = [
     pytest.param("lock", "both-in", "all", marks=pytest.mark.thorough),
     pytest.param("elevator", "two-calls", "all", marks=pytest.mark.thorough),
 ]
+
+
+@pytest.fixture(autouse=True)
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """A test searches each task once, for several pages too: commands, and functions."""
+    folder = tmp_path_factory.mktemp("kept")
+    with pytest.MonkeyPatch.context() as patch, keeping_plans(plan_store(folder)):
+        patch.setenv("COORDLANG_CACHE", str(folder))
+        yield
 
 
 @pytest.mark.parametrize(("domain", "problem", "tasks"), [*WORLDS, *MORE])

@@ -281,7 +281,9 @@ def random_building(random: Random) -> str:
     return "coordinate_system: cartesian_meters\n" + text
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize(
+    "seed", [*range(6), *(pytest.param(n, marks=pytest.mark.thorough) for n in range(6, 12))]
+)
 def test_steps_are_those_of_the_definition(seed: int, tmp_path: Path) -> None:
     random = Random(seed)
     clearance = random.choice([0.0, 0.29, 0.83, 1.13])  # no distance of these points

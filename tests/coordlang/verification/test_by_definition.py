@@ -37,9 +37,9 @@ from tests.support.texts import parsed
 
 #: (robots, plans of one task that the twin lists at most, models)
 SIZES = [
-    (2, 60, 20),
-    (3, 14, 16),
-    (4, 7, 10),
+    (2, 60, 12),
+    (3, 14, 10),
+    (4, 7, 6),
     pytest.param(2, 60, 600, marks=pytest.mark.slow),
     pytest.param(3, 14, 600, marks=pytest.mark.slow),
     pytest.param(4, 7, 200, marks=pytest.mark.slow),

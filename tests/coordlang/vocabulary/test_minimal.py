@@ -96,7 +96,7 @@ def test_one_of_symmetric_partitions(
     ("robots", "most", "examples"),
     [
         (2, 40, 70),
-        (3, 14, 35),
+        (3, 14, 18),
         pytest.param(2, 40, 280, marks=pytest.mark.slow),
         pytest.param(3, 14, 140, marks=pytest.mark.slow),
     ],
@@ -194,7 +194,7 @@ def test_walks_of_goals_up_to_symmetry_refute_what_is_no_language(folder: str, s
     states = range(len(candidates.rows))
     refuter = Refuter(candidates.spaces, group, len(states), 0)
     random, answers = Random(1), Counter[bool]()
-    for _ in range(60):
+    for _ in range(40):
         word = list(states)
         for _ in range(random.randint(1, 3)):
             one, other = random.sample(states, 2)

@@ -150,7 +150,7 @@ def test_every_plan_of_random_models_once(seed: int, kind: Kind, cost: Cost) -> 
     event(f"plans: {min(every_plan_once(loaded.model, task)[1], 3)}")
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 100_000), cost=st.sampled_from(COSTS))
 @example(seed=82, cost="makespan").via("a third action makes one delete what another adds")
 @example(seed=331, cost="makespan+actions").via("the same, and no plan was left")

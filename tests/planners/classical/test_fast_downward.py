@@ -202,7 +202,7 @@ def test_a_parent_that_is_killed_takes_everything_with_it(tmp_path: Path) -> Non
     until(lambda: not processes(tmp_path))
 
 
-@pytest.mark.parametrize("limit", [20_000_000, 60_000_000])
+@pytest.mark.parametrize("limit", [20_000_000, 45_000_000])
 def test_too_little_memory_is_an_error_of_its_own(
     limit: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
