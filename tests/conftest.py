@@ -7,6 +7,8 @@ import os
 import sys
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -39,6 +41,22 @@ def coordlang(capfd: pytest.CaptureFixture[str]) -> Command:
         return Outcome(code, out, err)
 
     return call
+
+
+@pytest.fixture
+def searches(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The names of the tasks that are really searched, and not among the kept plans."""
+    from planners.search import kept_plans, optimal_plans
+
+    done: list[str] = []
+
+    def search(model: Any, task: Any, *rest: Any) -> object:
+        done.append(task.name)
+        return optimal_plans.search(model, task, *rest)
+
+    counting = SimpleNamespace(search=search, joined=optimal_plans.joined)
+    monkeypatch.setattr(kept_plans, "optimal_plans", counting)
+    return done
 
 
 @pytest.fixture

@@ -109,6 +109,3 @@ def test_the_curve_of_the_smallest_grid() -> None:
     assert "| GW1 | 7.58* | 3.79* | 0* |" in str(shown.blocks[1])
     assert [figure.name for figure in shown.figures] == ["silence-words", "silence-bits"]
     assert all(figure.draw() for figure in shown.figures)
-
-
-# ---- disruptions

@@ -16,7 +16,7 @@ import pytest
 
 from coordlang.commands.building import build_language
 from coordlang.language.words import Language
-from coordlang.required.miscoordination import Inseparable, miscoordination
+from coordlang.required.miscoordination import miscoordination
 from coordlang.verification.by_definition import verify
 from planners.joint.states import split_atoms
 from planners.loading import PlanningInstance, build
@@ -130,13 +130,6 @@ def test_the_commands_in_the_readme(
     assert {command.text.split()[1] for command in run} >= {"build", "verify"}
     for command in run:
         run_command(command, folder, monkeypatch)
-
-
-def test_no_state_tells_who_holds_the_switch() -> None:
-    """Two actions without effects, either of which will do: only remembering tells them apart."""
-    row = {"language for": "three-robots", "--tasks": "its own", "options": ""}
-    with pytest.raises(Inseparable):
-        build_language(candidates("lock", row))
 
 
 # ---- what they say in words of a smallest language

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from functools import partial
 from itertools import chain
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -154,16 +155,13 @@ def test_work_that_is_stopped_leaves_no_old_certificate(
     """First the work on the certificate, then the search: its place takes that of the bound."""
     decide = MinimalSearch.decide
 
-    def stop(_: object) -> None:
-        raise error
-
     def late(search: MinimalSearch, size: int, budget: Budget) -> bool:
         if size > 1:  # that one word is not enough is known
             raise error
         return decide(search, size, budget)
 
     with monkeypatch.context() as patched:
-        patched.setattr(Built, "certificate", stop)
+        patched.setattr(Built, "certificate", Mock(side_effect=error))
         outcome = coordlang(*BUILD, *PAIR)
     assert (_pair(old_pair), outcome.code) == ("new, alone", code)
     end = "it is verified{}; no certificate is written\n"

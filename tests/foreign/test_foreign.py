@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable, Sequence
 from functools import partial
 from typing import Any
 
@@ -14,6 +14,9 @@ from coordlang.commands.building import build_language
 from coordlang.commands.main import run
 from coordlang.language.candidates import Candidates, from_listed
 from coordlang.language.listed import varied_tasks
+from coordlang.language.sentences import Sentence, sentence
+from coordlang.language.words import Language
+from coordlang.required.choices import Choices
 from coordlang.required.miscoordination import Inseparable
 from planners.classical import compile_classical
 from planners.classical.fast_downward import optimal_cost
@@ -23,8 +26,8 @@ from planners.pddl import read_domain, read_problem
 from planners.pddl.factored import read_factored
 from planners.pddl.model_options import ModelOptions
 from planners.search.optimal_plans import search
+from planners.search.plans import Plans
 from planners.system.limits import time_limit
-from tests.support.agreement import Feature, Plan, agreement, parts, who, who_does_what
 from tests.support.domains import SHARED
 from tests.support.pages import DOCS, rows, sections
 
@@ -115,7 +118,79 @@ def test_fast_downward_agrees(
     assert answer[0] == KNOWN[name][1]
 
 
-# ---- languages for varied tasks
+# ---- languages for varied tasks, and what their sentences determine
+
+#: A plan: for each step and robot the subaction's text, None for idling.
+Plan = Sequence[Sequence[str | None]]
+#: What a listener may want to know of a plan.
+Feature = Callable[[Plan], Hashable]
+#: Tasks with more plans than this are left out.
+MANY = 3000
+
+
+def parts(plan: Plan, schemas: Sequence[str]) -> list[tuple[int, int, str]]:
+    """(step, robot, subaction) of these schemas, or of all."""
+    return [
+        (step, robot, text)
+        for step, texts in enumerate(plan)
+        for robot, text in enumerate(texts)
+        if text and (not schemas or text[1:-1].split()[0] in schemas)
+    ]
+
+
+def who_does_what(*schemas: str) -> Feature:
+    """Which robot does which subactions of these schemas, or of all, at whatever time."""
+    return lambda plan: frozenset((robot, text) for _, robot, text in parts(plan, schemas))
+
+
+def who(*schemas: str) -> Feature:
+    """Which robots do anything of these schemas."""
+    return lambda plan: frozenset(robot for _, robot, _ in parts(plan, schemas))
+
+
+def exactly(plan: Plan) -> Hashable:
+    """The plan itself."""
+    return tuple(map(tuple, plan))
+
+
+def agreement(
+    language: Language, candidates: Candidates, told: Feature, left: Feature = exactly
+) -> dict[str, int]:
+    """Count the tasks whose sentences determine a feature of plans, or leave another one open.
+
+    Only tasks that require coordination and have few plans count.
+
+    Returns
+    -------
+    dict
+        "different": tasks whose plans differ in ``told``; "told": those of them in which all plans
+        of every sentence agree on it.  "left": tasks in which plans of some sentence differ in
+        ``left``.
+    """
+    partition = language.partition(candidates.model)
+    figures = dict.fromkeys(("different", "told", "left"), 0)
+    for space in candidates.spaces:
+        word = partition.word_of(space.rows).tolist()
+        requires = Choices(space).requires[space.starts]
+        for task in requires.nonzero()[0].tolist():
+            plans = Plans.of(space, task)
+            if plans.count <= MANY:
+                values = _values(plans, word, told)
+                differ = len(set().union(*values)) > 1
+                figures["different"] += differ
+                figures["told"] += differ and all(len(v) == 1 for v in values)
+                figures["left"] += any(len(v) > 1 for v in _values(plans, word, left))
+    return figures
+
+
+def _values(plans: Plans, word: Sequence[int], feature: Feature) -> list[set[Hashable]]:
+    """For each sentence, the values of a feature on its plans; ``word`` is that of each state."""
+    found: dict[Sentence, set[Hashable]] = {}
+    for plan in plans:
+        words = sentence(word[state] for state in plans.states(plan))
+        texts = [plans.space.model.texts(step) for step in plan]
+        found.setdefault(words, set()).add(feature(texts))
+    return list(found.values())
 
 
 def loaded(plan: Plan) -> Hashable:

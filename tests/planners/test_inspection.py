@@ -7,16 +7,13 @@ import math
 import re
 import sys
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from unittest.mock import DEFAULT, Mock
 
 import pytest
 
 from coordlang.commands.inspect import inspection
 from planners.joint.composition import ComposingStepper
-from planners.joint.model import Options, Stepper, Steps
-from planners.joint.tables import Rows
-from planners.loading import PlanningInstance, load
+from planners.loading import PlanningInstance
 from planners.pddl.model_options import ModelOptions
 from planners.search.optimal_plans import search
 from planners.search.reachable import PieceSizes, count, explore
@@ -31,7 +28,7 @@ from planners.system.limits import (
     time_left,
     time_limit,
 )
-from tests.support.domains import DOMAINS
+from tests.support.domains import loaded_from
 from tests.support.random_pddl import random_model
 from tests.support.texts import model_of
 
@@ -54,16 +51,14 @@ TASK = """(define (problem p) (:domain pushing) (:objects r1 r2 - robot a b - pl
   ( :goal (forall (?x - heavy) (or (in ?x b) (not (seen a))))))"""
 
 
-def test_what_can_never_be_is_shown() -> None:
+def test_what_was_understood_is_shown() -> None:
     found = inspection(model_of(PUSHING, TASK))
     assert found.impossible == ("carry", "melt")
     assert found.never == ("glows",)
     assert found.objects == {"heavy": 1, "place": 2, "robot": 2}
     assert found.start == {"at": 2, "in": 1}
-
-
-def test_formulas_are_shown_with_what_is_there() -> None:
-    assert inspection(model_of(PUSHING, TASK)).formulas == (
+    assert found.goal == "(forall (?x - heavy) (or (in ?x b) (not (seen a))))"
+    assert found.formulas == (
         "(push r1 anvil a b) speaks of (push r2 anvil a b) in the same step",
         "(look r1 a) forbids (look r2 a) in the same step",
     )
@@ -74,13 +69,6 @@ def test_formulas_are_shown_with_what_is_there() -> None:
     assert (
         "(push r1 anvil a b) speaks of (push r2 anvil a a), which no robot can ever do, in the same step"
         in shown
-    )
-
-
-def test_the_goal_is_the_one_that_was_understood() -> None:
-    assert (
-        inspection(model_of(PUSHING, TASK)).goal
-        == "(forall (?x - heavy) (or (in ?x b) (not (seen a))))"
     )
 
 
@@ -244,43 +232,16 @@ def test_what_follows_on_stopped_work_is_stopped_soon() -> None:
 # How far work got
 
 
-@dataclass(frozen=True)
-class Stopping(Stepper):
-    """A stepper that a limit stops after some tables of states."""
-
-    stepper: Stepper
-    error: BaseException
-    left: list[int]
-
-    def steps(self, rows: Rows, options: Options | None = None) -> Steps:
-        self.left[0] -= 1
-        if self.left[0] < 0:
-            raise self.error
-        return self.stepper.steps(rows, options)
-
-    def choices(self, rows: Rows) -> Options:
-        return self.stepper.choices(rows)
-
-    def most_steps(self, rows: Rows) -> int:
-        return self.stepper.most_steps(rows)
-
-    def why_not(self, row: Rows, labels: Sequence[int]) -> str:
-        return self.stepper.why_not(row, labels)
-
-
-def corners(problem: str = "corners-3x3") -> PlanningInstance:
-    return load(DOMAINS / "grid" / "domain.pddl", [DOMAINS / "grid" / f"{problem}.pddl"])
-
-
-def stopped(after: int, error: BaseException) -> PlanningInstance:
-    loaded = corners()
-    stepper = Stopping(loaded.model.stepper, error, [after])
-    return replace(loaded, model=replace(loaded.model, stepper=stepper))
+def stop(monkeypatch: pytest.MonkeyPatch, after: int, error: BaseException) -> None:
+    """Steps are not made any more after some tables of states."""
+    made = Mock(side_effect=[*[DEFAULT] * after, error], wraps=ComposingStepper.steps)
+    monkeypatch.setattr(ComposingStepper, "steps", lambda *given: made(*given))
 
 
 @pytest.mark.parametrize("error", [late(), MemoryError()], ids=["time", "memory"])
-def test_search_says_how_far_it_got(error: BaseException) -> None:
-    loaded = stopped(4, error)  # two tables of states to choose a bound
+def test_search_says_how_far_it_got(error: BaseException, monkeypatch: pytest.MonkeyPatch) -> None:
+    loaded = loaded_from("grid", "corners-3x3")
+    stop(monkeypatch, 4, error)  # two tables of states to choose a bound
     with pytest.raises((OutOfTime, OutOfMemory)) as caught:
         search(loaded.model, loaded.tasks[0])
     # Within four steps every step leads nearer: 2 * 2 states after one, and after two both robots
@@ -291,8 +252,9 @@ def test_search_says_how_far_it_got(error: BaseException) -> None:
     )
 
 
-def test_exploring_says_how_far_it_got() -> None:
-    loaded = stopped(1, late())
+def test_exploring_says_how_far_it_got(monkeypatch: pytest.MonkeyPatch) -> None:
+    loaded = loaded_from("grid", "corners-3x3")
+    stop(monkeypatch, 1, late())
     with pytest.raises(OutOfTime, match=r"time limit") as caught:
         explore(loaded.model, loaded.tasks[0].init[None, :])
     assert caught.value.reached == (
@@ -301,7 +263,7 @@ def test_exploring_says_how_far_it_got() -> None:
 
 
 def test_exploring_in_pieces_is_the_same_work() -> None:
-    loaded, small = corners("corners-4x4"), PieceSizes(states=7, steps=40)
+    loaded, small = loaded_from("grid", "corners-4x4"), PieceSizes(states=7, steps=40)
     init = loaded.tasks[0].init[None, :]
     space = explore(loaded.model, init)
     assert count(loaded.model, init, small) == (len(space), len(space.target))
@@ -311,7 +273,7 @@ def test_exploring_in_pieces_is_the_same_work() -> None:
 
 
 def test_combinations_that_do_not_fit_are_not_made() -> None:
-    loaded = corners("three-robots-3x3")
+    loaded = loaded_from("grid", "three-robots-3x3")
     assert isinstance(loaded.model.stepper, ComposingStepper)
     loaded.model.stepper.piece = 10
     loaded.model.stepper.memory_left = lambda: 1000

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import cache
-from itertools import combinations, product
+from itertools import product
 from random import Random
 
 from coordlang.language.candidates import all_pairs
@@ -257,17 +257,13 @@ def _components(acting: Sequence[int], joined: Callable[[int, int], bool]) -> li
     return sorted(tuple(sorted(one)) for one in found)
 
 
-def ordered_partitions(robots: Block, number: int) -> Iterator[tuple[Block, ...]]:
-    """The ways to put robots into so many blocks one after another, by the order of robots."""
-    for size in range(1, len(robots) - number + 2):
-        for first in combinations(robots, len(robots) if number == 1 else size):
-            rest = tuple(robot for robot in robots if robot not in first)
-            if number == 1:
-                yield (first,)
-            else:
-                yield from ((first, *others) for others in ordered_partitions(rest, number - 1))
-        if number == 1:
-            return
+def ordered_partitions(robots: Block, number: int) -> list[tuple[Block, ...]]:
+    """The ways to put robots into so many blocks one after another, small first blocks first."""
+    found = [
+        tuple(tuple(r for r, k in zip(robots, own, strict=True) if k == at) for at in range(number))
+        for own in product(range(number), repeat=len(robots))
+    ]
+    return sorted(filter(all, found), key=lambda blocks: [(len(own), own) for own in blocks])
 
 
 def random_tasks(robots: int, seeds: range) -> Iterator[tuple[PlanSpace, World, list[int], Random]]:

@@ -102,6 +102,14 @@ def _random(seed: int, robots: int, asynchronous: bool) -> Candidates | None:
         return None
 
 
+def random_candidates(seeds: range, robots: int, most: int) -> Iterator[tuple[int, Candidates]]:
+    """Those of the random models of seeds, with ``most`` tasks at most."""
+    for seed in seeds:
+        found = _random(seed, robots, False)
+        if found is not None and 0 < found.count <= most:
+            yield seed, found
+
+
 def listed(
     candidates: Candidates, most: int = MOST
 ) -> Iterator[tuple[PlanSpace, int, list[Plan], list[tuple[int, ...]]]]:

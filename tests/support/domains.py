@@ -31,10 +31,17 @@ class World:
     plans: PlanSpace
 
 
+def loaded_from(
+    folder: str, stem: str = "problem", options: ModelOptions | None = None
+) -> PlanningInstance:
+    """The joint model of ``domains/FOLDER/STEM.pddl``, made anew."""
+    return load(DOMAINS / folder / "domain.pddl", [DOMAINS / folder / f"{stem}.pddl"], options)
+
+
 @cache
 def world_of(folder: str, problem: str) -> World:
     """The world of ``domains/FOLDER/PROBLEM.pddl``."""
-    loaded = load(DOMAINS / folder / "domain.pddl", [DOMAINS / folder / f"{problem}.pddl"])
+    loaded = loaded_from(folder, problem)
     task = loaded.tasks[0]
     return World(loaded, explore(loaded.model, task.init[None, :]), search(loaded.model, task))
 

@@ -31,13 +31,6 @@ Own = tuple[int, ...]
 Known = tuple[frozenset[str], frozenset[str]]
 
 
-def sentences(task_language: TaskLanguage, most: int) -> dict[tuple[int, ...], list[Plan]]:
-    """All optimal plans of the task by their sentence; raises `naive.TooLarge`."""
-    space = task_language.space
-    word = task_language.partition.word_of(space.rows).tolist()
-    return naive.by_sentence(space, task_language.task, word.__getitem__, most)
-
-
 @dataclass
 class Listed:
     """The plans of one sentence, and all plans of the task."""
@@ -149,7 +142,7 @@ def listed(
     task_language: TaskLanguage, most_plans: int, most_combinations: int
 ) -> Iterator[tuple[tuple[int, ...], Listed]]:
     """Every sentence of a task with what it leaves open; raises `naive.TooLarge`."""
-    groups = sentences(task_language, most_plans)
+    groups = naive.numbered_sentences(task_language, most_plans)
     optimal = {plan for group in groups.values() for plan in group}
     for words, plans in groups.items():
         found = Listed(task_language, plans, optimal)

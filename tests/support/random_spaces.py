@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import lru_cache
 from random import Random
 from typing import Any, get_args
@@ -84,6 +84,16 @@ def blind_search(model: JointModel, task: PlanningTask) -> PlanSpace:
     (found,) = plan_spaces(explore(model, init), [(task.goal, init)])
     used, state = np.unique(found.state, return_inverse=True)
     return replace(found, rows=found.rows[used], state=state)
+
+
+def equal(one: PlanSpace, other: PlanSpace) -> None:
+    """Every field but the model is the same, and so are the types of arrays."""
+    for field in fields(PlanSpace):
+        a, b = getattr(one, field.name), getattr(other, field.name)
+        if isinstance(a, np.ndarray):
+            assert (a.dtype, a.tolist()) == (b.dtype, b.tolist()), field.name
+        else:
+            assert field.name == "model" or a == b, field.name
 
 
 def random_spaces(

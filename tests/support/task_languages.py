@@ -51,10 +51,6 @@ SHIPPED = [
 ] + ["grid/three-robots-3x3"]
 
 
-class Unsuitable(Exception):
-    """A random model without a solvable task, without a language, or with too much to list."""
-
-
 def in_words(
     language: Language | None, table: Partition, space: PlanSpace, task: int
 ) -> TaskLanguage:
@@ -120,23 +116,23 @@ def random_task_languages(
     """So many random models by their seeds, each made once in a process."""
     found: list[tuple[int, Candidates, TaskLanguage]] = []
     for seed in count():
-        with suppress(Unsuitable):
-            found.append((seed, *random_task_language(seed, robots)))
+        if (made := random_task_language(seed, robots)) is not None:
+            found.append((seed, *made))
         if len(found) == number:
             return tuple(found)
     raise AssertionError("seeds do not end")
 
 
-def random_task_language(seed: int, robots: int) -> tuple[Candidates, TaskLanguage]:
+def random_task_language(seed: int, robots: int) -> tuple[Candidates, TaskLanguage] | None:
     """The task of a random model with most choices, under a random partition; some states are left
-    to the default.
+    to the default; None without a task of few plans.
 
     No coordination language, mostly: saying and understanding, searching and wishing do not depend
     on it.
     """
     random, candidates = Random(seed), candidates_of(seed, robots)
     if candidates is None or candidates.loaded.options.remember_actions:
-        raise Unsuitable
+        return None
     space, task = tasks_of(candidates, seed)[0]
     if not candidates.listed:  # all pairs of states: one of them, or some literals of its goal
         codec, goal = candidates.model.codec, space.goals[space.goal[space.starts[task]]]
@@ -149,7 +145,7 @@ def random_task_language(seed: int, robots: int) -> tuple[Candidates, TaskLangua
         loaded = candidates.loaded
         candidates = from_listed(loaded.domain, loaded.problems, [listed], loaded.options)
     if not 1 < Plans.of(candidates.spaces[0]).count <= 300:
-        raise Unsuitable
+        return None
     size = random.choice([1, 2, 2, 3, 3, 4, 5])
     used = sorted(set(candidates.spaces[0].state.tolist()))
     mapped = [n for n in used if random.random() < 0.9] or used[:1]

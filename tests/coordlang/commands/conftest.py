@@ -24,9 +24,8 @@ FILES = {
         ("SMALL", "grid", "gw2-2x3"),
         ("CORNERS", "grid", "corners-3x3"),
         ("CORNERS-4", "grid", "corners-4x4"),
-        ("HUGE", "grid", "corners-10x10"),
         ("JOINT", "grid-joint", "corners-3x3"),
-        ("JOINT-4", "grid-joint", "corners-4x4"),
+        ("LOCK", "lock", "three-robots"),
     )
 }
 #: Exit codes of errors that say on the line below what to do.

@@ -57,12 +57,6 @@ def test_words_that_suffice_in_step_are_refuted(shell: Shell) -> None:
     shell("verify three.json SQUARE", 31)
 
 
-def test_a_proof_is_checked(shell: Shell) -> None:
-    build = "build SQUARE --tasks all --method minimal --asynchronous -o l.json --certificate"
-    shell(f"{build} p.json", 0)
-    shell("verify l.json SQUARE --certificate p.json", 0, "lower bound 5")
-
-
 DOOR = """(define (domain door) (:types robot)
  (:predicates (free) (in ?r - robot) (done ?r - robot))
  (:action enter :agent ?r - robot :parameters ()
@@ -172,7 +166,7 @@ def test_words_over_features_carry_over(shell: Shell) -> None:
     shell("ground lifted.json SQUARE -o l.json", 0)
     shell("verify l.json SQUARE", 0, "asynchronous: all optimal plans of one sentence mix freely")
     loaded = library.load(*SQUARE, asynchronous=True)
-    assert library.lift(loaded, tasks="all").language.model["execution"] == "asynchronous"
+    assert library.lift(loaded).language.model["execution"] == "asynchronous"
 
 
 def test_words_over_features_are_not_learned_from_a_loaded_domain_with_slack() -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import jsonschema
 import pytest
@@ -256,11 +257,10 @@ SAMPLE = "--sample and --max exclude each other"
         (f"{UNDERSTAND} --seed 1", "--seed belongs to --sample"),
         (f"{PLANS} --format ipc --json", "leave out --format ipc"),
         (f"{CHOICES} --format text --json", "leave out --format text"),
-        ("export l d p w0 --to ltlf --for fd", "--for fd belongs to --to pddl"),
         (f"{PLANS} --robots r1 --robot-type robot", "give one of them"),
-        (f"{BUILD} -o l --prefer flexible --method greedy", "--prefer flexible belongs to --metho"),
-        (f"{BUILD} -o l --alpha-only", "--alpha-only belongs to --method separating"),
         (f"{BUILD} -o l --effort 2 --method minimal", "--effort belongs to --method best"),
+        (f"{BUILD} -o l --effort -1", "--effort"),
+        (f"{BUILD} -o l --words 2 --certificate c", "--certificate"),
     ],
 )
 def test_usage(line: str, message: str, shell: Shell) -> None:
@@ -352,9 +352,7 @@ def test_what_ends_the_work_as_json(
     shell: Shell,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def ends(*_: object) -> None:
-        raise raised
-
+    ends = Mock(side_effect=raised)
     monkeypatch.setattr("coordlang.commands.inputs.Arguments.instance", ends)
     found = error(shell("inspect T-MAP --json", code))
     assert part.items() <= found.items()

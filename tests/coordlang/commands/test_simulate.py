@@ -127,6 +127,7 @@ def test_an_interrupt_keeps_the_runs_that_are_done(
 
 
 def test_a_record_is_drawn_again(simulate: Shell, shell: Shell) -> None:
+    """And the same seed gives the same run."""
     simulate("--runs 2 -o runs.json")
     simulate("--seed 1 -o sheet.png")
     out = shell("simulate --replay runs.json --seed 1 -o again.png --json").out
@@ -152,14 +153,6 @@ def test_robots_are_as_large_as_the_places_allow(shell: Shell) -> None:
         assert read_simulation("run.json").radius == pytest.approx(radius)
     Path("points.json").write_text(Path("points.json").read_text().replace("0.5", "0.2"))
     shell("simulate language.json CELLS --coordinates points.json", 2, "too small")
-
-
-def test_places_need_coordinates(shell: Shell) -> None:
-    shell("build CELLS --method greedy -o language.json")
-    shell("simulate language.json CELLS", 31, "--coordinates")
-    places = {"a": [0, 0], "b": [1, 0], "c": [0.5, 0.87]}
-    Path("points.json").write_text(json.dumps({"coordinates": places}))
-    shell("simulate language.json CELLS --coordinates points.json")
 
 
 def test_without_the_extra_it_says_what_to_install(

@@ -35,24 +35,6 @@ from tests.support.naive import plans_by_sentence
 from tests.support.task_languages import RANDOM, SHIPPED, random_task_languages, shipped
 
 
-def check_said(task_language: TaskLanguage) -> None:
-    for words, plans in [*plans_by_sentence(task_language).items()][:15]:
-        for plan in sorted(plans)[:5]:
-            said = sentence_of_plan(task_language, texts(task_language.model, plan))
-            assert task_language.text(said) == " ".join(words)
-
-
-@pytest.mark.parametrize("name", SHIPPED)
-def test_every_plan_says_its_sentence(name: str) -> None:
-    check_said(shipped(name)[1])
-
-
-@pytest.mark.parametrize(("robots", "number"), RANDOM)
-def test_every_plan_of_a_random_model(robots: int, number: int) -> None:
-    for _, _, task_language in random_task_languages(robots, number):
-        check_said(task_language)
-
-
 def changed(task_language: TaskLanguage, random: Random) -> Plan:
     """A sequence of label tuples near an optimal plan, or a detour that ends in the goal."""
     model, plans = task_language.model, Plans.of(task_language.space)
@@ -145,7 +127,7 @@ def judged(
     return "longer" if worse.value.excess[0] else "dearer"
 
 
-@pytest.mark.parametrize("number", [18, pytest.param(60, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("number", [12, pytest.param(60, marks=pytest.mark.thorough)])
 def test_wrong_plans_of_random_models(number: int) -> None:
     seen: Counter[str] = Counter()
     models = *random_task_languages(2, number), *random_task_languages(3, number)
@@ -211,6 +193,8 @@ def check_open(task_language: TaskLanguage, seed: int) -> None:
     groups = plans_by_sentence(task_language)
     for words, plans in list(groups.items())[:40]:
         said = task_language.words_of(words)
+        for plan in sorted(plans)[:5]:
+            assert sentence_of_plan(task_language, texts(task_language.model, plan)) == said
         fits = task_language.plans_with(said)
         assert Plans.of(fits).count == len(plans)
         assert set(Plans.of(fits)) == plans

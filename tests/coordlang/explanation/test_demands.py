@@ -17,15 +17,13 @@ from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import RobotPart, SentenceDemands, meaning, sentence_demands
 from coordlang.explanation.text import demands_text
 from coordlang.explanation.words import all_covers, mapped_states
-from coordlang.language.candidates import all_pairs, from_problems
 from coordlang.language.sentences import task_sentences
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
-from planners.system.errors import ProvedImpossible
 from tests.support import naive
+from tests.support.candidates import random_candidates
 from tests.support.command import Command
 from tests.support.domains import all_tasks
-from tests.support.random_models import random_model
 from tests.support.task_languages import random_language
 
 
@@ -73,14 +71,7 @@ def test_against_listed_plans(robots: int, monkeypatch: pytest.MonkeyPatch) -> N
     few = 2
     monkeypatch.setattr("coordlang.explanation.demands.FEW", few)
     seen: Counter[str] = Counter()
-    for seed in range(20):
-        domain, problem, options = random_model(seed, robots)
-        try:
-            candidates = (all_pairs if seed % 3 else from_problems)(domain, [problem], options)
-        except ProvedImpossible:
-            continue
-        if not 0 < candidates.count <= 300:
-            continue
+    for seed, candidates in random_candidates(range(20), robots, 300):
         # A coordination language or not: what is asked is about listed plans.
         language = random_language(Random(seed), candidates)
         formulas = all_covers(mapped_states(language, candidates.model))
@@ -199,16 +190,8 @@ def first_users(space: PlanSpace, name: str) -> set[tuple[str, ...]]:
 
 def test_which_sentences_lead_and_what_they_mean_against_listed_plans() -> None:
     seen: Counter[bool] = Counter()
-    for seed in range(40):
-        random = Random(seed)
-        domain, problem, options = random_model(seed, 2)
-        try:
-            candidates = (all_pairs if seed % 2 else from_problems)(domain, [problem], options)
-        except ProvedImpossible:
-            continue
-        if not 0 < candidates.count <= 300:
-            continue
-        language = random_language(random, candidates)
+    for seed, candidates in random_candidates(range(60), 2, 300):
+        language = random_language(Random(seed), candidates)
         for used in list(languages_in_tasks(language, candidates))[:20]:
             said = leading_sentences(used, 4)
             every = task_sentences(used.space, used.task, used.partition, used.plans_with)
@@ -216,7 +199,7 @@ def test_which_sentences_lead_and_what_they_mean_against_listed_plans() -> None:
             if len(said) < 2:
                 continue
             spaces = [used.plans_with(words) for words, _ in said]
-            names = problem.objects.keys() - {*used.model.robots}
+            names = candidates.loaded.problems[0].objects.keys() - {*used.model.robots}
             answers = {name: [first_users(space, name) for space in spaces] for name in names}
             meant = {
                 name: [*map(min, own)]

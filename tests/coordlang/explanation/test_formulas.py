@@ -19,7 +19,7 @@ from coordlang.explanation.simple import _Search, simple
 from coordlang.explanation.text import literal_text, pddl_condition, shown
 from coordlang.explanation.variables import Variable, truth, valuation
 from coordlang.explanation.words import Cover, Literal, all_covers, describe_words, mapped_states
-from coordlang.language.candidates import Candidates, all_pairs, from_problems
+from coordlang.language.candidates import Candidates, from_problems
 from coordlang.language.words import Language
 from coordlang.vocabulary.job import Assignment, Outcome
 from coordlang.vocabulary.loop import Budget
@@ -28,10 +28,15 @@ from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Atom
 from planners.pddl.model_options import ModelOptions
 from planners.search.reachable import explore
-from planners.system.errors import OutOfTime, ProvedImpossible
-from tests.support.candidates import failing, is_language, partitions, small_worlds
+from planners.system.errors import OutOfTime
+from tests.support.candidates import (
+    failing,
+    is_language,
+    partitions,
+    random_candidates,
+    small_worlds,
+)
 from tests.support.domains import DOMAINS, all_tasks
-from tests.support.random_models import random_model
 from tests.support.task_languages import language_of, random_language
 
 
@@ -62,16 +67,8 @@ def check_exact(language: Language, candidates: Candidates, formulas: dict[str, 
 @pytest.mark.parametrize("robots", [2, 3])
 def test_exactly_one_formula_is_true_in_every_mapped_state(robots: int) -> None:
     seen: Counter[str] = Counter()
-    for seed in range(24):
-        random = Random(seed)
-        domain, problem, options = random_model(seed, robots)
-        try:
-            candidates = (all_pairs if seed % 2 else from_problems)(domain, [problem], options)
-        except ProvedImpossible:
-            continue
-        if not 0 < candidates.count <= 600:
-            continue
-        language = random_language(random, candidates)
+    for seed, candidates in random_candidates(range(24), robots, 600):
+        language = random_language(Random(seed), candidates)
         mapped = mapped_states(language, candidates.model)
         formulas = all_covers(mapped)
         check_exact(language, candidates, formulas)
@@ -172,15 +169,14 @@ def test_further_states_have_the_default() -> None:
 
 def every_box(points: Points) -> list[np.ndarray]:
     """All boxes without `off` points."""
-    sets = [[s for r in range(1, n + 1) for s in combinations(range(n), r)] for n in points.sizes]
-    boxes = []
-    for chosen in product(*sets):
+    found = []
+    for chosen in boxes(points.sizes):
         box = np.zeros(sum(points.sizes), np.bool_)
         for start, values in zip(points.offset, chosen, strict=True):
             box[[start + v for v in values]] = True
         if not points.inside(box[None, :], points.off)[0].any():
-            boxes.append(box)
-    return boxes
+            found.append(box)
+    return found
 
 
 def random_points(random: Random) -> Points:
@@ -350,7 +346,7 @@ def length(word: Assignment, states: list[int], shortest: dict[int, Lengths]) ->
 @cache
 def by_trying_all(number: int) -> tuple[Lengths, list[int], dict[int, Lengths]]:
     """The shortest formulas of any smallest language of a small world."""
-    candidates = small_worlds(6)[number]
+    candidates = small_worlds(6, number + 1)[number]
     built = build_language(candidates, "minimal")
     size, states = built.language.guarantee.size, list(built.job.states)
     variables, value = valuation(candidates.model, candidates.rows[states])
@@ -365,7 +361,7 @@ def by_trying_all(number: int) -> tuple[Lengths, list[int], dict[int, Lengths]]:
     "number", [3, *(pytest.param(n, marks=pytest.mark.thorough) for n in range(10))]
 )
 def test_shortest_by_trying_all(number: int) -> None:
-    candidates = small_worlds(6)[number]
+    candidates = small_worlds(6, number + 1)[number]
     best, states, shortest = by_trying_all(number)
     built = build_language(candidates, "minimal", prefer="simple")
     figures = built.figures

@@ -16,14 +16,11 @@ from coordlang.language import candidates as room
 from coordlang.language.candidates import Candidates, describe, from_listed
 from coordlang.language.file import to_bytes
 from coordlang.language.listed import ListedTask, goal_text
-from planners.joint.model import JointModel, PlanningTask
-from planners.joint.tables import Rows
+from planners.joint.model import JointModel
 from planners.pddl import parse_domain, parse_problem, read_domain, read_problem
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
 from planners.pddl.sexpr import Source
-from planners.search import kept_plans, optimal_plans
-from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, Note, ProvedImpossible
@@ -42,22 +39,6 @@ def large(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(room, "MOST_STATES", 0)
 
 
-@pytest.fixture
-def searches(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    done: list[str] = []
-
-    class Counting:
-        joined = staticmethod(optimal_plans.joined)
-
-        @staticmethod
-        def search(model: JointModel, task: PlanningTask) -> PlanSpace:
-            done.append(task.name)
-            return optimal_plans.search(model, task)
-
-    monkeypatch.setattr(kept_plans, "optimal_plans", Counting)
-    return done
-
-
 def grid() -> tuple[Domain, list[Problem]]:
     domain = read_domain(GRID)
     return domain, [read_problem(CORNERS, domain)]
@@ -70,18 +51,11 @@ def answers(candidates: Candidates) -> Counter[tuple[object, ...]]:
         for task in range(len(space.starts)):
             plans = Plans.of(space, task)
             listed = sorted(
-                (
-                    tuple(map(tuple, plan)),
-                    tuple(map(space.model.state_text, _rows(space, plans, n))),
-                )
-                for n, plan in enumerate(plans)
+                (plan, tuple(map(space.model.state_text, space.rows[[*plans.states(plan)]])))
+                for plan in plans
             )
             found[describe(space, task), space.cost_of(task), tuple(listed)] += 1
     return found
-
-
-def _rows(space: PlanSpace, plans: Plans, number: int) -> list[Rows]:
-    return [space.rows[state] for state in plans.states(plans.unrank(number))]
 
 
 def some_tasks(model: JointModel, start: np.ndarray, most: int) -> list[ListedTask]:

@@ -8,14 +8,15 @@ import re
 from itertools import product
 from pathlib import Path
 
+import networkx as nx
 import pytest
 
 from coordlang.language.candidates import from_listed
 from coordlang.language.listed import ListedTask, read_task_file, varied_tasks
-from planners.loading import PlanningInstance, load
+from planners.loading import PlanningInstance
 from planners.system.errors import UsageError
 from tests.support.command import Command
-from tests.support.domains import DOMAINS
+from tests.support.domains import DOMAINS, loaded_from
 from tests.support.naive_joint_steps import Twin
 
 
@@ -32,11 +33,7 @@ def naive(
 ) -> set[tuple[frozenset[str], frozenset[str]]]:
     """The definition, with sets of atoms."""
     twin = Twin(loaded.domain, loaded.problems[0], loaded.team)
-    states, todo = {twin.init}, [twin.init]
-    while todo:
-        new = {after for _, after in twin.successors(todo.pop())} - states
-        states |= new
-        todo += new
+    states = twin.reachable()
     text = {
         state: frozenset(f"({' '.join((a.predicate, *a.args))})" for a in state) for state in states
     }
@@ -47,13 +44,10 @@ def naive(
         for state in states
         for atoms in product(*([a for a in text[state] if matches(a, goal)] for goal in goals))
     }
+    steps = nx.DiGraph((state, after) for state in states for _, after in twin.successors(state))
     found = set()
     for start in chosen:
-        reached, todo = {start}, [start]
-        while todo:
-            new = {after for _, after in twin.successors(todo.pop())} - reached
-            reached |= new
-            todo += new
+        reached = {start, *nx.descendants(steps, start)}
         for goal in wanted:
             if not goal <= text[start] and any(goal <= text[state] for state in reached):
                 found.add((text[start], goal))
@@ -76,7 +70,7 @@ def naive(
 def test_the_tasks_are_those_of_the_definition(
     folder: str, problem: str, starts: list[str], goals: list[str], number: int | None
 ) -> None:
-    loaded = load(DOMAINS / folder / "domain.pddl", [DOMAINS / folder / f"{problem}.pddl"])
+    loaded = loaded_from(folder, problem)
     tasks = varied_tasks(loaded, starts, goals)
     assert len(set(tasks)) == len(tasks)
     assert {(frozenset(t.init), frozenset(t.goal)) for t in tasks} == naive(loaded, starts, goals)
@@ -85,7 +79,7 @@ def test_the_tasks_are_those_of_the_definition(
 
 
 def test_without_goals_it_is_the_problems_own() -> None:
-    loaded = load(DOMAINS / "lock" / "domain.pddl", [DOMAINS / "lock" / "both-in.pddl"])
+    loaded = loaded_from("lock", "both-in")
     assert varied_tasks(loaded, [], []) == (
         ListedTask(("(at r1 yard)", "(at r2 yard)"), ("(at r1 lab)", "(at r2 lab)")),
     )
@@ -95,7 +89,7 @@ def test_without_goals_it_is_the_problems_own() -> None:
 
 
 def test_a_pattern_that_matches_nothing() -> None:
-    loaded = load(DOMAINS / "lock" / "domain.pddl", [DOMAINS / "lock" / "both-in.pddl"])
+    loaded = loaded_from("lock", "both-in")
     for wrong in ("(on r1 ?)", "(at r1)", "at r1 ?", "(at r1 ? ?)", "(switch outer yard)", ""):
         with pytest.raises(
             UsageError, match=re.escape(f"no fluent of this problem matches {wrong}")

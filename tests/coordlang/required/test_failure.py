@@ -27,7 +27,6 @@ from coordlang.required.failure import (
 from coordlang.required.miscoordination import Miscoordination, Step, miscoordination
 from coordlang.verification.by_definition import inseparable, verify
 from planners.check.rules import Verdict, validate
-from planners.joint.model import JointModel
 from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
 from tests.support import naive
@@ -136,7 +135,7 @@ def test_a_count_that_takes_too_long_is_given_up() -> None:
 def breaks(candidates: Candidates, space: PlanSpace, found: Miscoordination) -> None:
     """Optimal plans whose mixture breaks in its last step; own tasks: the plan checker agrees."""
     model = space.model
-    mixed = [numbers(model, step) for step in found.mixture]
+    mixed = [naive.known(model.numbers(step)) for step in found.mixture]
     (start,) = {states[0] for states in found.states}
     keys = {n: model.codec.key(space.rows[space.state[n]]) for n in space.starts.tolist()}
     nodes = [n for n, key in keys.items() if key == start and goes(space, n, found)]
@@ -161,15 +160,9 @@ def breaks(candidates: Candidates, space: PlanSpace, found: Miscoordination) -> 
         assert (verdict(found.mixture).step == found.step) == (not possible)
 
 
-def numbers(model: JointModel, step: Step) -> tuple[int, ...]:
-    known = model.numbers(step)
-    assert known is not None
-    return known
-
-
 def goes(space: PlanSpace, node: int, found: Miscoordination) -> bool:
     """Whether all plans are optimal plans from a node."""
-    plans = [[numbers(space.model, step) for step in plan] for plan in found.plans]
+    plans = [[naive.known(space.model.numbers(step)) for step in plan] for plan in found.plans]
     return all(
         len(plan) == space.layer[node] and space.path_with(node, plan) is not None for plan in plans
     )

@@ -14,7 +14,8 @@ from planners.pddl import parse_problem, read_domain
 from planners.pddl.model_options import ModelOptions
 from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search
-from planners.search.plans import Plans, counts
+from planners.search.plan_space import PlanSpace
+from planners.search.plans import Plans
 from planners.system.errors import ProvedImpossible
 from tests.support import naive
 from tests.support.command import Command
@@ -27,15 +28,14 @@ PAIR = ("domain", "problem")
 Plan = tuple[tuple[str | None, ...], ...]
 
 
+def listed(space: PlanSpace) -> set[Plan]:
+    """All plans of the task, as texts; none if they are too many."""
+    plans = Plans.of(space)
+    return {tuple(map(space.model.texts, p)) for p in plans} if plans.count <= _MOST else set()
+
+
 def plans(loaded: PlanningInstance) -> set[Plan]:
-    space = search(loaded.model, loaded.tasks[0])
-    start, counted = int(space.starts[0]), counts(space)
-    if counted[start] > _MOST:
-        return set()
-    return {
-        tuple(loaded.model.texts(labels) for labels in plan)
-        for plan in Plans(space, start, counted)
-    }
+    return listed(search(loaded.model, loaded.tasks[0]))
 
 
 @pytest.mark.parametrize(("kind", "number"), [("agent", 36), ("plain", 75)])
@@ -57,11 +57,7 @@ def test_they_are_the_plans_of_the_other_cost(kind: Kind, number: int) -> None:
             assert requiring([space]) is None
             continue
         cut += 1
-        found = {
-            tuple(least.model.texts(labels) for labels in plan)
-            for plan in Plans(fewer, int(fewer.starts[0]), counts(fewer))
-        }
-        assert found == expected
+        assert listed(fewer) == expected
         if len(expected) ** len(least.model.robots) <= 20_000:
             mixed += 1
             assert requiring([space]) == any(naive.failing([*expected], space.robots))  # type: ignore[list-item]
@@ -81,11 +77,7 @@ def test_of_joint_actions_the_parts_count() -> None:
     )
     fewer = fewest_actions(search(least.model, least.tasks[0]))
     assert fewer is not None
-    found = {
-        tuple(least.model.texts(labels) for labels in plan)
-        for plan in Plans(fewer, int(fewer.starts[0]), counts(fewer))
-    }
-    assert found == plans(cheap) < plans(least)
+    assert listed(fewer) == plans(cheap) < plans(least)
 
 
 #: r1 goes from a to d by b or c; r2 has nothing to do, and may stand in its way at either.

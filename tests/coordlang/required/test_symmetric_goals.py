@@ -43,8 +43,12 @@ def agree(candidates: Candidates, portion: float = PORTION) -> bool:
     if found is None or every is None:
         assert found is every
         return False
-    assert found.states.tolist() == every.states.tolist()
-    one, other = found, every
+    return same(found, every)
+
+
+def same(one: FirstDifferences, other: FirstDifferences) -> bool:
+    """They are; whether coordination is required."""
+    assert one.states.tolist() == other.states.tolist()
     assert one.listed.tolist() == other.listed.tolist()
     assert (one.requiring, one.nodes, one.edges) == (other.requiring, other.nodes, other.edges)
     return bool(one.requiring)
@@ -150,13 +154,6 @@ def random_candidates(seeds: range, robots: int) -> Iterator[Candidates]:
             yield found
 
 
-def found(candidates: Candidates, portion: float) -> FirstDifferences | str:
-    try:
-        return differences(candidates, HERE, portion=portion)
-    except Inseparable:
-        return "inseparable"
-
-
 def words(differences: FirstDifferences, seed: int) -> dict[int, int]:
     random = Random(seed)
     return {state: random.randrange(4) for state in differences.states.tolist()}
@@ -166,19 +163,14 @@ def words(differences: FirstDifferences, seed: int) -> dict[int, int]:
 def test_jobs_give_what_the_whole_gives(
     robots: int, number: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    answers: Counter[object] = Counter()
+    answers: Counter[bool] = Counter()
     monkeypatch.setattr(first_differences, "_ROWS", 20)
     for candidates in random_candidates(range(number), robots):
-        whole, parts = found(candidates, 1e9), found(candidates, ONE)
-        if isinstance(whole, str) or isinstance(parts, str):
-            assert whole == parts
-            answers[whole] += 1
-            continue
-        assert (whole.states == parts.states).all()
-        a, b = whole, parts
-        assert a.listed.tolist() == b.listed.tolist()
-        assert (a.requiring, a.nodes, a.edges) == (b.requiring, b.nodes, b.edges)
-        answers[bool(a.requiring)] += 1
+        whole, parts = (answer(candidates, portion, False) for portion in (1e9, ONE))
+        if whole is None or parts is None:
+            assert whole is parts
+        else:
+            answers[same(whole, parts)] += 1
     assert answers[True] >= 3
     assert answers[False] >= 3
 

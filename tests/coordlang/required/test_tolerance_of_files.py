@@ -8,6 +8,7 @@ from fractions import Fraction
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -89,10 +90,7 @@ def test_a_refuted_language_is_refuted_when_time_is_over(
     coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Counting is a service: without it the answer is the same."""
-
-    def over(*_: object) -> None:
-        raise library.OutOfTime("the time limit of 1 s is over")
-
+    over = Mock(side_effect=library.OutOfTime("the time limit of 1 s is over"))
     monkeypatch.setattr("coordlang.required.failure.failure_probability", over)
     found = coordlang("verify", silent(tmp_path / "l.json", None), *SQUARE)
     assert found.code == 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -78,11 +79,7 @@ def test_a_signal_ends_a_recording_without_a_word_of_others(
     language = language_of_task("t-map").language
     t_map = DOMAINS / "t-map"
     found = coordlang.simulate(language, t_map / "domain.pddl", t_map / "problem.pddl")
-
-    def write(*_: object) -> None:
-        raise Interrupted(2)
-
-    monkeypatch.setattr(GifImagePlugin, "_write_frame_data", write)
+    monkeypatch.setattr(GifImagePlugin, "_write_frame_data", Mock(side_effect=Interrupted(2)))
     with pytest.raises(Interrupted):
         recorded(found.record, found.runs[0], ".gif")
     assert capfd.readouterr().err == ""

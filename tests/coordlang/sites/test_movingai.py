@@ -8,17 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from coordlang import import_site
 from coordlang.sites.coordinates import read_coordinates
 from coordlang.sites.movingai import planning_files, read_agents, read_map
 from planners.loading import PlanningInstance, load
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
-from planners.system.errors import BadInput, UsageError
+from planners.system.errors import BadInput
 from tests.support.command import Command
-from tests.support.domains import DOMAINS, ROOT
+from tests.support.domains import DOMAINS, SHARED
 
-SHARED = ROOT.parent / "shared" / "data"
 MAP = "type octile\nheight 3\nwidth 4\nmap\n.@..\n....\n.@.T\n"
 LINE = "3\tsome.map\t4\t3\t{}\t2.41421356\n"
 
@@ -110,11 +108,6 @@ def test_what_is_wrong_with_a_scenario_and_where(
         planning_files(grid, scenario, 2)
     assert str(caught.value).startswith(str(scenario) + line)
     assert caught.value.remedy
-
-
-def test_no_robots(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="at least one is needed"):
-        import_site(*files(tmp_path, ["0 0 1 1"]), robots=0)
 
 
 def test_command(coordlang: Command, tmp_path: Path) -> None:

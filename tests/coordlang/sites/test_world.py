@@ -6,15 +6,14 @@ from __future__ import annotations
 import pytest
 
 from coordlang.sites.world import World, find_world
-from planners.loading import PlanningInstance, load
-from planners.search.reachable import explore
-from tests.support.domains import DOMAINS
+from planners.search.reachable import Space, explore
+from tests.support.domains import loaded_from
 
 
-def world_of(domain: str, problem: str) -> tuple[World, PlanningInstance]:
-    loaded = load(DOMAINS / domain / "domain.pddl", [DOMAINS / domain / f"{problem}.pddl"])
+def world_of(domain: str, problem: str) -> tuple[World, Space]:
+    loaded = loaded_from(domain, problem)
     space = explore(loaded.model, loaded.tasks[0].init[None, :])
-    return find_world(loaded.model, [loaded.model.codec.decode(row) for row in space.rows]), loaded
+    return find_world(space.model, [space.model.codec.decode(row) for row in space.rows]), space
 
 
 #: Problem -> things, number of places, and what some atoms say.
@@ -55,13 +54,13 @@ WORLDS: dict[str, tuple[str, int, dict[str, str]]] = {
 @pytest.mark.parametrize("name", WORLDS)
 def test_worlds(name: str) -> None:
     """What is found, and that no thing is in two places of a reachable state."""
-    world, loaded = world_of(*name.split("/"))
+    world, space = world_of(*name.split("/"))
     things, places, roles = WORLDS[name]
     assert world.things == tuple(things.split())
     assert len(world.places) == places
     assert {atom: " ".join(world.roles[atom]) for atom in roles} == roles
-    for row in explore(loaded.model, loaded.tasks[0].init[None, :]).rows:
-        said = [world.roles[atom] for atom in loaded.model.codec.decode(row)]
+    for row in space.rows:
+        said = [world.roles[atom] for atom in space.model.codec.decode(row)]
         where = [role[1] for role in said if role[0] == "at"]
         assert len(where) == len(set(where))
 
@@ -79,9 +78,8 @@ def test_links_are_ways_and_what_statics_relate() -> None:
 )
 def test_moves_are_what_happens(domain: str, problem: str) -> None:
     """Where a subaction is said to bring a thing, there it is after every such joint step."""
-    world, loaded = world_of(domain, problem)
-    model = loaded.model
-    space = explore(model, loaded.tasks[0].init[None, :])
+    world, space = world_of(domain, problem)
+    model = space.model
     steps = model.successors(space.rows)
     checked = 0
     for number in range(len(steps)):

@@ -8,16 +8,14 @@ from random import Random
 
 import pytest
 
-from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
-from coordlang.language.listed import ListedTask
+from coordlang.language.candidates import Candidates, all_pairs, from_problems
 from coordlang.symmetry.group import SymmetryGroup, symmetry_group
-from planners.joint.states import split_atoms
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
 from planners.search.plans import Plans, counts
 from planners.system.errors import ProvedImpossible
+from tests.support.candidates import random_candidates, some_tasks
 from tests.support.domains import all_tasks
-from tests.support.random_models import random_model
 from tests.support.symmetric_worlds import GRID, state_symmetries, world
 
 
@@ -38,14 +36,7 @@ def random_world(random: Random) -> Candidates | None:
             return from_problems(GRID, [problem])
         except ProvedImpossible:
             return None
-    tasks = []
-    for _ in range(random.randint(1, 4)):
-        init, goal = (
-            tuple(split_atoms(every.model.codec.key(row)))
-            for row in every.rows[random.sample(range(len(every.rows)), 2)]
-        )
-        tasks.append(ListedTask(init, goal[: random.randint(1, len(goal))]))
-    return from_listed(GRID, [problem], tasks)
+    return some_tasks(every, random, random.randint(1, 4))
 
 
 def elements(group: SymmetryGroup) -> set[tuple[int, ...]]:
@@ -78,15 +69,7 @@ def test_the_group_that_the_slow_twin_finds() -> None:
 def test_the_group_of_unstructured_models(robots: int) -> None:
     """Random models: mostly no symmetry, and never one that the twin does not find."""
     found = 0
-    for seed in range(40):
-        domain, problem, options = random_model(seed, robots)
-        try:
-            make = all_pairs if seed % 3 else from_problems
-            candidates = make(domain, [problem], options)
-        except ProvedImpossible:
-            continue
-        if not 0 < candidates.count <= 3_000:
-            continue
+    for _, candidates in random_candidates(range(40), robots, 3_000):
         group = symmetry_group(candidates)
         assert elements(group) == state_symmetries(candidates)
         found += bool(group.symmetries)

@@ -9,13 +9,12 @@ from pathlib import Path
 
 import pytest
 
-import coordlang as library
 from coordlang.commands.building import Making, build_language
 from coordlang.language.candidates import all_pairs
 from coordlang.vocabulary import METHODS
 from coordlang.vocabulary.job import Assignment
 from planners.pddl.model_options import ModelOptions
-from planners.system.errors import OutOfMemory, OutOfTime, UsageError
+from planners.system.errors import OutOfMemory, OutOfTime
 from tests.support import naive
 from tests.support.candidates import requiring, small_candidates
 from tests.support.command import Command
@@ -80,11 +79,6 @@ def test_few_words_that_leave_many_plans_open() -> None:
     assert found.figures["flexibility"] >= 86 > found.figures["work"] / 1_000
 
 
-def test_the_same_language_again() -> None:
-    one, again = (build_language(own_task("grid", "corners-3x3")).language for _ in range(2))
-    assert one == again
-
-
 @pytest.mark.parametrize(
     ("stem", "least"), [("gw2-2x3", 5), pytest.param("gw3-2x4", 6, marks=pytest.mark.thorough)]
 )
@@ -111,13 +105,6 @@ def test_what_more_effort_might_bring(coordlang: Command, tmp_path: Path) -> Non
     proved = coordlang("build", *CORNERS, "-o", path)
     assert "proved minimal" in proved.out
     assert "--effort" not in proved.out
-
-
-def test_effort_belongs_to_it(coordlang: Command, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="--effort belongs to --method best"):
-        library.build(*CORNERS, method="minimal", effort=3)
-    made = coordlang("build", *CORNERS, "--effort", -1, "-o", tmp_path / "l.json")
-    assert made.code == 2
 
 
 def test_single_states_are_merged_before_effort_is_spent_on_bounds() -> None:

@@ -179,13 +179,6 @@ def test_words_are_found_in_their_own_way(options: dict[str, object], message: s
         library.build(*SQUARE, **options)
 
 
-def test_no_certificate_goes_with_words(coordlang: Command, tmp_path: Path) -> None:
-    made = coordlang(
-        "build", *SQUARE, "--words", 2, "--certificate", "c", "-o", tmp_path / "l.json"
-    )
-    assert (made.code, list(tmp_path.iterdir())) == (2, [])
-
-
 def test_a_function_gives_words_too() -> None:
     built = library.build(*SQUARE, tasks="all", words=2, worst=True)
     assert built.failures.mean == Fraction(5, 132)

@@ -7,13 +7,14 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations
 from random import Random
+from unittest.mock import Mock
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coordlang.commands.building import build_language
-from coordlang.vocabulary.job import Assignment, Job
+from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.repair import _Repair, repair
 from planners.system.errors import OutOfTime
 from tests.support.candidates import failing, is_language, small_worlds
@@ -86,25 +87,16 @@ def test_as_few_changes_as_can_be(data: st.DataObject) -> None:
     assert found.stopped is None
 
 
-def one_word_for_all() -> tuple[Job, dict[int, int]]:
-    """All tasks of the open 2x2 grid, and one word for all states."""
-    built = build_language(all_tasks("grid", "gw1-2x2"))
-    return built.job, dict.fromkeys(built.job.states, 0)
-
-
 @pytest.mark.parametrize("phase", ["_hit_greedily", "_hit_least", "_decide"])
 def test_stopped_repairs_are_languages(phase: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Out of time in any phase: what was verified last is there, and bounds that are true."""
-    job, kept = one_word_for_all()
     checked: list[Assignment] = []
-    job = replace(job, check=checked.append)
+    job = replace(build_language(all_tasks("grid", "gw1-2x2")).job, check=checked.append)
+    kept = dict.fromkeys(job.states, 0)  # one word for all states
     whole = repair(job, kept, 1, 0)
     checked.clear()
 
-    def late(*_: object) -> bool:
-        raise OutOfTime("late")
-
-    monkeypatch.setattr(_Repair, phase, late)
+    monkeypatch.setattr(_Repair, phase, Mock(side_effect=OutOfTime("late")))
     if phase == "_hit_greedily":
         with pytest.raises(OutOfTime):
             repair(job, kept, 1, 0)

@@ -371,11 +371,6 @@ def test_effects(init: str, label: str, result: str) -> None:
     assert after(things(init), label, None) == {*result[1:-1].split(") (")}
 
 
-def test_effects_of_all_robots_happen_together() -> None:
-    assert after(ROOMS, "(move r1 a b)", "(move r2 b c)") == {"at r1 b", "at r2 c"}
-    assert after(ROOMS, None, None) == {"at r1 a", "at r2 b"}
-
-
 # -- joint-action PDDL
 
 JOINT = """(:types place) (:predicates (at1 ?p - place) (at2 ?p - place) (link ?a ?b - place))

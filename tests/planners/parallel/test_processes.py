@@ -13,6 +13,7 @@ from multiprocessing import resource_tracker, spawn
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -26,7 +27,6 @@ from planners.parallel.workers import workers as given_workers
 from planners.system.errors import BadInput, Note, OutOfMemory, OutOfTime, UsageError
 from planners.system.limits import address_space, limited_memory, time_limit
 from tests.support import jobs
-from tests.support import jobs as support
 from tests.support.domains import ROOT
 from tests.support.jobs import batch, runs, until, workers
 
@@ -135,10 +135,7 @@ def test_workers_that_cannot_start(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     with pytest.raises(OutOfMemory, match="lost its worker 2 times") as caught:
         list(TWO.tables(given))
     assert "--jobs 1" in str(caught.value)
-
-    def refused(*_: object) -> None:
-        raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
-
+    refused = Mock(side_effect=BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN)))
     monkeypatch.setattr(SpawnProcess, "start", refused)
     with pytest.raises(UsageError, match="cannot be started: Resource temporarily") as error:
         list(TWO.tables(given))
@@ -180,20 +177,16 @@ def results(store: Store, given: Batch) -> tuple[list[list[int]], int]:
 
 @pytest.mark.filterwarnings("error")
 def test_what_is_kept_is_not_done_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    squares = batch(support.squares, 3, PARTS)
+    squares = batch(jobs.squares, 3, PARTS)
     store = Store(tmp_path / "folder")
     first, new = results(store, squares)
     assert new == 5
-    assert results(store, batch(support.squares, 4, PARTS))[1] == 5  # of other words, as it were
-    more = results(store, batch(support.squares, 3, [*PARTS, range(3)]))  # more of the same
+    assert results(store, batch(jobs.squares, 4, PARTS))[1] == 5  # of other words, as it were
+    more = results(store, batch(jobs.squares, 3, [*PARTS, range(3)]))  # more of the same
     assert more == ([*first, [0, 3, 12]], 1)
-    monkeypatch.setattr(support, "squares", None)
+    monkeypatch.setattr(jobs, "squares", None)
     assert results(store, replace(squares)) == (first, 0)
-
-    def other(_: str) -> str:
-        return "other code"
-
-    monkeypatch.setattr(batches, "code_hash", other)
+    monkeypatch.setattr(batches, "code_hash", lambda _: "other code")
     assert results(store, squares)[1] == 5
 
 
@@ -202,7 +195,7 @@ def test_a_damaged_table_is_worked_out_again_and_said(
     damage: bytes | str | None, tmp_path: Path
 ) -> None:
     """One that is empty, noise, has another last byte, is that of another key, or is no file."""
-    squares, store = batch(support.squares, 3, PARTS), Store(tmp_path)
+    squares, store = batch(jobs.squares, 3, PARTS), Store(tmp_path)
     first, _ = results(store, squares)
     path, other = sorted(tmp_path.iterdir())[2:4]
     whole = path.read_bytes()

@@ -38,8 +38,10 @@ from tests.support.asynchronous import (
     random_tasks,
     texts,
 )
-from tests.support.domains import DOMAINS, own_task, read
+from tests.support.domains import DOMAINS, own_task
 from tests.support.random_models import random_model
+from tests.support.symmetric_worlds import GRID
+from tests.support.symmetric_worlds import world as on_cells
 from tests.support.texts import parsed
 
 RUNS = [(2, range(36)), (3, range(8))]
@@ -191,16 +193,9 @@ def test_least_words(links: str, robots: int, in_step: int, asynchronously: int)
 
 def small_map(links: str, robots: int) -> tuple[Domain, Problem]:
     """Robots of the grid on cells that are linked like this."""
-    domain, _ = read("grid", "gw1-2x2")
     cells = sorted({*links} - {" "})
-    names = [f"r{number + 1}" for number in range(robots)]
-    ways = [f"(adjacent {x[0]} {x[1]}) (adjacent {x[1]} {x[0]})" for x in links.split()]
-    at = " ".join(f"(at {robot} {cell})" for robot, cell in zip(names, cells, strict=False))
-    text = (
-        f"(define (problem map) (:domain grid) (:objects {' '.join(names)} - robot "
-        f"{' '.join(cells)} - cell) (:init {at} {' '.join(ways)}) (:goal (and {at})))"
-    )
-    return domain, parse_problem(Source("map.pddl", text), domain)
+    edges = [(cells.index(link[0]), cells.index(link[1])) for link in links.split()]
+    return GRID, parse_problem(Source("map.pddl", on_cells(len(cells), edges, robots)), GRID)
 
 
 def test_single_steps_are_those_of_tables() -> None:

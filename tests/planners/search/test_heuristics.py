@@ -5,13 +5,14 @@ from __future__ import annotations
 
 from collections import Counter
 
+import networkx as nx
 import numpy as np
 import pytest
 
 from coordlang.commands.inspect import feasibility
 from planners.joint.model import JointModel
 from planners.joint.tables import Ints, Rows, find_rows, unique_rows
-from planners.loading import PlanningInstance, load
+from planners.loading import PlanningInstance
 from planners.search.goals import FAR
 from planners.search.heuristics import HEURISTICS, Bound, heuristic
 from planners.search.optimal_plans import search
@@ -20,7 +21,7 @@ from planners.search.reachable import Space, explore
 from planners.search.search_estimate import estimate
 from planners.search.state_variables import StateVariable, state_variables
 from planners.system.errors import BadInput, ProvedImpossible
-from tests.support.domains import DOMAINS
+from tests.support.domains import loaded_from
 from tests.support.joint_twin import built
 from tests.support.random_pddl import random_model
 from tests.support.random_spaces import explored, random_instance
@@ -41,15 +42,11 @@ def check(bound: Bound, loaded: PlanningInstance, space: Space) -> Counter[int]:
 
 def distances(space: Space, goals: list[bool]) -> Ints:
     """The least joint steps from every state to a goal, -1 if there is no way, backward."""
-    before: dict[int, set[int]] = {}
-    for source, target in zip(space.sources.tolist(), space.target.tolist(), strict=True):
-        before.setdefault(target, set()).add(source)
-    found = {state: 0 for state, reached in enumerate(goals) if reached}
-    layer, steps = set(found), 0
-    while layer:
-        steps += 1
-        layer = {s for t in layer for s in before.get(t, ())} - found.keys()
-        found.update(dict.fromkeys(layer, steps))
+    edges = zip(space.target.tolist(), space.sources.tolist(), strict=True)
+    back: nx.DiGraph[int] = nx.DiGraph(edges)
+    back.add_nodes_from(range(len(space)))
+    ends = {state for state, reached in enumerate(goals) if reached}
+    found = nx.multi_source_dijkstra_path_length(back, ends) if ends else {}
     return np.array([found.get(state, -1) for state in range(len(space))])
 
 
@@ -104,8 +101,8 @@ def test_random_models() -> None:
     ],
 )
 def test_shipped_domains(problem: str) -> None:
-    folder = DOMAINS / problem.split("/")[0]
-    loaded = load(folder / "domain.pddl", [DOMAINS / f"{problem}.pddl"])
+    folder, _, stem = problem.partition("/")
+    loaded = loaded_from(folder, stem)
     space = explore(loaded.model, loaded.tasks[0].init[None, :])
     for name in HEURISTICS:
         gaps = check(HEURISTICS[name], loaded, space)
@@ -123,7 +120,7 @@ def test_shipped_domains(problem: str) -> None:
     ],
 )
 def test_variables_of_domains(folder: str, problem: str, variables: int, facts: int) -> None:
-    loaded = load(DOMAINS / folder / "domain.pddl", [DOMAINS / folder / f"{problem}.pddl"])
+    loaded = loaded_from(folder, problem)
     found = variables_of(loaded, explore(loaded.model, loaded.tasks[0].init[None, :]))
     assert (len(found), sum(len(variable.facts) for variable in found)) == (variables, facts)
 

@@ -7,12 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from planners.loading import load
 from planners.search.optimal_plans import search
 from planners.search.plan_file import read_plans, to_ipc, to_plansys2
 from planners.search.plans import Plans, texts
 from tests.support.command import Command
-from tests.support.domains import DOMAINS
+from tests.support.domains import DOMAINS, loaded_from
 
 
 def items(text: str) -> list[tuple[float, str, float]]:
@@ -44,7 +43,7 @@ def items(text: str) -> list[tuple[float, str, float]]:
     ],
 )
 def test_plansys2_reads_each_plan_and_so_do_we(folder: str, problem: str, tmp_path: Path) -> None:
-    loaded = load(DOMAINS / folder / "domain.pddl", [DOMAINS / folder / f"{problem}.pddl"])
+    loaded = loaded_from(folder, problem)
     plans = Plans.of(search(loaded.model, loaded.tasks[0]))
     path = tmp_path / "plan"
     for plan in plans.sample(10, seed=1):

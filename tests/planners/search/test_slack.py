@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from planners.joint.model import JointModel, PlanningTask
-from planners.loading import PlanningInstance, build, load
+from planners.loading import PlanningInstance, build
 from planners.pddl.model_options import ModelOptions
 from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plans import Plan, Plans
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, ProvedImpossible, UsageError
-from tests.support.domains import DOMAINS
+from tests.support.domains import loaded_from
 from tests.support.random_models import random_model
 
 #: Problems, their least makespans, and their numbers of plans within slack 0, 1 and 2 (the sums
@@ -34,11 +34,7 @@ COUNTS = [
 
 
 def loaded(folder: str, stem: str, slack: int, **options: object) -> PlanningInstance:
-    return load(
-        DOMAINS / folder / "domain.pddl",
-        [DOMAINS / folder / f"{stem}.pddl"],
-        ModelOptions(slack=slack, **options),  # type: ignore[arg-type]
-    )
+    return loaded_from(folder, stem, ModelOptions(slack=slack, **options))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
