@@ -324,7 +324,7 @@ def test_task_files_and_plans(coordlang: Command, tmp_path: Path, every: int) ->
 
 def test_a_false_bound_is_not_repeated(coordlang: Command, tmp_path: Path) -> None:
     """Six words that say they are the fewest, where three are: nobody says it after them."""
-    files = files_of("t-map")
+    files = files_of(CELLS)
     path, new = tmp_path / "l.json", tmp_path / "new.json"
     build = ("build", *files, "--tasks", "all")
     assert coordlang(*build, "--method", "greedy", "-o", path).code == 0

@@ -49,6 +49,13 @@ SHIPPED = [
         or path.stem in ("corners-4x4", "gw2-2x3", "gwb5-3x3", "three-cells")
     )
 ] + ["grid/three-robots-3x3"]
+#: The same as parameters: one problem of each folder always, all others at night.
+EACH_FOLDER = [
+    pytest.param(
+        name, marks=[pytest.mark.thorough] * (name.split("/")[0] == SHIPPED[n - 1].split("/")[0])
+    )
+    for n, name in enumerate(SHIPPED)
+]
 
 
 def in_words(

@@ -119,6 +119,7 @@ def test_completion(shell: str) -> None:
         assert absent not in out
     script = completed(shell, "", _COORDLANG_COMPLETE=f"{shell}_source").out
     assert f"_COORDLANG_COMPLETE={shell}_complete" in script
+    assert completed(shell, "", _COORDLANG_COMPLETE="tcsh_source").code == 2
 
 
 def test_bash_itself(tmp_path: Path) -> None:
@@ -133,10 +134,6 @@ _coordlang_completion coordlang; echo "${COMPREPLY[@]}"; complete -p coordlang >
     env = dict(os.environ, PATH=f"{tmp_path}:{os.environ['PATH']}", PYTHONPATH=str(ROOT))
     done = subprocess.run(["bash", "-c", script], env=env, text=True, capture_output=True)
     assert (done.returncode, done.stdout, done.stderr) == (0, "minimal\n", "")
-
-
-def test_an_unknown_shell() -> None:
-    assert completed("bash", "", _COORDLANG_COMPLETE="tcsh_source").code == 2
 
 
 # ---- text about many robots: grouped, aligned, no wider than a page

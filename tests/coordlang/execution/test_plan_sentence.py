@@ -32,7 +32,7 @@ from planners.search.plans import Plan, Plans, Texts, texts
 from planners.system.errors import ProvedImpossible
 from tests.support.domains import read
 from tests.support.naive import plans_by_sentence
-from tests.support.task_languages import RANDOM, SHIPPED, random_task_languages, shipped
+from tests.support.task_languages import EACH_FOLDER, RANDOM, random_task_languages, shipped
 
 
 def changed(task_language: TaskLanguage, random: Random) -> Plan:
@@ -262,7 +262,7 @@ def check_broken(
     } == following
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", EACH_FOLDER)
 def test_every_sentence_of_a_shipped_domain(name: str) -> None:
     check_open(shipped(name)[1], 0)
 

@@ -17,7 +17,7 @@ from planners.search.plans import Plan, Plans
 from planners.system.errors import OutOfMemory, UsageError
 from tests.support.naive import plans_by_sentence, sentence
 from tests.support.random_spaces import layered_space
-from tests.support.task_languages import SHIPPED, random_task_languages, shipped
+from tests.support.task_languages import EACH_FOLDER, random_task_languages, shipped
 
 #: The value of a wish, for the sentence and its plans; smaller is better.
 Value = Callable[[tuple[str, ...], set[Plan]], object]
@@ -91,7 +91,7 @@ def check(task_language: TaskLanguage, texts: list[str]) -> Counter[str]:
     return seen
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", EACH_FOLDER)
 def test_shipped_domains(name: str) -> None:
     task_language, random = shipped(name)[1], Random(name)
     wishes = [wishes_for(task_language, random) for _ in range(3)]

@@ -8,7 +8,6 @@ from dataclasses import replace
 from math import prod
 from pathlib import Path
 from random import Random
-from typing import Any
 
 import numpy as np
 import pytest
@@ -98,11 +97,9 @@ def test_ranks_are_those_of_the_planner() -> None:
                 for edge in edges
             ] == [tuple(t or "idle" for t in spoken.model.texts(step)) for step in plan]
             keys = [spoken.model.codec.key(spoken.space.rows[s]) for s in plans.states(plan)]
-            assert [key_of(data, task["nodes"]["state"][n]) for n in nodes] == keys
-
-
-def key_of(data: dict[str, Any], state: int) -> str:
-    return " ".join(sorted(data["facts"][f]["text"] for f in data["states"][state]))
+            states = [data["states"][task["nodes"]["state"][n]] for n in nodes]
+            facts = [sorted(data["facts"][f]["text"] for f in state) for state in states]
+            assert [*map(" ".join, facts)] == keys
 
 
 def test_random_models() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
+from itertools import product
 
 import pytest
 from hypothesis import event, example, given, reject, settings
@@ -87,8 +88,7 @@ def every_plan_once(model: JointModel, task: PlanningTask) -> tuple[tuple[int, i
     return expected
 
 
-@pytest.mark.parametrize("cost", [*COSTS, "makespan+cost"])
-@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize(("name", "cost"), [*product(TEXTS, COSTS), ("twice", "makespan+cost")])
 def test_every_plan_once(name: str, cost: Cost) -> None:
     loaded = read(*TEXTS[name], cost)
     found, number = every_plan_once(loaded.model, loaded.tasks[0])
