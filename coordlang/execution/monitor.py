@@ -405,12 +405,12 @@ class EventMonitor(Monitor):
                 raise _broken(f"event {_shown(text)} waits for {_shown(min(lost))}: no such robot")
         #: What the end of an event counts for: (robot, subaction), "" for the own robot.
         self._counted: dict[tuple[str, str], list[_Count]] = {}
-        interferes, where = _get(record, "interferes", dict, where), f"{where}: 'interferes'"
+        interferes, inside = _get(record, "interferes", dict, where), f"{where}: 'interferes'"
         for own in interferes:
-            by_robot = _get(interferes, own, dict, where)
+            by_robot = _get(interferes, own, dict, inside)
             for robot in by_robot:
-                for text in _get(by_robot, robot, list, where):
-                    _check_plain(text, where)
+                for text in _get(by_robot, robot, list, inside):
+                    _check_plain(text, inside)
                     self._counted.setdefault((robot, text), []).append(_Count(robot, own=own))
                     self._counted.setdefault(("", own), []).append(_Count(robot, its=text))
         for number, state in enumerate(_get(entry, "states", list, where)):

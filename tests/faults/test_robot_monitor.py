@@ -366,6 +366,9 @@ def test_every_move_is_an_event_of_the_file() -> None:
     data["choices"][0]["passings"]["events"].popitem()
     with pytest.raises(MonitorError, match=r"'events' lacks \(move r1"):
         EventMonitor(data)
+    del data["choices"][0]["states"]
+    with pytest.raises(MonitorError, match="the choices of r1: 'states' is missing"):
+        EventMonitor(data)
 
 
 # ---- what a robot says
