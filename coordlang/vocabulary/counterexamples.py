@@ -246,15 +246,17 @@ class Mixtures:
         return False
 
     def _others(self, node: int, most: int, random: Random) -> set[_Plans]:
-        """More plans of mixtures from a node of which one fails, drawn at random."""
+        """More plans of mixtures from a node of which one fails, in ``most`` draws at most."""
         found: set[_Plans] = set()
         familiar = 0
-        while len(found) < most and familiar < _FAMILIAR:
+        for _ in range(most):
             failing = self._of_node(node, random)
             assert failing is not None, "some mixture fails"
             plans = self._plans(node, failing, random)
             familiar = familiar + 1 if plans in found else 0
             found.add(plans)
+            if familiar >= _FAMILIAR:
+                break
         return found
 
     def _plan(
