@@ -213,11 +213,12 @@ class _Mixing:
         ways = (a for a in product(range(size), repeat=robots) if len(set(a)) == size)
         at_once = 1  # most sets that fail do so in the first ways
         while (assigned := list(islice(ways, at_once))) and not fails.all():
-            rows = np.repeat(np.flatnonzero(~fails[number]), len(assigned))
+            undecided = np.flatnonzero(~fails[number])
+            rows = np.repeat(undecided, len(assigned))
             self.looked_at += len(rows)
             if self.looked_at > self._most:
                 raise TooManyDivergences
-            given = sets[rows[:: len(assigned)]][:, assigned].reshape(-1, robots)
+            given = sets[undecided][:, assigned].reshape(-1, robots)
             row, nodes, missing = self._mixed(given)
             fails[number[rows[missing]]] = True
             which = number[rows[row]]

@@ -237,12 +237,11 @@ class Mixtures:
     def _fails(self, node: int, plans: _Plans) -> bool:
         """Whether the mixture of each robot's part of its plan fails."""
         for edges in zip(*plans, strict=True):
-            tree: Any = self._edges.of(node)
-            for robot, edge in enumerate(edges):
-                tree = tree.get(self._space.labels_of(edge)[robot])
-                if tree is None:
-                    return True
-            node = tree
+            labels = tuple(self._space.labels_of(edge)[n] for n, edge in enumerate(edges))
+            target = self._choices.edges_of(node).get(labels)
+            if target is None:
+                return True
+            node = target
         return False
 
     def _others(self, node: int, most: int, random: Random) -> set[_Plans]:
