@@ -8,16 +8,16 @@ steps.  A node is ``(y, ahead_1 .. ahead_n)``: the node of the plan space that t
 reached, and for each robot the words that it has said while some other robot has not, with the set
 of its steps to come.
 
-It is cut off where the robots have no sentence in common, and where they can do what plans from
-``y`` do and no mixture of those fails.  At the step by which a mixture fails labels cease to
-matter: it is a violation iff the robots' sets have a sentence in common (Proposition 14a of
-docs/concepts.md).  Sets are canonical: equal ones have one number.  No method recurses, since plans
-may be long.
+Of each set those sequences are kept that say what all robots can say; the walk is cut off where
+that is nothing, and where robots can only do what plans from ``y`` do and no mixture of those
+fails.  At the step by which a mixture fails labels cease to matter: it is a violation iff the
+robots' sets have a sentence in common (Proposition 14a of docs/concepts.md).  Sets are canonical:
+equal ones have one number.  No method recurses, since plans may be long.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -33,6 +33,28 @@ from planners.system.limits import reaching
 
 #: The set that holds the empty sequence only.
 _EMPTY = 0
+
+
+def _resolved(
+    question: Any,
+    answers: dict[Any, Any],
+    asks: Callable[[Any], dict[int, Any]],
+    answer: Callable[[Any, dict[int, Any]], Any],
+) -> Any:
+    """The answer to a question, made of those to the questions that it ``asks``, by step.
+
+    All of them are kept.  Not by recursion: plans may be long.
+    """
+    todo = [question]
+    while todo:
+        below = {} if todo[-1] in answers else asks(todo[-1])
+        missing = [part for part in below.values() if part not in answers]
+        todo += missing
+        if not missing:
+            done = todo.pop()
+            if done not in answers:
+                answers[done] = answer(done, {step: answers[part] for step, part in below.items()})
+    return answers[question]
 
 
 class SequenceSets:
@@ -64,22 +86,10 @@ class SequenceSets:
         """The union of different sets, given in ascending order."""
         if len(members) == 1:
             return members[0]
-        todo = [] if members in self._unions else [members]
-        while todo:
-            following = self._following(todo[-1])
-            missing = [
-                below
-                for below in following.values()
-                if len(below) > 1 and below not in self._unions
-            ]
-            if missing:
-                todo += missing
-                continue
-            self._unions[todo.pop()] = self.number(
-                (label, self._unions[below] if len(below) > 1 else below[0])
-                for label, below in sorted(following.items())
-            )
-        return self._unions[members]
+        united: int = _resolved(
+            members, self._unions, self._following, lambda _, below: self.number(below.items())
+        )
+        return united
 
     def _following(self, members: tuple[int, ...]) -> dict[int, tuple[int, ...]]:
         """Each first member of some of the sets, with the sets of what follows it."""
@@ -87,7 +97,8 @@ class SequenceSets:
         for member in members:
             for label, after in self.moves[member].items():
                 found.setdefault(label, set()).add(after)
-        return {label: tuple(sorted(after)) for label, after in found.items()}
+                self._unions[after,] = after
+        return {label: tuple(sorted(found[label])) for label in sorted(found)}
 
 
 #: Words, one after another.
@@ -117,7 +128,7 @@ class SentenceSets(SequenceSets):
     def __init__(self) -> None:
         super().__init__()
         self.silence = self.number([(_END, 0)])
-        self._common: dict[tuple[int, int], int | None] = {}
+        self._common: dict[tuple[int, int], int | None] = {(_EMPTY, _EMPTY): _EMPTY}
 
     def before(self, words: Words, number: int) -> int:
         """The sentences that say these words and then one of a set."""
@@ -139,27 +150,23 @@ class SentenceSets(SequenceSets):
             said.append(word)
         return tuple(said)
 
-    def common(self, one: int | None, other: int | None) -> int | None:
+    def common(self, one: int, other: int | None) -> int | None:
         """The sentences of both; None if there are none."""
-        if one is None or other is None or one == other:
-            return one if one == other else None
-        todo = [] if (one, other) in self._common else [(one, other)]
-        while todo:
-            below = self._below(*todo[-1])
-            missing = [pair for pair in below.values() if pair not in self._common]
-            todo += missing
-            if not missing:
-                shared = [(word, self._common[pair]) for word, pair in below.items()]
-                kept = [(word, after) for word, after in shared if after is not None]
-                self._common[todo.pop()] = self.number(kept) if kept else None
-        return self._common[one, other]
+        if other is None or one == other:
+            return other
+        shared: int | None = _resolved((one, other), self._common, self._both, self._shared)
+        return shared
 
-    def _below(self, one: int, other: int) -> dict[int, tuple[int, int]]:
+    def _both(self, pair: tuple[int, int]) -> dict[int, tuple[int, int]]:
         """The words that begin sentences of both, with what follows them in each."""
-        mine, theirs = self.moves[one], self.moves[other]
-        below = {word: (mine[word], theirs[word]) for word in sorted(mine.keys() & theirs.keys())}
-        self._common.update({(a, b): a for a, b in below.values() if a == b})
-        return below
+        mine, theirs = (self.moves[number] for number in pair)
+        return {word: (mine[word], theirs[word]) for word in sorted(mine.keys() & theirs.keys())}
+
+    def _shared(self, pair: tuple[int, int], below: dict[int, int | None]) -> int | None:
+        if pair[0] == pair[1]:
+            return pair[0]
+        kept = [(word, after) for word, after in below.items() if after is not None]
+        return self.number(kept) if kept else None
 
 
 class SetWalk:
@@ -173,6 +180,8 @@ class SetWalk:
         self._steps, self._sentences = SequenceSets(), SentenceSets()
         #: Of each set of steps its sentences.
         self._said = [self._sentences.silence]
+        #: Of sets of steps and of sentences the steps along which some of these are said.
+        self._able_to_say = {(_EMPTY, self._sentences.silence): _EMPTY}
         self._edges = EdgeTrees(space)
 
         def so_far() -> str:
@@ -214,9 +223,9 @@ class SetWalk:
         return self._steps.number((step, self._steps.union(after)) for step, after in followed)
 
     def _find_sentences(self) -> None:
-        """Those of each set of steps; what follows a step is older."""
+        """Those of each new set of steps; what follows a step is older."""
         sentences = self._sentences
-        for steps in self._steps.moves[1:]:
+        for steps in self._steps.moves[len(self._said) :]:
             said = {
                 sentences.before(self._entered(step), self._said[after])
                 for step, after in steps.items()
@@ -249,55 +258,101 @@ class SetWalk:
 
         with reaching(so_far, space.model.smaller("fewer robots", "smaller or fewer tasks")):
             for here, below in pairwise(reversed(layers)):
+                able = set[_Node]()
                 for node in here:
                     walked += 1
-                    y, sets = node
-                    if not self._fails[y] and self._of[y] == tuple(own for _, own in sets):
+                    y, ahead = node
+                    common = self._common(ahead)
+                    ahead = self._able(ahead, common)
+                    if (y, ahead) in able or self._is_safe(y, ahead):
                         continue
-                    for steps, ahead, target in self._moves(*node):
+                    able.add((y, ahead))
+                    for steps, following, target in self._moves(y, ahead, common):
                         if target is None:
-                            return _Failure(node, steps, ahead), walked
-                        child = target, _short(ahead)
+                            return _Failure(node, steps, following), walked
+                        child = target, _short(following)
                         below[child] = None
                         if before is not None:
                             before.setdefault(child, (node, steps))
                 here.clear()
         return None, walked
 
-    def _common(self, ahead: _Ahead) -> tuple[Words, int | None]:
-        """What the robot that is ahead of all has said, and what all can say after it."""
-        said = max((words for words, _ in ahead), key=len)
+    def _common(self, ahead: _Ahead) -> int:
+        """The sentences that all robots can say; there is one."""
         common: int | None = None
-        for robot, (words, own) in enumerate(ahead):
-            if said[: len(words)] != words:
-                return said, None
-            rest = self._sentences.after(said[len(words) :], self._said[own])
-            common = self._sentences.common(common, rest) if robot else rest
-            if common is None:
-                break
-        return said, common
+        for words, own in ahead:
+            said = self._sentences.before(words, self._said[own])
+            common = said if common is None else self._sentences.common(said, common)
+        assert common is not None
+        return common
 
-    def _moves(self, node: int, ahead: _Ahead) -> Iterator[tuple[Steps, _Ahead, int | None]]:
+    def _able(self, ahead: _Ahead, common: int) -> _Ahead:
+        """What the robots can do while they say what all of them can say."""
+        return tuple(
+            (words, self._saying(own, self._sentences.after(words, common))) for words, own in ahead
+        )
+
+    def _saying(self, number: int, sentences: int | None) -> int:
+        """The part of a set of steps along which some sentence of a set is said; there is one."""
+        if self._said[number] == sentences:
+            return number
+        able: int = _resolved((number, sentences), self._able_to_say, self._rest, self._part)
+        return able
+
+    def _rest(self, asked: tuple[int, int]) -> dict[int, tuple[int, int]]:
+        """The steps of a set that can be taken, each with what follows, and can be said then."""
+        number, sentences = asked
+        rest = {}
+        for step, after in self._steps.moves[number].items():
+            said = self._sentences.after(self._entered(step), sentences)
+            said = self._sentences.common(self._said[after], said)
+            if said is not None:
+                rest[step] = after, said
+        return rest
+
+    def _part(self, _: tuple[int, int], below: dict[int, int]) -> int:
+        part = self._steps.number(below.items())
+        self._find_sentences()
+        return part
+
+    def _is_safe(self, node: int, ahead: _Ahead) -> bool:
+        """Whether robots can only do what plans from a node do, and no mixture of these fails."""
+        both = zip(ahead, self._of[node], strict=True)
+        return not self._fails[node] and all(
+            self._steps.union(tuple(sorted({own, every}))) == every for (_, own), every in both
+        )
+
+    def _moves(
+        self, node: int, ahead: _Ahead, common: int
+    ) -> Iterator[tuple[Steps, _Ahead, int | None]]:
         """Steps after which the robots have a sentence in common, and what is ahead of them then.
 
         Last the node that the mixture reaches; None where it fails, whatever those robots do whose
-        step is not among them.
+        step is not among them.  ``common``: the sentences that all can say before.
         """
-        todo: list[tuple[Steps, _Ahead, Any]] = [((), ahead, self._edges.of(node))]
+        options = [self._options(*own) for own in ahead]
+        todo: list[tuple[Steps, _Ahead, int, Any]] = [((), ahead, common, self._edges.of(node))]
         while todo:
-            steps, reached, edges = todo.pop()
+            steps, reached, left, edges = todo.pop()
             robot = len(steps)
-            words, own = reached[robot]
-            for step, after in self._steps.moves[own].items():
-                moved = words + self._entered(step), after
-                following = (*reached[:robot], moved, *reached[robot + 1 :])
-                if self._common(following)[1] is None:
+            for step, moved, said in options[robot]:
+                shared = self._sentences.common(left, said)
+                if shared is None:
                     continue
+                following = (*reached[:robot], moved, *reached[robot + 1 :])
                 found = edges.get(step // self._base)
                 if found is None or robot + 1 == len(ahead):
                     yield (*steps, step), following, found
                 else:
-                    todo.append(((*steps, step), following, found))
+                    todo.append(((*steps, step), following, shared, found))
+
+    def _options(self, words: Words, own: int) -> list[tuple[int, tuple[Words, int], int]]:
+        """The next steps of a robot: what is ahead of it then, and all that it can say."""
+        found = []
+        for step, after in self._steps.moves[own].items():
+            moved = words + self._entered(step), after
+            found.append((step, moved, self._sentences.before(moved[0], self._said[after])))
+        return found
 
     # ---- a violation shown
 
@@ -326,9 +381,7 @@ class SetWalk:
             node, steps = before[node]
             history.append(steps)
         history.reverse()
-        said, common = self._common(found.ahead)
-        assert common is not None
-        sentence = said + self._sentences.first(common)
+        sentence = self._sentences.first(self._common(found.ahead))
         plans = []
         for robot, (words, _) in enumerate(found.ahead):
             taken = [steps[robot] for steps in (*history, found.steps) if robot < len(steps)]
@@ -362,5 +415,5 @@ class SetWalk:
 
 def _short(ahead: _Ahead) -> _Ahead:
     """The same without the words that all robots have said."""
-    said = min(len(words) for words, _ in ahead)
+    said = min([len(words) for words, _ in ahead])
     return tuple((words[said:], own) for words, own in ahead) if said else ahead
