@@ -148,6 +148,12 @@ class PartitionProblem:
             return
         self._solver.add_clause([self._separate_all(pairs) for pairs in alternatives])
 
+    def prefer(self, words: Mapping[int, int]) -> None:
+        """Try first to give states these words; not with CaDiCaL."""
+        wanted = {self._word[state][word] for state, word in words.items()}
+        every = (variable for own in self._word.values() for variable in own)
+        self._solver.set_phases([v if v in wanted else -v for v in every])
+
     def separate_on_paths(self, steps: Iterable[PairStep]) -> None:
         """Require of each path through a graph of pairs that one of them is in different words."""
         reached = defaultdict[int, int](self._new)

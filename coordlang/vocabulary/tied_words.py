@@ -16,7 +16,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import islice, tee
+from itertools import tee
 
 import numpy as np
 
@@ -106,14 +106,6 @@ class TiedWords:
             failing = failing_pairs(Choices(space), self._most)
         return _Ties(np.arange(len(self._images[0])), _joined(space), failing)
 
-    def of_facts(self) -> Assignment | None:
-        """Of one task the language that says the steps to go and a few facts, if there is one."""
-        ties = next(islice(self._every(), 1, None), None)
-        if ties is None:
-            return None
-        classes = ties.classes[self._states]
-        return dict(zip(self._states.tolist(), classes.tolist(), strict=True))
-
     def find(self, size: int, rounds: int) -> Assignment | None:
         """A language with at most ``size`` words; None if none was found with some effort.
 
@@ -146,7 +138,8 @@ class TiedWords:
             # With many tasks what other numbers met slows the solver: open 3x4 by a third.
             own = ties if self._is_one_task else _Ties(ties.classes)
             first = _STUTTER_FREE if own.joined else self._first
-            yield _Kind(self._states, own, size, self._images, first)
+            random = self._random if self._is_one_task else None
+            yield _Kind(self._states, own, size, self._images, first, random)
 
     @property
     def _spent(self) -> int:
@@ -192,7 +185,7 @@ class _Kind:
     ``ties`` are what they have in common, ``first`` (states) the first state that has the same
     word, of those that need one, ``images`` of some symmetries those after which that is not the
     same.  ``problem`` has the partitions that are left; ``effort`` may be spent on them, and
-    ``rounds`` of them are refuted so far.
+    ``rounds`` of them are refuted so far.  ``random`` draws the words that are tried first.
     """
 
     def __init__(
@@ -202,6 +195,7 @@ class _Kind:
         size: int,
         images: Sequence[Ints],
         effort: Budget,
+        random: np.random.Generator | None = None,
     ) -> None:
         self.ties, tied = ties, ties.classes
         _, number, of_state = np.unique(tied[states], return_index=True, return_inverse=True)
@@ -215,6 +209,9 @@ class _Kind:
         for states_of_step in ties.joined:
             self.problem.separate_one([states_of_step])
         self.problem.separate_on_paths(ties.failing)
+        if random is not None and not ties.failing:
+            # Few plans have one sentence by chance; what the solver tries by itself is one word.
+            self.problem.prefer(dict(zip(free, random.integers(size, size=len(free)), strict=True)))
         self.effort, self.rounds, self._required = effort, 0, 0
 
     def require_clauses(self) -> None:
