@@ -60,6 +60,9 @@ _DEAR = 30_000
 _FOR_KINDS, _WHERE_DEAR = (1, 2, 5, 10), (5, 10)
 #: .. with fewer words than the best language by this part at least.
 _FEWER_WORDS = 5
+#: A solver is not begun with for more clauses than these, one for each step and word: half a
+#: minute's work.  Then words that a few facts say come first, and so many searches for merges.
+_CLAUSES, _MERGED_SOON = 20_000_000, 30
 #: Merges in a row that fail before something else is tried.
 _VAIN = 15
 #: Plans that local search may measure for a unit of effort.
@@ -202,6 +205,11 @@ class MinimalSearch:
         (space,) = self._job.candidates.spaces
         if not (self._job.by_clauses or self._is_asynchronous) and needs_three_words(space):
             self.lower = max(self.lower, 3)
+        if len(space.target) * between(self.lower, self.upper) > _CLAUSES:
+            found = self._tied.of_facts()
+            if found is not None and word_count(found) < self.upper:
+                self._offer(found)
+                self.merge(most=_MERGED_SOON)
         for rounds in _WHERE_DEAR if self._is_dear else _FOR_KINDS:
             self._find_fewer_tied(rounds)
 
@@ -239,17 +247,18 @@ class MinimalSearch:
     def _is_spent(self) -> bool:
         return self.work >= self._most
 
-    def merge(self, vain: int = sys.maxsize) -> None:
+    def merge(self, vain: int = sys.maxsize, most: int = sys.maxsize) -> None:
         """Merge words of the best language as long as it stays a language.
 
-        After ``vain`` searches in a row that failed it is left, and the next call goes on there.
+        After ``vain`` searches in a row that failed, or ``most``, it is left, and the next call
+        goes on there.
         """
         if self.best is None or self.upper <= self.lower:
             return
         if self._merging is None or self._merging[0] is not self.best:
             self._merging = self.best, merged(self.best, self._job.states, self.languages.refuter)
         coarsest, failed = self.best, 0
-        for coarser in self._merging[1]:
+        for number, coarser in enumerate(self._merging[1], 1):
             failed += 1
             if word_count(coarser) < word_count(coarsest):
                 coarsest, failed = coarser, 0
@@ -257,7 +266,7 @@ class MinimalSearch:
                     self._offer(coarsest)  # what is not verified is lost when time is over
             self._merges += 1
             self._report(f"merging words: {word_count(coarser)} left")
-            if self._is_spent or failed >= vain:
+            if self._is_spent or failed >= vain or number >= most:
                 break
         if coarsest is not self.best:
             self._offer(coarsest)

@@ -16,7 +16,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import tee
+from itertools import islice, tee
 
 import numpy as np
 
@@ -105,6 +105,14 @@ class TiedWords:
         with suppress(Undecided):
             failing = failing_pairs(Choices(space), self._most)
         return _Ties(np.arange(len(self._images[0])), _joined(space), failing)
+
+    def of_facts(self) -> Assignment | None:
+        """Of one task the language that says the steps to go and a few facts, if there is one."""
+        ties = next(islice(self._every(), 1, None), None)
+        if ties is None:
+            return None
+        classes = ties.classes[self._states]
+        return dict(zip(self._states.tolist(), classes.tolist(), strict=True))
 
     def find(self, size: int, rounds: int) -> Assignment | None:
         """A language with at most ``size`` words; None if none was found with some effort.
