@@ -47,13 +47,16 @@ def _resolved(
     """
     todo = [question]
     while todo:
-        below = {} if todo[-1] in answers else asks(todo[-1])
+        asked = todo[-1]
+        if asked in answers:
+            todo.pop()
+            continue
+        below = asks(asked)
         missing = [part for part in below.values() if part not in answers]
-        todo += missing
-        if not missing:
-            done = todo.pop()
-            if done not in answers:
-                answers[done] = answer(done, {step: answers[part] for step, part in below.items()})
+        if missing:
+            todo += missing
+        else:
+            answers[asked] = answer(asked, {step: answers[part] for step, part in below.items()})
     return answers[question]
 
 
@@ -128,7 +131,7 @@ class SentenceSets(SequenceSets):
     def __init__(self) -> None:
         super().__init__()
         self.silence = self.number([(_END, 0)])
-        self._common: dict[tuple[int, int], int | None] = {(_EMPTY, _EMPTY): _EMPTY}
+        self._common: dict[tuple[int, int], int | None] = {}
 
     def before(self, words: Words, number: int) -> int:
         """The sentences that say these words and then one of a set."""
@@ -158,7 +161,9 @@ class SentenceSets(SequenceSets):
         return shared
 
     def _both(self, pair: tuple[int, int]) -> dict[int, tuple[int, int]]:
-        """The words that begin sentences of both, with what follows them in each."""
+        """The words that begin sentences of both, with what follows; none if both are one set."""
+        if pair[0] == pair[1]:
+            return {}
         mine, theirs = (self.moves[number] for number in pair)
         return {word: (mine[word], theirs[word]) for word in sorted(mine.keys() & theirs.keys())}
 
@@ -181,7 +186,7 @@ class SetWalk:
         #: Of each set of steps its sentences.
         self._said = [self._sentences.silence]
         #: Of sets of steps and of sentences the steps along which some of these are said.
-        self._able_to_say = {(_EMPTY, self._sentences.silence): _EMPTY}
+        self._able_to_say: dict[tuple[int, int], int] = {}
         self._edges = EdgeTrees(space)
 
         def so_far() -> str:
@@ -258,15 +263,15 @@ class SetWalk:
 
         with reaching(so_far, space.model.smaller("fewer robots", "smaller or fewer tasks")):
             for here, below in pairwise(reversed(layers)):
-                able = set[_Node]()
+                seen = set[_Node]()
                 for node in here:
                     walked += 1
                     y, ahead = node
                     common = self._common(ahead)
                     ahead = self._able(ahead, common)
-                    if (y, ahead) in able or self._is_safe(y, ahead):
+                    if (y, ahead) in seen or self._is_safe(y, ahead):
                         continue
-                    able.add((y, ahead))
+                    seen.add((y, ahead))
                     for steps, following, target in self._moves(y, ahead, common):
                         if target is None:
                             return _Failure(node, steps, following), walked

@@ -60,8 +60,9 @@ _DEAR = 30_000
 _FOR_KINDS, _WHERE_DEAR = (1, 2, 5, 10), (5, 10)
 #: .. with fewer words than the best language by this part at least.
 _FEWER_WORDS = 5
-#: A solver is not begun with for more clauses than these, one for each step and word: half a
-#: minute's work.  Then words that a few facts say come first, and so many searches for merges.
+#: Where there are more steps times words, a solver would get too many clauses (elevators p03, 92
+#: million: not done after 80 s).  There words that a few facts say come first, and so many searches
+#: for merges.
 _CLAUSES, _MERGED_SOON = 20_000_000, 30
 #: Merges in a row that fail before something else is tried.
 _VAIN = 15
