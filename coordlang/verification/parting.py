@@ -121,4 +121,4 @@ def _numbered(rows: Ints, size: int) -> Ints:
 
 def _different(*columns: Ints) -> tuple[Ints, Ints]:
     """The different rows of a table, sorted, and the number of each row among them."""
-    return unique_rows(np.column_stack(columns))
+    return unique_rows(np.array(columns).T)

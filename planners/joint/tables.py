@@ -38,15 +38,17 @@ def narrow(numbers: Numbers) -> Numbers:
 
 def ranges(starts: Ints, counts: Ints) -> Ints:
     """``[s, s+1, .., s+c-1]`` for every pair, joined."""
-    total = int(counts.sum())
-    ends = np.cumsum(counts)
-    within: Ints = np.arange(total) + np.repeat(starts - (ends - counts), counts)
+    before = starts + counts - counts.cumsum()
+    within: Ints = before.repeat(counts)
+    within += np.arange(len(within))
     return within
 
 
 def differs(values: Numbers) -> Bools:
     """Which entries differ from the one before; the first does."""
-    return np.append(np.ones(min(1, len(values)), np.bool_), values[1:] != values[:-1])
+    found = np.ones(len(values), np.bool_)
+    np.not_equal(values[1:], values[:-1], out=found[1:])
+    return found
 
 
 def kept_runs(first: Ints, kept: Bools) -> Ints:
@@ -81,7 +83,7 @@ def unpacked(rows: Rows, columns: int) -> Bools:
     """The truth values of rows of blocks, (rows, columns)."""
     blocks = np.ascontiguousarray(rows, "<u8")
     true = np.unpackbits(blocks.view(np.uint8), axis=1, bitorder="little")
-    return true[:, :columns].astype(np.bool_)
+    return true[:, :columns].view(np.bool_)
 
 
 def unique_rows(table: NDArray[T]) -> tuple[NDArray[T], Ints]:
@@ -93,19 +95,20 @@ def unique_rows(table: NDArray[T]) -> tuple[NDArray[T], Ints]:
     codes: list[Rows] = []
     size = _MOST + 1
     for column in table.T:
-        bound = int(column.max(initial=0)) + 1
+        bound = int(np.maximum.reduce(column, initial=0)) + 1
         size *= bound
         if size > _MOST:
             codes.append(column.astype(np.uint64))
             size = bound
         else:
-            codes[-1] = codes[-1] * np.uint64(bound) + column.astype(np.uint64)
-    order = np.argsort(codes[0]) if len(codes) == 1 else np.lexsort(codes[::-1])
-    fresh = np.zeros(len(table), np.bool_)
-    for code in codes:
+            codes[-1] *= np.uint64(bound)
+            codes[-1] += column.astype(np.uint64)
+    order = codes[0].argsort() if len(codes) == 1 else np.lexsort(codes[::-1])
+    fresh = differs(codes[0][order])
+    for code in codes[1:]:
         fresh |= differs(code[order])
     number = np.empty(len(table), np.int64)
-    number[order] = np.cumsum(fresh) - 1
+    number[order] = fresh.cumsum() - 1
     return table[order[fresh]], number
 
 
