@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations, product
+from itertools import combinations, pairwise, product
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from planners.grounding.actions import GroundAction
 from planners.joint.conditions import Evaluator, Labels, Operators, speaks_of_step
 from planners.joint.interference import Choices, compatible, conflict
 from planners.joint.model import Options, Stepper, Steps, products
-from planners.joint.states import StateCodec
+from planners.joint.states import StateCodec, TrueFacts
 from planners.joint.tables import Bools, Ints, Numbers, Rows, differs, ranges, spans
 from planners.pddl.formula_tree import conjuncts, formula_text, joined, signed
 from planners.pddl.lifted import FALSE, And, Atom, Formula, Junction, StepAtom
@@ -76,7 +76,8 @@ class ComposingStepper(Stepper):
 
     def choices(self, rows: Rows) -> Options:
         """For each robot the labels whose conditions on the state hold, by state (CSR)."""
-        found = [robot.operators.applicable(rows) for robot in self._robot]
+        true = TrueFacts(rows)
+        found = [robot.operators.applicable(rows, true) for robot in self._robot]
         every = np.arange(len(rows) + 1)
         return [(np.searchsorted(row, every), label) for row, label in found]
 
@@ -244,23 +245,24 @@ class _Subactions:
         # A shared subaction is paid once, by the first of its owners.
         own = [a.second_cost(cost) if a.owners[0] == robot else 0 for a in actions if a]
         self.cost = np.array([idling_cost, *own], np.int64)
-        #: By label what it asks of the step, and what of the state is enough for that.
-        self._formulas: dict[int, tuple[Formula, Formula]] = {}
+        #: By label the number of the formula that it asks of the step, or -1.
+        self._asked: Ints = np.full(len(actions), -1)
+        numbers: dict[Formula, int] = {}
         for label, formulas in self.operators.step_formulas.items():
-            formula = And(tuple(formulas))
-            self._formulas[label] = formula, _enough(formula)
-        self._asks = np.zeros(len(actions), np.bool_)
-        self._asks[list(self._formulas)] = True
+            self._asked[label] = numbers.setdefault(And(tuple(formulas)), len(numbers))
+        #: With what of the state is enough for each.
+        self._formulas = [(formula, _enough(formula)) for formula in numbers]
         #: Which labels ask something of the step, or do what depends on the state.
-        self.depends = self._asks.copy()
+        self.depends = self._asked >= 0
         self.depends[list(self.operators.conditional)] = True
 
     def waits(self, rows: Rows, first: Ints, label: Ints) -> Bools:
         """Which options in the states of a table (CSR) depend on what the others choose."""
-        found = self._asks[label]
+        asked = self._asked[label]
+        found: Bools = asked >= 0
         row = np.repeat(np.arange(len(rows)), np.diff(first))
-        for there in _by_value(np.flatnonzero(found), label):
-            _, enough = self._formulas[int(label[there[0]])]
+        for there in _by_value(np.flatnonzero(found), asked):
+            _, enough = self._formulas[asked[there[0]]]
             found[there] = ~self._evaluator.holds(enough, rows, row[there])
         return found
 
@@ -268,16 +270,17 @@ class _Subactions:
         self, fits: Bools, asking: Ints, robot: int, rows: Rows, source: Ints, labels: Labels
     ) -> None:
         """Clear ``fits`` where a formula about the step is not met, of the items ``asking``."""
-        own = labels[:, robot]
-        for there in _by_value(asking, own):
-            formula, _ = self._formulas[int(own[there[0]])]
+        asked = self._asked[labels[:, robot]]
+        for there in _by_value(asking, asked):
+            formula, _ = self._formulas[asked[there[0]]]
             fits[there] = self._evaluator.holds(formula, rows, source[there], labels[there])
 
 
 def _by_value(items: Ints, values: Numbers) -> list[Ints]:
     """The items in groups of equal values."""
     items = items[np.argsort(values[items], kind="stable")]
-    return np.split(items, np.flatnonzero(np.diff(values[items])) + 1) if len(items) else []
+    first = np.flatnonzero(differs(values[items])).tolist()
+    return [items[begin:end] for begin, end in pairwise([*first, len(items)])]
 
 
 def _enough(formula: Formula) -> Formula:

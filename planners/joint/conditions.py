@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.grounding.actions import GroundAction, GroundEffect
-from planners.joint.states import FactTable, StateCodec, TrueFacts, test_bits
+from planners.joint.states import FactTable, StateCodec, TrueFacts, test_bit, test_bits
 from planners.joint.tables import Bools, Ints, Numbers, Rows, ranges
 from planners.pddl.formula_tree import Compound, Leaf, conjuncts, fold, literals, signed
 from planners.pddl.lifted import TRUE, And, Atom, Formula, Junction, Not, StepAtom, Truth
@@ -44,7 +44,7 @@ class Evaluator:
                 case Truth(value):
                     return np.full(count, value)
                 case Atom() if (number := self.facts.index.get(found)) is not None:
-                    return test_bits(rows, which, np.full(count, number))
+                    return test_bit(rows, which, number)
                 case StepAtom() if (subaction := self.subactions.get(found)) is not None:
                     assert labels is not None, "a formula about the joint step without labels"
                     robot, label = subaction
@@ -149,9 +149,9 @@ class Operators:
         formulas = self._state_formulas.get(action, ())
         return all(self._evaluator.holds(formula, *here)[0] for formula in formulas)
 
-    def applicable(self, rows: Rows) -> tuple[Ints, Ints]:
+    def applicable(self, rows: Rows, true: TrueFacts | None = None) -> tuple[Ints, Ints]:
         """Pairs (row, action) whose conditions on the state hold, sorted."""
-        row, operator = self._with_literals(rows)
+        row, operator = self._with_literals(rows, true or TrueFacts(rows))
         keep: Bools = np.ones(len(row), np.bool_)
         for number, formulas in self._state_formulas.items():
             there = np.flatnonzero(operator == number)
@@ -159,10 +159,9 @@ class Operators:
                 keep[there] &= self._evaluator.holds(formula, rows, row[there])
         return row[keep], operator[keep]
 
-    def _with_literals(self, rows: Rows) -> tuple[Ints, Ints]:
+    def _with_literals(self, rows: Rows, true: TrueFacts) -> tuple[Ints, Ints]:
         """Pairs whose literals hold, sorted: found by the rarest fact required, then tested."""
-        true, every = TrueFacts(rows), np.arange(len(rows))
-        row = np.concatenate((every, true.row))
+        row = np.concatenate((np.arange(len(rows)), true.row))
         fact = np.concatenate((np.full(len(rows), -1), true.fact))
         counts = self._first[fact + 2] - self._first[fact + 1]
         operator = self._by_fact[ranges(self._first[fact + 1], counts)]

@@ -145,7 +145,7 @@ class StateCodec:
 
     def column(self, rows: Rows, fact: int) -> Bools:
         """In which states of a table a fact is true."""
-        return test_bits(rows, np.arange(len(rows)), np.full(len(rows), fact))
+        return test_bit(rows, slice(None), fact)
 
     def set(self, rows: Rows, which: Ints | Bools | slice, facts: Iterable[int]) -> None:
         """Make facts true in some states of a table (by number or mask), in place."""
@@ -234,6 +234,11 @@ def test_bits(rows: Rows, which: Ints, facts: Ints) -> Bools:
     return (blocks >> (facts % _BLOCK_BITS).astype(np.uint64) & np.uint64(1)).astype(np.bool_)
 
 
+def test_bit(rows: Rows, which: Ints | slice, fact: int) -> Bools:
+    """Whether one fact is true in ``rows[which[k]]``."""
+    return (rows[which, fact // _BLOCK_BITS] & np.uint64(1 << fact % _BLOCK_BITS)).astype(np.bool_)
+
+
 class TrueFacts:
     """The facts that are true in each row of a table that holds facts only, in order, CSR.
 
@@ -242,18 +247,11 @@ class TrueFacts:
 
     def __init__(self, rows: Rows) -> None:
         row, block = np.nonzero(rows)
-        left = rows[row, block]
-        end = np.concatenate(([0], np.cumsum(np.bitwise_count(left), dtype=np.int64)))
-        self.first: Ints = end[np.searchsorted(row, np.arange(len(rows) + 1))]
-        self.counts = np.diff(self.first)
-        self.fact: Ints = np.empty(int(self.first[-1]), np.int64)
-        place, code = end[:-1], block * _BLOCK_BITS
-        while len(left):
-            rest = left & (left - np.uint64(1))
-            # A power of two is exact as a float.
-            self.fact[place] = code + np.frexp((left ^ rest).astype(np.float64))[1] - 1
-            more = rest != 0
-            left, place, code = rest[more], place[more] + 1, code[more]
+        true = np.flatnonzero(unpacked(rows[None, row, block], len(row) * _BLOCK_BITS))
+        at = true // _BLOCK_BITS
+        self.fact: Ints = block[at] * _BLOCK_BITS + (true & (_BLOCK_BITS - 1))
+        self.counts = np.bincount(row[at], minlength=len(rows))
+        self.first: Ints = np.concatenate(([0], self.counts.cumsum()))
 
     @property
     def row(self) -> Ints:
