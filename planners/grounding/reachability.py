@@ -99,7 +99,7 @@ def _require_memory(domain: Domain, objects: Mapping[str, tuple[str, ...]]) -> N
 
 
 def _least_model(rules: Sequence[str]) -> dict[str, list[_Numbers]]:
-    """The numbers of the arguments of each predicate in the least model of a Datalog program."""
+    """The numbers of each action's arguments in the least model of a Datalog program."""
     from clingo import Control
 
     messages: list[str] = []
@@ -123,6 +123,7 @@ def _least_model(rules: Sequence[str]) -> dict[str, list[_Numbers]]:
     return {
         predicate: [_arguments(str(atom.symbol)) for atom in atoms.by_signature(predicate, arity)]
         for predicate, arity, _ in atoms.signatures
+        if predicate.startswith("action_")
     }
 
 

@@ -93,7 +93,7 @@ class Postponed:
 
     def begin(self) -> None:
         """Let the signals wait that have a handler in Python."""
-        for number in signal.valid_signals():
+        for number in range(1, signal.NSIG):
             handler = signal.getsignal(number)
             if callable(handler):
                 self._handlers[number] = handler
