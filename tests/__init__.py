@@ -1,6 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The tests: a folder for each package and room, ``support`` for what several of them need."""
 
-import pytest
+import gc
+import os
+import sys
 
-pytest.register_assert_rewrite("tests.support")
+# As the command line does, before numpy is loaded: threads of BLAS would take turns on the cores.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+gc.set_threshold(50_000)
+if pytest := sys.modules.get("pytest"):  # worker processes, which take jobs from here, need none
+    pytest.register_assert_rewrite("tests.support")

@@ -95,10 +95,10 @@ def test_steps_take_constant_memory_and_wake_no_garbage_collector() -> None:
     at = long.copy()
     at.commit(do="idle")
     gc.collect()
-    before = [generation["collections"] for generation in gc.get_stats()]
     while not at.finished:
         one_step(at)
-    assert [generation["collections"] for generation in gc.get_stats()] == before
+    new, *collections = gc.get_count()
+    assert (new < 700, collections) == (True, [0, 0])  # 700 wake it if nothing else is said
     tracemalloc.start()
     try:
         begin, _ = tracemalloc.get_traced_memory()
