@@ -34,10 +34,15 @@ PYTHON_FILES = sorted(
 )
 
 
+@cache
+def nodes(path: Path) -> list[ast.AST]:
+    return [*ast.walk(ast.parse(path.read_text(encoding="utf-8")))]
+
+
 def imported(path: Path) -> set[str]:
     """The packages that a file imports, anywhere in it."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in nodes(path):
         if isinstance(node, ast.Import):
             found |= {alias.name.partition(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module is not None:
@@ -84,11 +89,6 @@ def test_no_test_file_imports_another_and_no_script_hides_a_module_of_python() -
 FILES = sorted(path for room in ("planners", "coordlang") for path in (ROOT / room).rglob("*.py"))
 #: Calls that make an error of their arguments: `Token.fail` has a remedy of its own.
 BASE = "CoordlangError"
-
-
-@cache
-def nodes(path: Path) -> list[ast.AST]:
-    return [*ast.walk(ast.parse(path.read_text()))]
 
 
 @cache

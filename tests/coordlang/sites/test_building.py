@@ -7,6 +7,7 @@ import json
 import math
 import re
 from collections.abc import Callable
+from functools import cache
 from itertools import product
 from pathlib import Path
 from random import Random
@@ -209,6 +210,7 @@ def least(distance: Callable[[np.ndarray[Any, Any]], float], size: int) -> float
     return math.sqrt(max(0.0, float(found.fun)))
 
 
+@cache
 def apart(one: tuple[Any, Any], other: tuple[Any, Any]) -> float:
     """How near two segments are; both are driven evenly where one ends as the other begins."""
     (a, b), (c, d) = (tuple(map(np.array, each)) for each in (one, other))
