@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
+from typing import Any
 
 import numpy as np
 
@@ -138,10 +140,15 @@ def _features(vocabulary: _Vocabulary, numbers: Sequence[Number], most: int) -> 
     for number in numbers:
         yield from (Residue(number, modulus) for modulus in _MODULI)
         yield from (Least(number, cut) for cut in _MOSTS)
-    for one, other in combinations(numbers, 2):
-        if 1 + one.complexity + other.complexity <= most and _comparable(one, other):
-            yield Sign(one, other)
+    yield from (Sign(*pair) for pair in _pairs(numbers, most - 1) if _comparable(*pair))
     yield from (Same(one, other) for one, other in combinations(vocabulary.terms(), 2))
+
+
+def _pairs(simplest_first: Sequence[Any], most: int) -> Iterator[tuple[Any, Any]]:
+    """Pairs that together have no more than this complexity, as `combinations` gives them."""
+    known = [one.complexity for one in simplest_first]
+    for k, one in enumerate(simplest_first):
+        yield from product([one], simplest_first[k + 1 : bisect_right(known, most - known[k])])
 
 
 def _comparable(one: Number, other: Number) -> bool:
@@ -166,9 +173,8 @@ def _numbers(vocabulary: _Vocabulary, concepts: Sequence[Concept], most: int) ->
                 yield Count(predicate, args)
     # A feature adds two to the complexity of its number.
     yield from (Size(concept) for concept in concepts if 3 + concept.complexity <= most)
-    for one, other in combinations(concepts, 2):
-        if 3 + one.complexity + other.complexity <= most:
-            yield from (Gap(relation, one, other) for relation in vocabulary.relations)
+    for pair in _pairs(concepts, most - 3):
+        yield from (Gap(relation, *pair) for relation in vocabulary.relations)
 
 
 def _different_numbers(found: Iterable[Number], states: Sequence[States]) -> list[Number]:
