@@ -24,15 +24,7 @@ import numpy as np
 
 from coordlang.required.choices import Choices
 from coordlang.required.composition_walk import can_fail, in_one_state, layered, move_counts, moves
-from planners.joint.tables import (
-    Bools,
-    Ints,
-    Rows,
-    find_rows,
-    ranges,
-    spans,
-    unique_rows,
-)
+from planners.joint.tables import Bools, Ints, Rows, find_rows, ranges, spans, unique_rows
 from planners.search.edge_index import EdgeIndex
 
 #: Rows of a table handled together.

@@ -76,9 +76,8 @@ class ComposingStepper(Stepper):
 
     def choices(self, rows: Rows) -> Options:
         """For each robot the labels whose conditions on the state hold, by state (CSR)."""
-        true = TrueFacts(rows)
+        true, every = TrueFacts(rows), np.arange(len(rows) + 1)
         found = [robot.operators.applicable(rows, true) for robot in self._robot]
-        every = np.arange(len(rows) + 1)
         return [(np.searchsorted(row, every), label) for row, label in found]
 
     def allows(self, row: Rows, labels: Sequence[int]) -> bool:
@@ -245,12 +244,12 @@ class _Subactions:
         # A shared subaction is paid once, by the first of its owners.
         own = [a.second_cost(cost) if a.owners[0] == robot else 0 for a in actions if a]
         self.cost = np.array([idling_cost, *own], np.int64)
-        #: By label the number of the formula that it asks of the step, or -1.
+        #: By label which of ``_formulas`` it asks of the step, or -1; these are with what of the
+        #: state is enough.
         self._asked: Ints = np.full(len(actions), -1)
         numbers: dict[Formula, int] = {}
         for label, formulas in self.operators.step_formulas.items():
             self._asked[label] = numbers.setdefault(And(tuple(formulas)), len(numbers))
-        #: With what of the state is enough for each.
         self._formulas = [(formula, _enough(formula)) for formula in numbers]
         #: Which labels ask something of the step, or do what depends on the state.
         self.depends = self._asked >= 0

@@ -13,15 +13,7 @@ from numpy.typing import NDArray
 
 from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, Options, Steps
-from planners.joint.tables import (
-    Bools,
-    Ints,
-    Numbers,
-    Rows,
-    find_rows,
-    narrow,
-    unique_rows,
-)
+from planners.joint.tables import Bools, Ints, Numbers, Rows, find_rows, narrow, unique_rows
 from planners.system.limits import reaching
 
 T = TypeVar("T", bound=np.generic)
