@@ -8,5 +8,5 @@ import sys
 # As the command line does, before numpy is loaded: threads of BLAS would take turns on the cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 gc.set_threshold(50_000)
-if pytest := sys.modules.get("pytest"):  # worker processes, which take jobs from here, need none
-    pytest.register_assert_rewrite("tests.support")
+if "pytest" in sys.modules:  # workers, which take jobs from here, do not load it
+    sys.modules["pytest"].register_assert_rewrite("tests.support")

@@ -253,14 +253,12 @@ def reachable(building: Building, start: tuple[str, str], clearance: float) -> t
     known: dict[tuple[Step, Step], bool] = {}
     while left:
         ways = [[(p, p), *((a, b) for a, b in lanes if a == p)] for p in left.pop()]
-        for one, other in product(ways[0], ways[1]):
-            pair = one, other
-            if pair not in known:
-                known[pair] = allowed(building, one, other, clearance)
-            if known[pair]:
+        for one, other in product(*ways):
+            if (one, other) not in known:
+                known[one, other] = allowed(building, one, other, clearance)
+            if known[one, other]:
                 steps += 1
-                state = pair[0][1], pair[1][1]
-                if state not in found:
+                if (state := (one[1], other[1])) not in found:
                     found.add(state)
                     left.append(state)
     return len(found), steps
