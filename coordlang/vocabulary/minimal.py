@@ -19,7 +19,7 @@ from itertools import islice
 from typing import TYPE_CHECKING
 
 from coordlang.language.warping import Clause
-from coordlang.vocabulary.counting import needs_three_words
+from coordlang.required.choices import Choices
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome, word_count
 from coordlang.vocabulary.loop import (
@@ -38,7 +38,9 @@ from planners.system.limits import run_until_stopped
 
 if TYPE_CHECKING:  # they load networkx
     from coordlang.vocabulary.contained import ContainedInstance
+    from coordlang.vocabulary.plan_pairs import PlanPairs
     from coordlang.vocabulary.tied_words import TiedWords
+    from coordlang.vocabulary.two_words import TwoWords
 
 #: A thousand conflicts are a unit of effort; a refuted partition counts as so many ..
 _UNIT, _ROUND = 1_000, 250
@@ -49,10 +51,13 @@ _MERGES = 5
 _PAIRS, _FIRST_PAIRS = 1_000, 30
 #: Effort that is not enough for a tenth of the first failing plans is not begun with.
 _BEGINNING = 10
-#: Nodes of mixtures of two plans that are looked at: some seconds, and fewer for less effort.
-_MIXTURES, _MIXTURES_FOR_UNIT = 300_000, 10
 #: What may be spent on each number at first.
 _SOON = Budget(rounds=10, conflicts=2_000)
+#: What may be spent on two words of one task at first.
+_FOR_TWO = Budget(rounds=12, conflicts=30_000)
+#: Of pairs of edges that two plans take so many are looked at for two words for each round of a
+#: budget, some seconds' for words that tell plans apart step by step; so many count as a conflict.
+_FOR_ROUND, _MOST_PAIRS, _EDGES = 10_000, 400_000, 20
 #: Rounds are dear where there are more pairs of edges that leave one node.
 _DEAR = 30_000
 #: Rounds that partitions of a kind are given for one task at first, one time after another, and
@@ -159,8 +164,25 @@ class MinimalSearch:
     def _tied(self) -> TiedWords:
         from coordlang.vocabulary.tied_words import TiedWords
 
-        mixtures = min(_MIXTURES, _MIXTURES_FOR_UNIT * self._most)
-        return TiedWords(self._job, self.languages, mixtures)
+        pairs = self._plan_pairs if self._is_one_task else None
+        return TiedWords(self._job, self.languages, pairs, min(_MOST_PAIRS, _EDGES * self._most))
+
+    @cached_property
+    def _plan_pairs(self) -> PlanPairs:
+        """Pairs of plans of one task, as far as they were looked at."""
+        from coordlang.vocabulary.plan_pairs import PlanPairs
+
+        (space,) = self._job.candidates.spaces
+        return PlanPairs(Choices(space))
+
+    @cached_property
+    def _two_words(self) -> TwoWords | None:
+        """Who decides two words of one task; None where clauses must prove it."""
+        from coordlang.vocabulary.two_words import TwoWords
+
+        if self._job.by_clauses or self._is_asynchronous or not self._is_one_task:
+            return None
+        return TwoWords(self._plan_pairs, self._job.states, self.languages.clauses)
 
     @cached_property
     def _contained(self) -> list[ContainedInstance]:
@@ -204,8 +226,8 @@ class MinimalSearch:
     def _begin_with_one_task(self) -> None:
         """Count how many sentences are needed, and look for words of a kind."""
         (space,) = self._job.candidates.spaces
-        if not (self._job.by_clauses or self._is_asynchronous) and needs_three_words(space):
-            self.lower = max(self.lower, 3)
+        if self._two_words is not None and self.lower == 2 < self.upper:
+            self._find_or_refute(2, _FOR_TWO)
         if len(space.target) * between(self.lower, self.upper) > _CLAUSES:
             found = self._tied.of_facts()
             if found is not None and word_count(found) < self.upper:
@@ -219,17 +241,18 @@ class MinimalSearch:
 
         From below, where partitions are refuted soonest and most is learnt of the others, too; then
         between the number that was tried last and the one that suffices.  Where rounds are dear
-        only that.
+        only that, unless numbers from below are soon decided: then at most twice the last one.
         """
         least = self.lower
         if not self._is_dear and least < self.upper:
             if self._finds_tied(least, rounds):
                 return
             least += 1
+        most = 2 * least if self._tied.has_pairs else sys.maxsize
         while least <= self.upper - max(1, self.upper // _FEWER_WORDS) and not self._is_spent:
-            size = between(least, self.upper)
+            size = min(most, between(least, self.upper))
             if not self._finds_tied(size, rounds):
-                least = size + 1
+                least, most = size + 1, 2 * most
 
     @property
     def work(self) -> int:
@@ -237,8 +260,12 @@ class MinimalSearch:
         if "languages" not in self.__dict__:
             return 0
         rounds = self.languages.rounds + self._merges // _MERGES
-        tied = self._tied.conflicts if "_tied" in self.__dict__ else 0
-        return self._partitions.conflicts + tied + rounds * (_ROUND + self._pairs // _PAIRS)
+        conflicts = self._partitions.conflicts
+        if "_tied" in self.__dict__:
+            conflicts += self._tied.conflicts
+        if self._two_words is not None:
+            conflicts += self._two_words.conflicts + self._plan_pairs.looked_at // _EDGES
+        return conflicts + rounds * (_ROUND + self._pairs // _PAIRS)
 
     @property
     def _is_open(self) -> bool:
@@ -314,13 +341,23 @@ class MinimalSearch:
                 raise Undecided
             return self._partitions.find(size, min(conflicts, self._most - self.work))
 
-        found = find(partition, self._holds, budget)
-        self._partitions.drop(size)
+        if size == 2 and self._two_words is not None:
+            found = self._of_two_words(self._two_words, budget)
+            refuting: Mapping[Clause, Evidence] = {}  # not by clauses
+        else:
+            found = find(partition, self._holds, budget)
+            self._partitions.drop(size)
+            refuting = self.languages.evidence
         if found is None:
-            return dict(self.languages.evidence)
+            return dict(refuting)
         self._offer(found)
         self.merge(_VAIN)
         return None
+
+    def _of_two_words(self, search: TwoWords, budget: Budget) -> dict[int, int] | None:
+        left = self._most - self.work
+        budget = replace(budget, conflicts=min(budget.conflicts, left))
+        return search.find(self._holds, budget, min(_FOR_ROUND * budget.rounds, _EDGES * left))
 
     def _finds_tied(self, size: int, rounds: int) -> bool:
         """Whether a language with so many words is soon found among those of some kinds."""
@@ -366,9 +403,9 @@ class MinimalSearch:
 
     def close(self) -> None:
         """Give back what the solvers hold."""
-        for name in ("_partitions", "_tied"):
-            if name in self.__dict__:
-                self.__dict__[name].close()
+        for name in ("_partitions", "_tied", "_two_words"):
+            if (search := self.__dict__.get(name)) is not None:
+                search.close()
         for instance in self.__dict__.get("_contained", ()):
             instance.close()
 

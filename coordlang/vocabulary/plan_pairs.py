@@ -1,56 +1,101 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Two plans on their way, with all mixtures of both: whether a mixture fails, and where.
+"""Two plans on their way, with all mixtures of both, until one of these fails.
 
 Plans that differ are many, but the nodes that they and their mixtures are in together are few.
 """
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterator
-from itertools import combinations, product
-from typing import Any
+from collections import defaultdict, deque
+from itertools import combinations, count, product
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from coordlang.language.warping import Pair, pair
 from coordlang.required.choices import Choices
-from coordlang.vocabulary.sat import END, PairStep, Undecided
+from coordlang.vocabulary.sat import END, START, PairStep, Undecided
 from planners.search.edge_index import EdgeTrees
-from planners.search.plan_space import PlanSpace
 
 #: For each set of robots, as bits, the node that is reached where these follow the second plan and
 #: the others the first one; only robots that the plans tell apart.
 Mixed = dict[int, int]
+#: The place of two plans of which some mixture has failed.
+FAILED = -1
+
+
+class Step(NamedTuple):
+    """A step of two plans from a place into two nodes, and to the place where they are then."""
+
+    before: int
+    nodes: tuple[int, int]
+    after: int
 
 
 class PlanPairs:
-    """Pairs of plans of a space; ``most`` nodes of them and their mixtures may be looked at."""
+    """A graph whose paths from nodes to `FAILED` are the pairs of plans that fail, as far as that.
 
-    def __init__(self, space: PlanSpace, most: int) -> None:
-        self.space, self._edges, self._left = space, EdgeTrees(space), most
+    A place is a node in which both plans are, by its number; or, numbered from there on, the nodes
+    in which two plans that differ and all their mixtures are.  Places from which no mixture fails
+    are left out.  ``steps``: those that were looked at so far, the first steps of all pairs before
+    longer ways; ``looked_at`` counts pairs of edges.
+    """
 
-    def spend(self, nodes: int) -> None:
-        """Look at so many nodes.  Raises `Undecided` after too many."""
-        self._left -= nodes
-        if self._left < 0:
-            raise Undecided
+    def __init__(self, choices: Choices) -> None:
+        self.space, self._choices = choices.space, choices
+        self._edges, self._sets = EdgeTrees(choices.space), choices.of_node.T.tolist()
+        self.steps: set[Step] = set()
+        self.looked_at = 0
+        #: What `_place` says of each place that is no node.
+        self._numbers: dict[tuple[tuple[int, int], ...], int | None] = {}
+        self._labels_of: dict[tuple[int, int], set[tuple[int, ...]]] = {}
+        begin = np.flatnonzero(choices.requires & self.space.descendants(self.space.starts))
+        self._open: deque[tuple[int, Mixed]] = deque((node, {0: node}) for node in begin.tolist())
+        self._last = len(self.space) - 1
+        degrees = self.space.out_degrees[begin]
+        #: How many pairs of edges there are at least.
+        self.least = int((degrees * (degrees - 1) // 2).sum())
 
-    def edges(self, mixed: Mixed) -> Iterator[tuple[int, int]]:
-        """The next edges of the two plans, in all ways."""
-        out = self.space.out_edges
-        return product(out(mixed[0]), out(mixed[max(mixed)]))
+    def grow(self, most: int) -> bool:
+        """Look at pairs of edges, up to about ``most`` in all; whether there are no more."""
+        out, target = self.space.out_edges, self.space.target_of
+        while self._open and self.looked_at < most:
+            place, mixed = self._open.popleft()
+            together = [*product(out(mixed[0]), out(mixed[max(mixed)]))]
+            if place < len(self.space):
+                together = [*combinations(out(place), 2)]
+            self.looked_at += len(together)
+            for one, other in together:
+                after = self._place(self._after(mixed, one, other))
+                if after is not None:
+                    self.steps.add(Step(place, (target(one), target(other)), after))
+        return not self._open
 
-    def after(self, mixed: Mixed, one: int, other: int) -> Mixed | None:
-        """What becomes of two plans after an edge of each; None if a mixture fails.
+    def _goes_on(self, mixed: Mixed, plan: int, edge: int) -> bool:
+        """Whether all mixtures may go on, as far as the labels of one of two plans tell."""
+        every, labels = (1 << self.space.robots) - 1, self.space.labels_of(edge)
+        return all(
+            _of_robots(labels, own) in self._labels(node, own)
+            for robots, node in mixed.items()
+            for own in [robots if plan else every & ~robots]
+        )
 
-        Raises `Undecided` after too many mixtures.
-        """
+    def _labels(self, node: int, robots: int) -> set[tuple[int, ...]]:
+        """What some robots do together in the steps from a node."""
+        key = node, robots
+        if key not in self._labels_of:
+            steps = map(self.space.labels_of, self.space.out_edges(node))
+            self._labels_of[key] = {_of_robots(labels, robots) for labels in steps}
+        return self._labels_of[key]
+
+    def _after(self, mixed: Mixed, one: int, other: int) -> Mixed | None:
+        """What becomes of two plans after an edge of each; None if a mixture fails."""
         two = self.space.labels_of(one), self.space.labels_of(other)
         following = dict(mixed)
         for robot, (mine, theirs) in enumerate(zip(*two, strict=True)):
             bit = 1 << robot
             if mine != theirs and not max(mixed) & bit:
                 following |= {robots | bit: node for robots, node in following.items()}
-        self.spend(len(following))
         for robots, node in following.items():
             tree: Any = self._edges.of(node)
             for robot, labels in enumerate(zip(*two, strict=True)):
@@ -60,87 +105,85 @@ class PlanPairs:
             following[robots] = tree  # at its end, the target
         return following
 
+    def _place(self, mixed: Mixed | None) -> int | None:
+        """The number of a place, new or known; None if nothing fails from there."""
+        if mixed is None:
+            return FAILED
+        if len(set(mixed.values())) == 1:  # the plans are together again
+            return None
+        key = tuple(sorted(mixed.items()))
+        if key not in self._numbers:
+            self._numbers[key] = None
+            if self._can_fail(mixed):
+                self._numbers[key] = FAILED
+                if self._all_go_on(mixed):
+                    self._last += 1
+                    self._numbers[key] = self._last
+                    self._open.append((self._last, mixed))
+        return self._numbers[key]
 
-#: A place: the mixtures of plans that have not failed yet, or the nodes of two plans that have.
-_Place = frozenset[tuple[int, int]] | Pair
+    def _all_go_on(self, mixed: Mixed) -> bool:
+        """Whether each of two plans may go on so that no mixture fails at once."""
+        out = self.space.out_edges
+        return any(self._goes_on(mixed, 0, edge) for edge in out(mixed[0])) and any(
+            self._goes_on(mixed, 1, edge) for edge in out(mixed[max(mixed)])
+        )
+
+    def _can_fail(self, mixed: Mixed) -> bool:
+        """Whether something fails of what robots may do from where their plans are."""
+        plans = mixed[0], mixed[max(mixed)]
+        return any(
+            self._choices.fails(
+                tuple(
+                    self._sets[plans[robots >> robot & 1]][robot]
+                    for robot in range(self.space.robots)
+                ),
+                node,
+            )
+            for robots, node in mixed.items()
+        )
 
 
-def failing_pairs(choices: Choices, most: int) -> list[PairStep]:
-    """Steps such that the paths from place 0 to the end are the pairs of plans that fail.
+def _of_robots(labels: tuple[int, ...], robots: int) -> tuple[int, ...]:
+    return tuple(label for robot, label in enumerate(labels) if robots >> robot & 1)
 
-    Each pair begins at a node from which some mixture fails, and the plans before are the same.
 
-    ``choices``: those of the plan space.  ``most``: nodes of mixtures that may be looked at.
-    Raises `Undecided` if these are not enough.
+def failing_pairs(pairs: PlanPairs, within: float, most: int) -> list[PairStep]:
+    """Steps such that on each path from the start to the end two plans must be told apart.
+
+    The paths are the pairs of plans that fail, of those that were looked at: from where they differ
+    to ``within`` steps after a mixture has failed; 0: to that step, infinitely many: to their ends.
+    Raises `Undecided` if there are more than about ``most`` steps.
     """
-    space, graph = choices.space, _FailingPairs(choices.space, most)
-    for node in (choices.requires & space.descendants(space.starts)).nonzero()[0].tolist():
-        for edges in combinations(space.out_edges(node), 2):
-            graph.step(0, {0: node}, *edges)
-    while graph.open:
-        graph.expand(*graph.open.pop())
-    return graph.leading_to_end()
+    space = pairs.space
+    #: The nodes of two plans of which a mixture has failed, with the steps that are left.
+    failed = set[tuple[Pair, float]]()
+    left = list[tuple[Pair, float]]()
+    steps = set[tuple[object, Pair, object]]()
 
+    def after_failing(nodes: Pair, within: float) -> object:
+        if not within or not space.layer[nodes[0]]:
+            return END
+        if (place := (nodes, within)) not in failed:
+            failed.add(place)
+            left.append(place)
+        return place
 
-class _FailingPairs:
-    def __init__(self, space: PlanSpace, most: int) -> None:
-        self._pairs, self._space = PlanPairs(space, most), space
-        self._numbers: dict[_Place, int] = {}
-        #: The steps from each place, and the steps to go there.
-        self._steps: dict[int, set[PairStep]] = defaultdict(set)
-        self._layer: dict[int, int] = {}
-        #: Places whose steps are not entered yet.
-        self.open: list[tuple[int, Mixed | Pair]] = []
-
-    def step(self, before: int, mixed: Mixed, one: int, other: int) -> None:
-        """Enter a step of two plans of which no mixture failed before."""
-        after = self._pairs.after(mixed, one, other)
-        targets = self._space.target_of(one), self._space.target_of(other)
-        if after is None:
-            self._enter(before, targets, targets)
-        elif len(set(after.values())) > 1:  # else they are together again
-            self._enter(before, targets, after)
-
-    def _enter(self, before: int, nodes: tuple[int, int], place: Mixed | Pair) -> None:
-        first, second = self._space.state[list(nodes)].tolist()
-        layer = int(self._space.layer[nodes[0]])
-        if not layer and isinstance(place, dict):
-            return  # no mixture of theirs fails
-        after = END
-        if layer:
-            key = pair(*place) if isinstance(place, tuple) else _key(place)
-            after = self._numbers.setdefault(key, len(self._numbers) + 1)
-            if after not in self._layer:
-                self._layer[after] = layer
-                self.open.append((after, place))
+    for step in pairs.steps:
+        nodes = pair(*step.nodes)
+        after = after_failing(nodes, within) if step.after == FAILED else step.after
+        steps.add((START if step.before < len(space) else step.before, nodes, after))
+    while left:
+        both, within = place = left.pop()
+        one, other = ({space.target_of(edge) for edge in space.out_edges(node)} for node in both)
+        for nodes in {pair(*nodes) for nodes in product(one, other)}:
+            steps.add((place, nodes, after_failing(nodes, within - 1)))
+        if len(steps) > most:
+            raise Undecided
+    numbers: dict[object, int] = defaultdict(count(1).__next__, {START: START, END: END})
+    found = []
+    for before, nodes, after in steps:
+        first, second = space.state[list(nodes)].tolist()
         states = pair(first, second) if first != second else None
-        self._steps[before].add(PairStep(before, states, after))
-
-    def expand(self, number: int, place: Mixed | Pair) -> None:
-        """Enter all steps from a place."""
-        space = self._space
-        if isinstance(place, dict):
-            for edges in self._pairs.edges(place):
-                self.step(number, place, *edges)
-        else:
-            one, other = ({space.target_of(edge) for edge in space.out_edges(n)} for n in place)
-            self._pairs.spend(len(one) * len(other))
-            for nodes in product(one, other):
-                self._enter(number, nodes, nodes)
-
-    def leading_to_end(self) -> list[PairStep]:
-        """The steps after which plans can still fail, or have failed."""
-        kept, leading = list[PairStep](), {END}
-        for place in (*sorted(self._layer, key=self._layer.__getitem__), 0):
-            steps = [step for step in self._steps[place] if step.after in leading]
-            kept += sorted(steps, key=lambda step: (step.after, step.states or ()))
-            if steps:
-                leading.add(place)
-        return kept
-
-
-def _key(mixed: Mixed) -> _Place:
-    """The mixtures of two plans, whichever is named first."""
-    every = max(mixed)
-    mirrored = {every ^ robots: node for robots, node in mixed.items()}
-    return frozenset(min(mixed, mirrored, key=lambda m: sorted(m.items())).items())
+        found.append(PairStep(numbers[before], states, numbers[after]))
+    return sorted(found, key=lambda step: (step.before, step.after, step.states or ()))

@@ -87,8 +87,7 @@ _SLICE = 2_000
 class PairStep(NamedTuple):
     """A step of two plans that fail together, from one place of a graph to another.
 
-    ``states`` are those that the plans enter, None if both enter the same.  Place 0 is where plans
-    begin to differ, ``END`` where both end.
+    ``states`` are those that the plans enter, None if both enter the same.
     """
 
     before: int
@@ -96,8 +95,8 @@ class PairStep(NamedTuple):
     after: int
 
 
-#: The place where two plans that fail together have ended.
-END = -1
+#: The places where two plans that fail together begin to differ, and where both have ended.
+START, END = 0, -1
 
 
 class PartitionProblem:

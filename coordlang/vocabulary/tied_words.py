@@ -14,19 +14,18 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field
-from itertools import islice, tee
+from dataclasses import dataclass, field, replace
+from itertools import chain, tee
+from math import inf
 
 import numpy as np
 
 from coordlang.language.candidates import Candidates
 from coordlang.language.warping import Pair, pair
-from coordlang.required.choices import Choices
 from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
 from coordlang.vocabulary.job import Assignment, Job, words_of_states
 from coordlang.vocabulary.loop import Budget, Languages, find
-from coordlang.vocabulary.plan_pairs import failing_pairs
+from coordlang.vocabulary.plan_pairs import PlanPairs, failing_pairs
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import PairStep, PartitionProblem, Undecided
 from planners.joint.tables import Bools, Ints, unique_rows
@@ -38,10 +37,14 @@ from planners.search.sat import whole
 _AT_ONCE, _ENOUGH = 100, 300
 #: What may be spent on each kind of one task, and of many, at first; then twice as much each time.
 _OF_ONE, _OF_MANY = Budget(rounds=25, conflicts=2_000), Budget(rounds=50, conflicts=2_000)
-_STUTTER_FREE = Budget(rounds=8, conflicts=2_000)
+_STUTTER_FREE, _ALL_PAIRS = Budget(rounds=8, conflicts=2_000), Budget(rounds=8, conflicts=10_000)
 #: Failing tuples of one length, under one symmetry, that are looked at for what they differ in, and
 #: after which longer ones are not.
 _ENOUGH_FOR_FACTS = 500
+#: All pairs of edges that two plans take are so many times those of their first steps, or more.
+_FIRST_STEPS = 6
+#: How many steps after a mixture has failed plans must be told apart.
+_WITHIN = 0, 2, inf
 #: Refuted partitions of all kinds for each of the budget, so many conflicts counted as one.
 _TOGETHER, _CONFLICTS = 8, 250
 
@@ -52,8 +55,9 @@ class _Ties:
 
     ``classes`` (states): those of one class share a word.  ``joined``: pairs that some step joins,
     if words are stutter-free.  ``failing``: the pairs of plans of one task that fail, to be told
-    apart step by step, if they are not too many.  ``clauses``: those of refuted partitions, of one
-    task whatever the number of words: (clauses, pairs) codes ``a * states + b``, -1 for no pair.
+    apart step by step, if they are not too many.  ``clauses``: those of refuted partitions, of
+    one task whatever the number of words: (clauses, pairs) codes ``a * states + b``, -1 for no
+    pair.
     """
 
     classes: Ints
@@ -65,9 +69,9 @@ class _Ties:
 class TiedWords:
     """Looks for languages among such partitions, with effort that grows from call to call."""
 
-    def __init__(self, job: Job, languages: Languages, most: int) -> None:
-        """Begin; ``most`` nodes of mixtures of two plans may be looked at before any solver."""
-        self._most = most
+    def __init__(self, job: Job, languages: Languages, pairs: PlanPairs | None, most: int) -> None:
+        """Begin; of the ``pairs`` of plans of one task so many steps may be looked at."""
+        self._pairs, self._most = pairs, most
         self._states, self._languages = np.array(job.states), languages
         self._refuter = languages.refuter
         self._random = np.random.default_rng(job.seed)
@@ -76,6 +80,8 @@ class TiedWords:
         self._first = _OF_ONE if self._is_one_task else _OF_MANY
         #: What there may be in common, kind by kind; each size goes through a copy of it.
         self._tied = self._classes(job)
+        #: Of one task the classes that facts decide, not listed before they are asked for.
+        self._facts = classes_by_facts(job.candidates, self._refuter)
         #: Those of the solvers so far on kinds that stayed undecided.
         self.conflicts = 0
         #: Of each number of words the kinds that were not looked at, and those that are undecided.
@@ -91,28 +97,43 @@ class TiedWords:
         For one task: no state need share its word and words are stutter-free, or as few facts as
         possible decide it, then more and more.
         """
-        if self._is_one_task:
-            found = classes_by_facts(job.candidates, self._refuter)
-            yield self._stutter_free(job.candidates.spaces[0])
+        if self._pairs is not None:
+            yield from self._stutter_free(self._pairs)
+            yield from map(_Ties, self._facts)
         else:
             tied = [*abstractions(job.candidates, job.states), *map(_orbits, self._images[1:])]
             tied.sort(key=lambda classes: len(np.unique(classes[self._states])))
-            found = iter(up_to_symmetry(tied, self._images))
-        yield from map(_Ties, found)
+            yield from map(_Ties, up_to_symmetry(tied, self._images))
 
-    def _stutter_free(self, space: PlanSpace) -> _Ties:
-        failing: list[PairStep] = []
-        with suppress(Undecided):
-            failing = failing_pairs(Choices(space), self._most)
-        return _Ties(np.arange(len(self._images[0])), _joined(space), failing)
+    def _stutter_free(self, pairs: PlanPairs) -> Iterator[_Ties]:
+        """Words that tell plans apart soon after they fail, and then before they end.
+
+        Where pairs are too many of them, words of which only single steps are known.
+        """
+        free = _Ties(np.arange(len(self._images[0])), _joined(pairs.space))
+        if _FIRST_STEPS * pairs.least > self._most or not pairs.grow(self._most):
+            yield free
+            return
+        for within in _WITHIN:
+            try:
+                yield replace(free, failing=failing_pairs(pairs, within, self._most))
+            except Undecided:
+                yield free
+                return
 
     def of_facts(self) -> Assignment | None:
         """Of one task the language that says the steps to go and a few facts, if there is one."""
-        ties = next(islice(self._every(), 1, None), None)
-        if ties is None:
+        first = next(self._facts, None)
+        if first is None:
             return None
-        classes = ties.classes[self._states]
+        self._facts = chain([first], self._facts)
+        classes = first[self._states]
         return dict(zip(self._states.tolist(), classes.tolist(), strict=True))
+
+    @property
+    def has_pairs(self) -> bool:
+        """Whether pairs of plans that fail are known: small numbers of words are soon decided."""
+        return bool(next(self._every()).failing)
 
     def find(self, size: int, rounds: int) -> Assignment | None:
         """A language with at most ``size`` words; None if none was found with some effort.
@@ -146,7 +167,8 @@ class TiedWords:
             # With many tasks what other numbers met slows the solver: open 3x4 by a third.
             own = ties if self._is_one_task else _Ties(ties.classes)
             first = _STUTTER_FREE if own.joined else self._first
-            random = self._random if self._is_one_task else None
+            first = _ALL_PAIRS if own.failing else first
+            random = self._random if self._is_one_task and not own.failing else None
             yield _Kind(self._states, own, size, self._images, first, random)
 
     @property
@@ -217,7 +239,7 @@ class _Kind:
         for states_of_step in ties.joined:
             self.problem.separate_one([states_of_step])
         self.problem.separate_on_paths(ties.failing)
-        if random is not None and not ties.failing:
+        if random is not None:
             # Few plans have one sentence by chance; what the solver tries by itself is one word.
             self.problem.prefer(dict(zip(free, random.integers(size, size=len(free)), strict=True)))
         self.effort, self.rounds, self._required = effort, 0, 0
