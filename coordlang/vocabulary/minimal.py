@@ -53,11 +53,11 @@ _PAIRS, _FIRST_PAIRS = 1_000, 30
 _BEGINNING = 10
 #: What may be spent on each number at first.
 _SOON = Budget(rounds=10, conflicts=2_000)
-#: What may be spent on two words of one task at first.
-_FOR_TWO = Budget(rounds=12, conflicts=30_000)
+#: Conflicts of the solver for two words of one task.
+_FOR_TWO = 30_000
 #: Of pairs of edges that two plans take so many are looked at for two words for each round of a
 #: budget, some seconds' for words that tell plans apart step by step; so many count as a conflict.
-_FOR_ROUND, _MOST_PAIRS, _EDGES = 10_000, 400_000, 20
+_FOR_ROUND, _MOST_PAIRS, _EDGES = 12_000, 400_000, 20
 #: Rounds are dear where there are more pairs of edges that leave one node.
 _DEAR = 30_000
 #: Rounds that partitions of a kind are given for one task at first, one time after another, and
@@ -227,7 +227,7 @@ class MinimalSearch:
         """Count how many sentences are needed, and look for words of a kind."""
         (space,) = self._job.candidates.spaces
         if self._two_words is not None and self.lower == 2 < self.upper:
-            self._find_or_refute(2, _FOR_TWO)
+            self._find_or_refute(2, _SOON)
         if len(space.target) * between(self.lower, self.upper) > _CLAUSES:
             found = self._tied.of_facts()
             if found is not None and word_count(found) < self.upper:
@@ -341,13 +341,14 @@ class MinimalSearch:
                 raise Undecided
             return self._partitions.find(size, min(conflicts, self._most - self.work))
 
-        if size == 2 and self._two_words is not None:
-            found = self._of_two_words(self._two_words, budget)
-            refuting: Mapping[Clause, Evidence] = {}  # not by clauses
-        else:
+        refuting = self.languages.evidence
+        try:
             found = find(partition, self._holds, budget)
-            self._partitions.drop(size)
-            refuting = self.languages.evidence
+        except Undecided:
+            if size != 2 or self._two_words is None:
+                raise
+            found, refuting = self._of_two_words(self._two_words, budget), {}  # not by clauses
+        self._partitions.drop(size)
         if found is None:
             return dict(refuting)
         self._offer(found)
@@ -356,8 +357,9 @@ class MinimalSearch:
 
     def _of_two_words(self, search: TwoWords, budget: Budget) -> dict[int, int] | None:
         left = self._most - self.work
-        budget = replace(budget, conflicts=min(budget.conflicts, left))
-        return search.find(self._holds, budget, min(_FOR_ROUND * budget.rounds, _EDGES * left))
+        conflicts = max(0, min(_FOR_TWO, left))
+        edges = min(_FOR_ROUND * budget.rounds, _EDGES * left)
+        return search.find(self._holds, Budget(budget.rounds, conflicts), edges)
 
     def _finds_tied(self, size: int, rounds: int) -> bool:
         """Whether a language with so many words is soon found among those of some kinds."""

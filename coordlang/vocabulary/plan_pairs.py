@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections import defaultdict, deque
 from itertools import combinations, count, product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from coordlang.language.warping import Pair, pair
 from coordlang.required.choices import Choices
 from coordlang.vocabulary.sat import END, START, PairStep, Undecided
-from planners.search.edge_index import EdgeTrees
 
 #: For each set of robots, as bits, the node that is reached where these follow the second plan and
 #: the others the first one; only robots that the plans tell apart.
@@ -43,7 +42,7 @@ class PlanPairs:
 
     def __init__(self, choices: Choices) -> None:
         self.space, self._choices = choices.space, choices
-        self._edges, self._sets = EdgeTrees(choices.space), choices.of_node.T.tolist()
+        self._sets = choices.of_node.T.tolist()
         self.steps: set[Step] = set()
         self.looked_at = 0
         #: What `_place` says of each place that is no node.
@@ -90,19 +89,18 @@ class PlanPairs:
 
     def _after(self, mixed: Mixed, one: int, other: int) -> Mixed | None:
         """What becomes of two plans after an edge of each; None if a mixture fails."""
-        two = self.space.labels_of(one), self.space.labels_of(other)
+        two = [*zip(self.space.labels_of(one), self.space.labels_of(other), strict=True)]
         following = dict(mixed)
-        for robot, (mine, theirs) in enumerate(zip(*two, strict=True)):
+        for robot, (mine, theirs) in enumerate(two):
             bit = 1 << robot
             if mine != theirs and not max(mixed) & bit:
                 following |= {robots | bit: node for robots, node in following.items()}
         for robots, node in following.items():
-            tree: Any = self._edges.of(node)
-            for robot, labels in enumerate(zip(*two, strict=True)):
-                tree = tree.get(labels[robots >> robot & 1])
-                if tree is None:
-                    return None
-            following[robots] = tree  # at its end, the target
+            labels = tuple(both[robots >> robot & 1] for robot, both in enumerate(two))
+            target = self._choices.edges_of(node).get(labels)
+            if target is None:
+                return None
+            following[robots] = target
         return following
 
     def _place(self, mixed: Mixed | None) -> int | None:

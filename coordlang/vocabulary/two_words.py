@@ -38,7 +38,8 @@ class TwoWords:
     def __init__(self, pairs: PlanPairs, states: Sequence[int], clauses: Sequence[Clause]) -> None:
         self._pairs, self._states, self._clauses = pairs, states, clauses
         self._formula: _Changes | None = None
-        self._is_complete = False
+        #: Whether the formula is of all pairs, and how many pairs of edges it is of.
+        self._is_complete, self._known = False, 0
         self.conflicts = 0
 
     def find(
@@ -66,10 +67,10 @@ class TwoWords:
 
     def _next_formula(self, most: int) -> _Changes:
         """The formula of more pairs."""
-        wanted = max(_FIRST, _MORE * self._pairs.looked_at)
+        wanted = max(_FIRST, _MORE * self._known)
         if wanted > most:
             raise Undecided
-        self._is_complete = self._pairs.grow(wanted)
+        self._is_complete, self._known = self._pairs.grow(wanted), self._pairs.looked_at
         return _Changes(self._pairs)
 
     def close(self) -> None:
