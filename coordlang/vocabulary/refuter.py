@@ -33,7 +33,7 @@ _LEAST_PARTS = 8
 _TASKS_OF_A_PART = 1_500
 #: Failing tuples of a part that are collected at the beginning, and later at a time: each walk
 #: is short if it need not find many.
-_AT_FIRST, _LATER = 4_000, 20
+_AT_FIRST, _LATER = 1_000, 20
 #: Longer tuples are left out of what is looked at once there are so many.
 _ENOUGH = 2_000
 
