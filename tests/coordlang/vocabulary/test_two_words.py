@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import closing
+from dataclasses import replace
 from itertools import combinations, islice, product
 from math import inf
 
@@ -18,10 +19,10 @@ from coordlang.language.candidates import Candidates, from_problems
 from coordlang.language.warping import Pair, pair
 from coordlang.required.choices import Choices
 from coordlang.vocabulary.loop import Budget, Languages
+from coordlang.vocabulary.minimal import MinimalSearch
 from coordlang.vocabulary.plan_pairs import PlanPairs, failing_pairs
 from coordlang.vocabulary.sat import END, START, PairStep, Undecided
 from coordlang.vocabulary.two_words import TwoWords
-from planners.system.limits import time_limit
 from tests.support import naive
 from tests.support.candidates import MOST, listed, requiring, small_candidates
 from tests.support.texts import parsed
@@ -168,12 +169,17 @@ def test_few_pairs_prove_nothing_too_much_and_the_next_call_goes_on() -> None:
         assert search.find(lambda _: False, Budget(), 10**6) is None
 
 
-@pytest.mark.parametrize("reserve", [0.0, 0.5])
-def test_a_bound_for_a_certificate_is_proved_by_clauses(reserve: float) -> None:
+@pytest.mark.parametrize("by_clauses", [False, True])
+def test_a_bound_is_counted_unless_clauses_must_prove_it(by_clauses: bool) -> None:
     """The same tone twice: four plans, each two fail, and three numbers of changes in four steps."""
-    with time_limit(60):
-        built = build_language(bells(EQUAL[:2], EQUAL[:2]), "minimal", reserve=reserve)
+    job = Making(bells(EQUAL[:2], EQUAL[:2])).job(MethodOptions())
+    with closing(MinimalSearch(replace(job, by_clauses=by_clauses))) as search:
+        assert search.decide(2, Budget(rounds=2)) != by_clauses
+        assert (search.lower, search.refuting) == (2 if by_clauses else 3, {})
+
+
+def test_clauses_prove_what_is_counted() -> None:
+    built = build_language(bells(EQUAL[:2], EQUAL[:2]), "minimal", reserve=0.5)
     guarantee = built.language.guarantee
     assert (guarantee.size, guarantee.lower_bound, guarantee.proved_minimal) == (3, 3, True)
-    assert bool(built.outcome.refuting) == bool(reserve)
     assert built.certificate().refuted == 2
