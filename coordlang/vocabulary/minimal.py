@@ -53,11 +53,12 @@ _PAIRS, _FIRST_PAIRS = 1_000, 30
 _BEGINNING = 10
 #: What may be spent on each number at first.
 _SOON = Budget(rounds=10, conflicts=2_000)
-#: Conflicts of the solver for two words of one task.
-_FOR_TWO = 30_000
-#: Of pairs of edges that two plans take so many are looked at for two words for each round of a
-#: budget, some seconds' for words that tell plans apart step by step; so many count as a conflict.
-_FOR_ROUND, _MOST_PAIRS, _EDGES = 12_000, 400_000, 20
+#: For each round of a budget so many pairs of edges that two plans take are looked at for two words
+#: of one task, and so many conflicts allowed: small formulas may need many.
+_FOR_ROUND, _CONFLICTS = 12_000, 40_000
+#: Pairs of edges that are looked at for words that tell plans apart step by step, in some seconds;
+#: so many count as a conflict.
+_MOST_PAIRS, _EDGES = 400_000, 20
 #: Rounds are dear where there are more pairs of edges that leave one node.
 _DEAR = 30_000
 #: Rounds that partitions of a kind are given for one task at first, one time after another, and
@@ -357,7 +358,7 @@ class MinimalSearch:
 
     def _of_two_words(self, search: TwoWords, budget: Budget) -> dict[int, int] | None:
         left = self._most - self.work
-        conflicts = max(0, min(_FOR_TWO, left))
+        conflicts = max(0, min(_CONFLICTS * budget.rounds, left))
         edges = min(_FOR_ROUND * budget.rounds, _EDGES * left)
         return search.find(self._holds, Budget(budget.rounds, conflicts), edges)
 
