@@ -171,13 +171,13 @@ def failing_pairs(pairs: PlanPairs, within: float, most: int) -> list[PairStep]:
         nodes = pair(*step.nodes)
         after = after_failing(nodes, within) if step.after == FAILED else step.after
         steps.add((START if step.before < len(space) else step.before, nodes, after))
-    while left:
+    while left and len(steps) <= most:
         both, within = place = left.pop()
         one, other = ({space.target_of(edge) for edge in space.out_edges(node)} for node in both)
         for nodes in {pair(*nodes) for nodes in product(one, other)}:
             steps.add((place, nodes, after_failing(nodes, within - 1)))
-        if len(steps) > most:
-            raise Undecided
+    if len(steps) > most:
+        raise Undecided
     numbers: dict[object, int] = defaultdict(count(1).__next__, {START: START, END: END})
     found = []
     for before, nodes, after in steps:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import replace
 from itertools import combinations, islice, product
 from math import inf
@@ -59,7 +59,7 @@ def test_pairs_of_plans_that_fail_are_the_paths_of_a_graph(robots: int, number: 
                 for path in set(paths_of(failing_pairs(pairs, within, 10**6))):
                     begun = {whole[: len(path)] for whole in paths}
                     assert path in begun
-            with pytest.raises(Undecided):
+            with pytest.raises(Undecided) if paths else nullcontext():
                 failing_pairs(pairs, inf, 0)
     assert told >= 2 * number, told
 
