@@ -225,7 +225,7 @@ class MinimalSearch:
             self.decide(self.lower, Budget())
 
     def _begin_with_one_task(self) -> None:
-        """Count how many sentences are needed, and look for words of a kind."""
+        """Decide two words, and look for words of a kind."""
         (space,) = self._job.candidates.spaces
         if self._two_words is not None and self.lower == 2 < self.upper:
             self._find_or_refute(2, _SOON)

@@ -41,7 +41,7 @@ _STUTTER_FREE, _ALL_PAIRS = Budget(rounds=8, conflicts=2_000), Budget(rounds=8, 
 #: Failing tuples of one length, under one symmetry, that are looked at for what they differ in, and
 #: after which longer ones are not.
 _ENOUGH_FOR_FACTS = 500
-#: All pairs of edges that two plans take are so many times those of their first steps, or more.
+#: In large tasks two plans take so many times more pairs of edges in all than at first, or more.
 _FIRST_STEPS = 6
 #: How many steps after a mixture has failed plans must be told apart.
 _WITHIN = 0, 2, inf
@@ -70,13 +70,13 @@ class TiedWords:
     """Looks for languages among such partitions, with effort that grows from call to call."""
 
     def __init__(self, job: Job, languages: Languages, pairs: PlanPairs | None, most: int) -> None:
-        """Begin; of the ``pairs`` of plans of one task so many steps may be looked at."""
+        """Begin; ``most`` steps of ``pairs``, None for many tasks, may be looked at."""
         self._pairs, self._most = pairs, most
         self._states, self._languages = np.array(job.states), languages
         self._refuter = languages.refuter
         self._random = np.random.default_rng(job.seed)
         self._images = languages.refuter.pool.images
-        self._is_one_task = job.candidates.count == 1
+        self._is_one_task = pairs is not None
         self._first = _OF_ONE if self._is_one_task else _OF_MANY
         #: What there may be in common, kind by kind; each size goes through a copy of it.
         self._tied = self._classes(job)

@@ -14,18 +14,15 @@ from itertools import product
 
 import numpy as np
 
-from coordlang.language.warping import Clause, Pair, pair
+from coordlang.language.warping import Clause, pair
 from coordlang.vocabulary.loop import Budget
 from coordlang.vocabulary.plan_pairs import FAILED, PlanPairs
-from coordlang.vocabulary.sat import Undecided, satisfiable
+from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from planners.joint.tables import Ints
-from planners.search.sat import sat_solver
 
 #: Pairs of edges that are looked at first, and how many times as many then: few of the pairs of
 #: plans often suffice for a proof.
 _FIRST, _MORE = 20_000, 5
-#: A literal that is true.
-_TRUE = 1
 
 
 class TwoWords:
@@ -53,12 +50,13 @@ class TwoWords:
         for _ in range(budget.rounds):
             if self._formula is None:
                 self._formula = self._next_formula(most)
-            before = self._formula.conflicts
+            for clause in self._clauses[self._formula.known :]:
+                self._formula.separate_one(clause)
+            self._formula.known, before = len(self._clauses), self._formula.conflicts
             try:
-                word = self._formula.solve(self._clauses, budget.conflicts)
+                found = self._formula.solve(budget.conflicts)
             finally:
                 self.conflicts += self._formula.conflicts - before
-            found = None if word is None else {s: word.get(s, 0) for s in self._states}
             if found is None or holds(found):
                 return found
             if not self._is_complete:
@@ -71,7 +69,7 @@ class TwoWords:
         if wanted > most:
             raise Undecided
         self._is_complete, self._known = self._pairs.grow(wanted), self._pairs.looked_at
-        return _Changes(self._pairs)
+        return _Changes(self._states, self._pairs)
 
     def close(self) -> None:
         """Give back what the solver holds."""
@@ -80,42 +78,19 @@ class TwoWords:
         self._formula = None
 
 
-class _Changes:
-    """A formula: plans of which a mixture fails do not change their word equally often.
+class _Changes(PartitionProblem):
+    """Partitions into two words; of two plans that fail one changes its word more often.
 
-    Variables: a state has the second word; two states differ; two plans are in a place, and the
-    first one has changed its word so many times more often; plans from a node can change it so
-    many times.
+    Further variables: two plans are in a place, and the first one has changed its word so many
+    times more often; plans from a node can change it so many times.  ``known``: how many clauses
+    of other counterexamples are required.
     """
 
-    def __init__(self, pairs: PlanPairs) -> None:
-        self._space, self._solver = pairs.space, sat_solver("cadical153", [[_TRUE]])
-        self._last, self._known = _TRUE, 0
-        self._second = defaultdict[int, int](self._new)
-        self._differ: dict[Pair, int] = {}
+    def __init__(self, states: Sequence[int], pairs: PlanPairs) -> None:
+        super().__init__(states, 2)
+        self._space, self._true, self.known = pairs.space, self._new(), 0
+        self._solver.add_clause([self._true])
         self._add_mixtures(pairs)
-
-    def solve(self, clauses: Sequence[Clause], conflicts: int) -> dict[int, int] | None:
-        """The word of each state, of those that matter, such that ``clauses`` hold, too.
-
-        None if there is none.  Raises `Undecided` after so many ``conflicts``.
-        """
-        for clause in clauses[self._known :]:
-            self._solver.add_clause([self._differs(*states) for states in clause])
-        self._known = len(clauses)
-        if not satisfiable(self._solver, conflicts=conflicts):
-            return None
-        true = {variable for variable in self._solver.get_model() if variable > 0}
-        return {state: int(own in true) for state, own in self._second.items()}
-
-    @property
-    def conflicts(self) -> int:
-        """Those of the solver so far."""
-        return int(self._solver.accum_stats()["conflicts"])
-
-    def close(self) -> None:
-        """Give back what the solver holds."""
-        self._solver.delete()
 
     def _add_mixtures(self, pairs: PlanPairs) -> None:
         """Two plans from place to place, and by how much more often the first one changes."""
@@ -125,7 +100,7 @@ class _Changes:
         for step in sorted(pairs.steps, key=lambda step: (-layer[step.nodes[0]], step)):
             before = step.before
             if before < len(self._space):
-                nodes[before], ahead[before] = (before, before), {0: _TRUE}
+                nodes[before], ahead[before] = (before, before), {0: self._true}
             if step.after == FAILED:
                 failed.add(step.nodes)
             else:
@@ -155,7 +130,7 @@ class _Changes:
         can: dict[int, dict[int, int]] = {}
         for node in np.flatnonzero(self._space.descendants(nodes)).tolist():
             edges = self._space.out_edges(node)
-            own = can[node] = defaultdict(self._new) if edges else {0: _TRUE}
+            own = can[node] = defaultdict(self._new) if edges else {0: self._true}
             for target in sorted({self._space.target_of(edge) for edge in edges}):
                 for literal, changes in self._steps(node, target):
                     for number, below in can[target].items():
@@ -166,23 +141,6 @@ class _Changes:
         """Literals, and how often a step to another node changes the word where they are true."""
         one, other = self._space.state[[node, target]].tolist()
         if one == other:
-            return [(_TRUE, 0)]
-        differ = self._differs(*pair(one, other))
+            return [(self._true, 0)]
+        differ = self._is_separated(pair(one, other))
         return [(differ, 1), (-differ, 0)]
-
-    def _differs(self, one: int, other: int) -> int:
-        if (one, other) not in self._differ:
-            new, first, second = self._new(), self._second[one], self._second[other]
-            self._differ[one, other] = new
-            for clause in (
-                [-new, first, second],
-                [-new, -first, -second],
-                [new, -first, second],
-                [new, first, -second],
-            ):
-                self._solver.add_clause(clause)
-        return self._differ[one, other]
-
-    def _new(self) -> int:
-        self._last += 1
-        return self._last

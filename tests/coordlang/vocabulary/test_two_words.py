@@ -162,7 +162,7 @@ def test_two_words_suffice_iff_some_partition_of_random_models_does(
 
 def test_few_pairs_prove_nothing_too_much_and_the_next_call_goes_on() -> None:
     (space,) = bells(EQUAL, EQUAL).spaces
-    search = TwoWords(PlanPairs(Choices(space)), [], [])
+    search = TwoWords(PlanPairs(Choices(space)), np.unique(space.state).tolist(), [])
     with closing(search):
         with pytest.raises(Undecided):
             search.find(lambda _: True, Budget(), 0)
