@@ -22,7 +22,6 @@ import numpy as np
 
 from coordlang.language.candidates import Candidates
 from coordlang.language.warping import Pair, pair
-from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
 from coordlang.vocabulary.job import Assignment, Job, words_of_states
 from coordlang.vocabulary.loop import Budget, Languages, find
 from coordlang.vocabulary.plan_pairs import PlanPairs, failing_pairs
@@ -100,7 +99,9 @@ class TiedWords:
         if self._pairs is not None:
             yield from self._stutter_free(self._pairs)
             yield from map(_Ties, self._facts)
-        else:
+        else:  # these load networkx
+            from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
+
             tied = [*abstractions(job.candidates, job.states), *map(_orbits, self._images[1:])]
             tied.sort(key=lambda classes: len(np.unique(classes[self._states])))
             yield from map(_Ties, up_to_symmetry(tied, self._images))

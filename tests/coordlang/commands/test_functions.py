@@ -342,6 +342,23 @@ def test_import_loads_the_standard_library_only(used: str) -> None:
     assert set(out.split()) <= {*sys.stdlib_module_names, "coordlang"}
 
 
+def test_build_loads_what_it_needs_only() -> None:
+    """Of igraph not what it draws with, which others who import it get all the same."""
+    code = (
+        "import sys, coordlang\n"
+        "coordlang.build('domains/grid/domain.pddl', 'domains/grid/corners-3x3.pddl')\n"
+        "print(sorted({'matplotlib', 'networkx', 'igraph._igraph'} & set(sys.modules)))\n"
+        "import igraph\n"
+        "from matplotlib.figure import Figure\n"
+        "print(igraph.plot(igraph.Graph(2), target=Figure().subplots()))\n"
+    )
+    exit_code, out, err = python("-c", code)
+    assert exit_code == 0, err
+    loaded, drawn = out.splitlines()
+    assert loaded == "['igraph._igraph']"
+    assert "GraphArtist" in drawn
+
+
 def test_python_m_runs_the_command_line() -> None:
     assert coordlang.__version__ == version("coordlang")
     assert python("-m", "coordlang", "--version")[1].strip().endswith(coordlang.__version__)
