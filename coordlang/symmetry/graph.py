@@ -16,8 +16,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence, Set
 from functools import cache
-from importlib import import_module
-from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -160,20 +159,20 @@ class _ModelGraph:
 
 
 @cache
-def _igraph() -> ModuleType:
+def _igraph() -> Any:
     """igraph, without the matplotlib that it draws with: half the time of a small build.
 
     Whoever imports igraph later gets it whole.
     """
-    if "matplotlib" in sys.modules or "igraph" in sys.modules:
-        return import_module("igraph")
-    sys.modules["matplotlib"] = None  # type: ignore[assignment]
-    try:
-        return import_module("igraph")
-    finally:
-        del sys.modules["matplotlib"]
+    if not {"matplotlib", "igraph"} & sys.modules.keys():
+        sys.modules["matplotlib"] = None  # type: ignore[assignment]
+    import igraph
+
+    if sys.modules.get("matplotlib", igraph) is None:
         for name in [n for n in sys.modules if n.startswith("igraph") and n != "igraph._igraph"]:
             del sys.modules[name]
+        del sys.modules["matplotlib"]
+    return igraph
 
 
 def _shape(formula: Formula) -> str:
