@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from random import Random
 
 from coordlang.execution.task_language import TaskLanguage, language_in_task
-from coordlang.language.candidates import describe
+from coordlang.language.candidates import describe, explored_if_small
 from coordlang.language.listed import planning_task
 from coordlang.language.recorded import recorded_list
 from coordlang.language.words import Language
@@ -21,6 +21,7 @@ from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
 from planners.search.asynchronous import as_executed
 from planners.search.kept_plans import search
+from planners.search.optimal_plans import plan_space
 from planners.system.errors import OutOfMemory, Position, ProvedImpossible, UsageError
 
 #: Tasks looked at for each one shown, so that enough of them require coordination.
@@ -121,9 +122,16 @@ def _candidates(
         listed = recorded_list(first.language)
         random.shuffle(listed)
         tasks = (planning_task(first.model, domain, problem, one, position) for one in listed)
+    # Where states are few they are searched once for all tasks.
+    model = first.model.in_step
+    explored = explored_if_small(model, first.partition.rows)
     for task in tasks:
+        init = task.init[None, :]
         try:
-            space = as_executed(search(first.model.in_step, task))
+            if explored is not None and (explored.numbers(init) >= 0).all():
+                space = as_executed(plan_space(explored, [(task.goal, init)]))
+            else:
+                space = as_executed(search(model, task))
         except ProvedImpossible:
             continue  # of two states one need not be reachable from the other
         word = first.partition.word_of(space.rows)[space.state]
