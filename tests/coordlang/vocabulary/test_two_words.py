@@ -29,7 +29,8 @@ from tests.support.texts import parsed
 
 
 @pytest.mark.parametrize(
-    ("robots", "number"), [(2, 20), (3, 10), pytest.param(3, 80, marks=pytest.mark.thorough)]
+    ("robots", "number"),
+    [(2, 10), (3, 5), *(pytest.param(n, 80, marks=pytest.mark.thorough) for n in (2, 3))],
 )
 def test_pairs_of_plans_that_fail_are_the_paths_of_a_graph(robots: int, number: int) -> None:
     models = (c for _, c in small_candidates(robots, states=9, plans=MOST) if requiring(c))
@@ -128,10 +129,19 @@ def suffice(candidates: Candidates) -> bool:
 
 
 @pytest.mark.parametrize("goal", [ONE_END, MANY])
-def test_two_words_suffice_iff_some_partition_of_all_does(goal: str) -> None:
+@pytest.mark.parametrize(
+    "fits",
+    [
+        pytest.param([*zip(FITS, FITS[2:] + FITS[:2], strict=True), (EQUAL, EQUAL)], id="some"),
+        pytest.param([*product(FITS, repeat=2)], id="all", marks=pytest.mark.thorough),
+    ],
+)
+def test_two_words_suffice_iff_some_partition_of_all_does(
+    fits: Sequence[tuple[Sequence[str], Sequence[str]]], goal: str
+) -> None:
     """Whatever tones fit; and of three tones, where more sentences are needed."""
     told = Counter[bool]()
-    for first, second in [*product(FITS, repeat=2), (EQUAL, EQUAL)]:
+    for first, second in fits:
         candidates = bells(first, second, goal)
         if requiring(candidates):
             found = suffice(candidates)
@@ -142,7 +152,7 @@ def test_two_words_suffice_iff_some_partition_of_all_does(goal: str) -> None:
 
 @pytest.mark.parametrize(
     ("robots", "number"),
-    [(2, 20), (3, 20), *(pytest.param(n, 100, marks=pytest.mark.thorough) for n in (2, 3, 4))],
+    [(2, 10), (3, 10), *(pytest.param(n, 100, marks=pytest.mark.thorough) for n in (2, 3, 4))],
 )
 def test_two_words_suffice_iff_some_partition_of_random_models_does(
     robots: int, number: int
@@ -157,7 +167,7 @@ def test_two_words_suffice_iff_some_partition_of_random_models_does(
         found = suffice(candidates)
         assert found == (least(candidates) == 2)
         told[found] += 1
-    assert min(told[True], told[False]) >= 3, told
+    assert min(told[True], told[False]) >= 2, told
 
 
 def test_few_pairs_prove_nothing_too_much_and_the_next_call_goes_on() -> None:
