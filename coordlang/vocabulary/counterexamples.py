@@ -12,6 +12,7 @@ of what was found only then.
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from itertools import groupby, takewhile
 from random import Random
@@ -54,6 +55,8 @@ class Mixtures:
     def __init__(self, choices: Choices) -> None:
         self._choices, self._space = choices, choices.space
         self._edges = EdgeTrees(choices.space)
+        #: From which nodes mixtures failed, and under how many partitions.
+        self._failed = Counter[int]()
         self._forget()
 
     def _forget(self) -> None:
@@ -66,8 +69,8 @@ class Mixtures:
         """Failing tuples of plans with one sentence, one table for each number of steps.
 
         A table (tuples, steps, robots) has step by step the edge of each plan.
-        For each node that requires coordination, the rest of plans that begin alike; those with
-        fewer steps to go first.
+        For each node that requires coordination, the rest of plans that begin alike; those first
+        from which most partitions failed, then those with fewer steps to go.
 
         ``word``: (nodes) the word of each node of the plan space.  ``most``: about how many are
         wanted.  If there is none at all, ``word`` is a language for the tasks.  ``ways``: so many
@@ -85,9 +88,11 @@ class Mixtures:
         random = Random(0)  # always the same ones
         found: dict[int, list[_Plans]] = {}
         effort = sys.maxsize
-        for node in np.flatnonzero(requires & space.descendants(space.starts)).tolist():
+        nodes = np.flatnonzero(requires & space.descendants(space.starts)).tolist()
+        for node in sorted(nodes, key=lambda node: -self._failed[node]):
             failing = self._of_node(node)
             if failing is not None:
+                self._failed[node] += 1
                 found[node] = [self._plans(node, failing, random)]
                 effort = min(effort, self._visited + _EFFORT * most)
             if len(found) >= most or self._visited > effort:
@@ -98,7 +103,7 @@ class Mixtures:
                 break
             wanted = min(ways * _RANDOM_WAYS, most // len(found) - 1)
             plans += sorted(self._others(node, wanted, random))
-        by_steps = groupby(found, key=lambda node: int(space.layer[node]))
+        by_steps = groupby(sorted(found), key=lambda node: int(space.layer[node]))
         plans_by_steps = ([own for node in nodes for own in found[node]] for _, nodes in by_steps)
         return [np.array(plans, np.int64).transpose(0, 2, 1) for plans in plans_by_steps]
 
