@@ -35,14 +35,18 @@ _MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)
 _NO_PATH = 10**4
 
 
+#: The length of the sequences of a tuple, and how many of them are different.
+Shape = tuple[int, int]
+
+
 @dataclass(frozen=True, slots=True)
 class Agreeing:
-    """Tuples of one length whose images under a symmetry all have one sentence.
+    """Tuples of one shape whose images under a symmetry all have one sentence.
 
-    ``to`` (states) is the symmetry, ``rows`` are the tuples' rows in the table of that length.
+    ``to`` (states) is the symmetry, ``rows`` are the tuples' rows in the table of that shape.
     """
 
-    length: int
+    shape: Shape
     to: Ints
     rows: Ints
 
@@ -51,23 +55,23 @@ class FailingTuples:
     """A pool of failing tuples, closed under a group of symmetries.
 
     ``group``: the symmetries of the tasks.  ``states``: the number of states in the table of
-    states.  ``images``: where the identity and each symmetry take every state.  ``by_length``: the
-    states (length, robots, tuples) of the tuples of each length, old ones first: what is looked at
-    together lies together.
+    states.  ``images``: where the identity and each symmetry take every state.  ``by_shape``: the
+    states (length, plans, tuples) of the tuples of each shape, old ones first: what is looked at
+    together lies together.  A plan that several robots have is there once.
     """
 
     def __init__(self, group: SymmetryGroup, states: int) -> None:
         self.group, self.states = group, states
         self.images: list[Ints] = [np.arange(states), *(s.states for s in group.symmetries)]
-        self.by_length: dict[int, Ints] = {}
-        #: Where the tuples of each length come from (tuples, 2): number of a batch, row in it.
-        self._sources: dict[int, Ints] = {}
+        self.by_shape: dict[Shape, Ints] = {}
+        #: Where the tuples of each shape come from (tuples, 2): number of a batch, row in it.
+        self._sources: dict[Shape, Ints] = {}
         self._batches: list[tuple[PlanSpace, Ints]] = []
         self._keys = np.zeros(0, np.int64)
 
     def __len__(self) -> int:
         """Count the tuples, one for all their images."""
-        return sum(by_step.shape[2] for by_step in self.by_length.values())
+        return sum(by_step.shape[2] for by_step in self.by_shape.values())
 
     def add(self, edges: Ints, space: PlanSpace) -> int:
         """Add failing tuples of plans, by their edges; how many of them are new."""
@@ -77,13 +81,17 @@ class FailingTuples:
         for length in np.unique(high - low).tolist():
             rows = np.flatnonzero(high - low == length)
             cells = low[rows, None] + np.arange(length)
-            different = np.take_along_axis(states[rows], cells[:, None, :], axis=2)
-            fresh = self._new(different)
-            here = np.arange(kept, kept + len(fresh))
-            kept += len(fresh)
-            batch.append(rows[fresh])
-            source = np.column_stack((np.full(len(fresh), len(self._batches)), here))
-            self._append(length, different[fresh], source)
+            plans = np.take_along_axis(states[rows], cells[:, None, :], axis=2)
+            once = _once(plans)
+            for number in np.unique(once.sum(axis=1)).tolist():
+                mine = np.flatnonzero(once.sum(axis=1) == number)
+                different = plans[mine][once[mine]].reshape(len(mine), number, length)
+                fresh = self._new(different)
+                here = np.arange(kept, kept + len(fresh))
+                kept += len(fresh)
+                batch.append(rows[mine[fresh]])
+                source = np.column_stack((np.full(len(fresh), len(self._batches)), here))
+                self._append((length, number), different[fresh], source)
         self._batches.append((space, edges[np.concatenate(batch)]))
         return kept
 
@@ -97,13 +105,13 @@ class FailingTuples:
         so many.
         """
         found: list[Agreeing] = []
-        for length, by_step in sorted(self.by_length.items()):
+        for shape, by_step in sorted(self.by_shape.items()):
             if sum(len(shorter.rows) for shorter in found) >= enough:
                 break
             for to in self.images if images is None else images:
                 rows = np.flatnonzero(sequences_agree(word[to].take(by_step)))
                 if len(rows):
-                    found.append(Agreeing(length, to, rows))
+                    found.append(Agreeing(shape, to, rows))
         return found
 
     def codes(
@@ -115,7 +123,7 @@ class FailingTuples:
         """
         total = sum(len(found.rows) for found in agreeing)
         tables = []
-        for _, together in groupby(agreeing, key=lambda found: found.length):
+        for _, together in groupby(agreeing, key=lambda found: found.shape):
             parts = []
             for found in together:
                 rows = found.rows
@@ -133,8 +141,8 @@ class FailingTuples:
         )
 
     def sequences(self, agreeing: Agreeing, rows: Ints) -> Ints:
-        """The state sequences (rows, robots, length) of images of tuples."""
-        found: Ints = agreeing.to[self.by_length[agreeing.length][:, :, rows].transpose(2, 1, 0)]
+        """The state sequences (rows, plans, length) of images of tuples."""
+        found: Ints = agreeing.to[self.by_shape[agreeing.shape][:, :, rows].transpose(2, 1, 0)]
         return found
 
     def clauses(
@@ -149,7 +157,7 @@ class FailingTuples:
         most = _WARPED * returned
         total = sum(len(found.rows) for found in agreeing)
         clauses: dict[Clause, Ints] = {}
-        for length, together in groupby(agreeing, key=lambda found: found.length):
+        for shape, together in groupby(agreeing, key=lambda found: found.shape):
             groups = list(together)
             rows = np.concatenate([found.rows for found in groups])
             image = np.repeat(np.arange(len(groups)), [len(found.rows) for found in groups])
@@ -158,12 +166,12 @@ class FailingTuples:
                 drawn = random.permutation(len(rows))[:share]
                 rows, image = rows[drawn], image[drawn]
             words = np.stack([word[found.to] for found in groups])
-            states = self.by_length[length][:, :, rows].transpose(2, 1, 0)
+            states = self.by_shape[shape][:, :, rows].transpose(2, 1, 0)
             pairs = _pairs(states, words[image[:, None, None], states], self.states)
             for row in np.flatnonzero((pairs != -2).all(axis=1)).tolist():
                 codes = {*pairs[row].tolist()} - {-1}
                 clause = frozenset(divmod(code, self.states) for code in codes)
-                clauses.setdefault(clause, self._sources[length][rows[row]])
+                clauses.setdefault(clause, self._sources[shape][rows[row]])
         chosen = sorted(clauses, key=lambda c: (len(c), sorted(c)))[:returned]
         return {clause: self._evidence(*clauses[clause].tolist()) for clause in chosen}
 
@@ -181,14 +189,14 @@ class FailingTuples:
         self._keys = np.concatenate((self._keys, keys[fresh]))
         return np.sort(first[fresh])
 
-    def _append(self, length: int, states: Ints, source: Ints) -> None:
+    def _append(self, shape: Shape, states: Ints, source: Ints) -> None:
         if not len(states):
             return
         by_step = states.transpose(2, 1, 0)
-        if length in self.by_length:
-            by_step = np.concatenate((self.by_length[length], by_step), axis=2)
-            source = np.concatenate((self._sources[length], source))
-        self.by_length[length], self._sources[length] = np.ascontiguousarray(by_step), source
+        if shape in self.by_shape:
+            by_step = np.concatenate((self.by_shape[shape], by_step), axis=2)
+            source = np.concatenate((self._sources[shape], source))
+        self.by_shape[shape], self._sources[shape] = np.ascontiguousarray(by_step), source
 
 
 def plan_states(space: PlanSpace, edges: Ints) -> Ints:
@@ -209,6 +217,15 @@ def _different_part(states: Ints) -> tuple[Ints, Ints]:
     return np.argmin(same, axis=1) - 1, np.where(after > 0, steps - after + 1, steps)
 
 
+def _once(plans: Ints) -> Bools:
+    """(tuples, robots) the different sequences of each (tuples, robots, length), at least two."""
+    once = np.ones(plans.shape[:2], np.bool_)
+    for robot in range(plans.shape[1]):
+        once[:, robot] = (plans[:, :robot] != plans[:, robot, None]).any(axis=2).all(axis=1)
+    once[once.sum(axis=1) == 1, 1] = True
+    return once
+
+
 def _keys(states: Ints) -> Ints:
     """A number for each tuple that does not depend on the order of its sequences."""
     code = np.zeros(states.shape[:2], np.uint64)
@@ -222,7 +239,7 @@ def _keys(states: Ints) -> Ints:
 def sequences_agree(words: Ints) -> Bools:
     """(tuples) whether all sequences of each have one sentence; rarely true where they have not.
 
-    ``words``: (length, robots, tuples) the words of the states.
+    ``words``: (length, plans, tuples) the words of the states.
     """
     named = words.astype(np.uint64) + np.uint64(1)
     before = named[0]
@@ -235,14 +252,14 @@ def sequences_agree(words: Ints) -> Bools:
 
 
 def _pairs(sequences: Ints, words: Ints, states: int) -> Ints:
-    """The codes of the pairs in the clause of each tuple (tuples, robots, length); see `_cells`.
+    """The codes of the pairs in the clause of each tuple (tuples, plans, length); see `_cells`.
 
     ``sequences`` and ``words``: the states of the tuples' plans, and their words.  ``states``: more
     than every state number.
     """
-    robots = sequences.shape[1]
+    plans = sequences.shape[1]
     cells = [
-        _cells(sequences[:, [0, other]], words[:, [0, other]], states) for other in range(1, robots)
+        _cells(sequences[:, [0, other]], words[:, [0, other]], states) for other in range(1, plans)
     ]
     return np.concatenate(cells, axis=1)
 

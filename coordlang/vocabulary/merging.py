@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from coordlang.vocabulary.failing_tuples import FailingTuples, sequences_agree
+from coordlang.vocabulary.failing_tuples import FailingTuples, Shape, sequences_agree
 from coordlang.vocabulary.job import Assignment, words_of_states
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import Undecided
@@ -54,7 +54,7 @@ def merged(
                 return
             closed, left, steps = forbidden_merges(pool, word, {}), False, 2 * steps
             continue
-        known = {length: own.shape[2] for length, own in pool.by_length.items()}
+        known = {shape: own.shape[2] for shape, own in pool.by_shape.items()}
         try:
             holds = not refuter.agreeing(trial, None, 1, steps)
         except Undecided:
@@ -70,16 +70,16 @@ def merged(
         yield {state: int(word[state]) for state in states}
 
 
-def forbidden_merges(pool: FailingTuples, word: Ints, known: Mapping[int, int]) -> Bools:
+def forbidden_merges(pool: FailingTuples, word: Ints, known: Mapping[Shape, int]) -> Bools:
     """(words, words) the pairs of words of a language that some failing tuple forbids to merge.
 
     Those after whose merge all its sequences have one sentence.  Of two sentences the words that
     differ first become one, or one of them becomes the word before: three pairs can do that.
-    ``known`` says how many tuples of each length are not asked.
+    ``known`` says how many tuples of each shape are not asked.
     """
     forbidden = np.eye(int(word.max()) + 1, dtype=np.bool_)
-    for length, by_step in sorted(pool.by_length.items()):
-        for first in range(known.get(length, 0), by_step.shape[2], _TOGETHER):
+    for shape, by_step in sorted(pool.by_shape.items()):
+        for first in range(known.get(shape, 0), by_step.shape[2], _TOGETHER):
             some = by_step[:, :, first : first + _TOGETHER]
             for to in pool.images:
                 _forbid(forbidden, word[to].take(some))
@@ -87,7 +87,7 @@ def forbidden_merges(pool: FailingTuples, word: Ints, known: Mapping[int, int]) 
 
 
 def _forbid(forbidden: Bools, said: Ints) -> None:
-    """Note the merges after which sequences, by their words (length, robots, tuples), agree."""
+    """Note the merges after which sequences, by their words (length, plans, tuples), agree."""
     entered = np.zeros(said.shape, np.int64)
     entered[1:] = (said[1:] != said[:-1]).cumsum(axis=0)
     sentence = np.full(said.shape, -1)

@@ -330,7 +330,7 @@ def _deciding(facts: Bools, left: Bools, steps: Ints, refuter: Refuter) -> list[
 
 
 def _differing(facts: Bools, sequences: Ints) -> Bools:
-    """(different sets, facts) what the plans of each tuple (tuples, robots, length) differ in."""
+    """(different sets, facts) what the plans of each tuple (tuples, plans, length) differ in."""
     values = facts[:, sequences]
     differ = (values != values[:, :, :1]).any(axis=(2, 3))
     found: Bools = np.unique(differ.T, axis=0)

@@ -156,8 +156,6 @@ def test_images_under_symmetries_are_known() -> None:
         agreeing = pool.agreeing(np.array(word))
         assert bool(agreeing) == expected
         some = pool.agreeing(np.array(word), enough=1)
-        assert [a.length for a in some] == [
-            a.length for a in agreeing if a.length == some[0].length
-        ]
+        assert [a.shape for a in some] == [a.shape for a in agreeing if a.shape == some[0].shape]
         answers[expected] += 1
     assert min(answers[True], answers[False]) >= 5, answers
