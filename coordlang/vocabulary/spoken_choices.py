@@ -92,7 +92,7 @@ class SpokenChoices:
 
     def __init__(self, choices: Choices) -> None:
         self.space, self.words = choices.space, SentenceSets()
-        self._of_node: list[tuple[int, ...]] = []
+        self._of_node: dict[int, tuple[int, ...]] = {}
         self.word: list[int] = []
         self.labels: list[list[int]] = self.space.labels.tolist()
         self.targets: list[int] = self.space.targets().tolist()
@@ -116,19 +116,20 @@ class SpokenChoices:
         least = np.full(len(words), len(self.space.rows))
         np.minimum.at(least, number, self.space.state)
         self.word = least[number].tolist()
-        self._of_node = []
+        self._of_node = {}
 
-    def of_node(self, wanted: int) -> tuple[int, ...]:
-        """For a node the number of each robot's set; found from the goals up, as far as asked."""
-        for node in range(len(self._of_node), wanted + 1):
+    def of_node(self, node: int) -> tuple[int, ...]:
+        """For a node the number of each robot's set; nodes below it are looked at for it only."""
+        known = self._of_node.get(node)
+        if known is None:
             moves: list[dict[int, int]] = [{} for _ in range(self.space.robots)]
             for edge in self.space.out_edges(node):
-                below = self._of_node[self.targets[edge]]
+                below = self.of_node(self.targets[edge])
                 for robot, own in enumerate(moves):
                     code, after = self.code(robot, edge, node), below[robot]
                     own[code] = self._sets.union(own.get(code, after), after)
-            self._of_node.append(tuple(map(self._sets.of_moves, moves)))
-        return self._of_node[wanted]
+            known = self._of_node[node] = tuple(map(self._sets.of_moves, moves))
+        return known
 
     def entered(self, edge: int, node: int) -> Words:
         """The word that a plan enters by an edge out of a node, if it does."""
