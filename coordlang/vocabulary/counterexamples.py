@@ -150,9 +150,11 @@ class Mixtures:
         for codes, following, target in self._moves(self._edges.of(node), ahead, random):
             if target is None:
                 return codes, self._one_sentence(following, random)
-            together = zip(*(words for words, _ in following), strict=False)
-            said = len(list(takewhile(lambda words: len(set(words)) == 1, together)))
-            below = tuple((words[said:], own) for words, own in following)
+            below, said = following, 0
+            if all(words for words, _ in following):
+                together = zip(*(words for words, _ in following), strict=False)
+                said = len(list(takewhile(lambda words: len(set(words)) == 1, together)))
+                below = tuple((words[said:], own) for words, own in following)
             found = self._failing(target, below, random)
             if found is not None:
                 steps, sentence = found
