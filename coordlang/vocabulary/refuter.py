@@ -153,6 +153,8 @@ class Refuter:
         self.walks += 1
         for table in found:
             self.pool.add(table, walked.space)
+            if isinstance(walked.finder, Mixtures):  # here, not where a worker may have found it
+                walked.finder.met(table)
         return bool(found)
 
 

@@ -29,7 +29,7 @@ from planners.joint.tables import Ints
 from planners.parallel.batch import Store
 from planners.parallel.workers import Workers
 from tests.support.candidates import small_candidates
-from tests.support.domains import all_tasks
+from tests.support.domains import all_tasks, own_task
 from tests.support.random_spaces import random_spaces
 
 
@@ -208,9 +208,13 @@ def test_walks_of_goals_up_to_symmetry_refute_what_is_no_language(folder: str, s
 
 
 @pytest.mark.filterwarnings("error")
-def test_first_walks_find_the_same_in_other_processes_and_from_kept_jobs(tmp_path: Path) -> None:
-    """The same plans in the same order, so the same clauses for the same reasons."""
-    candidates = all_tasks("grid", "gw2-2x3")
+@pytest.mark.parametrize("robots", [2, 3])
+def test_first_walks_find_the_same_in_other_processes_and_from_kept_jobs(
+    robots: int, tmp_path: Path
+) -> None:
+    """The same plans in the same order, so the same clauses for the same reasons, and later, too."""
+    both = all_tasks("grid", "gw2-2x3"), own_task("grid", "three-robots-3x3")
+    candidates = both[robots - 2]
     group, states = symmetry_group(candidates), len(candidates.rows)
     halves = np.arange(states) % 2
 
@@ -225,10 +229,13 @@ def test_first_walks_find_the_same_in_other_processes_and_from_kept_jobs(tmp_pat
     for other in others:
         assert other.walks == here.walks == jobs
         assert len(other.pool) == len(here.pool) > 20
-    violated = [
-        [(c, e.edges) for c, e in found.violated(halves).items()] for found in (here, *others)
-    ]
-    assert violated[0]
-    assert all(found == violated[0] for found in violated[1:])
+    for _ in range(2):
+        violated = [
+            [(c, e.edges) for c, e in found.violated(halves).items()] for found in (here, *others)
+        ]
+        assert violated[0]
+        assert all(found == violated[0] for found in violated[1:])
+        for found in (here, *others):
+            found.pool = FailingTuples(group, states)  # it knows nothing, and has to walk
     refuter(kept, first=halves)
     assert len(list(tmp_path.iterdir())) == 2 * jobs, "other words, other jobs"

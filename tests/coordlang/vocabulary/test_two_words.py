@@ -133,7 +133,9 @@ def suffice(candidates: Candidates) -> bool:
     "fits",
     [
         pytest.param([*zip(FITS, FITS[2:] + FITS[:2], strict=True), (EQUAL, EQUAL)], id="some"),
-        pytest.param([*product(FITS, repeat=2)], id="all", marks=pytest.mark.thorough),
+        pytest.param(
+            [*product(FITS, repeat=2), (EQUAL, EQUAL)], id="all", marks=pytest.mark.thorough
+        ),
     ],
 )
 def test_two_words_suffice_iff_some_partition_of_all_does(
