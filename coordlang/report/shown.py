@@ -116,15 +116,15 @@ def _candidates(
     first: TaskLanguage, domain: Domain, problem: Problem, random: Random, position: Position | None
 ) -> Iterator[TaskLanguage]:
     """Yield the language's candidate tasks in random order, some of them more than once."""
-    if first.language.provenance.tasks.get("kind") == "all":
+    kind, explored, model = first.language.provenance.tasks.get("kind"), None, first.model.in_step
+    if kind != "problems":  # many tasks: where states are few they are searched once for all
+        explored = explored_if_small(model, first.partition.rows)
+    if kind == "all":
         tasks = _pairs(first, random)
     else:
         listed = recorded_list(first.language)
         random.shuffle(listed)
         tasks = (planning_task(first.model, domain, problem, one, position) for one in listed)
-    # Where states are few they are searched once for all tasks.
-    model = first.model.in_step
-    explored = explored_if_small(model, first.partition.rows)
     for task in tasks:
         init = task.init[None, :]
         try:

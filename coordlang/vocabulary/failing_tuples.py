@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from coordlang.language.warping import Clause
 from coordlang.symmetry.group import SymmetryGroup
 from coordlang.vocabulary.job import Evidence
-from planners.joint.tables import Bools, Ints
+from planners.joint.tables import Bools, Ints, unique_rows
 from planners.search.plan_space import PlanSpace
 
 #: Images of clauses returned at a time, at most.
@@ -33,7 +33,6 @@ _WARPED = 10
 _MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)
 #: Cost of a cell that no warping path of equal words passes.
 _NO_PATH = 10**4
-
 
 #: The length of the sequences of a tuple, and how many of them are different.
 Shape = tuple[int, int]
@@ -77,21 +76,20 @@ class FailingTuples:
         """Add failing tuples of plans, by their edges; how many of them are new."""
         states = plan_states(space, edges)
         low, high = _different_part(states)
+        once = _once(states)
+        shapes, shape_of = unique_rows(np.column_stack((high - low, once.sum(axis=1))))
         batch, kept = [np.zeros(0, np.int64)], 0
-        for length in np.unique(high - low).tolist():
-            rows = np.flatnonzero(high - low == length)
+        for number, (length, plans) in enumerate(shapes.tolist()):
+            rows = np.flatnonzero(shape_of == number)
             cells = low[rows, None] + np.arange(length)
-            plans = np.take_along_axis(states[rows], cells[:, None, :], axis=2)
-            once = _once(plans)
-            for number in np.unique(once.sum(axis=1)).tolist():
-                mine = np.flatnonzero(once.sum(axis=1) == number)
-                different = plans[mine][once[mine]].reshape(len(mine), number, length)
-                fresh = self._new(different)
-                here = np.arange(kept, kept + len(fresh))
-                kept += len(fresh)
-                batch.append(rows[mine[fresh]])
-                source = np.column_stack((np.full(len(fresh), len(self._batches)), here))
-                self._append((length, number), different[fresh], source)
+            different = states[rows][once[rows]].reshape(len(rows), plans, -1)
+            different = np.take_along_axis(different, cells[:, None, :], axis=2)
+            fresh = self._new(different)
+            here = np.arange(kept, kept + len(fresh))
+            kept += len(fresh)
+            batch.append(rows[fresh])
+            source = np.column_stack((np.full(len(fresh), len(self._batches)), here))
+            self._append((length, plans), different[fresh], source)
         self._batches.append((space, edges[np.concatenate(batch)]))
         return kept
 

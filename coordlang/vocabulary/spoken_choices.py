@@ -119,7 +119,7 @@ class SpokenChoices:
         self._of_node = {}
 
     def of_node(self, node: int) -> tuple[int, ...]:
-        """For a node the number of each robot's set; nodes below it are looked at for it only."""
+        """For a node the number of each robot's set, found from those of the nodes below it."""
         known = self._of_node.get(node)
         if known is None:
             moves: list[dict[int, int]] = [{} for _ in range(self.space.robots)]
