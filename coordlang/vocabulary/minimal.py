@@ -12,11 +12,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import islice
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from coordlang.language.warping import Clause
 from coordlang.required.choices import Choices
@@ -34,13 +36,14 @@ from coordlang.vocabulary.merging import merged
 from coordlang.vocabulary.sat import Undecided
 from planners.search.sat import SolverName
 from planners.system.errors import OutOfMemory
-from planners.system.limits import run_until_stopped
+from planners.system.limits import memory_left, run_until_stopped
 
 if TYPE_CHECKING:  # they load networkx
     from coordlang.vocabulary.contained import ContainedInstance
     from coordlang.vocabulary.plan_pairs import PlanPairs
     from coordlang.vocabulary.tied_words import TiedWords
     from coordlang.vocabulary.two_words import TwoWords
+    from coordlang.vocabulary.warped_pairs import PairsApart
 
 #: A thousand conflicts are a unit of effort; a refuted partition counts as so many ..
 _UNIT, _ROUND = 1_000, 250
@@ -59,6 +62,13 @@ _FOR_ROUND, _CONFLICTS = 12_000, 40_000
 #: Pairs of edges that are looked at for words that tell plans apart step by step, in some seconds;
 #: so many count as a conflict.
 _MOST_PAIRS, _EDGES = 400_000, 20
+#: Steps of pairs of plans that fail along their warping paths, in some 20 seconds; so many count as
+#: a conflict.  Each takes so many bytes at most.
+_MOST_STEPS, _STEPS, _BYTES = 11_000_000, 100, 200
+#: Steps by which the plans are apart at most: more make larger graphs and refute hardly more.
+_APART = 3
+#: Conflicts that are allowed for each round of a budget then.
+_HARD = 3_000
 #: Rounds are dear where there are more pairs of edges that leave one node.
 _DEAR = 30_000
 #: Rounds that partitions of a kind are given for one task at first, one time after another, and
@@ -186,6 +196,20 @@ class MinimalSearch:
         return TwoWords(self._plan_pairs, self._job.states, self.languages.clauses)
 
     @cached_property
+    def _apart(self) -> PairsApart | None:
+        """Partitions of one task's states that tell pairs of plans apart; None for large tasks."""
+        from coordlang.vocabulary.warped_pairs import PairsApart, WarpedPairs, steps_apart
+
+        left = self._most - self.work
+        most = min(_MOST_STEPS, _STEPS * left, memory_left() // _BYTES)
+        apart = min(_APART, steps_apart(self._plan_pairs.space, most))
+        if apart < 1:
+            return None
+        self._plan_pairs.grow(min(_MOST_PAIRS, _EDGES * left))
+        random, pairs = np.random.default_rng(self._job.seed), WarpedPairs(self._plan_pairs, apart)
+        return PairsApart(self._job.states, self.languages.clauses, pairs, random)
+
+    @cached_property
     def _contained(self) -> list[ContainedInstance]:
         candidates, group = self._job.candidates, self.languages.group
         if self._is_one_task:  # it contains itself alone
@@ -225,10 +249,13 @@ class MinimalSearch:
             self.decide(self.lower, Budget())
 
     def _begin_with_one_task(self) -> None:
-        """Decide two words, and look for words of a kind."""
+        """Decide what is soon decided from below, and look for words of a kind."""
         (space,) = self._job.candidates.spaces
-        if self._two_words is not None and self.lower == 2 < self.upper:
-            self._find_or_refute(2, _SOON)
+        while self._two_words is not None and self._is_open:
+            if self.lower > 2 and self._apart is None:
+                break
+            if not self._find_or_refute(self.lower, _SOON):
+                break
         if len(space.target) * between(self.lower, self.upper) > _CLAUSES:
             found = self._tied.of_facts()
             if found is not None and word_count(found) < self.upper:
@@ -266,6 +293,8 @@ class MinimalSearch:
             conflicts += self._tied.conflicts
         if self._two_words is not None:
             conflicts += self._two_words.conflicts + self._plan_pairs.looked_at // _EDGES
+        if (apart := self.__dict__.get("_apart")) is not None:
+            conflicts += apart.conflicts + apart.steps // _STEPS
         return conflicts + rounds * (_ROUND + self._pairs // _PAIRS)
 
     @property
@@ -335,32 +364,50 @@ class MinimalSearch:
         return True
 
     def _refuted(self, size: int, budget: Budget) -> Mapping[Clause, Evidence] | None:
-        """The clauses that refute so few words; None, and a language is offered, if none do."""
+        """The clauses that refute so few words; None, and a language is offered, if none do.
+
+        None of them where pairs of plans do.
+        """
+        ways = [self._by_clauses, self._by_pairs]
+        if size > 2 and self.__dict__.get("_apart") is not None:
+            ways.reverse()
+        for way in ways:
+            with suppress(Undecided):
+                found = way(size, budget)
+                break
+        else:
+            raise Undecided
+        self._partitions.drop(size)
+        if found is None:
+            return dict(self.languages.evidence) if way == self._by_clauses else {}
+        self._offer(found)
+        self.merge(_VAIN)
+        return None
+
+    def _by_clauses(self, size: int, budget: Budget) -> dict[int, int] | None:
+        """A language of so many words, None if known clauses refute them.  Raises `Undecided`."""
 
         def partition(conflicts: int) -> dict[int, int] | None:
             if self._is_spent:
                 raise Undecided
             return self._partitions.find(size, min(conflicts, self._most - self.work))
 
-        refuting = self.languages.evidence
-        try:
-            found = find(partition, self._holds, budget)
-        except Undecided:
-            if size != 2 or self._two_words is None:
-                raise
-            found, refuting = self._of_two_words(self._two_words, budget), {}  # not by clauses
-        self._partitions.drop(size)
-        if found is None:
-            return dict(refuting)
-        self._offer(found)
-        self.merge(_VAIN)
-        return None
+        return find(partition, self._holds, budget)
 
-    def _of_two_words(self, search: TwoWords, budget: Budget) -> dict[int, int] | None:
-        left = self._most - self.work
-        conflicts = max(0, min(_CONFLICTS * budget.rounds, left))
-        edges = min(_FOR_ROUND * budget.rounds, _EDGES * left)
-        return search.find(self._holds, Budget(budget.rounds, conflicts), edges)
+    def _by_pairs(self, size: int, budget: Budget) -> dict[int, int] | None:
+        """The same by what is said of all pairs of plans of one task."""
+        two_words = self._two_words
+        if two_words is None:
+            raise Undecided
+        left = max(0, self._most - self.work)
+        if size == 2:
+            edges = min(_FOR_ROUND * budget.rounds, _EDGES * left)
+            own = Budget(budget.rounds, min(_CONFLICTS * budget.rounds, left))
+            return two_words.find(self._holds, own, edges)
+        if (apart := self._apart) is None:
+            raise Undecided
+        own = Budget(budget.rounds, min(_HARD * budget.rounds, left))
+        return find(partial(apart.find, size), self._holds, own)
 
     def _finds_tied(self, size: int, rounds: int) -> bool:
         """Whether a language with so many words is soon found among those of some kinds."""
@@ -406,7 +453,7 @@ class MinimalSearch:
 
     def close(self) -> None:
         """Give back what the solvers hold."""
-        for name in ("_partitions", "_tied", "_two_words"):
+        for name in ("_partitions", "_tied", "_two_words", "_apart"):
             if (search := self.__dict__.get(name)) is not None:
                 search.close()
         for instance in self.__dict__.get("_contained", ()):

@@ -14,11 +14,14 @@ import numpy as np
 
 from coordlang.language.warping import Pair, pair
 from coordlang.required.choices import Choices
-from coordlang.vocabulary.sat import END, START, PairStep, Undecided
+from coordlang.vocabulary.sat import END, START, Undecided
+from planners.joint.tables import Ints
 
 #: For each set of robots, as bits, the node that is reached where these follow the second plan and
 #: the others the first one; only robots that the plans tell apart.
 Mixed = dict[int, int]
+#: Robots that may follow either of two plans, of which all choices are looked at.
+_FREE = 4
 #: The place of two plans of which some mixture has failed.
 FAILED = -1
 
@@ -128,17 +131,26 @@ class PlanPairs:
         )
 
     def _can_fail(self, mixed: Mixed) -> bool:
-        """Whether something fails of what robots may do from where their plans are."""
-        plans = mixed[0], mixed[max(mixed)]
+        """Whether something fails of what robots may do from where their plans are.
+
+        Those that the plans did not tell apart may follow either.  Yes, too, if many of them can.
+        """
+        told, sets = max(mixed), (self._sets[mixed[0]], self._sets[mixed[max(mixed)]])
+        free = [
+            1 << robot
+            for robot, (one, other) in enumerate(zip(*sets, strict=True))
+            if not told >> robot & 1 and one != other
+        ]
+        if len(free) > _FREE:
+            return True
+        chosen = [sum(some) for some in product(*((0, bit) for bit in free))]
         return any(
             self._choices.fails(
-                tuple(
-                    self._sets[plans[robots >> robot & 1]][robot]
-                    for robot in range(self.space.robots)
-                ),
+                tuple(sets[(robots | also) >> robot & 1][robot] for robot in range(len(sets[0]))),
                 node,
             )
             for robots, node in mixed.items()
+            for also in chosen
         )
 
 
@@ -146,12 +158,13 @@ def _of_robots(labels: tuple[int, ...], robots: int) -> tuple[int, ...]:
     return tuple(label for robot, label in enumerate(labels) if robots >> robot & 1)
 
 
-def failing_pairs(pairs: PlanPairs, within: float, most: int) -> list[PairStep]:
+def failing_pairs(pairs: PlanPairs, within: float, most: int) -> Ints:
     """Steps such that on each path from the start to the end two plans must be told apart.
 
     The paths are the pairs of plans that fail, of those that were looked at: from where they differ
     to ``within`` steps after a mixture has failed; 0: to that step, infinitely many: to their ends.
-    Raises `Undecided` if there are more than about ``most`` steps.
+    Raises `Undecided` if there are more than about ``most`` steps.  They are a table, see
+    `PartitionProblem.separate_on_paths`.
     """
     space = pairs.space
     #: The nodes of two plans of which a mixture has failed, with the steps that are left.
@@ -179,9 +192,7 @@ def failing_pairs(pairs: PlanPairs, within: float, most: int) -> list[PairStep]:
     if len(steps) > most:
         raise Undecided
     numbers: dict[object, int] = defaultdict(count(1).__next__, {START: START, END: END})
-    found = []
-    for before, nodes, after in steps:
-        first, second = space.state[list(nodes)].tolist()
-        states = pair(first, second) if first != second else None
-        found.append(PairStep(numbers[before], states, numbers[after]))
-    return sorted(found, key=lambda step: (step.before, step.after, step.states or ()))
+    found = [(numbers[before], *nodes, numbers[after]) for before, nodes, after in steps]
+    table = np.array(sorted(found), np.int64).reshape(-1, 4)
+    table[:, 1:3] = space.state[table[:, 1:3]]
+    return table

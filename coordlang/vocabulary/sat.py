@@ -7,11 +7,15 @@ A clause with fewer pairs asks for more, and implies every clause that holds its
 from __future__ import annotations
 
 import sys
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from itertools import product, repeat
+from typing import Any
+
+import numpy as np
 
 from coordlang.language.warping import Clause, Pair, pair
+from planners.joint.tables import Ints
 from planners.search.sat import SolverName, sat_solver, solve_slice
 
 
@@ -84,17 +88,6 @@ def clique(edges: Iterable[Pair], weights: Sequence[int] | None = None) -> list[
 _SLICE = 2_000
 
 
-class PairStep(NamedTuple):
-    """A step of two plans that fail together, from one place of a graph to another.
-
-    ``states`` are those that the plans enter, None if both enter the same.
-    """
-
-    before: int
-    states: Pair | None
-    after: int
-
-
 #: The places where two plans that fail together begin to differ, and where both have ended.
 START, END = 0, -1
 
@@ -124,6 +117,8 @@ class PartitionProblem:
         self._last = 0
         self._solver = sat_solver(solver)
         self._word = {s: [self._new() for _ in range(size)] for s in states}
+        #: The variables of places that two plans reach; none of the start.
+        self._reached: Ints = np.zeros(1, np.int64)
         self._separated: dict[Pair, int] = {}
         self._equivalent: set[Pair] = set()
         self._all_separated: dict[Clause, int] = {}
@@ -132,6 +127,8 @@ class PartitionProblem:
                 self._one_word(variables)
             else:
                 self._solver.add_clause(variables)
+        #: By word the variable that it is used, once fewer words were asked for.
+        self._used: list[int] = []
         if named:
             self._name_words_in_order()
 
@@ -147,20 +144,42 @@ class PartitionProblem:
             return
         self._solver.add_clause([self._separate_all(pairs) for pairs in alternatives])
 
-    def prefer(self, words: Mapping[int, int]) -> None:
-        """Try first to give states these words; not with CaDiCaL."""
-        wanted = {self._word[state][word] for state, word in words.items()}
-        every = (variable for own in self._word.values() for variable in own)
-        self._solver.set_phases([v if v in wanted else -v for v in every])
+    def prefer_any(self, random: np.random.Generator, size: int) -> None:
+        """Try first to give each state a word that is drawn of the first ones; not with CaDiCaL.
 
-    def separate_on_paths(self, steps: Iterable[PairStep]) -> None:
-        """Require of each path through a graph of pairs that one of them is in different words."""
-        reached = defaultdict[int, int](self._new)
-        for before, states, after in steps:
-            clause = [-reached[before]] if before else []
-            clause += [self._separate(states)] if states is not None else []
-            clause += [reached[after]] if after != END else []
-            self._solver.add_clause(clause)
+        Few plans have one sentence by chance; what a solver tries by itself is one word.
+        """
+        drawn = random.integers(size, size=len(self._word)).tolist()
+        for own, word in zip(self._word.values(), drawn, strict=True):
+            self._solver.set_phases([v if n == word else -v for n, v in enumerate(own)])
+
+    def separate_on_paths(self, steps: Ints) -> None:
+        """Require of each path through a graph of pairs that one of them is in different words.
+
+        ``steps`` (steps, 4) of two plans: a place of the graph, `START` where they begin to differ;
+        the states that the plans enter, equal ones where no words are compared; and the place where
+        they are then, `END` where both have ended.
+        """
+        before, one, other, after = steps.T
+        new = max(0, int(steps[:, [0, 3]].max(initial=0)) + 1 - len(self._reached))
+        self._reached = np.append(self._reached, self._last + 1 + np.arange(new))
+        self._last += new
+        literals = np.zeros((len(steps), 3), np.int64)
+        literals[:, 0] = -self._reached[before]
+        literals[:, 2] = np.where(after == END, 0, self._reached[after])
+        states = 1 + max(self._word)
+        pairs = np.minimum(one, other) * states + np.maximum(one, other)
+        pairs, place = np.unique(pairs, return_inverse=True)
+        both = map(divmod, pairs.tolist(), repeat(states))
+        told = [self._separate((a, b)) if a != b else 0 for a, b in both]
+        literals[:, 1] = np.array(told, np.int64)[place]
+        used = literals != 0
+        for some in product((False, True), repeat=3):
+            rows = literals[(used == some).all(axis=1)]
+            # By columns: millions of lists would keep the garbage collector busy.
+            columns = rows[:, some].T.tolist()
+            for clause in zip(*columns, strict=True) if columns else [()] * len(rows):
+                self._solver.add_clause(clause)
 
     def keep_words(self, kept: Mapping[int, int], changes: int) -> None:
         """Require that at most so many states have another word than ``kept`` gives them."""
@@ -195,12 +214,19 @@ class PartitionProblem:
         self._solver.add_clause([*before, -here, -there, equal])
         return equal
 
-    def solve(self, conflicts: int | None = None) -> dict[int, int] | None:
+    def solve(self, conflicts: int | None = None, size: int = sys.maxsize) -> dict[int, int] | None:
         """A partition (state -> word), or None if it is proved that there is none.
 
-        Raises `Undecided` after about so many ``conflicts`` of the solver.
+        Raises `Undecided` after about so many ``conflicts`` of the solver.  ``size``: only so many
+        words are used, where words are not named.
         """
-        if not satisfiable(self._solver, conflicts=conflicts):
+        if size < self.size and not self._used:
+            self._used = [self._new() for _ in range(self.size)]
+            self._solver.set_phases(self._used)  # a word that is free may be used
+            for own in self._word.values():
+                for variable, used in zip(own, self._used, strict=True):
+                    self._solver.add_clause((-variable, used))
+        if not satisfiable(self._solver, [-word for word in self._used[size:]], conflicts):
             return None
         true = {v for v in self._solver.get_model() if v > 0}
         return {s: next(w for w, v in enumerate(own) if v in true) for s, own in self._word.items()}

@@ -26,7 +26,7 @@ from coordlang.vocabulary.job import Assignment, Job, words_of_states
 from coordlang.vocabulary.loop import Budget, Languages, find
 from coordlang.vocabulary.plan_pairs import PlanPairs, failing_pairs
 from coordlang.vocabulary.refuter import Refuter
-from coordlang.vocabulary.sat import PairStep, PartitionProblem, Undecided
+from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from planners.joint.tables import Bools, Ints, unique_rows
 from planners.search.plan_space import PlanSpace
 from planners.search.sat import whole
@@ -61,7 +61,7 @@ class _Ties:
 
     classes: Ints
     joined: Sequence[Pair] = ()
-    failing: Sequence[PairStep] = ()
+    failing: Ints = field(default_factory=lambda: np.zeros((0, 4), np.int64))
     clauses: list[Ints] = field(default_factory=list)
 
 
@@ -134,7 +134,7 @@ class TiedWords:
     @property
     def has_pairs(self) -> bool:
         """Whether pairs of plans that fail are known: small numbers of words are soon decided."""
-        return bool(next(self._every()).failing)
+        return bool(len(next(self._every()).failing))
 
     def find(self, size: int, rounds: int) -> Assignment | None:
         """A language with at most ``size`` words; None if none was found with some effort.
@@ -168,8 +168,8 @@ class TiedWords:
             # With many tasks what other numbers met slows the solver: open 3x4 by a third.
             own = ties if self._is_one_task else _Ties(ties.classes)
             first = _STUTTER_FREE if own.joined else self._first
-            first = _ALL_PAIRS if own.failing else first
-            random = self._random if self._is_one_task and not own.failing else None
+            first = _ALL_PAIRS if len(own.failing) else first
+            random = self._random if self._is_one_task and not len(own.failing) else None
             yield _Kind(self._states, own, size, self._images, first, random)
 
     @property
@@ -241,8 +241,7 @@ class _Kind:
             self.problem.separate_one([states_of_step])
         self.problem.separate_on_paths(ties.failing)
         if random is not None:
-            # Few plans have one sentence by chance; what the solver tries by itself is one word.
-            self.problem.prefer(dict(zip(free, random.integers(size, size=len(free)), strict=True)))
+            self.problem.prefer_any(random, size)
         self.effort, self.rounds, self._required = effort, 0, 0
 
     def require_clauses(self) -> None:
