@@ -11,6 +11,7 @@ from functools import partial
 from itertools import combinations, islice, product
 from math import inf
 
+import networkx as nx
 import numpy as np
 import pytest
 
@@ -85,35 +86,6 @@ def paths_of(steps: Ints, place: int = START) -> Iterator[tuple[Pair | None, ...
             yield from ((states, *following) for following in rest)
 
 
-@pytest.mark.parametrize(
-    ("robots", "number"),
-    [(2, 15), (3, 8), *(pytest.param(n, 150, marks=pytest.mark.thorough) for n in (2, 3))],
-)
-def test_languages_tell_pairs_apart_on_all_warping_paths_and_nothing_else_does(
-    robots: int, number: int
-) -> None:
-    models = (c for _, c in small_candidates(robots, states=8, plans=MOST) if requiring(c))
-    random, seen = np.random.default_rng(0), Counter[tuple[bool, bool]]()
-    for candidates in islice(models, number):
-        bad = failing(candidates)
-        #: Two plans that are never in one state again once they differ.
-        two = [pairs for plans in bad if len(pairs := sorted(set(plans))) == 2 and parted(pairs)]
-        graphs = [
-            np.concatenate([*WarpedPairs(grown(space), apart, waiting).steps()])
-            for space in candidates.spaces
-            for apart, waiting in ((99, 99), (99, 0), (1, 2), (0, 2))
-        ]
-        for _ in range(40):
-            drawn = random.integers(random.integers(2, 9), size=len(candidates.rows)).tolist()
-            word = dict(enumerate(drawn))
-            told = [tells_apart(graph, drawn) for graph in graphs]
-            holds = is_language(word, bad)
-            assert all(told) >= holds
-            assert not all(told) or is_language(word, two)
-            seen[holds, all(told)] += 1
-    assert min(seen[True, True], seen[False, False]) >= 10 * number, seen
-
-
 def grown(space: PlanSpace) -> PlanPairs:
     """All pairs of plans."""
     pairs = PlanPairs(Choices(space))
@@ -140,75 +112,48 @@ def test_all_warping_paths_of_pairs_of_plans_are_the_paths_of_a_graph(
         for _, c in small_candidates(robots, states=9, plans=MOST)
         if requiring(c) and len(c.spaces) == 1 and int(c.spaces[0].layer.max()) <= 4
     )
-    listed = 0
+    random, seen, paths = np.random.default_rng(0), Counter[bool](), 0
     for candidates in islice(models, number):
-        two = [own for plans in failing(candidates) if len(own := sorted(set(plans))) == 2]
-        steps = WarpedPairs(grown(candidates.spaces[0]), 99, 99).steps()
-        found = {frozenset(path) - {None} for path in paths_of(np.concatenate([*steps]))}
+        bad, pairs = failing(candidates), grown(candidates.spaces[0])
+        two = [own for plans in bad if len(own := sorted(set(plans))) == 2]
+        graphs = [
+            np.concatenate([*WarpedPairs(pairs, apart, waiting).steps()])
+            for apart, waiting in ((99, 99), (99, 0), (1, 2), (0, 2))
+        ]
+        found = {frozenset(path) - {None} for path in paths_of(graphs[0])}
         expected = {
-            frozenset(path) - {None}
-            for pairs in map(parted, two)
-            if pairs
-            for path in warped(pairs[0], pairs[1])
+            frozenset(path) - {None} for both in map(parted, two) if both for path in warped(both)
         }
         assert found == expected if all(map(parted, two)) else found >= expected
-        listed += len(expected)
-    assert listed >= 2 * number, listed
+        paths += len(expected)
+        for _ in range(40):  # every language tells pairs apart, on fewer paths, too
+            word = random.integers(random.integers(2, 9), size=len(candidates.rows))
+            told = all(tells_apart(graph, word) for graph in graphs)
+            holds = is_language(dict(enumerate(word.tolist())), bad)
+            assert told >= holds
+            seen[holds] += 1
+    assert paths >= 2 * number, paths
+    assert min(seen.values()) >= 10 * number, seen
 
 
 def warped(
-    one: Sequence[int], other: Sequence[int], i: int = 0, j: int = 0
+    two: Sequence[Sequence[int]], i: int = 0, j: int = 0
 ) -> Iterator[tuple[Pair | None, ...]]:
     """What two plans are in on each warping path: pairs of different states."""
+    one, other = two
     here = pair(one[i], other[j]) if one[i] != other[j] else None
-    ends = i + 1 == len(one), j + 1 == len(other)
-    if all(ends):
+    if (i + 1, j + 1) == (len(one), len(other)):
         yield (here,)
-    for right, down in product((0, 1), repeat=2):
-        if (right or down) and right <= (not ends[0]) and down <= (not ends[1]):
-            yield from ((here, *rest) for rest in warped(one, other, i + right, j + down))
+    for right, down in ((0, 1), (1, 0), (1, 1)):
+        if i + right < len(one) and j + down < len(other):
+            yield from ((here, *rest) for rest in warped(two, i + right, j + down))
 
 
-def tells_apart(steps: Ints, word: Sequence[int]) -> bool:
+def tells_apart(steps: Ints, word: Ints) -> bool:
     """Whether two words differ on each path from the start to the end."""
-    after = defaultdict[int, set[int]](set)
-    for before, one, other, place in steps.tolist():
-        if word[one] == word[other]:
-            after[before].add(place)
-    left, reached = [START], {START}
-    while left:
-        new = after[left.pop()] - reached
-        reached |= new
-        left += new
-    return END not in reached
-
-
-@pytest.mark.parametrize(
-    ("robots", "number"),
-    [(2, 12), (3, 12), *(pytest.param(n, 100, marks=pytest.mark.thorough) for n in (2, 3, 4))],
-)
-def test_the_fewest_words_that_tell_pairs_apart_are_the_fewest_of_all(
-    robots: int, number: int
-) -> None:
-    models = (
-        c
-        for _, c in small_candidates(robots, states=7, plans=MOST)
-        if requiring(c) and len(c.spaces) == 1
-    )
-    seen = Counter[int]()
-    for candidates in [*islice(models, number), *map(bells, FITS[:3], FITS[3:6])]:
-        job = Making(candidates).job(MethodOptions())
-        languages, pairs = Languages.of(job), WarpedPairs(grown(candidates.spaces[0]), 99)
-        draws = np.random.default_rng(0)
-        search = PairsApart(job.states, languages.clauses, pairs, draws)
-        with closing(search):
-            fewest = 2
-            while (found := find(partial(search.find, fewest), languages.holds, Budget())) is None:
-                fewest += 1
-        job.check(found)
-        assert fewest == least(candidates)
-        seen[fewest] += 1
-    assert min(seen[2], seen[3]) >= 2, seen
+    equal = steps[word[steps[:, 1]] == word[steps[:, 2]]]
+    graph = nx.DiGraph([(START, START), (END, END), *equal[:, [0, 3]].tolist()])
+    return not nx.has_path(graph, START, END)
 
 
 BELLS = """(define (domain bells)
@@ -266,6 +211,18 @@ def suffice(candidates: Candidates) -> bool:
     return found is not None
 
 
+def fewest(candidates: Candidates) -> int:
+    """The fewest words of which some tell all pairs of plans apart, and are a language."""
+    job = Making(candidates).job(MethodOptions())
+    languages, pairs = Languages.of(job), WarpedPairs(grown(candidates.spaces[0]), 99)
+    draws, size = np.random.default_rng(0), 2
+    with closing(PairsApart(job.states, languages.clauses, pairs, draws)) as search:
+        while (found := find(partial(search.find, size), languages.holds, Budget())) is None:
+            size += 1
+    job.check(found)
+    return size
+
+
 @pytest.mark.parametrize("goal", [ONE_END, MANY])
 @pytest.mark.parametrize(
     "fits",
@@ -276,25 +233,26 @@ def suffice(candidates: Candidates) -> bool:
         ),
     ],
 )
-def test_two_words_suffice_iff_some_partition_of_all_does(
+def test_as_few_words_suffice_as_of_all_partitions(
     fits: Sequence[tuple[Sequence[str], Sequence[str]]], goal: str
 ) -> None:
     """Whatever tones fit; and of three tones, where more sentences are needed."""
-    told = Counter[bool]()
+    told = Counter[int]()
     for first, second in fits:
         candidates = bells(first, second, goal)
         if requiring(candidates):
-            found = suffice(candidates)
-            assert found == (least(candidates) == 2)
-            told[found] += 1
-    assert min(told[True], told[False]) >= 1, told
+            size = least(candidates)
+            assert suffice(candidates) == (size == 2)
+            assert fewest(candidates) == size
+            told[size] += 1
+    assert min(told[2], told[3]) >= 1, told
 
 
 @pytest.mark.parametrize(
     ("robots", "number"),
     [(2, 20), (3, 20), *(pytest.param(n, 100, marks=pytest.mark.thorough) for n in (2, 3, 4))],
 )
-def test_two_words_suffice_iff_some_partition_of_random_models_does(
+def test_as_few_words_of_random_models_suffice_as_of_all_partitions(
     robots: int, number: int
 ) -> None:
     models = (
@@ -302,12 +260,13 @@ def test_two_words_suffice_iff_some_partition_of_random_models_does(
         for _, c in small_candidates(robots, states=7, plans=MOST)
         if requiring(c) and len(c.spaces) == 1
     )
-    told = Counter[bool]()
+    told = Counter[int]()
     for candidates in islice(models, number):
-        found = suffice(candidates)
-        assert found == (least(candidates) == 2)
-        told[found] += 1
-    assert min(told[True], told[False]) >= 3, told
+        size = least(candidates)
+        assert suffice(candidates) == (size == 2)
+        assert fewest(candidates) == size
+        told[size] += 1
+    assert min(told[2], told[3]) >= 3, told
 
 
 def test_few_pairs_prove_nothing_too_much_and_the_next_call_goes_on() -> None:
