@@ -186,7 +186,7 @@ def failing_pairs(pairs: PlanPairs, within: float, most: int) -> Ints:
         steps.add((START if step.before < len(space) else step.before, nodes, after))
     while left and len(steps) <= most:
         both, within = place = left.pop()
-        one, other = ({space.target_of(edge) for edge in space.out_edges(node)} for node in both)
+        one, other = (set(space.successors(node)) for node in both)
         for nodes in {pair(*nodes) for nodes in product(one, other)}:
             steps.add((place, nodes, after_failing(nodes, within - 1)))
     if len(steps) > most:

@@ -129,9 +129,9 @@ class _Changes(PartitionProblem):
         """For each node below, how often plans can change their word from there."""
         can: dict[int, dict[int, int]] = {}
         for node in np.flatnonzero(self._space.descendants(nodes)).tolist():
-            edges = self._space.out_edges(node)
-            own = can[node] = defaultdict(self._new) if edges else {0: self._true}
-            for target in sorted({self._space.target_of(edge) for edge in edges}):
+            targets = sorted(set(self._space.successors(node)))
+            own = can[node] = defaultdict(self._new) if targets else {0: self._true}
+            for target in targets:
                 for literal, changes in self._steps(node, target):
                     for number, below in can[target].items():
                         self._solver.add_clause([-literal, -below, own[number + changes]])

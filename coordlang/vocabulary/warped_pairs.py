@@ -19,7 +19,7 @@ import numpy as np
 from coordlang.language.warping import Clause
 from coordlang.vocabulary.plan_pairs import FAILED, PlanPairs
 from coordlang.vocabulary.sat import END, START, PartitionProblem
-from planners.joint.tables import Ints
+from planners.joint.tables import Ints, unique_rows
 from planners.search.plan_space import PlanSpace
 
 #: Steps by which one of two plans may be ahead before a mixture fails.  With 1 as few words of taxi
@@ -48,17 +48,16 @@ class _Cell(NamedTuple):
 
 def steps_apart(space: PlanSpace, most: int) -> int:
     """By how many steps plans may be apart for a graph of about ``most`` steps; -1: not at all."""
-    layers = int(space.layer.max(initial=0)) + 1
-    nodes = np.bincount(space.layer, minlength=layers)
-    edges = np.bincount(space.layer[_successors(space)[:, 0]], minlength=layers)
+    nodes, edges = np.bincount(space.layer), np.array([*map(len, _successors(space))])
     moves = np.outer(edges, edges) + np.outer(edges, nodes) + np.outer(nodes, edges)
-    steps = [int(np.diagonal(moves, apart).sum()) for apart in range(layers)]
+    steps = [int(np.diagonal(moves, apart).sum()) for apart in range(len(nodes))]
     return int((np.cumsum(steps) <= most).sum()) - 1
 
 
-def _successors(space: PlanSpace) -> Ints:
-    """(steps, 2) the nodes that an edge leads from and to, each pair once."""
-    return np.unique(np.column_stack((space.sources, space.targets())), axis=0)
+def _successors(space: PlanSpace) -> list[Ints]:
+    """By layer the nodes (steps, 2) that an edge leads from and to, each pair once."""
+    layers = map(space.layer_edges, range(len(space.layers)))
+    return [unique_rows(np.column_stack((own.source, own.target)))[0] for own in layers]
 
 
 class WarpedPairs:
@@ -71,25 +70,24 @@ class WarpedPairs:
     def __init__(self, pairs: PlanPairs, apart: int, waiting: int = _WAITING) -> None:
         space = self._space = pairs.space
         self._after: list[list[int]] = [
-            sorted({space.target_of(edge) for edge in space.out_edges(node)})
-            for node in range(len(space))
+            sorted(set(space.successors(node))) for node in range(len(space))
         ]
         self._layer: list[int] = space.layer.tolist()
         self._steps = defaultdict[int, list[tuple[int, int, int]]](list)
         for before, nodes, after in sorted(pairs.steps):
             self._steps[before].append((*nodes, after))
         self._apart, self._waiting = apart, min(waiting, apart)
+        self._free = _FreeCells(space, apart)
 
     def steps(self) -> Iterator[Ints]:
         """Tables of steps: on each path from the start to the end plans must be told apart.
 
         See `PartitionProblem.separate_on_paths`.
         """
-        free = _FreeCells(self._space, self._apart)
-        yield from free.steps()
+        yield from self._free.steps()
         begin = [_Cell(node, False, node, node) for node in self._steps if node < len(self._space)]
         number = dict.fromkeys(begin, START)
-        left, found, last = begin, list[tuple[int, int, int, int]](), free.last
+        left, found, last = begin, list[tuple[int, int, int, int]](), self._free.last
         while left:
             cell = left.pop()
             here = number[cell]
@@ -102,7 +100,7 @@ class WarpedPairs:
                 into = START if is_free else number[after]
                 found.append((here, after.first, after.second, into))
         before, one, other, places = np.array(found, np.int64).reshape(-1, 4).T
-        places = np.where(places == START, free.number(one, other), places)
+        places = np.where(places == START, self._free.number(one, other), places)
         yield _with_states(self._space, before, one, other, places)
 
     def _after_failing(self, cell: _Cell) -> Iterator[_Cell]:
@@ -147,9 +145,7 @@ class _FreeCells:
         self._space, self._apart, self._layer = space, apart, space.layer
         counts = self._counts = np.bincount(space.layer)
         self._first = np.cumsum([0, *counts])
-        edges = _successors(space)
-        layer = space.layer[edges[:, 0]]
-        self._edges: list[Ints] = [edges[layer == own] for own in range(len(counts))]
+        self._edges = _successors(space)
         #: By the layers of the two nodes: the number before the first cell.
         sizes = np.triu(np.tri(len(counts), k=apart, dtype=np.int64)) * np.outer(counts, counts)
         self._before = np.cumsum(sizes).reshape(sizes.shape) - sizes
