@@ -15,7 +15,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import closing, suppress
 from dataclasses import replace
 from functools import cached_property, partial
-from itertools import islice
+from itertools import chain, islice
+from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -56,12 +57,17 @@ _PAIRS, _FIRST_PAIRS = 1_000, 30
 _BEGINNING = 10
 #: What may be spent on each number at first.
 _SOON = Budget(rounds=10, conflicts=2_000)
-#: For each round of a budget so many pairs of edges that two plans take are looked at for two words
-#: of one task, and so many conflicts allowed: small formulas may need many.
-_FOR_ROUND, _CONFLICTS = 12_000, 40_000
-#: Pairs of edges that are looked at for words that tell plans apart step by step, in some seconds;
-#: so many count as a conflict.
-_MOST_PAIRS, _EDGES = 400_000, 20
+#: For each round of a budget so many steps of mixtures of two plans are looked at for two words of
+#: one task, and so many conflicts allowed: small formulas may need many.
+_FOR_ROUND, _CONFLICTS = 60_000, 40_000
+#: Steps of mixtures of two plans that are looked at, in some ten seconds, for words that tell plans
+#: apart step by step, and along all warping paths; so many count as a conflict.
+_MOST_PAIRS, _FEW_PAIRS, _EDGES = 26_000_000, 1_200_000, 200
+#: Steps of mixtures that are looked at for each step of a formula of words that tell plans apart
+#: step by step; how many steps after a mixture has failed; what may be spent on each number.
+_PAIRS_OF_STEP, _WITHIN, _AT_FIRST = 2, (2, 1), Budget(rounds=8, conflicts=2_000)
+#: A solver has so many words more than it is asked for at first: larger sizes are asked for next.
+_FURTHER = 2
 #: Steps of pairs of plans that fail along their warping paths, in some 20 seconds; so many count as
 #: a conflict.  Each takes so many bytes at most.
 _MOST_STEPS, _STEPS, _BYTES = 11_000_000, 100, 200
@@ -155,6 +161,9 @@ class MinimalSearch:
         self._is_dear = self._pairs > _DEAR
         self._merges = 0
         self._merging: tuple[Assignment, Iterator[Assignment]] | None = None
+        #: Searches for stutter-free words, made one after another.
+        self._in_step: list[PairsApart] = []
+        self._next_in_step = self._more_in_step()
         self.lower = job.lower_bound
         self.best: Assignment | None = job.incumbent
         self.refuting: Mapping[Clause, Evidence] = {}
@@ -175,8 +184,7 @@ class MinimalSearch:
     def _tied(self) -> TiedWords:
         from coordlang.vocabulary.tied_words import TiedWords
 
-        pairs = self._plan_pairs if self._is_one_task else None
-        return TiedWords(self._job, self.languages, pairs, min(_MOST_PAIRS, _EDGES * self._most))
+        return TiedWords(self._job, self.languages)
 
     @cached_property
     def _plan_pairs(self) -> PlanPairs:
@@ -205,9 +213,29 @@ class MinimalSearch:
         apart = min(_APART, steps_apart(self._plan_pairs.space, most))
         if apart < 1:
             return None
-        self._plan_pairs.grow(min(_MOST_PAIRS, _EDGES * left))
+        self._plan_pairs.grow(min(_FEW_PAIRS, _EDGES * left))
         random, pairs = np.random.default_rng(self._job.seed), WarpedPairs(self._plan_pairs, apart)
-        return PairsApart(self._job.states, self.languages.clauses, pairs, random)
+        return PairsApart(self._job.states, self.languages.clauses, pairs.steps(), random)
+
+    def _more_in_step(self) -> Iterator[PairsApart]:
+        """Stutter-free words that tell pairs of plans of one task apart, step by step."""
+        from coordlang.vocabulary.tied_words import joined_states
+        from coordlang.vocabulary.warped_pairs import PairsApart, failing_pairs
+
+        pairs = self._plan_pairs
+        most = min(_MOST_PAIRS, _EDGES * self._most, memory_left() // _BYTES)
+        self._report("looking at pairs of plans")
+        if not pairs.complete(most):
+            return
+        joined, clauses = joined_states(pairs.space), self.languages.clauses
+        for within in (*_WITHIN, inf):
+            if self._in_step and within < inf:
+                continue
+            with suppress(Undecided):
+                steps = failing_pairs(pairs, within, most // _PAIRS_OF_STEP)
+                search = PairsApart(self._job.states, clauses, steps, joined=joined)
+                self._in_step.append(search)
+                yield search
 
     @cached_property
     def _contained(self) -> list[ContainedInstance]:
@@ -269,18 +297,40 @@ class MinimalSearch:
 
         From below, where partitions are refuted soonest and most is learnt of the others, too; then
         between the number that was tried last and the one that suffices.  Where rounds are dear
-        only that, unless numbers from below are soon decided: then at most twice the last one.
+        only that.
         """
+        self._find_fewer_in_step(rounds)
         least = self.lower
         if not self._is_dear and least < self.upper:
             if self._finds_tied(least, rounds):
                 return
             least += 1
-        most = 2 * least if self._tied.has_pairs else sys.maxsize
         while least <= self.upper - max(1, self.upper // _FEWER_WORDS) and not self._is_spent:
-            size = min(most, between(least, self.upper))
+            size = between(least, self.upper)
             if not self._finds_tied(size, rounds):
-                least, most = size + 1, 2 * most
+                least = size + 1
+
+    def _find_fewer_in_step(self, rounds: int) -> None:
+        """Look for fewer stutter-free words that tell all pairs of plans of one task apart.
+
+        From below, at most twice the number that was tried last: small ones are soon decided.
+        """
+        for search in chain(self._in_step[:], self._next_in_step):
+            least = self.lower
+            most = 2 * least
+            while least < self.upper and not self._is_spent:
+                size = min(most, between(least, self.upper))
+                left = max(0, self._most - self.work)
+                own = Budget(_AT_FIRST.rounds, min(_AT_FIRST.conflicts * rounds, left))
+                self._report(f"trying {size} words that tell plans apart step by step")
+                ask = partial(search.find, size, min(4 * size, self.upper - 1))
+                found = None
+                with suppress(Undecided):
+                    found = find(ask, self._holds, own)
+                if found is None:
+                    least, most = size + 1, 2 * size
+                else:
+                    self._offer(found)
 
     @property
     def work(self) -> int:
@@ -292,9 +342,12 @@ class MinimalSearch:
         if "_tied" in self.__dict__:
             conflicts += self._tied.conflicts
         if self._two_words is not None:
-            conflicts += self._two_words.conflicts + self._plan_pairs.looked_at // _EDGES
-        if (apart := self.__dict__.get("_apart")) is not None:
-            conflicts += apart.conflicts + apart.steps // _STEPS
+            conflicts += self._two_words.conflicts
+        if "_plan_pairs" in self.__dict__:
+            conflicts += self._plan_pairs.looked_at // _EDGES
+        for search in (*self._in_step, self.__dict__.get("_apart")):
+            if search is not None:
+                conflicts += search.conflicts + search.steps // _STEPS
         return conflicts + rounds * (_ROUND + self._pairs // _PAIRS)
 
     @property
@@ -407,7 +460,7 @@ class MinimalSearch:
         if (apart := self._apart) is None:
             raise Undecided
         own = Budget(budget.rounds, min(_HARD * budget.rounds, left))
-        return find(partial(apart.find, size), self._holds, own)
+        return find(partial(apart.find, size, size + _FURTHER), self._holds, own)
 
     def _finds_tied(self, size: int, rounds: int) -> bool:
         """Whether a language with so many words is soon found among those of some kinds."""
@@ -456,6 +509,8 @@ class MinimalSearch:
         for name in ("_partitions", "_tied", "_two_words", "_apart"):
             if (search := self.__dict__.get(name)) is not None:
                 search.close()
+        for search in self._in_step:
+            search.close()
         for instance in self.__dict__.get("_contained", ()):
             instance.close()
 

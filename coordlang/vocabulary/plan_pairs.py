@@ -6,32 +6,47 @@ Plans that differ are many, but the nodes that they and their mixtures are in to
 
 from __future__ import annotations
 
-from collections import defaultdict, deque
-from itertools import combinations, count, product
+from collections import defaultdict
+from collections.abc import Sequence
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
-from coordlang.language.warping import Pair, pair
 from coordlang.required.choices import Choices
-from coordlang.vocabulary.sat import END, START, Undecided
-from planners.joint.tables import Ints
+from planners.joint.tables import Bools, Ints, unique_rows
+from planners.search.edge_index import EdgeIndex
 
-#: For each set of robots, as bits, the node that is reached where these follow the second plan and
-#: the others the first one; only robots that the plans tell apart.
-Mixed = dict[int, int]
-#: Robots that may follow either of two plans, of which all choices are looked at.
-_FREE = 4
 #: The place of two plans of which some mixture has failed.
 FAILED = -1
+#: In place of a place: no mixture fails from there.
+_HARMLESS = -2
+#: Steps of mixtures that are expected for each pair of edges of two plans, and as many again where
+#: pairs more than double: seen were 2 to 8.
+_FOR_PAIR = 3
+#: Pairs of edges that are looked at together.
+_AT_ONCE = 60_000
 
 
-class Step(NamedTuple):
-    """A step of two plans from a place into two nodes, and to the place where they are then."""
+class _Places(NamedTuple):
+    """Places of two plans, in all of which they tell equally many robots apart.
 
-    before: int
-    nodes: tuple[int, int]
-    after: int
+    ``numbers`` (places).  ``told`` (places, robots): which robots had different labels so far.
+    ``nodes`` (places, sets): where the mixture is in which some of these follow the second plan and
+    all others the first one; bit k of a column's number is the k-th of them.
+    """
+
+    numbers: Ints
+    told: Bools
+    nodes: Ints
+
+    def rows(self, some: slice) -> _Places:
+        return _Places(self.numbers[some], self.told[some], self.nodes[some])
+
+
+def _joined(tables: Sequence[_Places]) -> _Places:
+    numbers, told, nodes = zip(*tables, strict=True)
+    return _Places(np.concatenate(numbers), np.concatenate(told), np.concatenate(nodes))
 
 
 class PlanPairs:
@@ -39,160 +54,166 @@ class PlanPairs:
 
     A place is a node in which both plans are, by its number; or, numbered from there on, the nodes
     in which two plans that differ and all their mixtures are.  Places from which no mixture fails
-    are left out.  ``steps``: those that were looked at so far, the first steps of all pairs before
-    longer ways; ``looked_at`` counts pairs of edges.
+    are left out.  ``looked_at`` counts steps of mixtures: the first ones of all pairs of plans are
+    looked at before others.
     """
 
     def __init__(self, choices: Choices) -> None:
         self.space, self._choices = choices.space, choices
-        self._sets = choices.of_node.T.tolist()
-        self.steps: set[Step] = set()
+        self._index = EdgeIndex.of(self.space)
         self.looked_at = 0
-        #: What `_place` says of each place that is no node.
-        self._numbers: dict[tuple[tuple[int, int], ...], int | None] = {}
-        self._labels_of: dict[tuple[int, int], set[tuple[int, ...]]] = {}
-        begin = np.flatnonzero(choices.requires & self.space.descendants(self.space.starts))
-        self._open: deque[tuple[int, Mixed]] = deque((node, {0: node}) for node in begin.tolist())
         self._last = len(self.space) - 1
-        degrees = self.space.out_degrees[begin]
-        #: How many pairs of edges there are at least.
-        self.least = int((degrees * (degrees - 1) // 2).sum())
+        #: The number of each place that is no node, or `_HARMLESS`.
+        self._numbers: dict[bytes, int] = {}
+        self._found, self._failed = [np.zeros((0, 4), np.int64)], [np.zeros(0, np.int64)]
+        begin = np.flatnonzero(choices.requires & self.space.descendants(self.space.starts))
+        none = np.zeros((len(begin), self.space.robots), np.bool_)
+        #: The places that come next, and those after them by the number of robots told apart.
+        self._open = [_Places(begin, none, begin[:, None])]
+        self._later = defaultdict[int, list[_Places]](list)
+
+    @property
+    def steps(self) -> Ints:
+        """The steps found so far, sorted: (steps, 4) a place, the nodes entered, the next place."""
+        steps = np.concatenate(self._found)
+        steps[np.isin(steps[:, 3], np.concatenate(self._failed)), 3] = FAILED
+        steps[:, 3] -= FAILED
+        found, _ = unique_rows(steps)
+        found[:, 3] += FAILED
+        return found
 
     def grow(self, most: int) -> bool:
-        """Look at pairs of edges, up to about ``most`` in all; whether there are no more."""
-        out, target = self.space.out_edges, self.space.target_of
-        while self._open and self.looked_at < most:
-            place, mixed = self._open.popleft()
-            together = [*product(out(mixed[0]), out(mixed[max(mixed)]))]
-            if place < len(self.space):
-                together = [*combinations(out(place), 2)]
-            self.looked_at += len(together)
-            for one, other in together:
-                after = self._place(self._after(mixed, one, other))
-                if after is not None:
-                    self.steps.add(Step(place, (target(one), target(other)), after))
-        return not self._open
+        """Look at steps of mixtures, up to about ``most`` in all; whether there are no more."""
+        while self.looked_at < most and (self._open or self._later):
+            if not self._open:
+                self._open = [*map(_joined, self._later.values())]
+                self._later.clear()
+            places = self._open.pop()
+            sizes = self._sizes(places)
+            last = max(1, int(np.searchsorted(np.cumsum(sizes), _AT_ONCE, side="right")))
+            if last < len(sizes):
+                self._open.append(places.rows(slice(last, None)))
+            if self.looked_at + int(sizes[:last].sum()) > max(most, _AT_ONCE):
+                self._open.append(places.rows(slice(last)))
+                break
+            self._look_at(places.rows(slice(last)))
+        return not (self._open or self._later)
 
-    def _goes_on(self, mixed: Mixed, plan: int, edge: int) -> bool:
-        """Whether all mixtures may go on, as far as the labels of one of two plans tell."""
-        every, labels = (1 << self.space.robots) - 1, self.space.labels_of(edge)
-        return all(
-            _of_robots(labels, own) in self._labels(node, own)
-            for robots, node in mixed.items()
-            for own in [robots if plan else every & ~robots]
-        )
+    def complete(self, most: int) -> bool:
+        """Look at all steps, unless more than ``most`` are expected; whether it did."""
+        waiting = 0
+        while self._open or self._later:
+            before = waiting
+            places = chain(self._open, *self._later.values())
+            waiting = sum(int(self._sizes(own).sum()) for own in places)
+            expected = _FOR_PAIR * waiting * (2 if waiting > 2 * before else 1)
+            if self.looked_at + expected > most:
+                return False
+            self.grow(self.looked_at + waiting)
+        return True
 
-    def _labels(self, node: int, robots: int) -> set[tuple[int, ...]]:
-        """What some robots do together in the steps from a node."""
-        key = node, robots
-        if key not in self._labels_of:
-            steps = map(self.space.labels_of, self.space.out_edges(node))
-            self._labels_of[key] = {_of_robots(labels, robots) for labels in steps}
-        return self._labels_of[key]
+    def _sizes(self, places: _Places) -> Ints:
+        """(places) the pairs of edges that lead from each."""
+        degrees = self.space.out_degrees
+        sizes: Ints = degrees[places.nodes[:, 0]] * degrees[places.nodes[:, -1]]
+        return sizes
 
-    def _after(self, mixed: Mixed, one: int, other: int) -> Mixed | None:
-        """What becomes of two plans after an edge of each; None if a mixture fails."""
-        two = [*zip(self.space.labels_of(one), self.space.labels_of(other), strict=True)]
-        following = dict(mixed)
-        for robot, (mine, theirs) in enumerate(two):
-            bit = 1 << robot
-            if mine != theirs and not max(mixed) & bit:
-                following |= {robots | bit: node for robots, node in following.items()}
-        for robots, node in following.items():
-            labels = tuple(both[robots >> robot & 1] for robot, both in enumerate(two))
-            target = self._choices.edges_of(node).get(labels)
-            if target is None:
-                return None
-            following[robots] = target
-        return following
+    def _look_at(self, places: _Places) -> None:
+        """Find the steps from some places."""
+        which, one = self.space.edges_from(places.nodes[:, 0])
+        again, other = self.space.edges_from(places.nodes[which, -1])
+        two = np.column_stack((which[again], one[again], other))
+        differ = bool(places.told.any())
+        if not differ:  # in one node either plan may be the first one
+            two = two[two[:, 1] < two[:, 2]]
+        self.looked_at += len(two)
+        which, one, other = two.T
+        told = places.told[which] | (self.space.labels[one] != self.space.labels[other])
+        after, number = np.full(len(two), FAILED), told.sum(axis=1)
+        for robots in np.unique(number).tolist():
+            rows = np.flatnonzero(number == robots)
+            nodes = self._mixtures(places, two[rows], told[rows])
+            alive = (nodes >= 0).all(axis=1)
+            after[rows[alive]] = self._places(told[rows[alive]], nodes[alive])
+        if differ:  # where all fail in the next step they have failed
+            goes_on = np.bincount(which[after != FAILED], minlength=len(places.numbers)) > 0
+            self._failed.append(places.numbers[~goes_on])
+            after[~goes_on[which]] = _HARMLESS
+        kept = after != _HARMLESS
+        one, other = self.space.targets(one[kept]), self.space.targets(other[kept])
+        before = places.numbers[which[kept]]
+        self._found.append(np.column_stack((before, one, other, after[kept])))
 
-    def _place(self, mixed: Mixed | None) -> int | None:
-        """The number of a place, new or known; None if nothing fails from there."""
-        if mixed is None:
-            return FAILED
-        if len(set(mixed.values())) == 1:  # the plans are together again
-            return None
-        key = tuple(sorted(mixed.items()))
-        if key not in self._numbers:
-            self._numbers[key] = None
-            if self._can_fail(mixed):
-                self._numbers[key] = FAILED
-                if self._all_go_on(mixed):
-                    self._last += 1
-                    self._numbers[key] = self._last
-                    self._open.append((self._last, mixed))
-        return self._numbers[key]
+    def _mixtures(self, places: _Places, two: Ints, told: Bools) -> Ints:
+        """(pairs, sets) where mixtures are after an edge of each plan; -1, also later, if none is.
 
-    def _all_go_on(self, mixed: Mixed) -> bool:
-        """Whether each of two plans may go on so that no mixture fails at once."""
-        out = self.space.out_edges
-        return any(self._goes_on(mixed, 0, edge) for edge in out(mixed[0])) and any(
-            self._goes_on(mixed, 1, edge) for edge in out(mixed[max(mixed)])
-        )
+        ``two``: the row of the place, and the edges.
+        """
+        alive = np.arange(len(two))
+        nodes = np.full((len(two), 1 << int(told[0].sum())), -1)
+        nodes[:, 0], nodes[:, -1] = self.space.targets(two[:, 1:]).T
+        for column in range(1, nodes.shape[1] - 1):
+            self.looked_at += len(alive)
+            which, one, other = two[alive].T
+            second = _following(told[alive], column)
+            at = places.nodes[which, _column(second, places.told[which])]
+            for robot in range(self.space.robots):
+                edge = np.where(second[:, robot], other, one)
+                at = self._index.follow(robot, at, self.space.robot_labels(robot, edge))
+            alive = alive[at >= 0]
+            nodes[alive, column] = self.space.targets(at[at >= 0])
+        return nodes
 
-    def _can_fail(self, mixed: Mixed) -> bool:
+    def _places(self, told: Bools, nodes: Ints) -> Ints:
+        """The numbers of places, new or known; `_HARMLESS` where nothing fails from there."""
+        apart = (nodes != nodes[:, :1]).any(axis=1)  # otherwise the plans are together again
+        table, row = unique_rows(np.column_stack((told[apart], nodes[apart])))
+        keys = [key.tobytes() for key in table.astype(np.int32)]
+        fresh = np.array([n for n, key in enumerate(keys) if key not in self._numbers], np.int64)
+        told, mixed = table[fresh, : told.shape[1]].astype(np.bool_), table[fresh, told.shape[1] :]
+        numbers = np.full(len(fresh), _HARMLESS)
+        fails = self._can_fail(told, mixed)
+        numbers[fails] = self._last + 1 + np.arange(int(fails.sum()))
+        self._last += int(fails.sum())
+        if fails.any():
+            places = _Places(numbers[fails], told[fails], mixed[fails])
+            self._later[int(told[0].sum())].append(places)
+        for n, number in zip(fresh.tolist(), numbers.tolist(), strict=True):
+            self._numbers[keys[n]] = number
+        found = np.full(len(nodes), _HARMLESS)
+        found[apart] = np.array([self._numbers[key] for key in keys], np.int64)[row]
+        return found
+
+    def _can_fail(self, told: Bools, nodes: Ints) -> Bools:
         """Whether something fails of what robots may do from where their plans are.
 
-        Those that the plans did not tell apart may follow either.  Yes, too, if many of them can.
+        Those that the plans did not tell apart may follow either: yes, if that is a difference.
         """
-        told, sets = max(mixed), (self._sets[mixed[0]], self._sets[mixed[max(mixed)]])
-        free = [
-            1 << robot
-            for robot, (one, other) in enumerate(zip(*sets, strict=True))
-            if not told >> robot & 1 and one != other
-        ]
-        if len(free) > _FREE:
-            return True
-        chosen = [sum(some) for some in product(*((0, bit) for bit in free))]
-        return any(
-            self._choices.fails(
-                tuple(sets[(robots | also) >> robot & 1][robot] for robot in range(len(sets[0]))),
-                node,
-            )
-            for robots, node in mixed.items()
-            for also in chosen
-        )
+        first, last = nodes[:, 0], nodes[:, -1]
+        sets = self._choices.of_node.T
+        fails: Bools = (~told & (sets[first] != sets[last])).any(axis=1)
+        for column in range(nodes.shape[1]):
+            is_plan = column in (
+                0,
+                nodes.shape[1] - 1,
+            )  # if all robots follow one, it is no mixture
+            left = np.flatnonzero(~(fails | told.all(axis=1) & is_plan))
+            second = _following(told[left], column)
+            plans = np.where(second, last[left, None], first[left, None])
+            mixed = np.column_stack((plans, nodes[left, column]))
+            fails[left] = self._choices.fails_each(mixed)
+        return fails
 
 
-def _of_robots(labels: tuple[int, ...], robots: int) -> tuple[int, ...]:
-    return tuple(label for robot, label in enumerate(labels) if robots >> robot & 1)
+def _following(told: Bools, column: int) -> Bools:
+    """(rows, robots) which robots follow the second plan in the mixture of a column."""
+    rank = np.maximum(told.cumsum(axis=1) - 1, 0)
+    second: Bools = told & (column >> rank & 1).astype(np.bool_)
+    return second
 
 
-def failing_pairs(pairs: PlanPairs, within: float, most: int) -> Ints:
-    """Steps such that on each path from the start to the end two plans must be told apart.
-
-    The paths are the pairs of plans that fail, of those that were looked at: from where they differ
-    to ``within`` steps after a mixture has failed; 0: to that step, infinitely many: to their ends.
-    Raises `Undecided` if there are more than about ``most`` steps.  They are a table, see
-    `PartitionProblem.separate_on_paths`.
-    """
-    space = pairs.space
-    #: The nodes of two plans of which a mixture has failed, with the steps that are left.
-    failed = set[tuple[Pair, float]]()
-    left = list[tuple[Pair, float]]()
-    steps = set[tuple[object, Pair, object]]()
-
-    def after_failing(nodes: Pair, within: float) -> object:
-        if not within or not space.layer[nodes[0]]:
-            return END
-        if (place := (nodes, within)) not in failed:
-            failed.add(place)
-            left.append(place)
-        return place
-
-    for step in pairs.steps:
-        nodes = pair(*step.nodes)
-        after = after_failing(nodes, within) if step.after == FAILED else step.after
-        steps.add((START if step.before < len(space) else step.before, nodes, after))
-    while left and len(steps) <= most:
-        both, within = place = left.pop()
-        one, other = (set(space.successors(node)) for node in both)
-        for nodes in {pair(*nodes) for nodes in product(one, other)}:
-            steps.add((place, nodes, after_failing(nodes, within - 1)))
-    if len(steps) > most:
-        raise Undecided
-    numbers: dict[object, int] = defaultdict(count(1).__next__, {START: START, END: END})
-    found = [(numbers[before], *nodes, numbers[after]) for before, nodes, after in steps]
-    table = np.array(sorted(found), np.int64).reshape(-1, 4)
-    table[:, 1:3] = space.state[table[:, 1:3]]
-    return table
+def _column(second: Bools, told: Bools) -> Ints:
+    """(rows) the column of the mixture in which some robots follow the second plan."""
+    bits = 1 << np.maximum(told.cumsum(axis=1) - 1, 0)
+    column: Ints = ((second & told) * bits).sum(axis=1)
+    return column

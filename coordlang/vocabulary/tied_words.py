@@ -14,9 +14,8 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import chain, tee
-from math import inf
 
 import numpy as np
 
@@ -24,7 +23,6 @@ from coordlang.language.candidates import Candidates
 from coordlang.language.warping import Pair, pair
 from coordlang.vocabulary.job import Assignment, Job, words_of_states
 from coordlang.vocabulary.loop import Budget, Languages, find
-from coordlang.vocabulary.plan_pairs import PlanPairs, failing_pairs
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from planners.joint.tables import Bools, Ints, unique_rows
@@ -36,14 +34,10 @@ from planners.search.sat import whole
 _AT_ONCE, _ENOUGH = 100, 300
 #: What may be spent on each kind of one task, and of many, at first; then twice as much each time.
 _OF_ONE, _OF_MANY = Budget(rounds=25, conflicts=2_000), Budget(rounds=50, conflicts=2_000)
-_STUTTER_FREE, _ALL_PAIRS = Budget(rounds=8, conflicts=2_000), Budget(rounds=8, conflicts=10_000)
+_STUTTER_FREE = Budget(rounds=8, conflicts=2_000)
 #: Failing tuples of one length, under one symmetry, that are looked at for what they differ in, and
 #: after which longer ones are not.
 _ENOUGH_FOR_FACTS = 500
-#: In large tasks two plans take so many times more pairs of edges in all than at first, or more.
-_FIRST_STEPS = 6
-#: How many steps after a mixture has failed plans must be told apart.
-_WITHIN = 0, 2, inf
 #: Refuted partitions of all kinds for each of the budget, so many conflicts counted as one.
 _TOGETHER, _CONFLICTS = 8, 250
 
@@ -53,29 +47,25 @@ class _Ties:
     """What the words of a kind have in common.
 
     ``classes`` (states): those of one class share a word.  ``joined``: pairs that some step joins,
-    if words are stutter-free.  ``failing``: the pairs of plans of one task that fail, to be told
-    apart step by step, if they are not too many.  ``clauses``: those of refuted partitions, of
-    one task whatever the number of words: (clauses, pairs) codes ``a * states + b``, -1 for no
-    pair.
+    if words are stutter-free.  ``clauses``: those of refuted partitions, of one task whatever the
+    number of words: (clauses, pairs) codes ``a * states + b``, -1 for no pair.
     """
 
     classes: Ints
     joined: Sequence[Pair] = ()
-    failing: Ints = field(default_factory=lambda: np.zeros((0, 4), np.int64))
     clauses: list[Ints] = field(default_factory=list)
 
 
 class TiedWords:
     """Looks for languages among such partitions, with effort that grows from call to call."""
 
-    def __init__(self, job: Job, languages: Languages, pairs: PlanPairs | None, most: int) -> None:
-        """Begin; ``most`` steps of ``pairs``, None for many tasks, may be looked at."""
-        self._pairs, self._most = pairs, most
+    def __init__(self, job: Job, languages: Languages) -> None:
+        """Begin."""
         self._states, self._languages = np.array(job.states), languages
         self._refuter = languages.refuter
         self._random = np.random.default_rng(job.seed)
         self._images = languages.refuter.pool.images
-        self._is_one_task = pairs is not None
+        self._is_one_task = job.candidates.count == 1
         self._first = _OF_ONE if self._is_one_task else _OF_MANY
         #: What there may be in common, kind by kind; each size goes through a copy of it.
         self._tied = self._classes(job)
@@ -96,8 +86,9 @@ class TiedWords:
         For one task: no state need share its word and words are stutter-free, or as few facts as
         possible decide it, then more and more.
         """
-        if self._pairs is not None:
-            yield from self._stutter_free(self._pairs)
+        if self._is_one_task:
+            (space,) = job.candidates.spaces
+            yield _Ties(np.arange(len(self._images[0])), joined_states(space))
             yield from map(_Ties, self._facts)
         else:  # these load networkx
             from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
@@ -105,22 +96,6 @@ class TiedWords:
             tied = [*abstractions(job.candidates, job.states), *map(_orbits, self._images[1:])]
             tied.sort(key=lambda classes: len(np.unique(classes[self._states])))
             yield from map(_Ties, up_to_symmetry(tied, self._images))
-
-    def _stutter_free(self, pairs: PlanPairs) -> Iterator[_Ties]:
-        """Words that tell plans apart soon after they fail, and then before they end.
-
-        Where pairs are too many of them, words of which only single steps are known.
-        """
-        free = _Ties(np.arange(len(self._images[0])), _joined(pairs.space))
-        if _FIRST_STEPS * pairs.least > self._most or not pairs.grow(self._most):
-            yield free
-            return
-        for within in _WITHIN:
-            try:
-                yield replace(free, failing=failing_pairs(pairs, within, self._most))
-            except Undecided:
-                yield free
-                return
 
     def of_facts(self) -> Assignment | None:
         """Of one task the language that says the steps to go and a few facts, if there is one."""
@@ -130,11 +105,6 @@ class TiedWords:
         self._facts = chain([first], self._facts)
         classes = first[self._states]
         return dict(zip(self._states.tolist(), classes.tolist(), strict=True))
-
-    @property
-    def has_pairs(self) -> bool:
-        """Whether pairs of plans that fail are known: small numbers of words are soon decided."""
-        return bool(len(next(self._every()).failing))
 
     def find(self, size: int, rounds: int) -> Assignment | None:
         """A language with at most ``size`` words; None if none was found with some effort.
@@ -168,8 +138,7 @@ class TiedWords:
             # With many tasks what other numbers met slows the solver: open 3x4 by a third.
             own = ties if self._is_one_task else _Ties(ties.classes)
             first = _STUTTER_FREE if own.joined else self._first
-            first = _ALL_PAIRS if len(own.failing) else first
-            random = self._random if self._is_one_task and not len(own.failing) else None
+            random = self._random if self._is_one_task else None
             yield _Kind(self._states, own, size, self._images, first, random)
 
     @property
@@ -239,7 +208,6 @@ class _Kind:
         self.problem = PartitionProblem(free, size, "minisat22", named=False)
         for states_of_step in ties.joined:
             self.problem.separate_one([states_of_step])
-        self.problem.separate_on_paths(ties.failing)
         if random is not None:
             self.problem.prefer_any(random, size)
         self.effort, self.rounds, self._required = effort, 0, 0
@@ -275,7 +243,7 @@ def _orbits(to: Ints) -> Ints:
     return least
 
 
-def _joined(space: PlanSpace) -> list[Pair]:
+def joined_states(space: PlanSpace) -> list[Pair]:
     """The pairs of states that some step joins: each lies in different stutter-free words."""
     before, after = space.state[space.sources], space.state[space.targets()]
     joined = np.unique(np.column_stack((before, after))[before != after], axis=0)

@@ -20,9 +20,9 @@ from coordlang.vocabulary.plan_pairs import FAILED, PlanPairs
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from planners.joint.tables import Ints
 
-#: Pairs of edges that are looked at first, and how many times as many then: few of the pairs of
+#: Steps of mixtures that are looked at first, and how many times as many then: few of the pairs of
 #: plans often suffice for a proof.
-_FIRST, _MORE = 20_000, 5
+_FIRST, _MORE = 60_000, 5
 
 
 class TwoWords:
@@ -97,16 +97,15 @@ class _Changes(PartitionProblem):
         layer, nodes = self._space.layer, dict[int, tuple[int, int]]()
         ahead: dict[object, dict[int, int]] = defaultdict(lambda: defaultdict(self._new))
         failed = set[tuple[int, int]]()
-        for step in sorted(pairs.steps, key=lambda step: (-layer[step.nodes[0]], step)):
-            before = step.before
+        steps = pairs.steps
+        for before, *two, end in steps[np.argsort(-layer[steps[:, 1]], kind="stable")].tolist():
             if before < len(self._space):
                 nodes[before], ahead[before] = (before, before), {0: self._true}
-            if step.after == FAILED:
-                failed.add(step.nodes)
-            else:
-                nodes[step.after] = step.nodes
-            after = ahead[step.nodes if step.after == FAILED else step.after]
-            mine, theirs = map(self._steps, nodes[before], step.nodes)
+            both = nodes[end] = (two[0], two[1])
+            if end == FAILED:
+                failed.add(both)
+            after = ahead[both if end == FAILED else end]
+            mine, theirs = map(self._steps, nodes[before], both)
             for (one, first), (other, second) in product(mine, theirs):
                 for number, variable in ahead[before].items():
                     now = after[number + first - second]

@@ -12,22 +12,21 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from itertools import product
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
 
-from coordlang.language.warping import Clause
+from coordlang.language.warping import Clause, Pair
 from coordlang.vocabulary.plan_pairs import FAILED, PlanPairs
-from coordlang.vocabulary.sat import END, START, PartitionProblem
-from planners.joint.tables import Ints, unique_rows
+from coordlang.vocabulary.sat import END, START, PartitionProblem, Undecided
+from planners.joint.tables import Bools, Ints, ranges, unique_rows
 from planners.search.plan_space import PlanSpace
 
 #: Steps by which one of two plans may be ahead before a mixture fails.  With 1 as few words of taxi
 #: p09 (makespan) are refuted, but 5 are found after more than 20 rounds, with 2 after 6; with more
 #: the formula is three times as large.
 _WAITING = 2
-#: A solver has so many words more than it is asked for at first: larger sizes are asked for next.
-_FURTHER = 2
 
 
 class _Cell(NamedTuple):
@@ -46,18 +45,32 @@ class _Cell(NamedTuple):
     waiting: tuple[int, ...] = ()
 
 
+def failing_pairs(pairs: PlanPairs, within: float, most: int) -> Ints:
+    """Steps such that on each path from the start to the end two plans must be told apart.
+
+    The paths are the pairs of plans that fail, of those that were looked at, step by step: from
+    where they differ to ``within`` steps after a mixture has failed; 0: to that step, infinitely
+    many: to their ends.  Raises `Undecided` if there are more than about ``most`` steps.  They are
+    a table, see `PartitionProblem.separate_on_paths`.
+    """
+    before, one, other, after = pairs.steps.T
+    before = np.where(before < len(pairs.space), START, before)
+    walked = np.column_stack((before, one, other, after))
+    return _FreeCells(pairs.space, 0, within, most).after(walked, after == FAILED)
+
+
 def steps_apart(space: PlanSpace, most: int) -> int:
     """By how many steps plans may be apart for a graph of about ``most`` steps; -1: not at all."""
-    nodes, edges = np.bincount(space.layer), np.array([*map(len, _successors(space))])
+    nodes = np.bincount(space.layer)
+    edges = np.bincount(space.layer[_steps_of(space)[:, 0]], minlength=len(nodes))
     moves = np.outer(edges, edges) + np.outer(edges, nodes) + np.outer(nodes, edges)
     steps = [int(np.diagonal(moves, apart).sum()) for apart in range(len(nodes))]
     return int((np.cumsum(steps) <= most).sum()) - 1
 
 
-def _successors(space: PlanSpace) -> list[Ints]:
-    """By layer the nodes (steps, 2) that an edge leads from and to, each pair once."""
-    layers = map(space.layer_edges, range(len(space.layers)))
-    return [unique_rows(np.column_stack((own.source, own.target)))[0] for own in layers]
+def _steps_of(space: PlanSpace) -> Ints:
+    """(steps, 2) the nodes that an edge leads from and to, each pair once."""
+    return unique_rows(np.column_stack((space.sources, space.targets())))[0]
 
 
 class WarpedPairs:
@@ -74,20 +87,18 @@ class WarpedPairs:
         ]
         self._layer: list[int] = space.layer.tolist()
         self._steps = defaultdict[int, list[tuple[int, int, int]]](list)
-        for before, nodes, after in sorted(pairs.steps):
-            self._steps[before].append((*nodes, after))
+        for before, *after in pairs.steps.tolist():
+            self._steps[before].append((after[0], after[1], after[2]))
         self._apart, self._waiting = apart, min(waiting, apart)
-        self._free = _FreeCells(space, apart)
 
-    def steps(self) -> Iterator[Ints]:
-        """Tables of steps: on each path from the start to the end plans must be told apart.
+    def steps(self) -> Ints:
+        """Steps such that on each path from the start to the end plans must be told apart.
 
-        See `PartitionProblem.separate_on_paths`.
+        They are a table, see `PartitionProblem.separate_on_paths`.
         """
-        yield from self._free.steps()
         begin = [_Cell(node, False, node, node) for node in self._steps if node < len(self._space)]
         number = dict.fromkeys(begin, START)
-        left, found, last = begin, list[tuple[int, int, int, int]](), self._free.last
+        left, found, last = begin, list[tuple[int, int, int, int]](), START
         while left:
             cell = left.pop()
             here = number[cell]
@@ -97,11 +108,10 @@ class WarpedPairs:
                     last += 1
                     number[after] = last
                     left.append(after)
-                into = START if is_free else number[after]
+                into = FAILED if is_free else number[after]
                 found.append((here, after.first, after.second, into))
-        before, one, other, places = np.array(found, np.int64).reshape(-1, 4).T
-        places = np.where(places == START, self._free.number(one, other), places)
-        yield _with_states(self._space, before, one, other, places)
+        walked = np.array(found, np.int64).reshape(-1, 4)
+        return _FreeCells(self._space, self._apart).after(walked, walked[:, 3] == FAILED)
 
     def _after_failing(self, cell: _Cell) -> Iterator[_Cell]:
         """The cells after one in which the second plan has still to catch up."""
@@ -137,95 +147,123 @@ def _named(cell: _Cell) -> _Cell:
 class _FreeCells:
     """Two plans after a mixture has failed, neither of which has to catch up.
 
-    A cell is two different nodes, in layers that are at most ``apart`` from each other.  They are
-    numbered from 1; ``last`` is the last number.
+    A cell is two different nodes, at most so many layers ``apart``, and in how many steps from
+    there the plans must be told apart: at most ``within`` after the mixture has failed.
+    Raises `Undecided` where there are more than about ``most`` steps.
     """
 
-    def __init__(self, space: PlanSpace, apart: int) -> None:
-        self._space, self._apart, self._layer = space, apart, space.layer
-        counts = self._counts = np.bincount(space.layer)
-        self._first = np.cumsum([0, *counts])
-        self._edges = _successors(space)
-        #: By the layers of the two nodes: the number before the first cell.
-        sizes = np.triu(np.tri(len(counts), k=apart, dtype=np.int64)) * np.outer(counts, counts)
-        self._before = np.cumsum(sizes).reshape(sizes.shape) - sizes
-        self.last = int(sizes.sum())
+    def __init__(
+        self, space: PlanSpace, apart: int, within: float = inf, most: float = inf
+    ) -> None:
+        self._space, self._layer, self._apart, self._most = space, space.layer, apart, most
+        #: More than the steps in which both plans end, if one goes at a time.
+        self._end = 1 + 2 * int(space.layer.max(initial=0))
+        self._within = int(min(within, self._end))
+        self._edges = _steps_of(space)
+        self._first = np.searchsorted(self._edges[:, 0], np.arange(len(space) + 1))
 
-    def number(self, one: Ints, other: Ints) -> Ints:
-        """The numbers of the cells of pairs of nodes; `END` where plans that agree may end."""
-        first, second = np.minimum(one, other), np.maximum(one, other)
-        low, high = self._layer[first], self._layer[second]
-        row, column = first - self._first[low], second - self._first[high]
-        found = 1 + self._before[low, high] + row * self._counts[high] + column
-        return np.where((first == second) | (high == 0), END, found)
+    def after(self, walked: Ints, fails: Bools) -> Ints:
+        """All steps: those ``walked``, and what follows those in which a mixture ``fails``.
 
-    def steps(self) -> Iterator[Ints]:
-        """The steps between them, a table for each layer of the node that is nearer to its end."""
-        layers = len(self._edges)
-        for low in range(layers):
-            others = range(low, min(layers, low + self._apart + 1))
-            steps = [own for high in others for own in self._between(low, high)]
-            yield np.concatenate(steps)
+        Places of the first are numbered from `START` on.  Nodes become states.
+        """
+        one, other = walked[fails, 1:3].T
+        begin = self._codes(one, other, np.full(len(one), self._within))
+        places = walked[:, [0, 3]]
+        free = 1 + int(places.max(initial=START))  # what is added to the codes of cells
+        walked[fails, 3] = np.where(begin == END, END, begin + free)
+        tables, number = [walked], len(walked)
+        for table in self._steps(begin):
+            number += len(table)
+            if number > self._most:
+                raise Undecided
+            table[:, [0, 3]] += np.where(table[:, [0, 3]] == END, 0, free)
+            tables.append(table)
+        steps = np.concatenate(tables)
+        steps[:, 1:3] = self._space.state[steps[:, 1:3]]
+        # `END` is the least place, and `START` the next one.
+        places = np.append(steps[:, [0, 3]], (END, START))
+        numbers = np.unique(places, return_inverse=True)[1] + END
+        steps[:, [0, 3]] = numbers[:-2].reshape(-1, 2)
+        return steps
 
-    def _between(self, low: int, high: int) -> Iterator[Ints]:
-        """From the nodes of two layers on both plans, or one of them."""
-        nodes = [np.arange(*self._first[layer : layer + 2]) for layer in (low, high)]
-        (stay, go), (other_stays, other_goes) = (
-            (np.column_stack((own, own)), self._edges[layer])
-            for own, layer in zip(nodes, (low, high), strict=True)
-        )
-        for apart, mine, theirs in (
-            (high - low, go, other_goes),
-            (high - low + 1, go, other_stays),
-            (abs(high - low - 1), stay, other_goes),
-        ):
-            if apart <= self._apart:
-                row, column = np.divmod(np.arange(len(mine) * len(theirs)), max(1, len(theirs)))
-                (first, here), (second, target) = mine[row].T, theirs[column].T
-                # Of two nodes of one layer the first one has the smaller number.
-                kept = np.flatnonzero(first < second)
-                first, second, here, target = first[kept], second[kept], here[kept], target[kept]
-                before, after = self.number(first, second), self.number(here, target)
-                yield _with_states(self._space, before, here, target, after)
+    def _steps(self, begin: Ints) -> Iterator[Ints]:
+        """Tables of the steps from cells, and from all that follow: those before others first."""
+        begin = np.unique(begin[begin != END])
+        layers = self._layer[np.stack(self._nodes(begin)[:2])].sum(axis=0)
+        arrived = defaultdict[int, list[Ints]](list)
+        for total in reversed(range(1, self._end)):  # each step of a plan leads to a smaller sum
+            cells = np.unique(np.concatenate((begin[layers == total], *arrived.pop(total, []))))
+            low, high, left = self._nodes(cells)
+            for steps, which, one, other in self._moves(low, high):
+                ends = self._codes(one, other, left[which] - (self._within < self._end))
+                arrived[total - steps].append(ends[ends != END])
+                yield np.column_stack((cells[which], one, other, ends))
 
+    def _moves(self, low: Ints, high: Ints) -> Iterator[tuple[int, Ints, Ints, Ints]]:
+        """In how many plans a step is made, the rows of cells, and the nodes that are entered."""
+        which, one = self._from(low)
+        again, other = self._from(high[which])
+        yield 2, which[again], one[again], other
+        if self._apart:
+            near = self._layer[high[which]] - self._layer[one] <= self._apart
+            yield 1, which[near], one[near], high[which[near]]
+            which, other = self._from(high)
+            yield 1, which, low[which], other
 
-def _with_states(space: PlanSpace, before: Ints, one: Ints, other: Ints, after: Ints) -> Ints:
-    """A table of steps with states in place of nodes."""
-    return np.column_stack((before, space.state[one], space.state[other], after))
+    def _from(self, nodes: Ints) -> tuple[Ints, Ints]:
+        """For each next node of each of some the row of this, and the next one."""
+        counts = self._first[nodes + 1] - self._first[nodes]
+        edges = ranges(self._first[nodes], counts)
+        return np.repeat(np.arange(len(nodes)), counts), self._edges[edges, 1]
+
+    def _codes(self, one: Ints, other: Ints, left: Ints) -> Ints:
+        """The numbers of cells; `END` where plans that agree so far may agree to their ends."""
+        low, high = np.minimum(one, other), np.maximum(one, other)
+        code = (low * len(self._space) + high) * (self._end + 1) + left
+        return np.where((low == high) | (self._layer[high] == 0) | (left == 0), END, code)
+
+    def _nodes(self, codes: Ints) -> tuple[Ints, Ints, Ints]:
+        """What `_codes` are made of: the nodes, nearer to its end first, and the steps left."""
+        both, left = np.divmod(codes, self._end + 1)
+        return *np.divmod(both, len(self._space)), left
 
 
 class PairsApart:
     """Partitions that satisfy all known clauses and tell pairs of plans apart, for every size.
 
-    ``states`` need words; ``clauses``: a list that only grows; ``pairs``: what no two plans of
-    which may agree; ``random`` draws the words that are tried first.  ``steps`` and ``conflicts``:
-    those of the graphs and of the solvers so far.
+    ``states`` need words; ``clauses``: a list that only grows; ``steps`` are a table,
+    see `PartitionProblem.separate_on_paths`; ``joined``: pairs of states that are in different
+    words, too.  ``random`` draws the words that are tried first.  ``steps`` and ``conflicts`` count
+    those of the solvers so far.
     """
 
     def __init__(
         self,
         states: Sequence[int],
         clauses: Sequence[Clause],
-        pairs: WarpedPairs,
-        random: np.random.Generator,
+        steps: Ints,
+        random: np.random.Generator | None = None,
+        joined: Sequence[Pair] = (),
     ) -> None:
-        self._states, self._clauses, self._pairs = states, clauses, pairs
+        self._states, self._clauses, self._table = states, clauses, steps
         self._problem: PartitionProblem | None = None
-        self._required, self._size, self._random = 0, 0, random
+        self._required, self._size, self._random, self._joined = 0, 0, random, joined
         self.steps = self.conflicts = 0
 
-    def find(self, size: int, conflicts: int) -> dict[int, int] | None:
+    def find(self, size: int, room: int, conflicts: int) -> dict[int, int] | None:
         """A partition into ``size`` words, or None if there is none.
 
-        Raises `Undecided` after so many ``conflicts`` of the solver.
+        Raises `Undecided` after so many ``conflicts`` of the solver.  A new one has ``room`` for so
+        many words: larger sizes may be asked for next.
         """
         problem = self._problem
         if problem is None or size > problem.size:
-            problem = self._start(size + _FURTHER)
+            problem = self._start(room)
         for clause in self._clauses[self._required :]:
             problem.separate_one(clause)
         self._required, before = len(self._clauses), problem.conflicts
-        if size != self._size:
+        if size != self._size and self._random is not None:
             problem.prefer_any(self._random, size)
             self._size = size
         try:
@@ -236,9 +274,10 @@ class PairsApart:
     def _start(self, size: int) -> PartitionProblem:
         self.close()
         self._problem = problem = PartitionProblem(self._states, size, "minisat22", named=False)
-        for steps in self._pairs.steps():
-            problem.separate_on_paths(steps)
-            self.steps += len(steps)
+        for states in self._joined:
+            problem.separate_one([states])
+        problem.separate_on_paths(self._table)
+        self.steps += len(self._table)
         self._required = self._size = 0
         return problem
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, nullcontext
 from dataclasses import replace
 from functools import partial
@@ -22,10 +22,10 @@ from coordlang.language.warping import Pair, pair
 from coordlang.required.choices import Choices
 from coordlang.vocabulary.loop import Budget, Languages, find
 from coordlang.vocabulary.minimal import MinimalSearch
-from coordlang.vocabulary.plan_pairs import PlanPairs, failing_pairs
+from coordlang.vocabulary.plan_pairs import PlanPairs
 from coordlang.vocabulary.sat import END, START, Undecided
 from coordlang.vocabulary.two_words import TwoWords
-from coordlang.vocabulary.warped_pairs import PairsApart, WarpedPairs
+from coordlang.vocabulary.warped_pairs import PairsApart, WarpedPairs, failing_pairs
 from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
 from tests.support import naive
@@ -63,15 +63,12 @@ def test_pairs_of_plans_that_fail_are_the_paths_of_a_graph(robots: int, number: 
                     two = zip(*(states.tolist() for states in entered), strict=True)
                     fail[id(space)].add(tuple(pair(a, b) if a != b else None for a, b in two))
         for space in candidates.spaces:
-            pairs = PlanPairs(Choices(space))
-            assert pairs.grow(10**6)
-            paths = set(paths_of(failing_pairs(pairs, inf, 10**6)))
-            assert paths == fail[id(space)]
+            pairs = grown(space)
+            for within in (0, 1, inf):
+                paths = set(paths_of(failing_pairs(pairs, within, 10**6)))
+                assert paths <= {whole[:n] for whole in fail[id(space)] for n in range(9)}
+            assert least_of(paths) == least_of(fail[id(space)])
             told += len(paths)
-            for within in (0, 1):
-                for path in set(paths_of(failing_pairs(pairs, within, 10**6))):
-                    begun = {whole[: len(path)] for whole in paths}
-                    assert path in begun
             with pytest.raises(Undecided) if paths else nullcontext():
                 failing_pairs(pairs, inf, 0)
     assert told >= 2 * number, told
@@ -86,10 +83,16 @@ def paths_of(steps: Ints, place: int = START) -> Iterator[tuple[Pair | None, ...
             yield from ((states, *following) for following in rest)
 
 
+def least_of(paths: Iterable[tuple[Pair | None, ...]]) -> set[frozenset[Pair | None]]:
+    """The pairs of states of which one must be told apart, where no fewer of them are said to."""
+    every = {frozenset(path) - {None} for path in paths}
+    return {states for states in every if not any(other < states for other in every)}
+
+
 def grown(space: PlanSpace) -> PlanPairs:
     """All pairs of plans."""
     pairs = PlanPairs(Choices(space))
-    assert pairs.grow(10**6)
+    assert pairs.complete(10**6)
     return pairs
 
 
@@ -117,7 +120,7 @@ def test_all_warping_paths_of_pairs_of_plans_are_the_paths_of_a_graph(
         bad, pairs = failing(candidates), grown(candidates.spaces[0])
         two = [own for plans in bad if len(own := sorted(set(plans))) == 2]
         graphs = [
-            np.concatenate([*WarpedPairs(pairs, apart, waiting).steps()])
+            WarpedPairs(pairs, apart, waiting).steps()
             for apart, waiting in ((99, 99), (99, 0), (1, 2), (0, 2))
         ]
         found = {frozenset(path) - {None} for path in paths_of(graphs[0])}
@@ -216,8 +219,10 @@ def fewest(candidates: Candidates) -> int:
     job = Making(candidates).job(MethodOptions())
     languages, pairs = Languages.of(job), WarpedPairs(grown(candidates.spaces[0]), 99)
     draws, size = np.random.default_rng(0), 2
-    with closing(PairsApart(job.states, languages.clauses, pairs, draws)) as search:
-        while (found := find(partial(search.find, size), languages.holds, Budget())) is None:
+    with closing(PairsApart(job.states, languages.clauses, pairs.steps(), draws)) as search:
+        while (
+            found := find(partial(search.find, size, size + 1), languages.holds, Budget())
+        ) is None:
             size += 1
     job.check(found)
     return size

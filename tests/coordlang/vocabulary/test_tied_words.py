@@ -20,14 +20,12 @@ from coordlang.commands.building import build_language
 from coordlang.language.candidates import Candidates
 from coordlang.language.warping import Pair
 from coordlang.language.words import Partition
-from coordlang.required.choices import Choices
 from coordlang.symmetry.group import symmetry_group
 from coordlang.verification.by_definition import verify_candidates
 from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
 from coordlang.vocabulary.first_differences import first_differences
 from coordlang.vocabulary.job import Assignment, Job
 from coordlang.vocabulary.loop import Budget, Languages
-from coordlang.vocabulary.plan_pairs import PlanPairs
 from coordlang.vocabulary.sat import PartitionProblem
 from coordlang.vocabulary.tied_words import TiedWords, _Kind, _orbits, _Ties, classes_by_facts
 from planners.joint.tables import Ints
@@ -40,8 +38,7 @@ from tests.support.domains import all_tasks, own_task
 def found(candidates: Candidates, size: int) -> tuple[Job, Languages, Assignment | None]:
     job = build_language(candidates, "greedy").job
     languages = Languages.of(job)
-    pairs = PlanPairs(Choices(candidates.spaces[0])) if candidates.count == 1 else None
-    search = TiedWords(job, languages, pairs, 10**6)
+    search = TiedWords(job, languages)
     try:
         return job, languages, search.find(size, 60)
     finally:
