@@ -35,6 +35,7 @@ from coordlang.vocabulary.loop import (
 )
 from coordlang.vocabulary.merging import merged
 from coordlang.vocabulary.sat import Undecided
+from planners.joint.tables import Ints
 from planners.search.sat import SolverName
 from planners.system.errors import OutOfMemory
 from planners.system.limits import memory_left, run_until_stopped
@@ -63,9 +64,10 @@ _FOR_ROUND, _CONFLICTS = 60_000, 40_000
 #: Steps of mixtures of two plans that are looked at, in some ten seconds, for words that tell plans
 #: apart step by step, and along all warping paths; so many count as a conflict.
 _MOST_PAIRS, _FEW_PAIRS, _EDGES = 26_000_000, 1_200_000, 200
-#: Steps of mixtures that are looked at for each step of a formula of words that tell plans apart
-#: step by step; how many steps after a mixture has failed; what may be spent on each number.
-_PAIRS_OF_STEP, _WITHIN, _AT_FIRST = 2, (2, 1), Budget(rounds=8, conflicts=2_000)
+#: Clauses of a formula of words that tell plans apart step by step, in some 20 seconds; that within
+#: two steps after a mixture has failed, not one, where it has so many times less for one; and what
+#: may be spent on each number.
+_MOST_CLAUSES, _SMALL, _AT_FIRST = 20_000_000, 4, Budget(rounds=8, conflicts=2_000)
 #: A solver has so many words more than it is asked for at first: larger sizes are asked for next.
 _FURTHER = 2
 #: Steps of pairs of plans that fail along their warping paths, in some 20 seconds; so many count as
@@ -217,23 +219,31 @@ class MinimalSearch:
         random, pairs = np.random.default_rng(self._job.seed), WarpedPairs(self._plan_pairs, apart)
         return PairsApart(self._job.states, self.languages.clauses, pairs.steps(), random)
 
+    @property
+    def _most_clauses(self) -> int:
+        """What a formula of words that tell plans apart step by step may have."""
+        return min(_MOST_CLAUSES, _STEPS * self._most, memory_left() // _BYTES)
+
     def _more_in_step(self) -> Iterator[PairsApart]:
         """Stutter-free words that tell pairs of plans of one task apart, step by step."""
-        from coordlang.vocabulary.tied_words import joined_states
-        from coordlang.vocabulary.warped_pairs import PairsApart, failing_pairs
+        from coordlang.vocabulary.warped_pairs import PairsApart, failing_pairs, joined_states
 
-        pairs = self._plan_pairs
-        most = min(_MOST_PAIRS, _EDGES * self._most, memory_left() // _BYTES)
+        pairs, most = self._plan_pairs, self._most_clauses
         self._report("looking at pairs of plans")
-        if not pairs.complete(most):
+        if not pairs.complete(min(_MOST_PAIRS, _EDGES * self._most, memory_left() // _BYTES)):
             return
         joined, clauses = joined_states(pairs.space), self.languages.clauses
-        for within in (*_WITHIN, inf):
-            if self._in_step and within < inf:
-                continue
-            with suppress(Undecided):
-                steps = failing_pairs(pairs, within, most // _PAIRS_OF_STEP)
+
+        def tables() -> Iterator[Ints]:
+            soon = failing_pairs(pairs, 1, most)
+            yield soon if _SMALL * len(soon) > most else failing_pairs(pairs, 2, most)
+            yield failing_pairs(pairs, inf, most)
+
+        with suppress(Undecided):
+            for steps in tables():
                 search = PairsApart(self._job.states, clauses, steps, joined=joined)
+                if search.number_of_clauses(2 * self.lower) > most:
+                    return
                 self._in_step.append(search)
                 yield search
 
@@ -299,6 +309,8 @@ class MinimalSearch:
         between the number that was tried last and the one that suffices.  Where rounds are dear
         only that.
         """
+        if not self._is_open:
+            return
         self._find_fewer_in_step(rounds)
         least = self.lower
         if not self._is_dear and least < self.upper:
@@ -323,7 +335,9 @@ class MinimalSearch:
                 left = max(0, self._most - self.work)
                 own = Budget(_AT_FIRST.rounds, min(_AT_FIRST.conflicts * rounds, left))
                 self._report(f"trying {size} words that tell plans apart step by step")
-                ask = partial(search.find, size, min(4 * size, self.upper - 1))
+                room = min(4 * size, self.upper - 1)
+                room = room if search.number_of_clauses(room) <= self._most_clauses else size
+                ask = partial(search.find, size, room)
                 found = None
                 with suppress(Undecided):
                     found = find(ask, self._holds, own)

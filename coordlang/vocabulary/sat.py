@@ -117,8 +117,7 @@ class PartitionProblem:
         self._last = 0
         self._solver = sat_solver(solver)
         self._word = {s: [self._new() for _ in range(size)] for s in states}
-        #: The variables of places that two plans reach; none of the start.
-        self._reached: Ints = np.zeros(1, np.int64)
+        self._required = 0
         self._separated: dict[Pair, int] = {}
         self._equivalent: set[Pair] = set()
         self._all_separated: dict[Clause, int] = {}
@@ -135,6 +134,12 @@ class PartitionProblem:
     def separate_one(self, clause: Iterable[Pair]) -> None:
         """Require that one of these pairs of states lies in different words."""
         self._solver.add_clause([self._separate(p) for p in sorted(clause)])
+
+    def require(self, clauses: Sequence[Clause]) -> None:
+        """`separate_one` of what is new in a list that only grows: always the same one."""
+        for clause in clauses[self._required :]:
+            self.separate_one(clause)
+        self._required = len(clauses)
 
     def separate_all_of_one(self, alternatives: Sequence[Clause]) -> None:
         """Require that all pairs of one of these sets lie in different words."""
@@ -161,12 +166,10 @@ class PartitionProblem:
         they are then, `END` where both have ended.
         """
         before, one, other, after = steps.T
-        new = max(0, int(steps[:, [0, 3]].max(initial=0)) + 1 - len(self._reached))
-        self._reached = np.append(self._reached, self._last + 1 + np.arange(new))
-        self._last += new
         literals = np.zeros((len(steps), 3), np.int64)
-        literals[:, 0] = -self._reached[before]
-        literals[:, 2] = np.where(after == END, 0, self._reached[after])
+        literals[:, 0] = np.where(before == START, 0, -self._last - before)
+        literals[:, 2] = np.where(after == END, 0, self._last + after)
+        self._last += int(steps[:, [0, 3]].max(initial=START))
         states = 1 + max(self._word)
         pairs = np.minimum(one, other) * states + np.maximum(one, other)
         pairs, place = np.unique(pairs, return_inverse=True)

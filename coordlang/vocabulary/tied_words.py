@@ -3,11 +3,9 @@
 
 States share a word that an abstraction takes for one (`coordlang.vocabulary.abstractions`), or that
 a symmetry takes to each other; in one task those of which a few facts say the same ("has robot 2
-loaded the package?"), or words are *stutter-free*: every step of every optimal plan enters another
-word, so that one clause rules a failing tuple out, the one of the warping path that goes step by
-step (Proposition 27 of docs/concepts.md).  One of these partitions often is a language where the
-loop finds none.  **What is not found here proves nothing about numbers of words**: that no
-partition of a kind is a language says nothing of the others (Proposition 18).
+loaded the package?").  One of these partitions often is a language where the loop finds none.
+**What is not found here proves nothing about numbers of words**: that no partition of a kind is a
+language says nothing of the others (Proposition 18 of docs/concepts.md).
 """
 
 from __future__ import annotations
@@ -20,13 +18,11 @@ from itertools import chain, tee
 import numpy as np
 
 from coordlang.language.candidates import Candidates
-from coordlang.language.warping import Pair, pair
 from coordlang.vocabulary.job import Assignment, Job, words_of_states
 from coordlang.vocabulary.loop import Budget, Languages, find
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from planners.joint.tables import Bools, Ints, unique_rows
-from planners.search.plan_space import PlanSpace
 from planners.search.sat import whole
 
 #: Clauses that are taken of a refuted partition, before their images; and failing tuples after
@@ -34,7 +30,6 @@ from planners.search.sat import whole
 _AT_ONCE, _ENOUGH = 100, 300
 #: What may be spent on each kind of one task, and of many, at first; then twice as much each time.
 _OF_ONE, _OF_MANY = Budget(rounds=25, conflicts=2_000), Budget(rounds=50, conflicts=2_000)
-_STUTTER_FREE = Budget(rounds=8, conflicts=2_000)
 #: Failing tuples of one length, under one symmetry, that are looked at for what they differ in, and
 #: after which longer ones are not.
 _ENOUGH_FOR_FACTS = 500
@@ -46,13 +41,12 @@ _TOGETHER, _CONFLICTS = 8, 250
 class _Ties:
     """What the words of a kind have in common.
 
-    ``classes`` (states): those of one class share a word.  ``joined``: pairs that some step joins,
-    if words are stutter-free.  ``clauses``: those of refuted partitions, of one task whatever the
-    number of words: (clauses, pairs) codes ``a * states + b``, -1 for no pair.
+    ``classes`` (states): those of one class share a word.  ``clauses``: those of refuted
+    partitions, of one task whatever the number of words: (clauses, pairs) codes ``a * states + b``,
+    -1 for no pair.
     """
 
     classes: Ints
-    joined: Sequence[Pair] = ()
     clauses: list[Ints] = field(default_factory=list)
 
 
@@ -83,12 +77,9 @@ class TiedWords:
     def _classes(self, job: Job) -> Iterator[_Ties]:
         """Which states share a word, kind by kind: those with few classes first.
 
-        For one task: no state need share its word and words are stutter-free, or as few facts as
-        possible decide it, then more and more.
+        For one task: as few facts as possible decide it, then more and more.
         """
         if self._is_one_task:
-            (space,) = job.candidates.spaces
-            yield _Ties(np.arange(len(self._images[0])), joined_states(space))
             yield from map(_Ties, self._facts)
         else:  # these load networkx
             from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
@@ -137,9 +128,8 @@ class TiedWords:
         for ties in self._every():
             # With many tasks what other numbers met slows the solver: open 3x4 by a third.
             own = ties if self._is_one_task else _Ties(ties.classes)
-            first = _STUTTER_FREE if own.joined else self._first
             random = self._random if self._is_one_task else None
-            yield _Kind(self._states, own, size, self._images, first, random)
+            yield _Kind(self._states, own, size, self._images, self._first, random)
 
     @property
     def _spent(self) -> int:
@@ -206,8 +196,6 @@ class _Kind:
         free = np.unique(self.first[states]).tolist()
         # A solver that is quick on many easy problems with many solutions.
         self.problem = PartitionProblem(free, size, "minisat22", named=False)
-        for states_of_step in ties.joined:
-            self.problem.separate_one([states_of_step])
         if random is not None:
             self.problem.prefer_any(random, size)
         self.effort, self.rounds, self._required = effort, 0, 0
@@ -241,13 +229,6 @@ def _orbits(to: Ints) -> Ints:
         least = np.minimum(least, image)
         image = to[image]
     return least
-
-
-def joined_states(space: PlanSpace) -> list[Pair]:
-    """The pairs of states that some step joins: each lies in different stutter-free words."""
-    before, after = space.state[space.sources], space.state[space.targets()]
-    joined = np.unique(np.column_stack((before, after))[before != after], axis=0)
-    return sorted({pair(a, b) for a, b in joined.tolist()})
 
 
 # ---- few facts that decide the words of one task

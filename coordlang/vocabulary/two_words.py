@@ -22,7 +22,7 @@ from planners.joint.tables import Ints
 
 #: Steps of mixtures that are looked at first, and how many times as many then: few of the pairs of
 #: plans often suffice for a proof.
-_FIRST, _MORE = 60_000, 5
+_FIRST, _MORE = 100_000, 5
 
 
 class TwoWords:
@@ -50,9 +50,8 @@ class TwoWords:
         for _ in range(budget.rounds):
             if self._formula is None:
                 self._formula = self._next_formula(most)
-            for clause in self._clauses[self._formula.known :]:
-                self._formula.separate_one(clause)
-            self._formula.known, before = len(self._clauses), self._formula.conflicts
+            self._formula.require(self._clauses)
+            before = self._formula.conflicts
             try:
                 found = self._formula.solve(budget.conflicts)
             finally:
@@ -88,7 +87,7 @@ class _Changes(PartitionProblem):
 
     def __init__(self, states: Sequence[int], pairs: PlanPairs) -> None:
         super().__init__(states, 2)
-        self._space, self._true, self.known = pairs.space, self._new(), 0
+        self._space, self._true = pairs.space, self._new()
         self._solver.add_clause([self._true])
         self._add_mixtures(pairs)
 

@@ -5,6 +5,9 @@ Two plans have one sentence iff a warping path goes through cells of one word ea
 docs/concepts.md).  A path of the graph here is such a path of two plans of which a mixture fails:
 until it fails both have to be known as far as the plan that is ahead, afterwards they go on as they
 like.  So a formula of the graph's steps rules out all partitions in which two such plans agree.
+
+Words are *stutter-free* if every step of every optimal plan enters another one.  Then only the path
+that goes step by step matters (Proposition 27), so that larger tasks have a formula.
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coordlang.language.warping import Clause, Pair
+from coordlang.language.warping import Clause, Pair, pair
 from coordlang.vocabulary.plan_pairs import FAILED, PlanPairs
 from coordlang.vocabulary.sat import END, START, PartitionProblem, Undecided
 from planners.joint.tables import Bools, Ints, ranges, unique_rows
@@ -27,6 +30,8 @@ from planners.search.plan_space import PlanSpace
 #: p09 (makespan) are refuted, but 5 are found after more than 20 rounds, with 2 after 6; with more
 #: the formula is three times as large.
 _WAITING = 2
+#: A pair of states takes as long as so many clauses, besides those that it has.
+_FOR_STATES = 8
 
 
 class _Cell(NamedTuple):
@@ -57,6 +62,12 @@ def failing_pairs(pairs: PlanPairs, within: float, most: int) -> Ints:
     before = np.where(before < len(pairs.space), START, before)
     walked = np.column_stack((before, one, other, after))
     return _FreeCells(pairs.space, 0, within, most).after(walked, after == FAILED)
+
+
+def joined_states(space: PlanSpace) -> list[Pair]:
+    """The pairs of states that some step joins: stutter-free words tell each apart."""
+    two = space.state[_steps_of(space)]
+    return sorted({pair(a, b) for a, b in two.tolist() if a != b})
 
 
 def steps_apart(space: PlanSpace, most: int) -> int:
@@ -248,8 +259,13 @@ class PairsApart:
     ) -> None:
         self._states, self._clauses, self._table = states, clauses, steps
         self._problem: PartitionProblem | None = None
-        self._required, self._size, self._random, self._joined = 0, 0, random, joined
+        self._size, self._random, self._joined = 0, random, joined
+        self._different = len(unique_rows(np.sort(steps[:, 1:3], axis=1))[0])
         self.steps = self.conflicts = 0
+
+    def number_of_clauses(self, words: int) -> int:
+        """How many clauses a solver gets for so many words; one for a pair of states is dear."""
+        return len(self._table) + self._different * (words + _FOR_STATES)
 
     def find(self, size: int, room: int, conflicts: int) -> dict[int, int] | None:
         """A partition into ``size`` words, or None if there is none.
@@ -260,9 +276,8 @@ class PairsApart:
         problem = self._problem
         if problem is None or size > problem.size:
             problem = self._start(room)
-        for clause in self._clauses[self._required :]:
-            problem.separate_one(clause)
-        self._required, before = len(self._clauses), problem.conflicts
+        problem.require(self._clauses)
+        before = problem.conflicts
         if size != self._size and self._random is not None:
             problem.prefer_any(self._random, size)
             self._size = size
@@ -278,7 +293,7 @@ class PairsApart:
             problem.separate_one([states])
         problem.separate_on_paths(self._table)
         self.steps += len(self._table)
-        self._required = self._size = 0
+        self._size = 0
         return problem
 
     def close(self) -> None:
