@@ -41,10 +41,12 @@ class _Places(NamedTuple):
     nodes: Ints
 
     def rows(self, some: slice) -> _Places:
+        """Some of them."""
         return _Places(self.numbers[some], self.told[some], self.nodes[some])
 
 
 def _joined(tables: Sequence[_Places]) -> _Places:
+    """Tables as one."""
     numbers, told, nodes = zip(*tables, strict=True)
     return _Places(np.concatenate(numbers), np.concatenate(told), np.concatenate(nodes))
 
@@ -61,7 +63,7 @@ class PlanPairs:
     def __init__(self, choices: Choices) -> None:
         self.space, self._choices = choices.space, choices
         self._index = EdgeIndex.of(self.space)
-        self.looked_at = 0
+        self.looked_at, self._looks_ahead = 0, True
         self._last = len(self.space) - 1
         self._labels_of: dict[tuple[int, tuple[int, ...]], set[tuple[int, ...]]] = {}
         #: The number of each place that is no node, or `_HARMLESS`.
@@ -81,9 +83,9 @@ class PlanPairs:
         """
         steps = np.concatenate(self._found)
         steps[np.isin(steps[:, 3], np.concatenate(self._failed)), 3] = FAILED
-        leads, known = np.zeros(self._last + 2, np.bool_), 0
+        leads = np.zeros(self._last + 2, np.bool_)  # (places, and `FAILED` at the end)
         leads[FAILED] = True
-        while known < (known := int(leads.sum())):
+        for _ in self.space.layers:
             leads[steps[leads[steps[:, 3]], 0]] = True
         steps = steps[leads[steps[:, 3]]]
         steps[:, 3] -= FAILED
@@ -134,6 +136,7 @@ class PlanPairs:
 
     def _look_at(self, places: _Places) -> None:
         """Find the steps from some places."""
+        # (pairs of edges) the row of the place, and the edges.
         which, one = self.space.edges_from(places.nodes[:, 0])
         again, other = self.space.edges_from(places.nodes[which, -1])
         two = np.column_stack((which[again], one[again], other))
@@ -235,12 +238,11 @@ class PlanPairs:
         first, last = nodes[:, 0], nodes[:, -1]
         sets = self._choices.of_node.T
         fails: Bools = (~told & (sets[first] != sets[last])).any(axis=1)
+        # In the first and the last mixture all robots follow one plan, if all are told apart.
+        plans_only = told.all(axis=1)
         for column in range(nodes.shape[1]):
-            is_plan = column in (
-                0,
-                nodes.shape[1] - 1,
-            )  # if all robots follow one, it is no mixture
-            left = np.flatnonzero(~(fails | told.all(axis=1) & is_plan))
+            is_plan = column in (0, nodes.shape[1] - 1)
+            left = np.flatnonzero(~(fails | plans_only & is_plan))
             second = _following(told[left], column)
             plans = np.where(second, last[left, None], first[left, None])
             mixed = np.column_stack((plans, nodes[left, column]))
