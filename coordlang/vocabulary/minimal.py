@@ -75,6 +75,8 @@ _FURTHER = 2
 _MOST_STEPS, _STEPS, _BYTES = 11_000_000, 100, 200
 #: Steps by which the plans are apart at most: more make larger graphs and refute hardly more.
 _APART = 3
+#: Other searches come first where there are more steps than this part of the most.
+_LARGE = 5
 #: Conflicts that are allowed for each round of a budget then.
 _HARD = 3_000
 #: Rounds are dear where there are more pairs of edges that leave one node.
@@ -219,6 +221,13 @@ class MinimalSearch:
         random, pairs = np.random.default_rng(self._job.seed), WarpedPairs(self._plan_pairs, apart)
         return PairsApart(self._job.states, self.languages.clauses, pairs.steps(), random)
 
+    @cached_property
+    def _is_large(self) -> bool:
+        """Whether it takes long to tell pairs of plans of one task apart on all warping paths."""
+        from coordlang.vocabulary.warped_pairs import steps_apart
+
+        return steps_apart(self._plan_pairs.space, _MOST_STEPS // _LARGE) < _APART
+
     @property
     def _most_clauses(self) -> int:
         """What a formula of words that tell plans apart step by step may have."""
@@ -290,6 +299,8 @@ class MinimalSearch:
         """Decide what is soon decided from below, and look for words of a kind."""
         (space,) = self._job.candidates.spaces
         while self._two_words is not None and self._is_open:
+            if self.lower > 2 and self._is_large:
+                self._find_fewer_tied(1)
             if self.lower > 2 and self._apart is None:
                 break
             if not self._find_or_refute(self.lower, _SOON):
