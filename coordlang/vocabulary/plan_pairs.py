@@ -72,7 +72,7 @@ class PlanPairs:
         begin = np.flatnonzero(choices.requires & self.space.descendants(self.space.starts))
         none = np.zeros((len(begin), self.space.robots), np.bool_)
         #: The places that come next, and those after them by the number of robots told apart.
-        self._open = [_Places(begin, none, begin[:, None])]
+        self._open = [_Places(begin, none, begin[:, None])] if len(begin) else []
         self._later = defaultdict[int, list[_Places]](list)
 
     @property

@@ -243,8 +243,8 @@ class _FreeCells:
 class PairsApart:
     """Partitions that satisfy all known clauses and tell pairs of plans apart, for every size.
 
-    ``states`` need words; ``clauses``: a list that only grows; ``steps`` are a table,
-    see `PartitionProblem.separate_on_paths`; ``joined``: pairs of states that are in different
+    ``states`` need words; ``clauses``: a list that only grows; ``table``: what
+    `PartitionProblem.separate_on_paths` asks for; ``joined``: pairs of states that are in different
     words, too.  ``random`` draws the words that are tried first.  ``steps`` and ``conflicts`` count
     those of the solvers so far.
     """
@@ -253,14 +253,14 @@ class PairsApart:
         self,
         states: Sequence[int],
         clauses: Sequence[Clause],
-        steps: Ints,
+        table: Ints,
         random: np.random.Generator | None = None,
         joined: Sequence[Pair] = (),
     ) -> None:
-        self._states, self._clauses, self._table = states, clauses, steps
+        self._states, self._clauses, self._table = states, clauses, table
         self._problem: PartitionProblem | None = None
         self._size, self._random, self._joined = 0, random, joined
-        self._different = len(unique_rows(np.sort(steps[:, 1:3], axis=1))[0])
+        self._different = len(unique_rows(np.sort(table[:, 1:3], axis=1))[0])
         self.steps = self.conflicts = 0
 
     def number_of_clauses(self, words: int) -> int:

@@ -48,7 +48,7 @@ from tests.support.texts import parsed
 def test_pairs_of_plans_that_fail_are_the_paths_of_a_graph(robots: int, number: int) -> None:
     models = (c for _, c in small_candidates(robots, states=9, plans=MOST) if requiring(c))
     told, own = 0, [own_task("grid", "corners-3x3"), own_task("corridor")] if robots == 2 else []
-    for candidates in (*own, *islice(models, number)):
+    for candidates in (bells(EQUAL[:1], EQUAL[:1]), *own, *islice(models, number)):
         fail = defaultdict[int, set[tuple[Pair | None, ...]]](set)
         for space, task, plans, _ in listed(candidates):
             start = int(space.starts[task])
