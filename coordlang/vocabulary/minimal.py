@@ -298,19 +298,20 @@ class MinimalSearch:
     def _begin_with_one_task(self) -> None:
         """Decide what is soon decided from below, and look for words of a kind."""
         (space,) = self._job.candidates.spaces
-        while self._two_words is not None and self._is_open:
-            if self.lower > 2 and self._is_large:
-                self._find_fewer_tied(1)
-            if self.lower > 2 and self._apart is None:
-                break
-            if not self._find_or_refute(self.lower, _SOON):
-                break
+        of_kinds = iter(_WHERE_DEAR if self._is_dear else _FOR_KINDS)
+        from_below = self._two_words is not None
+        if from_below and self.lower == 2 and self._is_open:
+            from_below = self._find_or_refute(2, _SOON)
+        if from_below and self._is_large:
+            self._find_fewer_tied(next(of_kinds))
+        while from_below and self._is_open and self._apart is not None:
+            from_below = self._find_or_refute(self.lower, _SOON)
         if len(space.target) * between(self.lower, self.upper) > _CLAUSES:
             found = self._tied.of_facts()
             if found is not None and word_count(found) < self.upper:
                 self._offer(found)
                 self.merge(most=_MERGED_SOON)
-        for rounds in _WHERE_DEAR if self._is_dear else _FOR_KINDS:
+        for rounds in of_kinds:
             self._find_fewer_tied(rounds)
 
     def _find_fewer_tied(self, rounds: int) -> None:
