@@ -14,15 +14,11 @@ import sys
 from collections.abc import Iterator, Mapping
 from contextlib import closing, suppress
 from dataclasses import replace
-from functools import cached_property, partial
-from itertools import chain, islice
-from math import inf
+from functools import cached_property
+from itertools import islice
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from coordlang.language.warping import Clause
-from coordlang.required.choices import Choices
 from coordlang.vocabulary.flexible import flexible
 from coordlang.vocabulary.job import Assignment, Evidence, Job, Outcome, word_count
 from coordlang.vocabulary.loop import (
@@ -35,17 +31,14 @@ from coordlang.vocabulary.loop import (
 )
 from coordlang.vocabulary.merging import merged
 from coordlang.vocabulary.sat import Undecided
-from planners.joint.tables import Ints
 from planners.search.sat import SolverName
 from planners.system.errors import OutOfMemory
-from planners.system.limits import memory_left, run_until_stopped
+from planners.system.limits import run_until_stopped
 
 if TYPE_CHECKING:  # they load networkx
     from coordlang.vocabulary.contained import ContainedInstance
-    from coordlang.vocabulary.plan_pairs import PlanPairs
+    from coordlang.vocabulary.one_task import OneTask
     from coordlang.vocabulary.tied_words import TiedWords
-    from coordlang.vocabulary.two_words import TwoWords
-    from coordlang.vocabulary.warped_pairs import PairsApart
 
 #: A thousand conflicts are a unit of effort; a refuted partition counts as so many ..
 _UNIT, _ROUND = 1_000, 250
@@ -58,27 +51,6 @@ _PAIRS, _FIRST_PAIRS = 1_000, 30
 _BEGINNING = 10
 #: What may be spent on each number at first.
 _SOON = Budget(rounds=10, conflicts=2_000)
-#: For each round of a budget so many steps of mixtures of two plans are looked at for two words of
-#: one task, and so many conflicts allowed: small formulas may need many.
-_FOR_ROUND, _CONFLICTS = 60_000, 40_000
-#: Steps of mixtures of two plans that are looked at, in some ten seconds, for words that tell plans
-#: apart step by step, and along all warping paths; so many count as a conflict.
-_MOST_PAIRS, _FEW_PAIRS, _EDGES = 26_000_000, 1_200_000, 200
-#: Clauses of a formula of words that tell plans apart step by step, in some 20 seconds; that within
-#: two steps after a mixture has failed, not one, where it has so many times less for one; and what
-#: may be spent on each number.
-_MOST_CLAUSES, _SMALL, _AT_FIRST = 20_000_000, 4, Budget(rounds=8, conflicts=2_000)
-#: A solver has so many words more than it is asked for at first: larger sizes are asked for next.
-_FURTHER = 2
-#: Steps of pairs of plans that fail along their warping paths, in some 20 seconds; so many count as
-#: a conflict.  Each takes so many bytes at most.
-_MOST_STEPS, _STEPS, _BYTES = 11_000_000, 100, 200
-#: Steps by which the plans are apart at most: more make larger graphs and refute hardly more.
-_APART = 3
-#: Other searches come first where there are more steps than this part of the most.
-_LARGE = 5
-#: Conflicts that are allowed for each round of a budget then.
-_HARD = 3_000
 #: Rounds are dear where there are more pairs of edges that leave one node.
 _DEAR = 30_000
 #: Rounds that partitions of a kind are given for one task at first, one time after another, and
@@ -165,9 +137,6 @@ class MinimalSearch:
         self._is_dear = self._pairs > _DEAR
         self._merges = 0
         self._merging: tuple[Assignment, Iterator[Assignment]] | None = None
-        #: Searches for stutter-free words, made one after another.
-        self._in_step: list[PairsApart] = []
-        self._next_in_step = self._more_in_step()
         self.lower = job.lower_bound
         self.best: Assignment | None = job.incumbent
         self.refuting: Mapping[Clause, Evidence] = {}
@@ -191,70 +160,19 @@ class MinimalSearch:
         return TiedWords(self._job, self.languages)
 
     @cached_property
-    def _plan_pairs(self) -> PlanPairs:
-        """Pairs of plans of one task, as far as they were looked at."""
-        from coordlang.vocabulary.plan_pairs import PlanPairs
+    def _one_task(self) -> OneTask | None:
+        """Who asks for all pairs of plans of one task; None where clauses must prove it."""
+        from coordlang.vocabulary.one_task import OneTask
 
-        (space,) = self._job.candidates.spaces
-        return PlanPairs(Choices(space))
-
-    @cached_property
-    def _two_words(self) -> TwoWords | None:
-        """Who decides two words of one task; None where clauses must prove it."""
-        from coordlang.vocabulary.two_words import TwoWords
-
-        if self._job.by_clauses or self._is_asynchronous or not self._is_one_task:
+        if self._job.by_clauses or not self._is_one_task:
             return None
-        return TwoWords(self._plan_pairs, self._job.states, self.languages.clauses)
-
-    @cached_property
-    def _apart(self) -> PairsApart | None:
-        """Partitions of one task's states that tell pairs of plans apart; None for large tasks."""
-        from coordlang.vocabulary.warped_pairs import PairsApart, WarpedPairs, steps_apart
-
-        left = self._most - self.work
-        most = min(_MOST_STEPS, _STEPS * left, memory_left() // _BYTES)
-        apart = min(_APART, steps_apart(self._plan_pairs.space, most))
-        if apart < 1:
-            return None
-        self._plan_pairs.grow(min(_FEW_PAIRS, _EDGES * left))
-        random, pairs = np.random.default_rng(self._job.seed), WarpedPairs(self._plan_pairs, apart)
-        return PairsApart(self._job.states, self.languages.clauses, pairs.steps(), random)
-
-    @cached_property
-    def _is_large(self) -> bool:
-        """Whether it takes long to tell pairs of plans of one task apart on all warping paths."""
-        from coordlang.vocabulary.warped_pairs import steps_apart
-
-        return steps_apart(self._plan_pairs.space, _MOST_STEPS // _LARGE) < _APART
-
-    @property
-    def _most_clauses(self) -> int:
-        """What a formula of words that tell plans apart step by step may have."""
-        return min(_MOST_CLAUSES, _STEPS * self._most, memory_left() // _BYTES)
-
-    def _more_in_step(self) -> Iterator[PairsApart]:
-        """Stutter-free words that tell pairs of plans of one task apart, step by step."""
-        from coordlang.vocabulary.warped_pairs import PairsApart, failing_pairs, joined_states
-
-        pairs, most = self._plan_pairs, self._most_clauses
-        self._report("looking at pairs of plans")
-        if not pairs.complete(min(_MOST_PAIRS, _EDGES * self._most, memory_left() // _BYTES)):
-            return
-        joined, clauses = joined_states(pairs.space), self.languages.clauses
-
-        def tables() -> Iterator[Ints]:
-            soon = failing_pairs(pairs, 1, most)
-            yield soon if _SMALL * len(soon) > most else failing_pairs(pairs, 2, most)
-            yield failing_pairs(pairs, inf, most)
-
-        with suppress(Undecided):
-            for steps in tables():
-                search = PairsApart(self._job.states, clauses, steps, joined=joined)
-                if search.number_of_clauses(2 * self.lower) > most:
-                    return
-                self._in_step.append(search)
-                yield search
+        return OneTask(
+            self._job,
+            self.languages,
+            lambda: (self.lower, self.upper),
+            lambda: self._left,
+            self._report,
+        )
 
     @cached_property
     def _contained(self) -> list[ContainedInstance]:
@@ -281,8 +199,8 @@ class MinimalSearch:
             return
         if self._pairs // _FIRST_PAIRS > _BEGINNING * self._most:
             return
-        if self._is_one_task:
-            self._begin_with_one_task()
+        if self._one_task is not None:
+            self._begin_with(self._one_task)
         while self._is_open and self.decide(self.lower, _SOON):
             pass
         while self._is_open and not self._is_one_task:
@@ -295,16 +213,16 @@ class MinimalSearch:
             # Merged words tell more states apart than a language must: fewer leave more plans open.
             self.decide(self.lower, Budget())
 
-    def _begin_with_one_task(self) -> None:
+    def _begin_with(self, one_task: OneTask) -> None:
         """Decide what is soon decided from below, and look for words of a kind."""
+        if not self._is_open:
+            return
         (space,) = self._job.candidates.spaces
         of_kinds = iter(_WHERE_DEAR if self._is_dear else _FOR_KINDS)
-        from_below = self._two_words is not None
-        if from_below and self.lower == 2 and self._is_open:
-            from_below = self._find_or_refute(2, _SOON)
-        if from_below and self._is_large:
+        from_below = self.lower > 2 or self._find_or_refute(2, _SOON)
+        if from_below and one_task.is_large:
             self._find_fewer_tied(next(of_kinds))
-        while from_below and self._is_open and self._apart is not None:
+        while from_below and self._is_open and one_task.can_decide(self.lower):
             from_below = self._find_or_refute(self.lower, _SOON)
         if len(space.target) * between(self.lower, self.upper) > _CLAUSES:
             found = self._tied.of_facts()
@@ -323,7 +241,9 @@ class MinimalSearch:
         """
         if not self._is_open:
             return
-        self._find_fewer_in_step(rounds)
+        if self._one_task is not None:
+            for found in self._one_task.in_step(self._holds, rounds):
+                self._offer(found)
         least = self.lower
         if not self._is_dear and least < self.upper:
             if self._finds_tied(least, rounds):
@@ -334,30 +254,6 @@ class MinimalSearch:
             if not self._finds_tied(size, rounds):
                 least = size + 1
 
-    def _find_fewer_in_step(self, rounds: int) -> None:
-        """Look for fewer stutter-free words that tell all pairs of plans of one task apart.
-
-        From below, at most twice the number that was tried last: small ones are soon decided.
-        """
-        for search in chain(self._in_step[:], self._next_in_step):
-            least = self.lower
-            most = 2 * least
-            while least < self.upper and not self._is_spent:
-                size = min(most, between(least, self.upper))
-                left = max(0, self._most - self.work)
-                own = Budget(_AT_FIRST.rounds, min(_AT_FIRST.conflicts * rounds, left))
-                self._report(f"trying {size} words that tell plans apart step by step")
-                room = min(4 * size, self.upper - 1)
-                room = room if search.number_of_clauses(room) <= self._most_clauses else size
-                ask = partial(search.find, size, room)
-                found = None
-                with suppress(Undecided):
-                    found = find(ask, self._holds, own)
-                if found is None:
-                    least, most = size + 1, 2 * size
-                else:
-                    self._offer(found)
-
     @property
     def work(self) -> int:
         """What was done so far: the conflicts of the solver, refuted partitions counted as some."""
@@ -367,14 +263,14 @@ class MinimalSearch:
         conflicts = self._partitions.conflicts
         if "_tied" in self.__dict__:
             conflicts += self._tied.conflicts
-        if self._two_words is not None:
-            conflicts += self._two_words.conflicts
-        if "_plan_pairs" in self.__dict__:
-            conflicts += self._plan_pairs.looked_at // _EDGES
-        for search in (*self._in_step, self.__dict__.get("_apart")):
-            if search is not None:
-                conflicts += search.conflicts + search.steps // _STEPS
+        if (one_task := self.__dict__.get("_one_task")) is not None:
+            conflicts += one_task.work
         return conflicts + rounds * (_ROUND + self._pairs // _PAIRS)
+
+    @property
+    def _left(self) -> int:
+        """Conflicts that may still be spent."""
+        return max(0, self._most - self.work)
 
     @property
     def _is_open(self) -> bool:
@@ -382,7 +278,7 @@ class MinimalSearch:
 
     @property
     def _is_spent(self) -> bool:
-        return self.work >= self._most
+        return self._left == 0
 
     def merge(self, vain: int = sys.maxsize, most: int = sys.maxsize) -> None:
         """Merge words of the best language as long as it stays a language.
@@ -448,7 +344,7 @@ class MinimalSearch:
         None of them where pairs of plans do.
         """
         ways = [self._by_clauses, self._by_pairs]
-        if size > 2 and self.__dict__.get("_apart") is not None:
+        if size > 2 and self._one_task is not None and self._one_task.has_formula:
             ways.reverse()
         for way in ways:
             with suppress(Undecided):
@@ -469,24 +365,15 @@ class MinimalSearch:
         def partition(conflicts: int) -> dict[int, int] | None:
             if self._is_spent:
                 raise Undecided
-            return self._partitions.find(size, min(conflicts, self._most - self.work))
+            return self._partitions.find(size, min(conflicts, self._left))
 
         return find(partition, self._holds, budget)
 
     def _by_pairs(self, size: int, budget: Budget) -> dict[int, int] | None:
         """The same by what is said of all pairs of plans of one task."""
-        two_words = self._two_words
-        if two_words is None:
+        if self._one_task is None:
             raise Undecided
-        left = max(0, self._most - self.work)
-        if size == 2:
-            edges = min(_FOR_ROUND * budget.rounds, _EDGES * left)
-            own = Budget(budget.rounds, min(_CONFLICTS * budget.rounds, left))
-            return two_words.find(self._holds, own, edges)
-        if (apart := self._apart) is None:
-            raise Undecided
-        own = Budget(budget.rounds, min(_HARD * budget.rounds, left))
-        return find(partial(apart.find, size, size + _FURTHER), self._holds, own)
+        return self._one_task.find(size, self._holds, budget)
 
     def _finds_tied(self, size: int, rounds: int) -> bool:
         """Whether a language with so many words is soon found among those of some kinds."""
@@ -532,11 +419,9 @@ class MinimalSearch:
 
     def close(self) -> None:
         """Give back what the solvers hold."""
-        for name in ("_partitions", "_tied", "_two_words", "_apart"):
+        for name in ("_partitions", "_tied", "_one_task"):
             if (search := self.__dict__.get(name)) is not None:
                 search.close()
-        for search in self._in_step:
-            search.close()
         for instance in self.__dict__.get("_contained", ()):
             instance.close()
 

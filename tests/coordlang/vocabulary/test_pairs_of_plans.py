@@ -254,15 +254,21 @@ def test_as_few_words_suffice_as_of_all_partitions(
 
 
 @pytest.mark.parametrize(
-    ("robots", "number"),
-    [(2, 20), (3, 20), *(pytest.param(n, 100, marks=pytest.mark.thorough) for n in (2, 3, 4))],
+    ("robots", "number", "asynchronous"),
+    [
+        (2, 20, False),
+        (3, 20, False),
+        (2, 25, True),
+        *(pytest.param(n, 100, False, marks=pytest.mark.thorough) for n in (2, 3, 4)),
+        pytest.param(3, 60, True, marks=pytest.mark.thorough),
+    ],
 )
 def test_as_few_words_of_random_models_suffice_as_of_all_partitions(
-    robots: int, number: int
+    robots: int, number: int, asynchronous: bool
 ) -> None:
     models = (
         c
-        for _, c in small_candidates(robots, states=7, plans=MOST)
+        for _, c in small_candidates(robots, states=7, plans=MOST, asynchronous=asynchronous)
         if requiring(c) and len(c.spaces) == 1
     )
     told = Counter[int]()
