@@ -101,13 +101,13 @@ def read_building(path: Path) -> Building:
     content = root.mapping()
     named = content["levels"].mapping() if "levels" in content else {}
     levels = [_Level(name, value) for name, value in named.items()]
-    vertices = [vertex for level in levels for vertex in level.used()]
+    vertices = [vertex for level in levels for vertex in level.used]
     if not vertices:
         remedy = "Expected 'levels:' with 'vertices:' and 'lanes:'; robots drive on nothing else."
         raise content.get("levels", root).wrong("this building has no lanes", remedy)
     unscaled = _set_scales(levels, content)
     spawning = _spawning(vertices)
-    _set_names(vertices, {pddl_name(robot) for robot in spawning})
+    _set_names(vertices, {*spawning})
     places = {vertex.name: vertex.place() for vertex in vertices}
     lanes = [lane for level in levels for lane in level.driven()]
     return Building(
@@ -151,6 +151,9 @@ class _Level:
         at: dict[Point, _Vertex] = {}
         self.vertices = [self._vertex(*each, at) for each in enumerate(self._list("vertices"))]
         self.lanes = [self._edge(each) for each in self._list("lanes")]
+        numbers = {each.number for start, end, _ in self.lanes for each in (start, end)}
+        #: The vertices with lanes, in the order of the file.
+        self.used = [self.vertices[number] for number in sorted(numbers)]
 
     def _list(self, key: str) -> Sequence[Value]:
         return self.content[key].list() if key in self.content else []
@@ -188,14 +191,9 @@ class _Level:
         found = [value.list(3) for value in self._list("fiducials")]
         return {name.text(): (x.number(), y.number()) for x, y, name, *_ in found}
 
-    def used(self) -> list[_Vertex]:
-        """The vertices with lanes, in the order of the file."""
-        numbers = {each.number for start, end, _ in self.lanes for each in (start, end)}
-        return [self.vertices[number] for number in sorted(numbers)]
-
     def set_scale(self, x_metres: float, y_metres: float, origin: Point = (0.0, 0.0)) -> None:
         """Turn the points of the vertices with lanes into metres."""
-        for vertex in self.used():
+        for vertex in self.used:
             x, y = vertex.point
             vertex.point = (x - origin[0]) * x_metres, (y - origin[1]) * y_metres
 
@@ -212,10 +210,10 @@ class _Level:
         """What is in the file and not read, by what it is called there."""
         lists = {k: v for k, v in self.content.items() if v.is_list and k not in _READ}
         found = Counter({key: len(value.list()) for key, value in lists.items()})
-        for params in [p for _, _, p in self.lanes] + [v.params for v in self.used()]:
+        for params in [p for _, _, p in self.lanes] + [v.params for v in self.used]:
             found.update(n for n in _IGNORED if _text(params, n) not in ("", "0"))
         found["robots off lanes"] = sum("spawn_robot_name" in v.params for v in self.vertices)
-        found["robots off lanes"] -= sum("spawn_robot_name" in v.params for v in self.used())
+        found["robots off lanes"] -= sum("spawn_robot_name" in v.params for v in self.used)
         return +found
 
 
@@ -248,7 +246,7 @@ def _set_scales(levels: Sequence[_Level], content: Mapping[str, Value]) -> tuple
         remedy = "Those that are read: reference_image, cartesian_meters, wgs84."
         raise system.wrong(f"the coordinate system {echoed(kind)} is not read", remedy)
     for level in levels:
-        level.set_scale(*(_degrees(level.used()) if kind == "wgs84" else (1.0, -1.0)))
+        level.set_scale(*(_degrees(level.used) if kind == "wgs84" else (1.0, -1.0)))
     return ()
 
 
@@ -288,17 +286,16 @@ def _degrees(vertices: Sequence[_Vertex]) -> tuple[float, float, Point]:
 
 
 def _spawning(vertices: Iterable[_Vertex]) -> dict[str, _Vertex]:
-    """The robots that start in the building, and where."""
+    """The robots that start in the building, by their names in PDDL, and where."""
     found: dict[str, _Vertex] = {}
-    taken = {""}
     for vertex in vertices:
         if robot := _text(vertex.params, "spawn_robot_name"):
             require_seen(robot, vertex.value.position, "robot")
-            if pddl_name(robot) in taken:
+            name = pddl_name(robot)
+            if not name or name in found:
                 remedy = "Give each robot a name of its own, of letters; PDDL has no upper case."
                 raise vertex.value.wrong(f"no name for a robot here: {echoed(robot)}", remedy)
-            taken.add(pddl_name(robot))
-            found[robot] = vertex
+            found[name] = vertex
     return found
 
 

@@ -207,21 +207,20 @@ def _started(
     building: Building, asked: int | Sequence[str] | None, clearance: float
 ) -> list[Robot]:
     """The robots that are asked for, each where it spawns, or else in a free charger or place."""
-    spawning = {pddl_name(robot): place for robot, place in building.spawning.items()}
-    if asked is None and not spawning:
+    if asked is None and not building.spawning:
         where = Position(building.path)
         raise BadInput("no robot spawns in this building", position=where, remedy="Say --robots 2.")
     if asked is None:
-        asked = list(spawning)
+        asked = list(building.spawning)
     elif isinstance(asked, int):
-        asked = [*spawning, *(f"r{number}" for number in range(1, asked + 1))][:asked]
+        asked = [*building.spawning, *(f"r{number}" for number in range(1, asked + 1))][:asked]
     starts: dict[str, str] = {}
     for said in asked:
         name = pddl_name(said)
         if not name or name in starts or name in building.places:
             remedy = "Give each robot a name of its own, which no place has."
             raise UsageError(f"--robots: {echoed(said)} cannot be used", remedy=remedy)
-        starts[name] = spawning.get(name, "")
+        starts[name] = building.spawning.get(name, "")
     added = [name for name in starts if not starts[name]]
     for name in added:
         starts[name] = _free(building, [place for place in starts.values() if place], clearance)
@@ -262,11 +261,10 @@ def _goals(
             what = "has a task already" if robot else "is no robot"
             remedy = f"Expected ROBOT:PLACE, once for each of {names}."
             raise UsageError(f"--task {echoed(task)}: {echoed(said)} {what}", remedy=remedy)
-        named = {p.name: p.said == where for p in building.places.values()}
-        exact = [name for name, is_exact in named.items() if is_exact and where]
+        exact = [p.name for p in building.places.values() if where and p.said == where]
         place = exact[0] if len(exact) == 1 else pddl_name(where)
         if place not in robot.reached:
-            what = "no lanes lead there" if place in named else "there is no such place"
+            what = "no lanes lead there" if place in building.places else "there is no such place"
             remedy = f"It can go to {some(sorted(robot.reached), 40)}."
             raise UsageError(f"--task {echoed(task)}: {what}", remedy=remedy)
         goals[robot.name] = place

@@ -72,8 +72,7 @@ def excluded(
     if not driving or (clearance <= 0 and not any(motion.groups for motion in driving)):
         return [], []
     near = _Near(driving, clearance)
-    standing = {place.name: staying(place) for place in places}
-    at = [(number, still) for still in standing.values() for number in near.of(still)]
+    at = [(number, still) for still in map(staying, places) for number in near.of(still)]
     blocked = [
         (still.start, driving[number])
         for number, still in sorted(at, key=lambda pair: pair[0])

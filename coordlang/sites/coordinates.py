@@ -30,8 +30,7 @@ class CoordinatesFile(msgspec.Struct):
     """A file of coordinates.  Keys that are not listed here are ignored by readers."""
 
     coordinates: Annotated[
-        dict[str, tuple[float, float]],
-        doc("Place -> [x, y], x to the right and y down; no two alike."),
+        dict[str, Point], doc("Place -> [x, y], x to the right and y down; no two alike.")
     ]
 
 

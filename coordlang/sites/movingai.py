@@ -197,11 +197,8 @@ def _positions(robots: Iterable[str], cells: Iterable[str]) -> str:
     return " ".join(f"(at {robot} {cell})" for robot, cell in zip(robots, cells, strict=True))
 
 
-def _wrong(
-    what: str, remedy: str, path: Path, line: int | None = None, column: int = 1
-) -> BadInput:
-    where = Position(str(path)) if line is None else Position(str(path), line, column)
-    return BadInput(what, position=where, remedy=remedy)
+def _wrong(what: str, remedy: str, path: Path, line: int = 0, column: int = 1) -> BadInput:
+    return BadInput(what, position=Position(str(path), line, column), remedy=remedy)
 
 
 def _lines(path: Path, what: str) -> list[str]:

@@ -84,7 +84,7 @@ def test_what_is_read(tmp_path: Path) -> None:
         ("north-west", "door-l1-4"),
     }
     assert driven(found) == both | {(b, a) for a, b in both} | {("l1-1", "lift")}
-    assert found.spawning == {"Ada": "north-west", "bob 2": "door-l1-4"}
+    assert found.spawning == {"ada": "north-west", "bob-2": "door-l1-4"}
     assert [name for name, place in found.places.items() if place.is_charger] == ["north-west"]
     assert [name for name, place in found.places.items() if place.is_parking] == ["lift"]
     assert found.unused == {"doors": 2, "speed_limit": 1}
