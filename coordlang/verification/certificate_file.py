@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import combinations, islice
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations, islice, pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,7 +13,7 @@ import msgspec
 from coordlang.language.file import refuse_duplicates
 from coordlang.language.warping import Clause
 from coordlang.vocabulary.sat import most_constrained_first
-from planners.search.sat import SolverName, sat_solver, solve_slice
+from planners.search.sat import sat_solver, solve_slice
 from planners.system.errors import OutOfMemory, Position
 from planners.system.files import FileFormat, doc, read_bytes
 from planners.system.limits import memory_left, more_memory
@@ -164,9 +164,9 @@ class Cnf:
         for reason, clause in enumerate(range(first, len(self.clauses) + 1), 1):
             yield f"c clause {clause}: reason {reason}"
 
-    def refuted(self, solver: SolverName = "maplesat") -> bool:
+    def refuted(self) -> bool:
         """Whether the formula is unsatisfiable, by a solver and a loop that builders do not use."""
-        with sat_solver(solver, self.clauses) as sat:
+        with sat_solver("maplesat", self.clauses) as sat:
             answer = None
             while answer is None:
                 answer = solve_slice(sat, _SLICE)
@@ -189,26 +189,20 @@ def _require_memory(states: int, pairs: int, clauses: Sequence[Clause], size: in
 def states_of(clauses: Sequence[Clause]) -> list[int]:
     """The states that clauses speak of, the most constrained first."""
     states = {state for clause in clauses for two in clause for state in two}
-    return list(most_constrained_first(sorted(states), clauses))
+    return most_constrained_first(states, clauses)
 
 
 def _words_in_order(
-    words: Sequence[tuple[int, ...]], size: int, counter: Iterable[int]
+    words: Sequence[tuple[int, ...]], size: int, counter: Iterator[int]
 ) -> tuple[list[tuple[int, ...]], list[tuple[int, ...]]]:
     """For each state but the first the variables "some state so far has word w"; their clauses."""
-    fresh = iter(counter)
     so_far: list[tuple[int, ...]] = []
-    cnf: list[tuple[int, ...]] = []
-    used: tuple[int, ...] | None = None
-    for own in words:
-        if used is None:
-            cnf += [(-v,) for v in own[1:]]
-            used = own
-            continue
+    cnf: list[tuple[int, ...]] = [(-v,) for own in words[:1] for v in own[1:]]
+    for before, own in pairwise(words):
+        used = so_far[-1] if so_far else before
         cnf += [(-own[w], used[w - 1]) for w in range(1, size)]
-        after = tuple(islice(fresh, size))
+        after = tuple(islice(counter, size))
         for w in range(size):
             cnf += [(-after[w], used[w], own[w]), (after[w], -used[w]), (after[w], -own[w])]
         so_far.append(after)
-        used = after
     return so_far, cnf

@@ -31,9 +31,6 @@ from planners.search.edge_index import EdgeTrees
 from planners.search.plan_space import PlanSpace
 from planners.system.limits import reaching
 
-#: The set that holds the empty sequence only.
-_EMPTY = 0
-
 
 def _resolved(
     question: Any,
@@ -63,13 +60,14 @@ def _resolved(
 class SequenceSets:
     """Sets of sequences by number; equal sets have equal numbers.
 
-    A set is kept as its first members, each with the set of what follows it.
+    A set is kept as its first members, each with the set of what follows it.  Set 0 holds the empty
+    sequence only.
     """
 
     def __init__(self) -> None:
         #: Per set the first members with the set of what follows each.
         self.moves: list[dict[int, int]] = [{}]
-        self._numbers: dict[tuple[tuple[int, int], ...], int] = {(): _EMPTY}
+        self._numbers: dict[tuple[tuple[int, int], ...], int] = {(): 0}
         self._unions: dict[tuple[int, ...], int] = {}
 
     def __len__(self) -> int:
