@@ -32,18 +32,13 @@ class _Leaf(NamedTuple):
     does: str
 
 
-_LEAVES = {
-    "Chooses": _Leaf("Condition", ("subaction",), "succeeds if the robot wants to do this now"),
-    "Holds": _Leaf("Condition", ("fact",), "succeeds if this fact is true now"),
-}
-#: By name, where robots step together, and where they do not.
-LEAVES = {
+#: Where robots step together, where they do not, and in both.
+_STEP_LEAVES = {
     "AwaitStep": _Leaf(
         "Action", ("step",), "is running until this joint step begins; steps count from 0"
     ),
-    **_LEAVES,
 }
-EVENT_LEAVES = {
+_EVENT_LEAVES = {
     "AwaitEnded": _Leaf(
         "Action",
         ("robot", "count", "subaction"),
@@ -55,7 +50,10 @@ EVENT_LEAVES = {
         "says that the own robot is ready for the subaction, and is running until the other one is "
         "for what it does",
     ),
-    **_LEAVES,
+}
+_LEAVES = {
+    "Chooses": _Leaf("Condition", ("subaction",), "succeeds if the robot wants to do this now"),
+    "Holds": _Leaf("Condition", ("fact",), "succeeds if this fact is true now"),
 }
 
 
@@ -80,25 +78,25 @@ def behaviour_trees(choices: SentenceChoices) -> str:
 
 
 def _comment(choices: SentenceChoices) -> str:
-    sentence = " ".join(choices.task_language.partition.words[word] for word in choices.words)
+    used = choices.task_language
     if choices.guaranteed:
-        kind = choices.task_language.model.kept_plan
-        article = "a" if choices.task_language.model.slack else "an"
+        article, kind = "a" if used.model.slack else "an", used.model.kept_plan
         promise = f"Whatever each robot chooses, all of them together follow {article} {kind}."
-    elif choices.task_language.covered:
+    elif used.covered:
         promise = "This is no coordination language: choices of different robots need not mix."
     else:
         promise = "The language does not cover this task: choices of different robots need not mix."
     leaves = "".join(
         f"\n    {name} ({leaf.kind}, {', '.join(leaf.ports)}): {leaf.does}."
-        for name, leaf in _leaves(choices.task_language.model).items()
+        for name, leaf in _leaves(used.model).items()
     )
+    sentence = used.text(choices.words)
     text = f' Sentence "{sentence}". {promise}\n  Leaves besides the actions:{leaves}\n  '
     return text.replace("--", "- -")  # two hyphens end a comment
 
 
 def _leaves(model: JointModel) -> Mapping[str, _Leaf]:
-    return EVENT_LEAVES if model.is_asynchronous else LEAVES
+    return (_EVENT_LEAVES if model.is_asynchronous else _STEP_LEAVES) | _LEAVES
 
 
 def _tree(model: JointModel, own: RobotChoices) -> ET.Element:

@@ -111,7 +111,7 @@ class PddlExport:
         Raises `BadInput` for an action that the problem does not have, or a plan that ends within a
         step.
         """
-        steps: list[dict[int, int]] = []
+        steps: list[dict[int, int]] = [{}]
         for number, name in enumerate(names, 1):
             labels = self.labels.get(name.lower())
             if labels is None:
@@ -120,7 +120,7 @@ class PddlExport:
                     remedy="Give a plan of the problem that this command exports, with the same "
                     "arguments.",
                 )
-            if not steps or any(robot in steps[-1] for robot, _ in labels):
+            if any(robot in steps[-1] for robot, _ in labels):
                 steps.append({})
             steps[-1].update(labels)
         plan = [step for step in steps if step]
@@ -226,7 +226,6 @@ class _Naming:
         )
 
     def add(self, text: str) -> int:
-        """Add a fact."""
         self.texts.append(text)
         return len(self.texts) - 1
 

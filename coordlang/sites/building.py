@@ -261,19 +261,18 @@ def _set_image_scales(levels: Sequence[_Level], named: Value | None) -> tuple[st
         raise named.wrong(f"there is no level {echoed(named.text())}", "Name one of the levels.")
     reference = levels[0] if named is None else by_name[named.text()]
     known, marks = reference.measured(), reference.fiducials()
-    scales: dict[str, float] = {}
+    unscaled = []
     for level in levels:
         own, scale = level.fiducials(), level.measured()
         pairs = combinations([name for name in marks if name in own], 2)
         apart = [(math.dist(own[a], own[b]), math.dist(marks[a], marks[b])) for a, b in pairs]
         if known is not None and apart and all(map(all, apart)):
             scale = known / fmean(here / there for here, there in apart)
-        if scale is not None:
-            scales[level.name] = scale
-    for level in levels:
-        scale = scales.get(level.name, 1.0)
+        if scale is None:
+            unscaled.append(level.name)
+            scale = 1.0
         level.set_scale(scale, scale)
-    return tuple(name for name in by_name if name not in scales)
+    return tuple(unscaled)
 
 
 def _degrees(vertices: Sequence[_Vertex]) -> tuple[float, float, Point]:

@@ -78,19 +78,17 @@ def find_world(model: JointModel, states: Sequence[Sequence[str]]) -> World:
     """
     locations, known = _locations(model)
     roles = _without_ambiguous(_location_roles(model, locations, known), states)
-    located = {role[1] for _, role in roles.values()}
-    places = frozenset(role[2] for _, role in roles.values())
+    things = {role[1] for role in roles.values()} | {*model.robots}
+    places = frozenset(role[2] for role in roles.values())
     for atom in model.codec.facts.atoms:
-        text = show(atom)
-        if text not in roles:
-            roles[text] = atom, _other_role(atom, places, located | {*model.robots})
-    carried = {thing for _, role in roles.values() if role[0] == "with" for thing in role[1:]}
-    others = sorted((located | carried) - {*model.robots}, key=natural)
+        roles.setdefault(show(atom), _other_role(atom, places, things))
+    carried = {thing for role in roles.values() if role[0] == "with" for thing in role[1:]}
+    others = sorted((things | carried) - {*model.robots}, key=natural)
     return World(
         things=(*model.robots, *others),
         places=tuple(sorted(places, key=natural)),
         links=tuple(_links(model, locations, places)),
-        roles={text: role for text, (_, role) in roles.items()},
+        roles=roles,
     )
 
 
@@ -121,8 +119,8 @@ def _owner(reading: _Reading, model: JointModel) -> str:
 
 def _without_ambiguous(
     roles: dict[str, tuple[Atom, Role]], states: Sequence[Sequence[str]]
-) -> dict[str, tuple[Atom, Role]]:
-    """Drop the atoms of a thing and predicate that put the thing into two places at once.
+) -> dict[str, Role]:
+    """The roles without atoms of a thing and predicate that put the thing into two places at once.
 
     Of two predicates the one that locates more things is kept: ``(at plane1 city0)``, as said of
     passengers, tells where a plane is, and ``(fuel-level plane1 fl3)`` does not.
@@ -140,7 +138,7 @@ def _without_ambiguous(
             kept = best if len(best) == 1 else []
             ambiguous |= {(thing, predicate) for predicate in predicates if predicate not in kept}
     return {
-        text: (atom, role)
+        text: role
         for text, (atom, role) in roles.items()
         if (role[1], atom.predicate) not in ambiguous
     }

@@ -202,7 +202,6 @@ class _Writer:
             self.agent_name(agent)
 
     def type_name(self, kind: Any) -> str:
-        """The name of a type of objects."""
         if not kind.is_user_type():
             raise refused(f"parameters of type {kind}")
         return "object" if kind.name == self.root else self.names.of("type", kind.name, kind.name)
@@ -214,7 +213,6 @@ class _Writer:
         return self.names.of("type", ("agent", agent.name), f"agent-{agent.name}")
 
     def object_name(self, thing: Any) -> str:
-        """The name of an object."""
         return self.names.of("object", thing.name, thing.name)
 
     def agent_name(self, agent: Any) -> str:
@@ -265,14 +263,12 @@ class _Writer:
         return domain, f"{problem}))\n", schemas
 
     def goals(self) -> list[str]:
-        """The goals of the problem and of its agents."""
         goals = [self.text(goal, None) for goal in self.problem.goals]
         for agent in self.agents:
             goals += [self.text(g, agent) for g in (*agent.public_goals, *agent.private_goals)]
         return goals
 
     def type_lines(self) -> list[str]:
-        """The declarations of types."""
         kinds = [
             (self.type_name(t), self.type_name(t.father) if t.father else "object")
             for t in self.problem.user_types
@@ -473,5 +469,4 @@ def _is_read(fluent: Any) -> bool:
 
 
 def _listed(*words: str) -> str:
-    """Words in brackets."""
     return f"({' '.join(words)})"
