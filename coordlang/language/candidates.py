@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from coordlang.language.listed import ListedTask, goal_text, listed_task, model_of_listed
-from planners.joint.model import NO_FACT, FullState, Goal, JointModel, PlanningTask
+from planners.joint.model import NO_FACT, Goal, JointModel, PlanningTask
 from planners.joint.tables import Bools, Rows, find_rows, unique_rows
 from planners.loading import PlanningInstance, build
 from planners.pddl.lifted import Domain, Problem
@@ -329,9 +329,8 @@ def describe(space: PlanSpace, task: int) -> str:
     """``INIT -> GOAL`` in words of the model."""
     node = space.starts[task]
     init = space.model.state_text(space.rows[space.state[node]])
-    goal = space.goals[space.goal[node]]
-    empty = NO_FACT if isinstance(goal, FullState) else "(and)"
-    return f"{init} -> {goal_text(space.model, goal) or empty}"
+    goal = goal_text(space.model, space.goals[space.goal[node]])
+    return f"{init} -> {goal or NO_FACT}"
 
 
 def require_solvable(candidates: Candidates) -> None:

@@ -72,18 +72,6 @@ def model_of_listed(
     return loaded, tasks
 
 
-def planning_task(
-    model: JointModel,
-    domain: Domain,
-    problem: Problem,
-    listed: ListedTask,
-    position: Position | None = None,
-) -> PlanningTask:
-    """A listed task in a joint model.  Raises `BadInput` as `model_of_listed` does."""
-    init, goal = ground_task(domain, problem, listed, position)
-    return PlanningTask("listed", model.state(init), goal)
-
-
 def goal_text(model: JointModel, goal: Goal) -> str:
     """A goal as PDDL text."""
     if isinstance(goal, FullState):

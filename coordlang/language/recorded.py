@@ -7,6 +7,8 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
+import msgspec
+
 from coordlang.language.candidates import (
     Candidates,
     all_pairs,
@@ -116,10 +118,7 @@ def _is_of_world(language: Language, domain: Domain, problem: Problem) -> bool:
 
 def recorded_list(language: Language) -> list[ListedTask]:
     """The candidate tasks that a language file lists; none under ``--tasks all``."""
-    return [
-        ListedTask(tuple(t["init"]), tuple(t["goal"]))
-        for t in language.provenance.tasks.get("tasks", [])
-    ]
+    return msgspec.convert(language.provenance.tasks.get("tasks", []), list[ListedTask])
 
 
 def recorded_candidates(
@@ -147,9 +146,8 @@ def recorded_candidates(
         make = from_listed if kind == "file" else from_recorded
         return make(domain, problems, listed, options, position)
     except BadInput as error:
-        if error.position is not None:
-            raise
-        raise BadInput(error.what, position=position, remedy=error.remedy) from None
+        error.position = error.position or position
+        raise
 
 
 def _require_same_pairs(language: Language, candidates: Candidates) -> None:

@@ -12,7 +12,7 @@ from random import Random
 
 from coordlang.execution.task_language import TaskLanguage, language_in_task
 from coordlang.language.candidates import describe, explored_if_small
-from coordlang.language.listed import planning_task
+from coordlang.language.listed import ground_task
 from coordlang.language.recorded import recorded_list
 from coordlang.language.words import Language
 from coordlang.required.miscoordination import Miscoordination, miscoordination
@@ -124,7 +124,8 @@ def _candidates(
     else:
         listed = recorded_list(first.language)
         random.shuffle(listed)
-        tasks = (planning_task(first.model, domain, problem, one, position) for one in listed)
+        ground = (ground_task(domain, problem, one, position) for one in listed)
+        tasks = (PlanningTask("listed", first.model.state(init), goal) for init, goal in ground)
     for task in tasks:
         init = task.init[None, :]
         try:
