@@ -26,7 +26,7 @@ from coordlang.simulation.record import (
     read_simulation,
     to_bytes,
 )
-from coordlang.simulation.recording import KINDS, recorded
+from coordlang.simulation.recording import RECORDINGS
 from coordlang.simulation.run import record_of, runs_of
 from coordlang.simulation.simulator import Settings, require_simulator
 from coordlang.simulation.team import Agreement, Mission
@@ -96,17 +96,17 @@ class Simulated(Presented):
                 remedy=f"There are {', '.join(str(run.seed) for run in self.runs[:8])}.",
             )
         is_record = kind == ".json"
-        data = to_bytes(self.record) if is_record else recorded(self.record, found[0], kind)
+        data = to_bytes(self.record) if is_record else RECORDINGS[kind](self.record, found[0])
         write_atomically(fspath(path), data)
 
 
 def kind_of(path: str) -> str:
     """Return the ending of a file's name; `UsageError` for one that is not written."""
     kind = Path(path).suffix.lower()
-    if kind != ".json" and kind not in KINDS:
+    if kind != ".json" and kind not in RECORDINGS:
         raise UsageError(
             f"{echoed(path)}: it is not known what to write there",
-            remedy=f"End the name in .json, {', '.join(KINDS)}.",
+            remedy=f"End the name in .json, {', '.join(RECORDINGS)}.",
         )
     return kind
 

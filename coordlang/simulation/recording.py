@@ -40,14 +40,6 @@ _LAST = 1.5
 _FRAMES, _COLUMNS = 8, 4
 
 
-def recorded(record: SimulationRecord, run: RunRecord, kind: str) -> bytes:
-    """Draw a run as a file of this kind, ``.gif``, ``.mp4`` or ``.png``.
-
-    Raises `UsageError` if a package is not installed that writes such files.
-    """
-    return _WRITERS[kind](record, run)
-
-
 class Scene:
     """A run drawn on axes, again and again for other times."""
 
@@ -295,10 +287,10 @@ def new_figure(width: float, height: float, dpi: int) -> Figure:
     return figure
 
 
-_WRITERS: dict[str, Callable[[SimulationRecord, RunRecord], bytes]] = {
+#: What draws a run, by the ending of the file's name.  `UsageError` is raised if a package is not
+#: installed that writes such files.
+RECORDINGS: dict[str, Callable[[SimulationRecord, RunRecord], bytes]] = {
     ".gif": _gif,
     ".mp4": _mp4,
     ".png": _sheet,
 }
-#: The endings of the names of files that are written.
-KINDS = tuple(_WRITERS)

@@ -18,8 +18,6 @@ from typing import Literal
 from coordlang.execution.monitor import IDLE, EventMonitor, Monitor, NotPossible, drawn
 
 Kind = Literal["step", "word", "ended", "ready"]
-#: By name, as ``--step`` has them.
-PACES = ("clock", "barrier", "word", "passings")
 
 #: Seconds by which times may differ that are the same: sums of ticks.
 _SAME = 1e-6
@@ -41,7 +39,7 @@ class Message:
 
 
 class Pace:
-    """One robot's way to keep step with the others, one of `PACES`; a period is in seconds.
+    """One robot's way to keep step with the others, as ``--step`` has it; a period is in seconds.
 
     - ``clock``: step k begins k periods after the start, by a clock that all robots have.
     - ``barrier``: step k begins when every robot has told that it has done k steps.
@@ -63,8 +61,6 @@ class Pace:
 
     def hears(self, messages: Iterable[Message]) -> None:
         """Take in how far the others are."""
-        if self._way == "passings":
-            return
         for message in messages:
             self._heard[message.sender] = max(self._heard[message.sender], message.number)
 

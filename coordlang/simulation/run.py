@@ -13,8 +13,7 @@ from typing import Any
 from coordlang.language.candidates import describe
 from coordlang.simulation.floor import Floor, require_room
 from coordlang.simulation.record import (
-    FORMAT,
-    VERSION,
+    SIMULATION,
     EventRecord,
     RunRecord,
     SimulationRecord,
@@ -63,8 +62,8 @@ def record_of(
     """Put runs together with what they were made with."""
     used = mission.task_language
     return SimulationRecord(
-        format=FORMAT,
-        version=VERSION,
+        format=SIMULATION.format,
+        version=SIMULATION.version,
         domain=dict(used.language.provenance.domain),
         task=describe(used.space, used.task),
         robots=list(mission.robots),
@@ -85,8 +84,6 @@ def record_of(
 
 
 class _Going:
-    """A run that is going on."""
-
     def __init__(
         self,
         mission: Mission,
@@ -137,7 +134,6 @@ class _Going:
 
     @property
     def has_ended(self) -> bool:
-        """Whether all are there, or nobody will move any more."""
         return self.has_arrived or self.time - self.last_change > _PATIENCE * self.period
 
     def tick(self) -> None:

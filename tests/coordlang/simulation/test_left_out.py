@@ -11,7 +11,7 @@ import pytest
 
 import coordlang
 from coordlang.simulation.floor import Floor, outlines, require_room
-from coordlang.simulation.recording import recorded
+from coordlang.simulation.recording import RECORDINGS
 from coordlang.sites.world import Link, World
 from planners.system.errors import BadInput, Note, UsageError
 from planners.system.signals import Interrupted
@@ -61,7 +61,7 @@ def test_a_robot_may_be_called_wall(tmp_path: Path) -> None:
     found = coordlang.simulate(words, domain, problem, seed=1)
     run = found.runs[0]
     assert set(run.poses) == {"r1", "wall"}
-    assert recorded(found.record, run, ".png").startswith(b"\x89PNG")
+    assert RECORDINGS[".png"](found.record, run).startswith(b"\x89PNG")
 
 
 def test_nothing_is_said_where_all_is_simulated(recwarn: pytest.WarningsRecorder) -> None:
@@ -81,7 +81,7 @@ def test_a_signal_ends_a_recording_without_a_word_of_others(
     found = coordlang.simulate(language, t_map / "domain.pddl", t_map / "problem.pddl")
     monkeypatch.setattr(GifImagePlugin, "_write_frame_data", Mock(side_effect=Interrupted(2)))
     with pytest.raises(Interrupted):
-        recorded(found.record, found.runs[0], ".gif")
+        RECORDINGS[".gif"](found.record, found.runs[0])
     assert capfd.readouterr().err == ""
 
 

@@ -35,7 +35,7 @@ from coordlang.simulation.record import (
     read_simulation,
     to_bytes,
 )
-from coordlang.simulation.recording import ROBOTS, Scene, frames, new_figure, recorded
+from coordlang.simulation.recording import RECORDINGS, ROBOTS, Scene, frames, new_figure
 from coordlang.simulation.run import record_of, runs_of
 from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Mission
@@ -292,14 +292,14 @@ def test_films_have_the_frames_that_are_drawn() -> None:
     drawn = list(frames(found, run))
     assert len({image.shape for image in drawn}) == 1
     gif, film, sheet = (
-        imageio.v3.imread(recorded(found, run, kind), extension=kind)
+        imageio.v3.imread(RECORDINGS[kind](found, run), extension=kind)
         for kind in (".gif", ".mp4", ".png")
     )
     assert gif[0].shape == drawn[0].shape
     assert film.shape == (len(drawn), *drawn[0].shape)
     assert np.abs(film[0].astype(int) - drawn[0]).mean() < 6
     assert sheet.shape[1] > drawn[0].shape[1]
-    assert recorded(found, run, ".png") == recorded(found, run, ".png")
+    assert RECORDINGS[".png"](found, run) == RECORDINGS[".png"](found, run)
 
 
 def test_a_record_that_cannot_be_played_is_refused(tmp_path: Path) -> None:
