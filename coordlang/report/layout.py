@@ -23,15 +23,15 @@ _ROUND = 0.95
 
 
 def place_layout(
-    names: Sequence[str], links: Sequence[tuple[str, str]], known: Mapping[str, Point] | None = None
+    names: Sequence[str], links: Sequence[tuple[str, str]], known: Mapping[str, Point]
 ) -> tuple[Mapping[str, Point], bool]:
     """Points of named places, and whether these are cells of a grid, squares that touch.
 
     By ``known`` coordinates of all of them, else by names, else by links.  x is to the right and y
     down, neighbours are about 1 apart.
     """
-    is_known = known is not None and all(name in known for name in names)
-    if points := known if is_known else from_names(names, links):
+    points = known if known.keys() >= set(names) else from_names(names, links)
+    if points:
         found = {name: points[name] for name in names}
         return found, _is_grid(list(found.values()))
     number = {name: k for k, name in enumerate(names)}

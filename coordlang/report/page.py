@@ -55,10 +55,7 @@ MOST_PLACES = 600
 
 
 def page_data(
-    language: Language,
-    selection: Selection,
-    seed: int,
-    known: Mapping[str, Point] | None = None,
+    language: Language, selection: Selection, seed: int, known: Mapping[str, Point]
 ) -> dict[str, Any]:
     """Return the page's data for a language and the tasks to be shown.
 
@@ -133,10 +130,8 @@ def word_rows(
     elif 0 < len(language.states) <= _STATES_EXPLAINED:
         mapped = mapped_states(language, model)
         described = describe_words(mapped, all_covers(mapped))
-        others, in_order = (
-            {word for word, cover in described.rules if not cover},
-            described.in_order,
-        )
+        in_order = described.in_order
+        others = {word for word, cover in described.rules if not cover}
         covers = {word: cover.terms if cover else () for word, cover in described.rules}
         terms_of = {word: [*map(term_text, terms)] for word, terms in covers.items()}
     sizes = language.sizes()
@@ -160,7 +155,7 @@ def word_rows(
     return rows, in_order
 
 
-def _map(world: World, known: Mapping[str, Point] | None) -> dict[str, Any]:
+def _map(world: World, known: Mapping[str, Point]) -> dict[str, Any]:
     if not world.places:
         return {"places": [], "links": [], "grid": False}
     placed, is_grid = place_layout(world.places, [link.ends for link in world.links], known)
@@ -191,10 +186,7 @@ def _pair(
 
 
 def _role(fact: str, world: World) -> list[Any]:
-    """The role of an atom with things and places as numbers."""
-    if fact.startswith("(last "):
-        robot, _, action = fact[len("(last ") : -1].partition(" ")
-        return ["about", world.things.index(robot), f"last did {own_text(action, robot)}"]
+    """The role of an atom that is shown on the map, with things and places as numbers."""
     kind, *rest = world.role(fact)
     things, places = world.things, world.places
     match kind, rest:
@@ -204,8 +196,6 @@ def _role(fact: str, world: World) -> list[Any]:
             return ["with", things.index(one), things.index(two)]
         case "mark", [place, text]:
             return ["mark", places.index(place), text]
-        case "about", [thing, text] if thing in things:
-            return ["about", things.index(thing), text]
     return ["other"]
 
 
@@ -228,22 +218,20 @@ def _state_graph(language: TaskLanguage) -> dict[str, Any]:
     """
     model, rows = language.model, language.partition.rows
     keys = [model.codec.key(row) for row in rows]
-    rank = np.empty(len(keys), np.int64)
-    rank[np.argsort(np.array(keys, object), kind="stable")] = np.arange(len(keys))
+    rank = np.argsort(np.argsort(np.array(keys, object)))
     steps = model.successors(rows)
     target = find_rows(rows, steps.result)
     inside = (target >= 0) & (target != steps.source)
     ends = np.sort(rank[np.column_stack((steps.source, target))[inside]], axis=1)
-    links = [(a, b) for a, b in np.unique(ends, axis=0).tolist()]
+    links = np.unique(ends, axis=0).tolist()
     points = graph_layout(len(keys), links)
     points *= 1000 / max(float(points.max(initial=0.0)), 1e-9)
     apart = np.linalg.norm(points[:, None] - points[None, :], axis=2)[np.triu_indices(len(keys), 1)]
     radius = max(2.0, min(26.0, 270 / len(keys) ** 0.5, float(apart.min()) / 2.1))
-    drawn = links if len(links) <= _STATE_LINES else []
     return {
         "points": [[round(x), round(y)] for x, y in points.tolist()],
         "radius": round(radius, 1),
-        "links": [[a, b] for a, b in drawn],
+        "links": links if len(links) <= _STATE_LINES else [],
         "steps": len(links),
     }
 
@@ -286,9 +274,10 @@ def make_report(
     would be too large, and what `coordlang.report.shown.select_tasks` raises.
     """
     position = position or Position("the language file")
+    points = coordinates or {}
     selection = select_tasks(language, domain, problems, tasks_shown, seed, options, position)
     model = selection.tasks[0].language.model
-    lifted = lifted_words(language, domain, problems[0], model, coordinates or {}, position)
+    lifted = lifted_words(language, domain, problems[0], model, points, position)
     rows, in_order = word_rows(language, model, lifted)
     shown: dict[str, Any] = {
         "language": language,
@@ -303,7 +292,7 @@ def make_report(
     }
     heat = None
     while True:
-        data = page_data(language, selection, seed, coordinates)
+        data = page_data(language, selection, seed, points)
         if heat is None and data["places"]:
             known = options or options_of(language)
             heat = heat_of(language, domain, problems, known, selection, position)

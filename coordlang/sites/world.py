@@ -16,8 +16,8 @@ from planners.joint.model import JointModel, show
 from planners.pddl.lifted import TRUE, Atom
 from planners.pddl.robots import natural
 
-#: What an atom says: ("at", thing, place), ("with", thing, thing), ("mark", place, text), ("about",
-#: thing, text), ("other",).
+#: What an atom says: ("at", thing, place), ("with", thing, thing), ("mark", place, text), or
+#: ("other",).
 Role = tuple[str, ...]
 
 _OTHER: Role = ("other",)
@@ -147,12 +147,10 @@ def _without_ambiguous(
 def _other_role(atom: Atom, places: frozenset[str], things: set[str]) -> Role:
     """The role of an atom that does not say where a thing is."""
     match atom.args:
-        case (one,):
-            return "mark" if one in places else "about", one, atom.predicate
+        case (one,) if one in places:
+            return "mark", one, atom.predicate
         case (one, two) if not places & {one, two} and things & {one, two}:
             return "with", one, two
-        case (one, two) if one in things and two in places:
-            return "about", one, f"{atom.predicate} {two}"
     return _OTHER
 
 

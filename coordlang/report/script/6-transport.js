@@ -6,10 +6,9 @@ const ICONS = {
 const icon = name => draw('svg', { viewBox: '0 0 18 18', 'aria-hidden': true }, draw('path', { d: ICONS[name] }));
 
 class Transport {
-  // last(): number of the last step there is; total(): of the last one there will be; show(step): draw it;
-  // said(step): what it is called; every: milliseconds between two.
-  constructor(root, player, { last, show, total = last, said = step => `step ${step} of ${total()}`, every = 850 }) {
-    Object.assign(this, { last, show, total, said, every, more: null, step: 0, timer: null });
+  // last(): number of the last step there is; total(): of the last one there will be; show(step): draw it.
+  constructor(root, player, { last, show, total = last }) {
+    Object.assign(this, { last, show, total, more: null, step: 0, timer: null });
     const button = (name, label, action) => make('button', { type: 'button', class: name, 'aria-label': label, title: label, onclick: action }, icon(name));
     this.playButton = button('play', 'Play', () => this.toggle());
     this.slider = make('input', { type: 'range', min: 0, value: 0, 'aria-label': 'Step', oninput: () => { this.pause(); this.go(+this.slider.value); } });
@@ -24,7 +23,7 @@ class Transport {
     this.step = Math.max(0, Math.min(this.last(), step));
     this.slider.max = this.last();
     this.slider.value = this.step;
-    this.output.textContent = this.said(this.step);
+    this.output.textContent = `step ${this.step} of ${this.total()}`;
     this.slider.setAttribute('aria-valuetext', this.output.textContent);
     this.show(this.step);
   }
@@ -40,7 +39,7 @@ class Transport {
   toggle() {
     if (this.timer) { this.pause(); return; }
     if (this.atEnd) this.go(0);
-    this.timer = setInterval(() => { this.forward(); if (this.atEnd) this.pause(); }, this.every);
+    this.timer = setInterval(() => { this.forward(); if (this.atEnd) this.pause(); }, 850);
     this.paint();
   }
 

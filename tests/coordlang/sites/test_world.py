@@ -27,7 +27,7 @@ WORLDS: dict[str, tuple[str, int, dict[str, str]]] = {
         {
             "(lies box west)": "at box west",
             "(holds r1 box)": "with r1 box",
-            "(free r1)": "about r1 free",
+            "(free r1)": "other",
         },
     ),
     "elevator/two-calls": (
@@ -36,7 +36,7 @@ WORLDS: dict[str, tuple[str, int, dict[str, str]]] = {
         {
             "(stops first)": "at lift first",
             "(on r1 first)": "at r1 first",
-            "(inside r1)": "about r1 inside",
+            "(inside r1)": "other",
         },
     ),
     "vans/two-each": ("d1 d2 v1 v2", 4, {"(aboard d1 v2)": "with d1 v2"}),
