@@ -55,12 +55,15 @@ def success_rates(
     ``most`` allows.
     """
     every = sentence_counts(space, word, most_steps=most)
-    starts = space.starts.tolist()
-    found: list[list[SuccessRates]] = [[] for _ in starts]
+    word_of = np.zeros(len(space.rows), np.int64)
+    word_of[space.state] = word
+    found: list[list[SuccessRates]] = [[] for _ in space.starts]
     for disruption in disruptions:
-        left = sentence_counts(space, word, edges=disruption.spared(space))
-        for row, node in zip(found, starts, strict=True):
-            row.append(_rates(every[node], left[node]))
+        spared = space.along(disruption.spared(space))
+        left = sentence_counts(spared, word_of[spared.state])
+        starts = zip(space.starts.tolist(), spared.starts.tolist(), strict=True)
+        for row, (node, own) in zip(found, starts, strict=True):
+            row.append(_rates(every[node], left[own]))
     return found
 
 

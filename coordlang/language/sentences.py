@@ -7,13 +7,12 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coordlang.language.words import Partition
-from planners.joint.tables import Bools, Ints
+from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import OutOfMemory
 from planners.system.limits import memory_left
@@ -86,7 +85,6 @@ def sentence_counts(
     word: Ints,
     *,
     start: int | None = None,
-    edges: Bools | None = None,
     most_steps: int | None = None,
 ) -> dict[int, Counter[Sentence]]:
     """Count the plans with each sentence, from the nodes of a plan space.
@@ -94,8 +92,7 @@ def sentence_counts(
     Backward over the plan space, for all tasks at once: O(edges * sentences of a node).
 
     ``word`` (nodes) is the word number of each node.  Counted are the plans from the nodes on plans
-    from ``start`` (default: from all nodes) over the ``edges`` of a mask (default: over all), with
-    at most ``most_steps`` additions.
+    from ``start`` (default: from all nodes), with at most ``most_steps`` additions.
 
     Returns for each node the sentences of the plans from it, the node's own word first, with the
     exact numbers of these plans.  Raises `OutOfMemory` if that takes more additions.
@@ -111,11 +108,7 @@ def sentence_counts(
             counts[node] = Counter({(words[node],): 1})
             continue
         total: Counter[Sentence] = Counter()
-        out = space.out_edges(node)
-        targets: Iterable[int] = space.successors(node)
-        if edges is not None:
-            targets = compress(targets, edges[out.start : out.stop])
-        for target in targets:
+        for target in space.successors(node):
             steps += len(counts[target])
             for rest, number in counts[target].items():
                 total[rest if rest[0] == words[node] else (words[node], *rest)] += number
