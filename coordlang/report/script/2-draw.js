@@ -2,9 +2,10 @@
 
 const SVG = 'http://www.w3.org/2000/svg';
 
+const byId = name => document.getElementById(name);
+
 function make(tag, attributes = {}, ...children) {
-  const element = document.createElement(tag);
-  return filled(element, attributes, children);
+  return filled(document.createElement(tag), attributes, children);
 }
 
 function draw(tag, attributes = {}, ...children) {

@@ -23,7 +23,7 @@ function mapGeometry() {
 
 class Scene {
   // marks: names of marks (atoms about one place) that are worth showing; names: write the places' names.
-  constructor(label, marks = new Set(), names = true) {
+  constructor(label, marks, names) {
     this.names = names;
     this.geometry = mapGeometry();
     this.marks = marks;
@@ -97,7 +97,7 @@ class Scene {
       draw('path', { class: `trail done ${robotClass(robot)}`, d: path(robot, 0, step) })]));
   }
 
-  show(state, { faded = new Set(), label = null } = {}) {
+  show(state, faded, label) {
     const { at, carried } = whereIs(state);
     const inPlace = new Map();
     for (const [thing, place] of [...at].sort((a, b) => a[0] - b[0])) {
@@ -123,7 +123,7 @@ class Scene {
       const { mark } = this.places[role[1]];
       mark.textContent += (mark.textContent ? ', ' : '') + role[2];
     }
-    if (label) this.svg.setAttribute('aria-label', label);
+    this.svg.setAttribute('aria-label', label);
   }
 
   spot(place, k, number) {

@@ -12,7 +12,7 @@ class Atlas {
     if (!this.views.length) return;
     root.hidden = false;
     const columns = this.plan ? 8 : this.pair ? mapGeometry().size[0] / CELL : 0;
-    document.getElementById('words').classList.toggle('stacked', DATA.words.length > 8 || columns > 7);
+    byId('words').classList.toggle('stacked', DATA.words.length > 8 || columns > 7);
     const tabs = root.querySelector('.tabs');
     if (this.views.length > 1) {
       tabs.append(...this.views.map(([name], k) => make('button', { type: 'button', onclick: () => this.open(k) }, name)));

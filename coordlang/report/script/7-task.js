@@ -3,9 +3,8 @@
 class TaskView {
   constructor(atlas) {
     this.atlas = atlas;
-    this.byId = name => document.getElementById(name);
     this.mode = -1;
-    this.transport = new Transport(this.byId('transport'), this.byId('task'), {
+    this.transport = new Transport(byId('transport'), byId('task'), {
       last: () => this.states.length - 1, total: () => this.task.steps, show: step => this.show(step) });
   }
 
@@ -18,10 +17,10 @@ class TaskView {
     this.varying = varyingFacts(task);
     this.scene = DATA.places.length ? new Scene('', this.varying.marks, DATA.places.length <= 60) : null;
     if (this.scene) this.scene.goals(task.goals);
-    this.byId('stage').replaceChildren(...(this.scene ? [this.scene.svg] : []));
-    this.byId('stage').hidden = !this.scene;
+    byId('stage').replaceChildren(...(this.scene ? [this.scene.svg] : []));
+    byId('stage').hidden = !this.scene;
     this.space = new SpacePicture(task, node => this.visit(node));
-    this.byId('space').replaceChildren(this.space.svg);
+    byId('space').replaceChildren(this.space.svg);
     this.describe(); this.fillModes(); this.fillTint(); this.fillSentences();
     this.choose(task.sentences.length > 1 ? -1 : 0);
   }
@@ -29,23 +28,23 @@ class TaskView {
   describe() {
     const { task } = this, plans = BigInt(task.plans);
     const cost = task.second === null ? '' : ` (second cost ${task.second})`;
-    this.byId('task-summary').replaceChildren(
+    byId('task-summary').replaceChildren(
       make('strong', {}, countedPlans(plans)), DATA.kept.slack ? ', of at most ' : ' of ', make('strong', {}, counted(task.steps, 'step')), cost, ', ',
       ...(task.all_sentences === null ? ['too many sentences to count. '] : [make('strong', {}, counted(task.all_sentences, 'sentence')), '. ']),
       task.requires === null ? 'Whether coordination is required was not decided: too large.' : task.requires
         ? `Coordination is required: some mixtures of these plans go wrong${task.silence === null ? '' : `, without a word ${percent(task.silence)} of all`}.` : 'No coordination is required: any mixture of these plans is one of them.');
-    const warning = this.byId('task-warning');
+    const warning = byId('task-warning');
     const text = task.violation ? 'In this task it is no coordination language: plans with one sentence miscoordinate, as shown below.'
         + (task.failure === null ? '' : ` Robots that choose by themselves fail in ${percent(task.failure)} of all runs.`)
       : task.covered ? '' : 'This task is not among those that the language was built for. Nothing is guaranteed for it'
         + (task.verified === null ? '.' : '; checked for this page, its sentences hold here.');
     warning.textContent = text; warning.hidden = !text;
     warning.classList.toggle('bad', Boolean(task.violation) || task.verified === null);
-    this.byId('space-note').textContent = (task.complete
+    byId('space-note').textContent = (task.complete
       ? `All ${counted(task.nodes.state.length, 'node')} and ${counted(task.target.length, 'joint step')} on ${DATA.kept.plans}; every way from left to right is one. `
       : `Too large to show: of ${counted(task.all_nodes, 'node')} and ${counted(task.all_edges, 'joint step')} on ${DATA.kept.plans}, these are on plans drawn at random. `)
       + 'A node is a joint state, coloured by its word; choose one to see a plan through it.';
-    this.byId('sentences-note').textContent = task.all_sentences === null
+    byId('sentences-note').textContent = task.all_sentences === null
       ? `Sentences of plans drawn at random: ${task.sentences.length}.` : task.all_sentences > task.sentences.length
         ? `The ${task.sentences.length} that leave most plans open, of ${grouped(task.all_sentences)}.` : 'Choose one: what it leaves open remains.';
   }
@@ -54,11 +53,11 @@ class TaskView {
     const buttons = [make('button', { type: 'button', 'data-mode': -1, onclick: () => this.play(-1) }, 'Play a plan')];
     DATA.robots.forEach((robot, number) => buttons.push(make('button', { type: 'button', 'data-mode': number, disabled: !this.task.complete,
       title: this.task.complete ? `See what ${robot} may do, and choose for it` : 'Only plans drawn at random are in this page', onclick: () => this.play(number) }, `Be ${robot}`)));
-    this.byId('modes').replaceChildren(...buttons);
+    byId('modes').replaceChildren(...buttons);
   }
 
   fillTint() {
-    const select = this.byId('tint'), label = this.byId('tint-label');
+    const select = byId('tint'), label = byId('tint-label');
     const movable = this.scene && DATA.mapped ? DATA.things.map((name, thing) => [name, thing]).filter(([, thing]) =>
       DATA.states.some((_, state) => state < DATA.mapped && whereIs(state).at.has(thing))) : [];
     label.hidden = !movable.length;
@@ -74,7 +73,7 @@ class TaskView {
       onclick: () => this.choose(number), onkeydown: event => this.sentenceKey(event) },
     make('span', { class: 'said' }, ...said), make('span', { class: 'open', title: counted(open, 'plan') }, shortNumber(open)),
     make('span', { class: 'bar', style: `--share:${share(open, plans)}%` }), own ? make('span', { class: 'own' }, own) : null);
-    this.byId('sentence-list').replaceChildren(
+    byId('sentence-list').replaceChildren(
       row(-1, [make('span', {}, `All ${DATA.kept.plans}`)], plans, null),
       ...task.sentences.map((s, k) => row(k, s.words.map(chip), BigInt(s.plans), ownText(s, task))));
   }
@@ -83,7 +82,7 @@ class TaskView {
     const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
     if (!step) return;
     event.preventDefault();
-    const rows = [...this.byId('sentence-list').children];
+    const rows = [...byId('sentence-list').children];
     const next = rows[(rows.indexOf(event.currentTarget) + step + rows.length) % rows.length];
     next.focus(); next.click();
   }
@@ -92,7 +91,7 @@ class TaskView {
     this.sentence = sentence;
     const words = sentence < 0 ? null : this.task.sentences[sentence].words;
     this.fits = new Fits(this.task, this.wordOf, words);
-    for (const row of this.byId('sentence-list').children) {
+    for (const row of byId('sentence-list').children) {
       const chosen = +row.dataset.sentence === sentence;
       row.setAttribute('aria-checked', chosen); row.tabIndex = chosen ? 0 : -1;
     }
@@ -103,7 +102,7 @@ class TaskView {
   play(mode) {
     this.transport.pause();
     this.mode = mode;
-    for (const button of this.byId('modes').children) button.setAttribute('aria-pressed', +button.dataset.mode === mode);
+    for (const button of byId('modes').children) button.setAttribute('aria-pressed', +button.dataset.mode === mode);
     this.transport.more = null;
     if (mode < 0) { this.setPlan(0n); return; }
     if (this.sentence < 0 && this.task.sentences.length) { this.choose(this.freest(mode)); return; }
@@ -166,16 +165,16 @@ class TaskView {
     const { task } = this, state = this.states[step], word = DATA.state_words[state];
     const did = step ? this.steps[step - 1] : null;
     const doing = did ? DATA.robots.map((r, k) => `${r}: ${DATA.labels[k][did[k]].short}`).join('; ') : 'start';
-    this.byId('now-word').replaceChildren('now ', chip(word));
+    byId('now-word').replaceChildren('now ', chip(word));
     if (this.scene) {
       const faded = new Set(this.mode < 0 ? [] : DATA.things.map((_, t) => t).filter(t => t < DATA.robots.length && t !== this.mode));
-      this.scene.show(state, { faded, label: `Step ${step} of ${task.steps}: ${told(state)}; word ${DATA.words[word].name}` });
+      this.scene.show(state, faded, `Step ${step} of ${task.steps}: ${told(state)}; word ${DATA.words[word].name}`);
       this.scene.trails(this.states, step);
       this.scene.tint(this.tintWords(state));
       this.scene.arrows(this.optionArrows(step));
     }
-    this.byId('now').textContent = `${doing}. ${this.ending(step)}`;
-    this.byId('now').title = told(state);
+    byId('now').textContent = `${doing}. ${this.ending(step)}`;
+    byId('now').title = told(state);
     this.space.plan(this.edges, step);
     this.atlas.now(state);
     this.showFacts(step); this.showChoices(step); this.showTimeline(step); this.showPlanNav();
@@ -196,7 +195,7 @@ class TaskView {
   }
 
   tintWords(state) {
-    const thing = +this.byId('tint').value;
+    const thing = +byId('tint').value;
     if (!this.scene || thing < 0) return null;
     this.lookup ??= new Map(DATA.states.map((facts, number) => [facts.join(), number]).reverse());
     const at = [], base = DATA.states[state].filter(f => !(DATA.facts[f].role[0] === 'at' && DATA.facts[f].role[1] === thing));
@@ -218,11 +217,11 @@ class TaskView {
       const kind = now.has(fact) ? (before.has(fact) ? 'on' : 'new') : before.has(fact) ? 'gone' : null;
       if (kind) items.push(make('li', { class: kind }, DATA.facts[fact].text.replace(/^\((.*)\)$/, '$1')));
     }
-    this.byId('facts').replaceChildren(...items);
+    byId('facts').replaceChildren(...items);
   }
 
   showChoices(step) {
-    const root = this.byId('choices');
+    const root = byId('choices');
     root.hidden = this.mode < 0 || step >= this.task.steps;
     if (root.hidden) return;
     const own = this.fits.options(this.mode, this.beliefs[step][this.mode]);
@@ -260,11 +259,11 @@ class TaskView {
       make('button', { type: 'button', 'data-step': k, 'aria-label': `Go to step ${k}`, onclick: () => { this.transport.pause(); this.transport.go(k); } }, k === 0 ? 'start' : k)));
     const rows = DATA.robots.map((robot, r) => make('tr', {}, make('th', { scope: 'row', class: robotClass(r) }, robot),
       ...states.map((state, k) => this.cell(r, k, step)), ...blanks()));
-    this.byId('timeline').replaceChildren(make('table', { class: 'timeline' }, make('thead', {}, make('tr', {}, make('th', {}, 'step'), ...head, ...blanks())),
+    byId('timeline').replaceChildren(make('table', { class: 'timeline' }, make('thead', {}, make('tr', {}, make('th', {}, 'step'), ...head, ...blanks())),
       make('tbody', {}, make('tr', { class: 'said' }, make('th', { scope: 'row' }, 'word'),
         ...words.map(({ word, span }) => make('td', { colspan: span, class: wordClass(word) }, DATA.words[word].name))), ...rows)));
-    if (focus !== undefined) this.byId('timeline').querySelector(`[data-step="${focus}"]`)?.focus({ preventScroll: true });
-    const scroller = this.byId('timeline'), cell = scroller.querySelector('thead .current');
+    if (focus !== undefined) byId('timeline').querySelector(`[data-step="${focus}"]`)?.focus({ preventScroll: true });
+    const scroller = byId('timeline'), cell = scroller.querySelector('thead .current');
     if (cell && scroller.scrollWidth > scroller.clientWidth) scroller.scrollLeft = cell.offsetLeft - scroller.clientWidth / 2;
   }
 

@@ -2,16 +2,15 @@
 
 class WithoutView {
   constructor() {
-    this.byId = name => document.getElementById(name);
-    this.transport = new Transport(this.byId('without-transport'), this.byId('without'), { last: () => this.last, show: step => this.show(step) });
+    this.transport = new Transport(byId('without-transport'), byId('without'), { last: () => this.last, show: step => this.show(step) });
   }
 
   open(task) {
     this.transport.pause();
     const witness = this.witness = task.violation || task.witness;
     this.task = task;
-    this.byId('without-player').hidden = !witness;
-    this.byId('without-note').textContent = !witness
+    byId('without-player').hidden = !witness;
+    byId('without-note').textContent = !witness
       ? (task.requires === null ? 'Not decided for this task: it is too large.' : `In this task nothing can go wrong: any mixture of its ${DATA.kept.plans} is ${DATA.kept.one}.`)
       : task.violation ? 'These plans have one sentence, and yet they do not mix. Each robot follows its own part of another one.'
         : `Each robot knows the task and plans by itself, ${DATA.kept.one} each time, and follows its own part of it. Nobody has said a word.`;
@@ -21,7 +20,7 @@ class WithoutView {
     const marks = varyingFacts(task).marks;
     this.acts = [...DATA.robots.map((robot, r) => this.makeAct(`${robot} follows`, witness.states[r], marks, r)),
       this.makeAct('Together they do', witness.together, marks, -1)];
-    this.byId('acts').replaceChildren(...this.acts.map(act => act.root));
+    byId('acts').replaceChildren(...this.acts.map(act => act.root));
     this.transport.go(0);
   }
 
@@ -45,7 +44,7 @@ class WithoutView {
       const labels = step ? (together ? DATA.robots.map((_, r) => witness.plans[r][step - 1][r]) : witness.plans[act.robot][step - 1]) : null;
       if (act.scene) {
         const faded = new Set(together ? [] : DATA.robots.map((_, r) => r).filter(r => r !== act.robot));
-        act.scene.show(state, { faded, label: `${act.root.querySelector('h3').textContent}, step ${step}: ${told(state)}` });
+        act.scene.show(state, faded, `${act.root.querySelector('h3').textContent}, step ${step}: ${told(state)}`);
         act.scene.trails(act.states.slice(0, at + 1), at);
         const tries = together && broken ? labels.flatMap((label, r) => DATA.labels[r][label].moves.map(([thing, place]) => [thing, place, true, r])) : [];
         act.scene.arrows(tries, tries.length ? [crossOf(act.scene, tries)] : []);
@@ -59,7 +58,7 @@ class WithoutView {
   }
 
   tell(step, broken, late) {
-    const { witness } = this, line = this.byId('verdict');
+    const { witness } = this, line = byId('verdict');
     const breaks = step > witness.breaks;
     line.classList.toggle('bad', breaks);
     line.textContent = broken ? `Step ${step} is not possible: ${witness.stops === witness.breaks ? witness.reason : witness.why}.`

@@ -18,9 +18,9 @@ function tasksNote() {
 }
 
 document.body.append(hatches());
-const atlas = new Atlas(document.getElementById('atlas'));
+const atlas = new Atlas(byId('atlas'));
 const taskView = new TaskView(atlas), withoutView = new WithoutView();
-const select = document.getElementById('task-select');
+const select = byId('task-select');
 
 function openTask(number) {
   select.value = number;
@@ -29,9 +29,9 @@ function openTask(number) {
 }
 
 fillTasks(select);
-document.getElementById('tasks-note').textContent = tasksNote();
+byId('tasks-note').textContent = tasksNote();
 select.addEventListener('change', () => openTask(+select.value));
-const nextTask = document.getElementById('task-next');
+const nextTask = byId('task-next');
 nextTask.hidden = DATA.tasks.length < 2;
 nextTask.addEventListener('click', () => {
   const order = [...select.options].map(option => +option.value);
