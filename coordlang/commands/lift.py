@@ -35,7 +35,6 @@ from coordlang.lifted.language import (
     read_lifted,
     require_robots,
     to_bytes,
-    write_lifted,
 )
 from coordlang.lifted.learning import Instance, Learned, learn
 from coordlang.lifted.world import States, World
@@ -53,6 +52,7 @@ from planners.system.errors import (
 )
 from planners.system.limits import stop_clock
 from planners.system.messages import Presented, counted
+from planners.system.writing import write_compressed
 
 #: What a lifted file says of the model.
 _MODEL = ("cost", "unowned", "remember_actions", "execution")
@@ -68,7 +68,7 @@ class Lifted(Presented):
 
     def save(self, path: File) -> None:
         """Write a lifted file (gzip for ``.gz``)."""
-        write_lifted(self.language, fspath(path))
+        write_compressed(fspath(path), to_bytes(self.language), level=6)
 
     def data(self) -> dict[str, Any]:
         """The figures of the learning, as ``--json`` has them."""

@@ -31,7 +31,6 @@ from planners.joint.tables import Ints
 from planners.system.errors import BadInput, Position
 from planners.system.files import FileFormat, doc, read_bytes, require_seen
 from planners.system.messages import echoed
-from planners.system.writing import write_compressed
 
 #: Entries of tables (states, objects) that are filled at a time.
 _ENTRIES = 20_000_000
@@ -245,11 +244,6 @@ def to_bytes(lifted: LiftedLanguage) -> bytes:
         "producer": dict(lifted.producer),
     }
     return msgspec.json.format(msgspec.json.encode(data), indent=1) + b"\n"
-
-
-def write_lifted(lifted: LiftedLanguage, path: str | Path) -> None:
-    """Write a lifted file (gzip for ``.gz``); it is complete or not there at all."""
-    write_compressed(path, to_bytes(lifted), level=6)
 
 
 def read_lifted(path: str | Path) -> LiftedLanguage:

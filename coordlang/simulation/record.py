@@ -13,6 +13,9 @@ from coordlang.simulation.floor import Wall
 from planners.system.errors import BadInput, Position
 from planners.system.files import FileFormat, doc, read_bytes
 
+FORMAT = "coordlang/simulation"
+VERSION = 1
+
 #: Places, walls and poses lie within so many metres.
 _LARGEST = 1e6
 
@@ -165,7 +168,7 @@ class SimulationRecord(msgspec.Struct, frozen=True):
     runs: Annotated[list[RunRecord], doc("The runs.")]
 
 
-SIMULATION = FileFormat("simulation", "record of runs", SimulationRecord, "coordlang/simulation")
+SIMULATION = FileFormat("simulation", "record of runs", SimulationRecord, FORMAT, VERSION)
 
 
 def to_bytes(record: SimulationRecord) -> bytes:

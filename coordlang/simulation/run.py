@@ -13,7 +13,8 @@ from typing import Any
 from coordlang.language.candidates import describe
 from coordlang.simulation.floor import Floor, require_room
 from coordlang.simulation.record import (
-    SIMULATION,
+    FORMAT,
+    VERSION,
     EventRecord,
     RunRecord,
     SimulationRecord,
@@ -62,8 +63,8 @@ def record_of(
     """Put runs together with what they were made with."""
     used = mission.task_language
     return SimulationRecord(
-        format=SIMULATION.format,
-        version=SIMULATION.version,
+        format=FORMAT,
+        version=VERSION,
         domain=dict(used.language.provenance.domain),
         task=describe(used.space, used.task),
         robots=list(mission.robots),

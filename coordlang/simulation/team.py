@@ -83,18 +83,12 @@ class Mission:
         agreed = self.agreement == "plan"
         team: Team = {}
         for robot, name in enumerate(self.robots):
-            fits = self._only(
-                self.agreed_plan(seed) if agreed else self._drawn(f"{seed} plan {name}")
-            )
+            fits = self._only(self._drawn(f"{seed} plan" if agreed else f"{seed} plan {name}"))
             words = None
             if agreed and not fits.model.is_asynchronous:
                 words = own_words(fits, self.task_language, robot)
             team[name] = monitor(fits, knowing_own(fits, robot), ""), words
         return team
-
-    def agreed_plan(self, seed: int) -> Plan:
-        """Return the plan that all robots follow in the run with this seed if they agree on one."""
-        return self._drawn(f"{seed} plan")
 
     def atom_at(self, robot: str, place: str) -> str:
         """Return the atom that a robot is in a place; raises `UsageError` if there is none."""
