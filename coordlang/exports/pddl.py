@@ -54,22 +54,17 @@ class PddlExport:
     labels that robots take in it: all robots (explicit form), one, or none (bookkeeping).  So many
     ``terms`` tell which word a state belongs to.
 
-    Up to ``limit`` plain actions (None: `MAX_ACTIONS`) every joint action is written as one;
-    beyond, robots choose one after another (see `planners.classical.compile_classical`).  With
-    ``strips_only`` there are neither negative conditions nor costs: then the plans with the fewest
-    actions are those of the sentence.
+    Up to `MAX_ACTIONS` plain actions every joint action is written as one; beyond, robots choose
+    one after another (see `planners.classical.compile_classical`).  With ``strips_only`` there are
+    neither negative conditions nor costs: then the plans with the fewest actions are those of the
+    sentence.
 
     Raises `NoPlanFits`, and `UsageError` under ``strips_only`` where actions without costs do not
     count joint steps; with slack, for words that see it, and where more than joint steps counts.
     """
 
     def __init__(
-        self,
-        task_language: TaskLanguage,
-        words: Sequence[int],
-        limit: int | None = None,
-        *,
-        strips_only: bool = False,
+        self, task_language: TaskLanguage, words: Sequence[int], *, strips_only: bool = False
     ) -> None:
         self.model = model = task_language.model
         refuse_seen_slack(model, "--to pddl")
@@ -87,8 +82,7 @@ class PddlExport:
             makespan, second = plan_under_sentence(task_language, words).cost
         start = space.starts[0]
         task = PlanningTask("task", space.rows[space.state[start]], space.goals[space.goal[start]])
-        most = MAX_ACTIONS if limit is None else limit
-        plain = compile_classical(model, task, most, longest=max(1, steps or makespan))
+        plain = compile_classical(model, task, MAX_ACTIONS, longest=max(1, steps or makespan))
         tests = exclusive_terms(task_language)
         named = _Naming(task_language, words, plain, tests, steps).task()
         if strips_only:

@@ -395,25 +395,17 @@ class SetWalk:
     def _plan(self, start: int, robot: int, taken: Sequence[int], entered: Words) -> list[int]:
         """The edges of a plan that begins with these steps of a robot, by the words it enters."""
         space = self._space
-        layers: list[dict[tuple[int, Words], tuple[tuple[int, Words], int]]] = []
-        here = [(start, entered)]
+        paths: dict[tuple[int, Words], list[int]] = {(start, entered): []}
         for number in range(int(space.layer[start])):
-            reached: dict[tuple[int, Words], tuple[tuple[int, Words], int]] = {}
-            for before in here:
-                node, words = before
+            before, paths = paths, {}
+            for (node, words), path in before.items():
                 for edge in space.out_edges(node):
                     step = self._step(robot, node, edge)
                     said = self._entered(step)
                     fits = number >= len(taken) or step == taken[number]
                     if fits and words[: len(said)] == said:
-                        reached[self._targets[edge], words[len(said) :]] = before, edge
-            layers.append(reached)
-            here = list(reached)
-        at, path = next(end for end in here if not end[1]), list[int]()
-        for layer in reversed(layers):
-            at, edge = layer[at]
-            path.append(edge)
-        return path[::-1]
+                        paths[self._targets[edge], words[len(said) :]] = [*path, edge]
+        return next(path for (_, words), path in paths.items() if not words)
 
 
 def _short(ahead: _Ahead) -> _Ahead:

@@ -53,12 +53,10 @@ def tasks(lot: str) -> tuple[TaskLanguage, ...]:
 
 def rich() -> TaskLanguage:
     """A task with several sentences, one of which has several words and leaves several plans open."""
-    for task_language in tasks("few"):
-        sentences = numbered_sentences(task_language)
-        if len(sentences) > 1 and any(
-            len(plans) > 1 and len(words) > 1 for words, plans in sentences.items()
-        ):
-            return task_language
+    for used in tasks("few"):
+        several = [len(w) > 1 and len(plans) > 1 for w, plans in numbered_sentences(used).items()]
+        if len(several) > 1 and any(several):
+            return used
     raise AssertionError("no such task")
 
 
@@ -71,17 +69,18 @@ def planned(exported: PddlExport, plans: Iterable[Sequence[int]] | None = None) 
 
 @pytest.mark.thorough
 @BOTH
-def test_the_optimal_plans_are_the_plans_that_fit(lot: str) -> None:
-    for task_language in tasks(lot):
-        for words, plans in islice(numbered_sentences(task_language).items(), 4):
+def test_the_optimal_plans_are_the_plans_that_fit(
+    lot: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for used in tasks(lot):
+        for words, plans in islice(numbered_sentences(used).items(), 4):
             for form, limit in FORMS.items():
-                exported = PddlExport(task_language, words, limit)
+                monkeypatch.setattr("coordlang.exports.pddl.MAX_ACTIONS", limit)
+                exported = PddlExport(used, words)
                 assert exported.classical.form == form
                 assert Counter(planned(exported)) == Counter(plans)
                 assert optimal_plans(exported.classical).cost == exported.cost
-                assert exported.classical.cost(exported.cost) == task_language.space.cost_of(
-                    task_language.task
-                )
+                assert exported.classical.cost(exported.cost) == used.space.cost_of(used.task)
 
 
 @BOTH
@@ -206,8 +205,9 @@ def test_plan_files_of_other_planners() -> None:
         plan_names("(go)\n(go a b)\n")
 
 
-def test_a_plan_that_is_cut_off_or_none() -> None:
-    exported = PddlExport(rich(), max(numbered_sentences(rich()), key=len), 0)
+def test_a_plan_that_is_cut_off_or_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("coordlang.exports.pddl.MAX_ACTIONS", 0)
+    exported = PddlExport(rich(), max(numbered_sentences(rich()), key=len))
     names = action_names(exported.classical)
     plan = [names[n] for n in next(iter(optimal_plans(exported.classical)))]
     whole = exported.joint_plan([name.upper() for name in plan])
@@ -249,7 +249,9 @@ def every_plan(task: ClassicalTask) -> Iterator[tuple[int, ...]]:
 
 
 @pytest.mark.parametrize(("folder", "slack"), WITHIN_SLACK)
-def test_every_plan_within_slack_has_the_sentence(folder: str, slack: int) -> None:
+def test_every_plan_within_slack_has_the_sentence(
+    folder: str, slack: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """All of them, with all, some or none of the steps at rest at the end."""
     task_language = within_slack(folder, slack)
     sentences = numbered_sentences(task_language)
@@ -259,7 +261,8 @@ def test_every_plan_within_slack_has_the_sentence(folder: str, slack: int) -> No
         least = {plan: len(of_task.without_rest(plan)) for plan in plans}
         wanted = {plan[:n] for plan in plans for n in range(least[plan], len(plan) + 1)}
         for limit in FORMS.values():
-            exported = PddlExport(task_language, words, limit)
+            monkeypatch.setattr("coordlang.exports.pddl.MAX_ACTIONS", limit)
+            exported = PddlExport(task_language, words)
             assert Counter(planned(exported, every_plan(exported.classical))) == Counter(wanted)
             assert exported.cost == min(map(len, wanted))
 

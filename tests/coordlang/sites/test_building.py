@@ -499,12 +499,8 @@ OTHERS = {
 @pytest.mark.parametrize("name", OTHERS)
 def test_buildings_of_others(name: str, tmp_path: Path) -> None:
     found = read_building(BUILDINGS / f"{name}.building.yaml")
-    counts = (
-        len(found.places),
-        len(found.lanes),
-        len({n.graph for n in found.lanes}),
-        len(found.spawning),
-    )
+    graphs = {lane.graph for lane in found.lanes}
+    counts = tuple(map(len, (found.places, found.lanes, graphs, found.spawning)))
     assert counts == OTHERS[name]
     assert found.unscaled == ()
     texts, robots = building_files(found, None, [], 0.2)
