@@ -118,16 +118,14 @@ class PddlExport:
                 steps.append({})
             steps[-1].update(labels)
         plan = [step for step in steps if step]
-        robots = range(len(self.model.robots))
         for number, step in enumerate(plan, 1):
-            for robot in robots:
+            for robot, name in enumerate(self.model.robots):
                 if robot not in step:
                     raise BadInput(
-                        f"in step {number} of the plan {self.model.robots[robot]} chooses nothing: "
-                        "the plan is cut off",
+                        f"in step {number} of the plan {name} chooses nothing: the plan is cut off",
                         remedy="Give the whole plan that the planner wrote.",
                     )
-        return tuple(tuple(step[robot] for robot in robots) for step in plan)
+        return tuple(tuple(step[robot] for robot in sorted(step)) for step in plan)
 
 
 def _require_steps_counted(plain: ClassicalTask, model: JointModel) -> None:

@@ -94,22 +94,16 @@ def check(
     progress(f"refuting {certificate.refuted} words")
     # A word for each state of its own satisfies every reason: no solver is needed to see it, and
     # no formula, which a number of a million words would make large.
-    states = len(states_of(clauses))
-    if certificate.refuted >= max(1, states) and all(clauses):
-        raise _leaves_languages(certificate)
-    cnf = Cnf(clauses, certificate.refuted)
-    if certificate.refuted and not cnf.refuted():
-        raise _leaves_languages(certificate)
+    is_open = certificate.refuted >= max(1, len(states_of(clauses))) and all(clauses)
+    cnf = None if is_open else Cnf(clauses, certificate.refuted)
+    if cnf is None or (certificate.refuted and not cnf.refuted()):
+        raise Refuted(
+            f"the certificate's {len(certificate.reasons):,} reasons leave languages "
+            f"with {certificate.refuted} words",
+            remedy=_REBUILD,
+        )
     names = {state: candidates.model.codec.key(candidates.rows[state]) for state in cnf.word}
     return Checked(certificate.refuted + 1, len(clauses), cnf, names)
-
-
-def _leaves_languages(certificate: Certificate) -> Refuted:
-    return Refuted(
-        f"the certificate's {len(certificate.reasons):,} reasons leave languages "
-        f"with {certificate.refuted} words",
-        remedy=_REBUILD,
-    )
 
 
 def _clause(reason: Reason, candidates: Candidates, tasks: _Tasks) -> Clause:
@@ -125,14 +119,12 @@ def _clause(reason: Reason, candidates: Candidates, tasks: _Tasks) -> Clause:
     space, start = tasks[state, goal]
     robots = len(space.model.robots)
     if len(reason.plans) != robots:
-        raise Refuted(f"expected a plan for each of {robots} robots", remedy=_REBUILD)
+        raise Refuted(f"expected a plan for each of {robots} robots")
     states = []
     for number, plan in enumerate(reason.plans):
         passed = _follow(space, start, plan)
         if passed is None:
-            raise Refuted(
-                f"plan {number} is no {space.model.kept_plan} of the task", remedy=_REBUILD
-            )
+            raise Refuted(f"plan {number} is no {space.model.kept_plan} of the task")
         states.append(passed)
     mixture = [
         [own[robot] for robot, own in enumerate(step)] for step in zip(*reason.plans, strict=True)
@@ -140,14 +132,13 @@ def _clause(reason: Reason, candidates: Candidates, tasks: _Tasks) -> Clause:
     if _follow(space, start, mixture) is not None:
         raise Refuted(
             f"the mixture of its plans is one of the {space.model.kept_plans}: they need no "
-            "separation",
-            remedy=_REBUILD,
+            "separation"
         )
     clause: set[Pair] = set()
     for path in reason.paths:
         clause |= _different_cells(path, states)
     if not _joins_all([path.plans for path in reason.paths], robots):
-        raise Refuted("its warping paths do not join all of its plans", remedy=_REBUILD)
+        raise Refuted("its warping paths do not join all of its plans")
     return frozenset(clause)
 
 
@@ -155,15 +146,14 @@ def _different_cells(path: WarpingPath, states: Sequence[Sequence[int]]) -> set[
     """The pairs of different states on the cells of a path; ``states`` by plan."""
     a, b = path.plans
     if not (0 <= a < len(states) and 0 <= b < len(states)):
-        raise Refuted(f"there are no plans {a} and {b}", remedy=_REBUILD)
+        raise Refuted(f"there are no plans {a} and {b}")
     one, other = states[a], states[b]
     ends = [(0, 0), (len(one) - 1, len(other) - 1)]
     steps = {(c - a, d - b) for (a, b), (c, d) in pairwise(path.cells)}
     is_between = bool(path.cells) and [path.cells[0], path.cells[-1]] == ends
     if not is_between or not steps <= {(0, 1), (1, 0), (1, 1)}:
         raise Refuted(
-            f"the path of plans {a} and {b} is no warping path from {ends[0]} to {ends[1]}",
-            remedy=_REBUILD,
+            f"the path of plans {a} and {b} is no warping path from {ends[0]} to {ends[1]}"
         )
     return {pair(one[i], other[j]) for i, j in path.cells if one[i] != other[j]}
 
