@@ -143,10 +143,6 @@ def _bearing(pose: Pose, target: tuple[float, float]) -> float:
     return math.remainder(angle, 2 * math.pi)
 
 
-def _bounded(value: float, most: float) -> float:
-    return max(-most, min(most, value))
-
-
 @dataclass(frozen=True, slots=True)
 class Sensed:
     """What a robot is told in a tick.
@@ -356,7 +352,7 @@ class Robot:
         Where all begin together, all drive off together.
         """
         angle = _bearing(sensed.pose, target)
-        turn = _bounded(_GAIN * angle, TURN)
+        turn = max(-TURN, min(TURN, _GAIN * angle))
         if self._is_turning:
             waits = self._pace.is_common and sensed.time - step.begin < _TURNING
             if waits or abs(angle) >= _ALIGNED:
@@ -369,4 +365,4 @@ class Robot:
             self._stopped_in = self.done
             self._events.append(("stopped", {}))
         ahead = _GAIN * math.dist(sensed.pose[:2], target) * max(0.0, math.cos(angle))
-        return max(0.0, min(_bounded(ahead, SPEED), room)), turn
+        return max(0.0, min(ahead, SPEED, room)), turn
