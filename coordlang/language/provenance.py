@@ -22,10 +22,6 @@ from planners.system.files import doc
 from planners.system.messages import counted
 
 _SIZE = {"minimum": 1}
-_UNKNOWN = (
-    "this is no coordination language: robots that choose by themselves under its sentences may "
-    "fail, and its file does not say how often"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +71,10 @@ class UnknownFailures(Tolerance):
     @property
     def warning(self) -> str:
         """See `Tolerance`."""
-        return _UNKNOWN
+        return (
+            "this is no coordination language: robots that choose by themselves under its "
+            "sentences may fail, and its file does not say how often"
+        )
 
 
 def tolerance_data(tolerance: Tolerance | None) -> dict[str, Any]:

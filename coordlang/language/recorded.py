@@ -57,23 +57,18 @@ def _require_same(name: str, given: Any, recorded: Any) -> None:
     """Raise `UsageError` for a model option that contradicts the language file."""
     flag = f"--{name.replace('_', '-')}"
     if name == "robot_type":
-        raise UsageError(
-            "--robot-type: a language file names its robots already",
-            remedy="Leave out --robot-type.",
-        )
-    if name == "robots":
-        if set(given) != set(recorded):
-            raise UsageError(
-                f"--robots contradicts the language file: its robots are {', '.join(recorded)}",
-                remedy="Leave out --robots.",
-            )
+        what = f"{flag}: a language file names its robots already"
+    elif name == "robots":
+        if set(given) == set(recorded):
+            return
+        what = f"{flag} contradicts the language file: its robots are {', '.join(recorded)}"
     elif given != recorded:
         option = flag if given is True else f"{flag} {given}"
         built = f"without {flag}" if recorded is False else f"with {flag} {recorded}"
-        raise UsageError(
-            f"{option} contradicts the language file, which was built {built}",
-            remedy=f"Leave out {flag}.",
-        )
+        what = f"{option} contradicts the language file, which was built {built}"
+    else:
+        return
+    raise UsageError(what, remedy=f"Leave out {flag}.")
 
 
 def check_source(

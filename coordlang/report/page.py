@@ -176,7 +176,7 @@ def _pair(
     pairs = {tuple(at) for at in located}
     if len(pairs) != 1 or len({tuple(at.values()) for at in located}) < len(located):
         return None
-    if len(things := pairs.pop()) != 2 or len(world.places) < 2:
+    if len(things := pairs.pop()) != 2:
         return None
     at = world.located(start)
     return {
