@@ -100,7 +100,6 @@ def _leaves(model: JointModel) -> Mapping[str, _Leaf]:
 
 
 def _tree(model: JointModel, own: RobotChoices) -> ET.Element:
-    """One robot's tree."""
     name = model.robots[own.robot]
     tree = ET.Element("BehaviorTree", ID=name)
     steps = ET.SubElement(tree, "Sequence", name=name)

@@ -194,7 +194,6 @@ class _Reading:
         return None if self.thing is None else atom.args[self.thing], atom.args[self.place]
 
     def take_in(self, action: GroundAction) -> None:
-        """Take in what an action changes."""
         read = ((effect.adds, self.read(effect.atom)) for effect in action.effects)
         changes = [(adds, *found) for adds, found in read if found is not None]
         self.signs |= {adds for adds, _, _ in changes}

@@ -301,7 +301,6 @@ class _Writer:
         return actions, schemas
 
     def body(self, action: Any, agent: Any) -> list[str]:
-        """Parameters, precondition and effect."""
         if type(action) is not InstantaneousAction or action.simulated_effect is not None:
             raise refused(
                 f"{type(action).__name__} {action.name!r} is not instantaneous, or its effects are "

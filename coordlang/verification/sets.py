@@ -71,7 +71,6 @@ class SequenceSets:
         self._unions: dict[tuple[int, ...], int] = {}
 
     def __len__(self) -> int:
-        """Count the different sets."""
         return len(self.moves)
 
     def number(self, moves: Iterable[tuple[int, int]]) -> int:
