@@ -18,11 +18,10 @@ class SpacePicture {
     for (let k = 0; k <= task.steps; k++) {
       this.svg.append(draw('text', { class: 'axis', x: column * (k + .5), y: 15 }, k === 0 ? 'start' : k === task.steps ? 'goal' : k));
     }
-    const source = [];
-    for (let n = 0; n < state.length; n++) for (let e = task.first[n]; e < task.first[n + 1]; e++) source[e] = n;
-    this.source = source;
+    this.source = [];
+    for (let n = 0; n < state.length; n++) for (let e = task.first[n]; e < task.first[n + 1]; e++) this.source[e] = n;
     this.paths = ['e-all', 'e-fit', 'e-plan'].map(name => this.svg.appendChild(draw('path', { class: name })));
-    this.paths[0].setAttribute('d', this.lines(source.keys()));
+    this.paths[0].setAttribute('d', this.lines(this.source.keys()));
     this.groups = state.map((s, node) => {
       const [x, y] = this.point(node), word = DATA.state_words[s];
       const shapes = wordShape('rect', { x: x - width / 2, y: y - height / 2, width, height, rx: Math.min(5, height / 3) }, word);

@@ -3,7 +3,6 @@
 class TaskView {
   constructor(atlas) {
     this.atlas = atlas;
-    this.mode = -1;
     this.transport = new Transport(byId('transport'), byId('task'), {
       last: () => this.states.length - 1, total: () => this.task.steps, show: step => this.show(step) });
   }
