@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -142,16 +143,14 @@ def planning_files(map_file: Path, scenario: Path, agents: int) -> dict[str, str
         [cell_name(goal) for _, goal in found],
         written_by="coordlang import",
     )
-    places = (
-        f'"{cell_name((row, column))}": [{column}, {row}]'
-        for row in range(grid.height)
-        for _, column in grid.in_row(row)
-    )
+    coordinates = {
+        cell_name(cell): cell[::-1] for row in range(grid.height) for cell in grid.in_row(row)
+    }
     domain = shipped_domains() / "grid" / "domain.pddl"
     return {
         "domain.pddl": domain.read_text(encoding="utf-8"),
         "problem.pddl": text,
-        "coordinates.json": f'{{"coordinates": {{{", ".join(places)}}}}}\n',
+        "coordinates.json": json.dumps({"coordinates": coordinates}) + "\n",
     }
 
 

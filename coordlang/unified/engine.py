@@ -322,12 +322,10 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         """The language in this problem, which has no texts of its own to compare."""
         language = self._options.language
         assert language is not None
-        hashes = ("sha256", "problem_sha256", "world_sha256")
-        domain, model = (
-            {key: value for key, value in entries.items() if key not in hashes}
-            for entries in (language.provenance.domain, language.provenance.model)
-        )
-        provenance = replace(language.provenance, domain=domain, model=model)
+        recorded = language.provenance
+        domain = {**recorded.domain, "sha256": None}
+        model = {**recorded.model, "world_sha256": None}
+        provenance = replace(recorded, domain=domain, model=model)
         return language_in_task(
             replace(language, provenance=provenance),
             found.domain,
