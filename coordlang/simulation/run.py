@@ -121,7 +121,6 @@ class _Going:
         self.last_change, self.nearest = 0.0, math.inf
         self.heard: tuple[Message, ...] = ()
         self.touching: set[tuple[str, str]] = set()
-        self.collided: set[str] = set()
         self.events: list[EventRecord] = []
         self.poses: dict[str, list[Pose]] = {name: [] for name in self.robots}
 
@@ -166,7 +165,7 @@ class _Going:
             for name, robot in self.robots.items()
             for one in robot.steps
         ]
-        has_arrived, is_stuck = self.has_arrived, not self.has_arrived and not self.collided
+        has_arrived, is_stuck = self.has_arrived, not self.has_arrived and not self.collisions
         seconds = self.time
         if has_arrived:
             seconds = max((step.end for step in steps if step.end is not None), default=0.0)
@@ -208,7 +207,6 @@ class _Going:
         for pair in sorted(touching - self.touching):
             self.collisions += 1
             robots = [name for name in pair if name in self.robots]
-            self.collided.update(robots)
             self._event("collision", robots, touched="wall" if WALL in pair else None)
         self.touching = touching
 
