@@ -14,6 +14,7 @@ it are ready (``AwaitPartner``).
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
@@ -92,7 +93,7 @@ def _comment(choices: SentenceChoices) -> str:
     )
     sentence = used.text(choices.words)
     text = f' Sentence "{sentence}". {promise}\n  Leaves besides the actions:{leaves}\n  '
-    return text.replace("--", "- -")  # two hyphens end a comment
+    return re.sub("-(?=-)", "- ", text)  # two hyphens end a comment
 
 
 def _leaves(model: JointModel) -> Mapping[str, _Leaf]:

@@ -153,7 +153,7 @@ class Provenance:
     guarantee: Guarantee | None = None
     domain: Mapping[str, Any] = field(default_factory=dict)
     model: Mapping[str, Any] = field(default_factory=dict)
-    tasks: Mapping[str, Any] = field(default_factory=dict)
+    tasks: Mapping[str, Any] = field(default_factory=lambda: {"kind": "problems", "count": 0})
     producer: Mapping[str, Any] = field(default_factory=dict)
     lifted: Mapping[str, Any] = field(default_factory=dict)
     tolerance: Tolerance | None = None

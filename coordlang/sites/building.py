@@ -212,8 +212,8 @@ class _Level:
         found = Counter({key: len(value.list()) for key, value in lists.items()})
         for params in [p for _, _, p in self.lanes] + [v.params for v in self.used]:
             found.update(n for n in _IGNORED if _text(params, n) not in ("", "0"))
-        found["robots off lanes"] = sum("spawn_robot_name" in v.params for v in self.vertices)
-        found["robots off lanes"] -= sum("spawn_robot_name" in v.params for v in self.used)
+        spawning = {v.number for v in self.vertices if "spawn_robot_name" in v.params}
+        found["robots off lanes"] = len(spawning.difference(v.number for v in self.used))
         return +found
 
 

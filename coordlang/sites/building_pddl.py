@@ -14,6 +14,7 @@ import networkx as nx
 
 from coordlang.sites.building import Building, Lane, Place, pddl_name
 from coordlang.sites.clearance import clash, excluded, motions, staying
+from coordlang.sites.coordinates import checked
 from planners.system.errors import BadInput, Position, UsageError, note
 from planners.system.messages import counted, echoed, named, some, visible
 
@@ -149,6 +150,7 @@ def building_files(
         ")",
     ]
     coordinates = {n: point for n, point in building.coordinates().items() if n in places}
+    checked(coordinates, Position(building.path))
     texts = {
         "domain.pddl": _DOMAIN.format(**more),
         "problem.pddl": "\n".join(listed) + "\n",

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from itertools import islice
 from random import Random
 from xml.etree import ElementTree as ET
@@ -187,6 +188,12 @@ def test_every_mixture_of_random_models(robots: int) -> None:
         with suppress(naive.TooLarge):
             several += run_every_mixture(used) > 1
     assert several >= 2
+
+
+def test_hyphens_of_a_word_end_no_comment() -> None:
+    _, used = shipped("three-cells/problem")
+    used = replace(used, partition=replace(used.partition, words=("-", "---", "w--")))
+    assert ET.fromstring(behaviour_trees(choices(used, used.words_of("--- -")))).tag == "root"
 
 
 @pytest.mark.parametrize("fails", [False, True])

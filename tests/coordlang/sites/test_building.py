@@ -109,12 +109,20 @@ def test_the_problem_is_understood(tmp_path: Path) -> None:
 
 def test_vertices_at_one_point_are_one_place(tmp_path: Path) -> None:
     text = level(
-        '[[0, 0, 0, ""], [1, 0, 0, ""], [1, 0, 0, b, {is_charger: [4, true]}], [2, 0, 0, c]]',
+        '[[0, 0, 0, ""], [1, 0, 0, ""], [1, 0, 0, b, {is_charger: [4, true], spawn_robot_name: [1, z]}], '
+        "[2, 0, 0, c]]",
         "[[0, 1], [2, 3, {bidirectional: [4, true]}]]",
     )
     found = read_building(written(tmp_path, text))
     assert driven(found) == {("l1-0", "b"), ("b", "c"), ("c", "b")}
     assert found.places["b"].is_charger
+    assert (found.spawning, found.unused) == ({"z": "b"}, {})
+
+
+def test_places_that_could_not_be_told_apart_on_a_page(tmp_path: Path) -> None:
+    near = level('[[0, 0, 0, ""], [1, 0, 0, ""], [1.0001, 0, 0, ""]]', "[[0, 1], [1, 2]]")
+    with pytest.raises(BadInput, match="two places have the same coordinates"):
+        library.import_site(written(tmp_path, near), robots=1)
 
 
 SCALED = {
