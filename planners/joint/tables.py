@@ -112,7 +112,7 @@ def unique_rows(table: NDArray[T]) -> tuple[NDArray[T], Ints]:
     return table[order[fresh]], number
 
 
-def find_rows(table: Rows, rows: Rows) -> NDArray[np.int64]:
+def find_rows(table: NDArray[T], rows: NDArray[T]) -> Ints:
     """For each of ``rows`` its number in the sorted ``table`` (as made by `unique_rows`), or -1."""
     if len(table) == 0:
         return np.full(len(rows), -1, np.int64)
@@ -121,7 +121,7 @@ def find_rows(table: Rows, rows: Rows) -> NDArray[np.int64]:
     return np.where(keys[found] == wanted, found, -1)
 
 
-def _comparable(rows: Rows) -> NDArray[np.generic]:
+def _comparable(rows: NDArray[T]) -> NDArray[np.generic]:
     """Rows as one sortable value each, in the order of `unique_rows`."""
     if rows.shape[1] == 1:
         return rows[:, 0]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.joint.tables import Ints, differs
+from planners.joint.tables import Ints, differs, find_rows
 from planners.search.plan_space import PlanSpace
 
 
@@ -43,12 +43,9 @@ class EdgeIndex:
 
     def follow(self, robot: int, prefix: Ints, label: NDArray[np.integer[Any]]) -> Ints:
         """The prefixes one robot further; -1 where there is none (and where ``prefix`` is -1)."""
-        keys, size = self.keys[robot], self.radix[robot]
-        if len(keys) == 0:
-            return np.full(len(prefix), -1, np.int64)
+        size = self.radix[robot]
         wanted = np.where((prefix >= 0) & (label < size), prefix * size + label, -1)
-        found = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        return np.where(keys[found] == wanted, found, -1)
+        return find_rows(self.keys[robot][:, None], wanted[:, None])
 
 
 class EdgeTrees:
