@@ -64,17 +64,14 @@ def simplified(clauses: array[int], kept: Sequence[int]) -> list[list[int]]:
     return list(found)
 
 
-def split_clauses(clauses: array[int] | Ints, block: int = _BLOCK) -> Iterator[list[int]]:
-    """The clauses of a formula in which 0 follows each; ``block`` are listed at a time."""
+def split_clauses(clauses: array[int] | Ints) -> Iterator[list[int]]:
+    """The clauses of a formula in which 0 follows each."""
     literals = np.asarray(clauses)
-    ends = np.flatnonzero(literals == 0)
-    begin = 0
-    for start in range(0, len(ends), block):
-        some = ends[start : start + block]
-        listed = literals[begin : some[-1]].tolist()
-        first = begin
-        for end in some.tolist():
-            yield listed[begin - first : end - first]
+    blocks = np.flatnonzero(literals == 0)[_BLOCK - 1 :: _BLOCK] + 1
+    for some in np.split(literals, blocks):
+        begin, listed = 0, some.tolist()
+        for end in np.flatnonzero(some == 0).tolist():
+            yield listed[begin:end]
             begin = end + 1
 
 
