@@ -11,8 +11,9 @@ and verifies languages in step does so without one (docs/asynchronous.md).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise, product
 
 import numpy as np
@@ -91,7 +92,6 @@ class _Unfolding:
         return f"{pasts:,} states with their pasts, {len(self._graph):,} nodes of the graph"
 
     def run(self) -> PlanSpace:
-        """The graph."""
         idle = (0,) * len(self._robots)
         starts = []
         for node in self._space.starts.tolist():
@@ -141,7 +141,7 @@ class _Unfolding:
             if not any(step):
                 self._require_no_change(edge, here.node)
             numbers = [0] * len(self._robots)
-            waits = self._waits.of(here.past, step)
+            waits = partial(self._waits.of, here.past, step)
             for robot, event in self._traces.events_of(row, step, waits).items():
                 known = self.events[robot]
                 numbers[robot] = known.setdefault(event, len(known) + 1)
@@ -244,10 +244,7 @@ class _Unfolding:
         space = self._space
         state, goal = int(space.state[here.node]), int(space.goal[here.node])
         layer = int(space.layer[here.node])
-        if not layer:
-            here.queues[self._nothing] = self._graph.node(state, goal, layer, {})
-            return
-        moves: dict[_Queues, dict[Step, tuple[int, int]]] = {}
+        moves: dict[_Queues, dict[Step, tuple[int, int]]] = {} if layer else {self._nothing: {}}
         for numbers, edge, after in here.moves:
             cost = int(space.cost[edge])
             for following, target in after.queues.items():
@@ -306,13 +303,9 @@ class _Waits:
             self._added[step] = np.sum(rows, axis=0, dtype=np.int16) if rows else self.none
         return self._added[step]
 
-    def of(self, past: Ints, step: Step) -> Callable[[int, int], int]:
+    def of(self, past: Ints, step: Step, robot: int, other: int) -> int:
         """How many events of another robot a robot's event of a step waits for, of the past."""
-
-        def waits(robot: int, other: int) -> int:
-            return int(past[self._column[robot][other][step[robot]]])
-
-        return waits
+        return int(past[self._column[robot][other][step[robot]]])
 
 
 def _future(space: PlanSpace, robot: int) -> Bools:
@@ -394,7 +387,6 @@ class _Graph:
         self._nodes: dict[tuple[int, int, int, _Edges], int] = {}
 
     def __len__(self) -> int:
-        """Count the nodes."""
         return len(self._nodes)
 
     def node(self, state: int, goal: int, layer: int, moves: Mapping[Step, tuple[int, int]]) -> int:
