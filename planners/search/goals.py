@@ -72,14 +72,6 @@ class FactsOf(NamedTuple):
                 yield self.needs | needs, frozenset((fact,))
 
 
-def ways_to_facts(model: JointModel) -> Iterator[tuple[frozenset[int], int]]:
-    """Every (facts that must be true, fact that becomes true) of the ground actions."""
-    for action in model.actions:
-        for needs, added in FactsOf.of(model, action).ways():
-            for fact in sorted(added):
-                yield needs, fact
-
-
 def _positive(model: JointModel, formula: Formula) -> frozenset[int]:
     """The facts that single literals of a condition need to be true."""
     literals, _ = split_condition(formula, model.evaluator)

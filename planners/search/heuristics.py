@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Sequence
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from planners.joint.composition import ComposingStepper
 from planners.joint.model import Goal, JointModel, Options, PlanningTask, some_options
 from planners.joint.states import TrueFacts
 from planners.joint.tables import Bools, Ints, Rows, packed, unpacked
-from planners.search.goals import FAR, Values, goal_facts, ways_to_facts
+from planners.search.goals import FAR, FactsOf, Values, goal_facts
 from planners.search.state_variables import StateVariable, state_variables
 from planners.system.errors import UsageError
 
@@ -147,8 +148,9 @@ class _RelaxedReach(NamedTuple):
     def of(cls, model: JointModel, goal: Goal) -> _RelaxedReach:
         wanted = goal_facts(model, goal)
         ways: dict[int, set[tuple[int, ...]]] = {}
-        for needs, fact in ways_to_facts(model):
-            if fact not in needs:
+        own = (FactsOf.of(model, action).ways() for action in model.actions)
+        for needs, added in chain.from_iterable(own):
+            for fact in added - needs:
                 ways.setdefault(fact, set()).add(tuple(sorted(needs)))
         relevant, todo = set(wanted), list(wanted)
         while todo:

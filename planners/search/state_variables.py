@@ -54,7 +54,7 @@ def state_variables(model: JointModel, init: Rows) -> list[StateVariable]:
 def _groups(model: JointModel, init: Rows) -> list[StateVariable]:
     """Groups with a common object of whose facts exactly one is true, whatever actions do."""
     true = set(model.codec.true_facts(model.codec.facts_part(init)))
-    read: dict[int, FactsOf] = {}
+    read = [FactsOf.of(model, action) for action in model.actions]
     touching: dict[Atom, list[int]] = defaultdict(list)
     for number, action in enumerate(model.actions):
         for atom in {effect.atom for effect in action.effects}:
@@ -62,10 +62,7 @@ def _groups(model: JointModel, init: Rows) -> list[StateVariable]:
     found = []
     for facts in _candidates(model, true):
         atoms = [model.codec.facts.atoms[fact] for fact in facts]
-        own = sorted({number for atom in atoms for number in touching.get(atom, ())})
-        for number in own:
-            if number not in read:
-                read[number] = FactsOf.of(model, model.actions[number])
+        own = sorted({number for atom in atoms for number in touching[atom]})
         changes = _changes(facts, {number: read[number] for number in own})
         if changes is not None and _one_at_a_time([model.actions[number] for number in changes]):
             found.append(StateVariable(tuple(sorted(facts)), changes))
