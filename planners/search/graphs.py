@@ -52,13 +52,11 @@ def csgraph() -> Any:
             f"{left / 2**20:.0f} MiB are left",
             remedy=f"Use {more_memory()}.",
         )
-    before = os.environ.get(_THREADS)
+    environment = dict(os.environ)
     os.environ[_THREADS] = "1"  # graphs need no BLAS, and each thread of it takes memory
     try:
         from scipy.sparse import csgraph
     finally:
-        if before is None:
-            del os.environ[_THREADS]
-        else:
-            os.environ[_THREADS] = before
+        del os.environ[_THREADS]
+        os.environ.update(environment)
     return csgraph

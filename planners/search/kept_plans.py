@@ -22,7 +22,7 @@ from planners.system.errors import CoordlangError, note
 if TYPE_CHECKING:
     import pathlib
 
-    from planners.parallel.batch import Store, Table
+    from planners.parallel.batch import Store
 
 #: The version of the tables: those of another one are never looked at, and go in time.
 _FORM = 5
@@ -110,8 +110,9 @@ def search(model: JointModel, task: PlanningTask) -> PlanSpace:
         return optimal_plans.search(model, task)
     key, store = used.key(model, task), used.store
     table = store.read(key)
-    if table is not None:
-        return _plan_space(table, model, task)
+    if table is not None:  # the plan space of the task, as the hash of its entry says
+        goal = np.zeros(len(table["state"]), np.int64)
+        return PlanSpace(model=model, goal=goal, goals=(task.goal,), **table)
     found = optimal_plans.search(model, task)
     try:
         store.write(key, {name: getattr(found, name) for name in _KEPT})
@@ -122,12 +123,6 @@ def search(model: JointModel, task: PlanningTask) -> PlanSpace:
             remedy="Say --no-cache, or set COORDLANG_CACHE to a folder that you may write to.",
         )
     return found
-
-
-def _plan_space(table: Table, model: JointModel, task: PlanningTask) -> PlanSpace:
-    """The plan space of a table: that of the task, as the hash of its entry says."""
-    goal = np.zeros(len(table["state"]), np.int64)
-    return PlanSpace(model=model, goal=goal, goals=(task.goal,), **table)
 
 
 def model_digest(model: JointModel) -> str:

@@ -228,13 +228,11 @@ _MOST = 8_000
 _BLOCK = 512
 
 
-def mutexes(
-    model: JointModel, init: Rows, most: int = _MOST, block: int = _BLOCK
-) -> list[tuple[int, int]]:
+def mutexes(model: JointModel, init: Rows, block: int = _BLOCK) -> list[tuple[int, int]]:
     """Pairs (p, q), p < q, of which no state that is reachable from ``init`` has both; sorted.
 
     (p, p) where fact p is never true; such facts are in no other pair.  The joint steps must be
-    composed.  None are found where labels make facts true in more than ``most`` ways, or where the
+    composed.  None are found where labels make facts true in more than `_MOST` ways, or where the
     memory has no room for scipy; ``block`` ways are compared with the others at a time.
     """
     try:
@@ -242,7 +240,7 @@ def mutexes(
     except OutOfMemory:
         return []
     facts, ways = len(model.codec.facts), list(_ways(model))
-    if len(ways) > most or not facts:
+    if len(ways) > _MOST or not facts:
         return []
     true = model.codec.true_facts(model.codec.facts_part(init))
     may = np.zeros((facts, facts), np.bool_)

@@ -89,9 +89,7 @@ class PlanSpace:
     @property
     def layers(self) -> list[slice]:
         """The nodes of each layer, the goals' layer (0) first."""
-        bounds = (
-            np.searchsorted(self.layer, np.arange(int(self.layer[-1]) + 2)) if len(self) else [0]
-        )
+        bounds = np.searchsorted(self.layer, np.arange(int(self.layer.max(initial=-1)) + 2))
         return [slice(int(a), int(b)) for a, b in pairwise(bounds)]
 
     @property

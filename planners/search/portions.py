@@ -7,7 +7,7 @@ themselves: they are sent where the plans come from, not the plans.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -246,11 +246,7 @@ def _pairs(space: Space, goals: Sequence[Goal]) -> int:
     return sum(int((far > 0).sum()) for far in distances_to(space, goals))
 
 
-def _of_model(model: JointModel) -> Iterator[object]:
+def _of_model(model: JointModel) -> tuple[object, ...]:
     """What the numbers of states and labels mean, for a hash."""
-    yield model.robots
-    yield model.labels
-    yield model.cost
-    yield model.slack
-    yield model.is_asynchronous
-    yield tuple(model.codec.facts.texts)
+    facts = tuple(model.codec.facts.texts)
+    return model.robots, model.labels, model.cost, model.slack, model.is_asynchronous, facts

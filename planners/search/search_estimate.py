@@ -95,19 +95,15 @@ def estimate(
     """
     start = task.init[None, :]
     layers = _layers(model, start, steps, states)
-    reached = [depth for depth, rows in enumerate(layers) if model.holds(task.goal, rows).any()]
-    makespan = reached[0] if reached else None
+    depths = (depth for depth, rows in enumerate(layers) if model.holds(task.goal, rows).any())
+    makespan = next(depths, None)
     hmax = int(relaxed(model, task.goal)(start)[0]) if makespan is None else makespan
     heuristic = search_heuristic("auto", model, task, state_variables(model, task.init))
     bound = 0 if heuristic.value is None else int(heuristic.value(start)[0])
+    choices = model.stepper.choices(model.codec.facts_part(start))
     found = SearchEstimate(
         labels={robot: len(own) for robot, own in zip(model.robots, model.labels, strict=True)},
-        choices={
-            robot: len(labels)
-            for robot, (_, labels) in zip(
-                model.robots, model.stepper.choices(model.codec.facts_part(start)), strict=True
-            )
-        },
+        choices={robot: len(own) for robot, (_, own) in zip(model.robots, choices, strict=True)},
         layers=tuple(len(rows) for rows in layers if len(rows)),
         next_steps=_most_steps(model, layers[-1]) if len(layers[-1]) else None,
         makespan=makespan,
