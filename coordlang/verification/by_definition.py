@@ -147,7 +147,7 @@ def verify_candidates(
     source, parting, efforts = candidates.source, None, candidates.source.efforts
     if isinstance(source, Explored) and source.has_every_way:
         space, word = source.space, partition.word_of(source.rows)
-        ends = [space.targets] * source.robots
+        ends = [space.target.astype(np.int64)] * source.robots
         parting = Parting(space.sources, ends[0], space.labels, word, ends)
         efforts = np.full(len(efforts), len(space.target) * source.robots / STEPS)
     portions = cut(efforts, portion)

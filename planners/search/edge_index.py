@@ -15,9 +15,7 @@ from planners.search.plan_space import PlanSpace
 
 @dataclass(frozen=True, slots=True)
 class EdgeIndex:
-    """Finds the edge of a node with given labels.
-
-    Robot by robot: a tree over label tuples, without overflow.
+    """Finds a node's edge by its labels, robot by robot: a tree over label tuples, no overflow.
 
     ``keys[i]`` are sorted codes (prefix, label of robot i); a prefix is first the node, then the
     number of the code one robot earlier; the last number is the edge itself.

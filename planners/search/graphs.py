@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from planners.joint.tables import Ints
+from planners.joint.tables import Ints, Numbers
 from planners.system.errors import OutOfMemory
 from planners.system.limits import address_space_left, more_memory
 
@@ -21,7 +21,7 @@ _THREADS = "OPENBLAS_NUM_THREADS"
 
 
 def parts_of_graph(
-    size: int, sources: Ints, targets: Ints, *, directed: bool = False
+    size: int, sources: Ints, targets: Numbers, *, directed: bool = False
 ) -> tuple[int, Ints]:
     """How many components a graph has (with ``directed`` strong ones), and each node's number.
 

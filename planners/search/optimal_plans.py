@@ -85,10 +85,8 @@ def joined(spaces: Sequence[PlanSpace]) -> PlanSpace:
     if len(spaces) == 1:
         return spaces[0]
     rows, number = unique_rows(np.concatenate([s.rows for s in spaces]))
-    row_offset, node_offset, edge_offset = (
-        np.cumsum([0, *sizes])
-        for sizes in zip(*((len(s.rows), len(s), len(s.target)) for s in spaces), strict=True)
-    )
+    row_offset = np.cumsum([0, *(len(s.rows) for s in spaces)])
+    node_offset = np.cumsum([0, *map(len, spaces)])
     parts = list(enumerate(spaces))
     together = PlanSpace(
         model=spaces[0].model,
@@ -96,7 +94,7 @@ def joined(spaces: Sequence[PlanSpace]) -> PlanSpace:
         state=np.concatenate([number[s.state + row_offset[k]] for k, s in parts]),
         goal=np.repeat(np.arange(len(spaces)), np.diff(node_offset)),
         layer=np.concatenate([s.layer for s in spaces]),
-        first=np.concatenate([[0], *(s.first[1:] + edge_offset[k] for k, s in parts)]),
+        first=np.cumsum(np.concatenate([[0], *(s.out_degrees for s in spaces)])),
         target=narrow(np.concatenate([s.target + node_offset[k] for k, s in parts])),
         labels=np.concatenate([s.labels for s in spaces]),
         cost=np.concatenate([s.cost for s in spaces]),

@@ -20,8 +20,7 @@ from planners.system.messages import echoed
 
 #: Larger counts are written as strings: not every JSON reader has big integers.
 _EXACT = 2**53
-#: A step number above this one is a mistake, not a plan with so many steps in which all robots
-#: idle.
+#: A larger step number is a mistake, not a plan with so many steps in which all robots idle.
 _MOST_STEPS = 1_000_000
 
 

@@ -47,9 +47,7 @@ def counts(space: PlanSpace) -> list[int]:
 
 @dataclass(frozen=True)
 class Plans:
-    """The optimal plans of one task as a sequence in a stable order.
-
-    Lexicographic by label numbers.
+    """The optimal plans of one task as a sequence, in lexicographic order of label numbers.
 
     ``space`` holds the task's plans as paths from node ``start``; ``counted`` is `counts` of it.
     """

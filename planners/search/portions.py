@@ -240,7 +240,7 @@ def _pairs(space: Space, goals: Sequence[Goal]) -> int:
     size = len(space)
     full = all(isinstance(goal, FullState) for goal in goals)
     if full and space.model.holds(goals[0], space.rows).sum() == 1:
-        parts, _ = parts_of_graph(size, space.sources, space.targets, directed=True)
+        parts, _ = parts_of_graph(size, space.sources, space.target, directed=True)
         if parts == 1:
             return len(goals) * (size - 1)
     return sum(int((far > 0).sum()) for far in distances_to(space, goals))

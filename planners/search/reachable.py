@@ -77,11 +77,6 @@ class Space:
         """The state that each step leads out of."""
         return np.repeat(np.arange(len(self)), np.diff(self.first))
 
-    @property
-    def targets(self) -> Ints:
-        """The state that each step leads to."""
-        return self.target.astype(np.int64)
-
     def numbers(self, rows: Rows) -> Ints:
         """The numbers of states given as rows, -1 for those that are not reachable."""
         return find_rows(self.rows, rows)

@@ -92,10 +92,10 @@ def _candidates(model: JointModel, true: set[int]) -> Iterator[frozenset[int]]:
         for size in range(min(_SHAPES, len(usable)), 0, -1):
             for chosen in combinations(usable, size):
                 facts = frozenset(fact for shape in chosen for fact in own[shape])
-                if sum(count[shape] for shape in chosen) == 1 and facts not in met:
+                true_ones = sum(count[shape] for shape in chosen)
+                if true_ones == 1 and len(facts) > 1 and facts not in met:
                     met.add(facts)
-                    if len(facts) > 1:
-                        yield facts
+                    yield facts
 
 
 def _changes(
