@@ -80,15 +80,14 @@ def search_heuristic(
         return alone
     chosen = "relaxed" if name == "auto" else name
     own = HEURISTICS[chosen](model, task.goal, variables)
-    start = task.init[None, :]
-    if name == "auto" and not max(own(start)[0], projections.value(start)[0]):
-        return Heuristic("blind", exact=exact)
-    if name == "auto" and _as_good(model, task, projections.value, own):
-        return alone
 
     def both(rows: Rows) -> Ints:
         return np.maximum(projections.value(rows), own(rows))
 
+    if name == "auto" and not both(task.init[None, :])[0]:
+        return Heuristic("blind", exact=exact)
+    if name == "auto" and _as_good(model, task, projections.value, own):
+        return alone
     return Heuristic(chosen, both, projections.in_time, exact)
 
 

@@ -12,7 +12,6 @@ import numpy as np
 
 from planners.joint.model import JointModel
 from planners.search.plan_space import PlanSpace
-from planners.search.slack import rests
 
 if TYPE_CHECKING:
     from planners.search.asynchronous import Timing
@@ -166,9 +165,7 @@ class Plans:
 
     def _rest(self, node: int) -> int | None:
         """The first edge from a node in which every robot idles, None if there is none."""
-        edges = self.space.out_edges(node)
-        found = np.flatnonzero(rests(self.space.labels[edges.start : edges.stop]))
-        return edges.start + int(found[0]) if len(found) else None
+        return self.space.edge_with(node, (0,) * self.space.robots)
 
     def sample(self, number: int, seed: int) -> Iterator[Plan]:
         """Plans drawn uniformly and independently; the same seed draws the same plans."""

@@ -102,14 +102,12 @@ class Explored:
         """A hash of all that portions say, the same in every process."""
         space = self.space
         goals = tuple(
-            (
-                goal.facts if isinstance(goal, FullState) else space.model.holds(goal, space.rows),
-                inits,
-            )
-            for goal, inits in self.goals
+            goal.facts if isinstance(goal, FullState) else space.model.holds(goal, space.rows)
+            for goal, _ in self.goals
         )
+        inits = tuple(inits for _, inits in self.goals)
         steps = (space.rows, space.first, space.target, space.labels, space.cost)
-        return digest(*_of_model(space.model), *steps, goals)
+        return digest(*_of_model(space.model), *steps, goals, inits)
 
 
 @dataclass(frozen=True, slots=True)
