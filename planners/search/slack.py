@@ -68,14 +68,13 @@ def require_rest(graph: PlanSpace) -> None:
     ``graph`` are the nodes that the tasks' plans pass through, goal states among them with steps
     left; from all others some step is on a shortest way.
     """
-    source = graph.sources
     ends = np.zeros(len(graph), np.bool_)
     for number, goal in enumerate(graph.goals):
         mine = np.flatnonzero(graph.goal == number)
         ends[mine] = graph.model.holds(goal, graph.rows[graph.state[mine]])
     good = rests(graph.labels) & ends[graph.target]
     can = graph.layer == 0
-    can[source[good]] = True
+    can[graph.sources[good]] = True
     stuck = np.flatnonzero(ends & ~can)
     if len(stuck):
         text = graph.model.state_text(graph.rows[graph.state[stuck[0]]])

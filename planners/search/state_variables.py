@@ -40,18 +40,16 @@ class StateVariable(NamedTuple):
 
 def state_variables(model: JointModel, init: Rows) -> list[StateVariable]:
     """Disjoint variables for the states that are reachable from ``init``, large ones first."""
-    found = _groups(model, init)
-    found.sort(key=lambda variable: (-len(variable.facts), variable.facts))
     taken: set[int] = set()
     chosen = []
-    for variable in found:
+    for variable in sorted(_groups(model, init), key=lambda own: (-len(own.facts), own.facts)):
         if taken.isdisjoint(variable.facts):
             taken.update(variable.facts)
             chosen.append(variable)
     return chosen
 
 
-def _groups(model: JointModel, init: Rows) -> list[StateVariable]:
+def _groups(model: JointModel, init: Rows) -> Iterator[StateVariable]:
     """Groups with a common object of whose facts exactly one is true, whatever actions do."""
     true = set(model.codec.true_facts(model.codec.facts_part(init)))
     read = [FactsOf.of(model, action) for action in model.actions]
@@ -59,14 +57,12 @@ def _groups(model: JointModel, init: Rows) -> list[StateVariable]:
     for number, action in enumerate(model.actions):
         for atom in {effect.atom for effect in action.effects}:
             touching[atom].append(number)
-    found = []
     for facts in _candidates(model, true):
         atoms = [model.codec.facts.atoms[fact] for fact in facts]
         own = sorted({number for atom in atoms for number in touching[atom]})
         changes = _changes(facts, {number: read[number] for number in own})
         if changes is not None and _one_at_a_time([model.actions[number] for number in changes]):
-            found.append(StateVariable(tuple(sorted(facts)), changes))
-    return found
+            yield StateVariable(tuple(sorted(facts)), changes)
 
 
 def _is_linked(action: GroundAction) -> bool:
