@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import pairwise, product
+from itertools import pairwise, permutations, product
 
 import numpy as np
 
@@ -272,23 +272,20 @@ class _Waits:
         robots = range(space.robots)
         future = [_future(space, robot) for robot in robots]
         self.acting: list[list[bool]] = np.stack([own.any(axis=1) for own in future], 1).tolist()
-        self._column: list[list[list[int]]] = [[[] for _ in robots] for _ in robots]
+        self._column: dict[tuple[int, int], list[int]] = {}
         matter, added = [np.zeros((len(space), 0), np.bool_)], []
         width = 0
-        for i in robots:
-            for j in robots:
-                if i == j:
-                    continue
-                used = np.unique(space.robot_labels(i))
-                table: Bools = traces.interfering[i, j].copy()
-                table[np.setdiff1d(np.arange(len(table)), used)] = False
-                patterns, pattern = np.unique(table, axis=0, return_inverse=True)
-                pattern = pattern.reshape(-1)
-                self._column[i][j] = (width + pattern).tolist()
-                of_label = pattern[:, None] == np.arange(len(patterns))
-                matter.append(future[i] @ (of_label & patterns.any(axis=1)))
-                added.append((j, slice(width, width + len(patterns)), patterns))
-                width += len(patterns)
+        for i, j in permutations(robots, 2):
+            used = np.unique(space.robot_labels(i))
+            table: Bools = traces.interfering[i, j].copy()
+            table[np.setdiff1d(np.arange(len(table)), used)] = False
+            patterns, pattern = np.unique(table, axis=0, return_inverse=True)
+            pattern = pattern.reshape(-1)
+            self._column[i, j] = (width + pattern).tolist()
+            of_label = pattern[:, None] == np.arange(len(patterns))
+            matter.append(future[i] @ (of_label & patterns.any(axis=1)))
+            added.append((j, slice(width, width + len(patterns)), patterns))
+            width += len(patterns)
         self.matter = np.concatenate(matter, axis=1).astype(np.int16)
         self.none: Ints = np.zeros(width, np.int16)
         self._by_label = [np.zeros((len(names), width), np.int16) for names in space.model.labels]
@@ -305,7 +302,7 @@ class _Waits:
 
     def of(self, past: Ints, step: Step, robot: int, other: int) -> int:
         """How many events of another robot a robot's event of a step waits for, of the past."""
-        return int(past[self._column[robot][other][step[robot]]])
+        return int(past[self._column[robot, other][step[robot]]])
 
 
 def _future(space: PlanSpace, robot: int) -> Bools:

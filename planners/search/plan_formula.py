@@ -8,7 +8,7 @@ only where an effect changes it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -23,6 +23,7 @@ from planners.pddl.lifted import FALSE, TRUE, And, Atom, Formula, Or, StepAtom, 
 from planners.search.goals import FactsOf
 from planners.search.graphs import csgraph
 from planners.search.questions import FixedPlans, Literals
+from planners.search.sat import flat_clauses
 from planners.search.state_variables import StateVariable
 from planners.system.errors import OutOfMemory
 
@@ -69,7 +70,7 @@ class PlanFormula:
         for fact in range(facts):
             self.step.append((-begins, fact + 1 if fact in true else -(fact + 1)))
         self._facts_follow()
-        self._flat_step, self._goal = _flat(self.step), _flat(goal)
+        self._flat_step, self._goal = flat_clauses(self.step), flat_clauses(goal)
 
     def plans(self) -> FixedPlans:
         """The plans of no step, that is, the goal, as a formula to be closed."""
@@ -215,11 +216,6 @@ def _unique(table: Bools) -> tuple[Bools, Ints]:
     """The different rows of a table, sorted, and each row's number among them."""
     found, number = unique_rows(np.packbits(table, axis=1))
     return np.unpackbits(found, axis=1, count=table.shape[1]).astype(np.bool_), number
-
-
-def _flat(clauses: Iterable[Sequence[int]]) -> Ints:
-    """Clauses one after another, each followed by 0."""
-    return np.array([literal for clause in clauses for literal in (*clause, 0)], np.int64)
 
 
 #: Ways to make facts true, beyond which nothing is looked for.

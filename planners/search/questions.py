@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Iterable, Sequence
-from itertools import chain
 
 import numpy as np
 
 from planners.joint.tables import Ints, ranges
 from planners.search.sat import (
     SolverName,
+    flat_clauses,
     sat_solver,
     simplified,
     solve_slice,
@@ -69,8 +69,7 @@ class FixedPlans:
         self.close()
         runs = np.tile(self._sizes, self.steps)
         labels = ranges(self.first.reshape(-1), runs)
-        found = [(*clause, 0) for clause in simplified(self.clauses, labels.tolist())]
-        literals = np.fromiter(chain.from_iterable(found), np.int64)
+        literals = flat_clauses(simplified(self.clauses, labels.tolist()))
         # Labels get the first numbers, then the other variables in the order in which they occur.
         known, at = np.unique(np.append(labels, np.abs(literals[literals != 0])), return_index=True)
         number = np.zeros(int(known[-1]) + 1, np.int64)

@@ -64,6 +64,11 @@ def simplified(clauses: array[int], kept: Sequence[int]) -> list[list[int]]:
     return list(found)
 
 
+def flat_clauses(clauses: Iterable[Sequence[int]]) -> Ints:
+    """Clauses one after another, each followed by 0."""
+    return np.array([literal for clause in clauses for literal in (*clause, 0)], np.int64)
+
+
 def split_clauses(clauses: array[int] | Ints) -> Iterator[list[int]]:
     """The clauses of a formula in which 0 follows each."""
     literals = np.asarray(clauses)
