@@ -214,10 +214,7 @@ class Exploration:
         return sum(map(len, self.layers))
 
     def steps(
-        self,
-        only: Only | None = None,
-        first: int = _FIRST,
-        most: int | None = None,
+        self, only: Only | None = None, first: int = _FIRST, most: int | None = None
     ) -> Iterator[tuple[Ints, Steps]]:
         """The joint steps out of the last layer, in pieces, with the states that each begins from.
 

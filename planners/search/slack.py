@@ -92,8 +92,7 @@ def seen_rows(model: JointModel, rows: Rows) -> Rows:
     every = np.tile(rows, (len(model.slack_facts), 1))
     for left, fact in enumerate(model.slack_facts):
         model.codec.set(every, slice(left * len(rows), (left + 1) * len(rows)), [fact])
-    found, _ = unique_rows(every)
-    return found
+    return unique_rows(every)[0]
 
 
 def seeing(graph: PlanSpace, left: Ints, rows: Rows) -> PlanSpace:
