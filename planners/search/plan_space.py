@@ -187,8 +187,7 @@ class PlanSpace:
 
     def sources_of(self, edges: Ints) -> Ints:
         """The source nodes of some edges: for few of them without a table of all."""
-        found: Ints = np.searchsorted(self.first, edges, side="right") - 1
-        return found
+        return np.searchsorted(self.first, edges, side="right") - 1
 
     @property
     def out_degrees(self) -> Ints:

@@ -142,8 +142,7 @@ class Searched:
     def efforts(self) -> Ints:
         """For each goal the nodes of its plan space, times robots."""
         plans = self.plans
-        found: Ints = np.bincount(plans.goal, minlength=len(plans.goals)) * plans.robots
-        return found
+        return np.bincount(plans.goal, minlength=len(plans.goals)) * plans.robots
 
     @property
     def tasks(self) -> int:
