@@ -52,11 +52,13 @@ def csgraph() -> Any:
             f"{left / 2**20:.0f} MiB are left",
             remedy=f"Use {more_memory()}.",
         )
-    environment = dict(os.environ)
+    before = os.environ.get(_THREADS)
     os.environ[_THREADS] = "1"  # graphs need no BLAS, and each thread of it takes memory
     try:
         from scipy.sparse import csgraph
     finally:
-        del os.environ[_THREADS]
-        os.environ.update(environment)
+        if before is None:
+            del os.environ[_THREADS]
+        else:
+            os.environ[_THREADS] = before
     return csgraph

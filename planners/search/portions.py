@@ -220,7 +220,7 @@ def require_room(source: Source) -> None:
     For work that keeps them all.
     """
     if not isinstance(source, Explored) or not source.is_every_pair:
-        return  # they are there already
+        return  # they are there already, or known by a bound that is far too large
     found, left = estimate(source), memory_left()
     if found.is_large and found.bytes > left:
         raise OutOfMemory(
