@@ -60,27 +60,21 @@ def most_constrained_first(states: Iterable[int], clauses: Iterable[Clause]) -> 
     return sorted(states, key=lambda s: (-demand.get(s, 0.0), s))
 
 
-def clique(edges: Iterable[Pair], weights: Sequence[int] | None = None) -> list[int]:
-    """A large clique, by greedy search from any state: its states need words of their own.
-
-    ``weights``: what each state counts, by default one.
-    """
+def clique(edges: Iterable[Pair]) -> list[int]:
+    """A large clique, by greedy search from any state: its states need words of their own."""
     near: dict[int, set[int]] = {}
     for a, b in sorted(edges):
         near.setdefault(a, set()).add(b)
         near.setdefault(b, set()).add(a)
 
-    def weight(states: Iterable[int]) -> int:
-        return sum(1 if weights is None else weights[s] for s in states)
-
     best: list[int] = []
     for start in sorted(near):
         clique, candidates = [start], set(near[start])
         while candidates:
-            chosen = max(candidates, key=lambda s: (weight((near[s] & candidates) | {s}), -s))
+            chosen = max(candidates, key=lambda s: (len(near[s] & candidates), -s))
             clique.append(chosen)
             candidates &= near[chosen]
-        best = max(best, clique, key=weight)
+        best = max(best, clique, key=len)
     return best
 
 
