@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import chain, tee
+from itertools import tee
 
 import numpy as np
 
@@ -54,7 +54,6 @@ class TiedWords:
     """Looks for languages among such partitions, with effort that grows from call to call."""
 
     def __init__(self, job: Job, languages: Languages) -> None:
-        """Begin."""
         self._states, self._languages = np.array(job.states), languages
         self._refuter = languages.refuter
         self._random = np.random.default_rng(job.seed)
@@ -63,8 +62,6 @@ class TiedWords:
         self._first = _OF_ONE if self._is_one_task else _OF_MANY
         #: What there may be in common, kind by kind; each size goes through a copy of it.
         self._tied = self._classes(job)
-        #: Of one task the classes that facts decide, not listed before they are asked for.
-        self._facts = classes_by_facts(job.candidates, self._refuter)
         #: Those of the solvers so far on kinds that stayed undecided.
         self.conflicts = 0
         #: Of each number of words the kinds that were not looked at, and those that are undecided.
@@ -80,7 +77,7 @@ class TiedWords:
         For one task: as few facts as possible decide it, then more and more.
         """
         if self._is_one_task:
-            yield from map(_Ties, self._facts)
+            yield from map(_Ties, classes_by_facts(job.candidates, self._refuter))
         else:  # these load networkx
             from coordlang.vocabulary.abstractions import abstractions, up_to_symmetry
 
@@ -90,11 +87,10 @@ class TiedWords:
 
     def of_facts(self) -> Assignment | None:
         """Of one task the language that says the steps to go and a few facts, if there is one."""
-        first = next(self._facts, None)
-        if first is None:
+        ties = next(self._every(), None)
+        if ties is None:
             return None
-        self._facts = chain([first], self._facts)
-        classes = first[self._states]
+        classes = ties.classes[self._states]
         return dict(zip(self._states.tolist(), classes.tolist(), strict=True))
 
     def find(self, size: int, rounds: int) -> Assignment | None:
@@ -287,9 +283,8 @@ def _differing(facts: Bools, sequences: Ints) -> Bools:
 
 def _changing_facts(candidates: Candidates) -> Bools:
     """(facts, states) the facts that are true in some states only."""
-    codec = candidates.model.codec
-    columns = [codec.column(candidates.rows, fact) for fact in range(len(codec.facts))]
-    return np.array([column for column in columns if column.any() and not column.all()], np.bool_)
+    true = candidates.model.codec.truth(candidates.rows)
+    return true.T[true.any(axis=0) & ~true.all(axis=0)]
 
 
 def _classes(steps: Ints, facts: Bools) -> Ints:
