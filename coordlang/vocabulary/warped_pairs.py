@@ -23,7 +23,7 @@ import numpy as np
 from coordlang.language.warping import Clause, Pair, pair
 from coordlang.vocabulary.plan_pairs import FAILED, PlanPairs
 from coordlang.vocabulary.sat import END, START, PartitionProblem, Undecided
-from planners.joint.tables import Bools, Ints, ranges, unique_rows
+from planners.joint.tables import Ints, ranges, unique_rows
 from planners.search.plan_space import PlanSpace
 
 #: Steps by which one of two plans may be ahead before a mixture fails.  With 1 as few words of taxi
@@ -58,10 +58,9 @@ def failing_pairs(pairs: PlanPairs, within: float, most: int) -> Ints:
     many: to their ends.  Raises `Undecided` if there are more than about ``most`` steps.  They are
     a table, see `PartitionProblem.separate_on_paths`.
     """
-    before, one, other, after = pairs.steps.T
-    before = np.where(before < len(pairs.space), START, before)
-    walked = np.column_stack((before, one, other, after))
-    return _FreeCells(pairs.space, 0, within, most).after(walked, after == FAILED)
+    walked = pairs.steps
+    walked[walked[:, 0] < len(pairs.space), 0] = START
+    return _FreeCells(pairs.space, 0, within, most).after(walked)
 
 
 def joined_states(space: PlanSpace) -> list[Pair]:
@@ -122,7 +121,7 @@ class WarpedPairs:
                 into = FAILED if is_free else number[after]
                 found.append((here, after.first, after.second, into))
         walked = np.array(found, np.int64).reshape(-1, 4)
-        return _FreeCells(self._space, self._apart).after(walked, walked[:, 3] == FAILED)
+        return _FreeCells(self._space, self._apart).after(walked)
 
     def _after_failing(self, cell: _Cell) -> Iterator[_Cell]:
         """The cells after one in which the second plan has still to catch up."""
@@ -173,11 +172,12 @@ class _FreeCells:
         self._edges = _steps_of(space)
         self._first = np.searchsorted(self._edges[:, 0], np.arange(len(space) + 1))
 
-    def after(self, walked: Ints, fails: Bools) -> Ints:
-        """All steps: those ``walked``, and what follows those in which a mixture ``fails``.
+    def after(self, walked: Ints) -> Ints:
+        """All steps: those ``walked``, and what follows those that lead to `FAILED`.
 
         Places of the first are numbered from `START` on.  Nodes become states.
         """
+        fails = walked[:, 3] == FAILED
         one, other = walked[fails, 1:3].T
         begin = self._codes(one, other, np.full(len(one), self._within))
         places = walked[:, [0, 3]]
