@@ -37,15 +37,14 @@ class Repair:
     """A partition, and how far it is from the old words.
 
     ``partition``: state number -> word number, below ``old_words`` for an old word.  ``changed``:
-    the states that had another word.  ``new_words``: how many words are new.  ``changes_bound`` and
-    ``new_words_bound``: no language changes the words of fewer states; of those that change so few,
-    none has fewer new words.  ``figures``: the work done, by name.  ``stopped``: the error that
-    ended the search early, None if it came to its end.
+    the states that had another word.  ``changes_bound`` and ``new_words_bound``: no language
+    changes the words of fewer states; of those that change so few, none has fewer new words.
+    ``figures``: the work done, by name.  ``stopped``: the error that ended the search early, None
+    if it came to its end.
     """
 
     partition: Assignment
     changed: tuple[int, ...]
-    new_words: int
     changes_bound: int
     new_words_bound: int
     figures: Mapping[str, float]
@@ -89,12 +88,11 @@ class _Repair:
     def result(self, stopped: BaseException | None) -> Repair:
         """The best language, with what is proved of it."""
         assert self.best is not None
-        changes, new_words = self._distance(self.best)
-        proved = changes == self._changes_bound
+        changed = sorted(s for s, word in self._kept.items() if self.best[s] != word)
+        proved = len(changed) == self._changes_bound
         return Repair(
             self.best,
-            tuple(sorted(s for s, word in self._kept.items() if self.best[s] != word)),
-            new_words,
+            tuple(changed),
             self._changes_bound,
             self._new_words_bound if proved else 0,
             {
