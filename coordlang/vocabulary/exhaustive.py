@@ -19,7 +19,7 @@ def exhaustive(job: Job) -> Outcome:
 
     Exponential in everything; the other methods are checked against it.
     """
-    failing = sorted({tuple(sequences) for sequences in _failing(job)})
+    failing = sorted(set(_failing(job)))
     tried = 0
     for size in range(1, len(job.states) + 1):
         for words in partitions(len(job.states), size):

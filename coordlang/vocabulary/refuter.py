@@ -127,10 +127,8 @@ class Refuter:
 
         Tasks are walked only where the pool has none, those that were refuted last first.
 
-        ``word``: (states) the word of each state number.  ``images``: the symmetries under which
-        images of tuples are looked at: by default all.  ``enough``: longer tuples are left out once
-        there are so many.  ``steps``: see `_Walked.failing`.  Raises `Undecided` after so many
-        steps.
+        ``word``, ``images`` and ``enough``: see `FailingTuples.agreeing`.  Raises `Undecided` after
+        so many ``steps`` of robots.
         """
         known = self.pool.agreeing(word, images, enough)
         for number, walked in enumerate(self._parts):
@@ -187,10 +185,9 @@ def _goals_by_images(space: PlanSpace, images: Sequence[Ints]) -> dict[tuple[int
 
     A goal that is not a single state is one of its own, and only the identity is needed.
     """
-    chosen: dict[tuple[int, ...], list[int]] = {}
     if not all(isinstance(goal, FullState) for goal in space.goals):
-        chosen[0,] = list(range(len(space.goals)))
-        return chosen
+        return {(0,): list(range(len(space.goals)))}
+    chosen: dict[tuple[int, ...], list[int]] = {}
     for goal, state in enumerate(ends(space).tolist()):
         reached = np.array([to[state] for to in images])
         if reached.min() == state:

@@ -81,8 +81,7 @@ class _Changes(PartitionProblem):
     """Partitions into two words; of two plans that fail one changes its word more often.
 
     Further variables: two plans are in a place, and the first one has changed its word so many
-    times more often; plans from a node can change it so many times.  ``known``: how many clauses
-    of other counterexamples are required.
+    times more often; plans from a node can change it so many times.
     """
 
     def __init__(self, states: Sequence[int], pairs: PlanPairs) -> None:
