@@ -143,14 +143,13 @@ def _chosen(variables: Sequence[_Values]) -> Iterator[Sequence[Ints | Bools]]:
     """What is looked at in each abstraction: a list of columns (states)."""
     for told in variables:
         others = [values for values in variables if values is not told]
-        colours = [values.colours for values in others]
-        own = told.of_state
-        yield [own]
-        yield [own, *colours]
+        base = [told.of_state, *(values.colours for values in others)]
+        yield [told.of_state]
+        yield base
         # Of others that have values in common with the variable that is told.
         seen = [at for values in others if (at := told.of_other(values)) is not None]
         if seen:
-            base, near = [own, *colours], [told.is_near(at) for at in seen]
+            near = [told.is_near(at) for at in seen]
             yield [*base, *near]
             yield [*base, *(np.where(close, at, -1) for close, at in zip(near, seen, strict=True))]
     if len(variables) > 2:

@@ -159,8 +159,7 @@ def part_of(space: PlanSpace, inside: Bools, end: Ints) -> PlanSpace | None:
         return None
     own = nodes[space.sources]
     for robot in range(space.robots):
-        labels, used = space.robot_labels(robot), part.robot_labels(robot)
-        own &= np.bincount(used, minlength=int(labels.max(initial=0)) + 1)[labels] > 0
+        own &= np.isin(space.robot_labels(robot), part.robot_labels(robot))
     return part if nodes[space.target[own]].all() else None
 
 

@@ -239,7 +239,6 @@ def symmetric_goals(
     if not generators:
         return None
     here = np.tile(np.arange(states), len(generators))
-    count, orbit = parts_of_graph(states, here, np.concatenate(generators))
-    first = np.full(count, states)
-    np.minimum.at(first, orbit, np.arange(states))
+    _, orbit = parts_of_graph(states, here, np.concatenate(generators))
+    _, first = np.unique(orbit, return_index=True)
     return SymmetricGoals(tuple(generators), first[orbit])
