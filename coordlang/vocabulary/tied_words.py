@@ -133,7 +133,7 @@ class TiedWords:
 
     def drop(self, size: int) -> None:
         """Forget a number of words that is decided."""
-        _, undecided = self._kinds.pop(size, ((), ()))
+        _, undecided = self._kinds.pop(size)
         for kind in undecided:
             kind.problem.close()
 
