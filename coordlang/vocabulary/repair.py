@@ -65,9 +65,6 @@ def repair(job: Job, kept: Assignment, old_words: int, default: int) -> Repair:
     search = _Repair(job, kept, old_words, default)
     with closing(search.problems):
         stopped = run_until_stopped(search.run)
-    if search.best is None:
-        assert stopped is not None
-        raise stopped
     return search.result(stopped)
 
 
@@ -86,8 +83,10 @@ class _Repair:
         )
 
     def result(self, stopped: BaseException | None) -> Repair:
-        """The best language, with what is proved of it."""
-        assert self.best is not None
+        """The best language, with what is proved of it.  Raises ``stopped`` if there is none."""
+        if self.best is None:
+            assert stopped is not None
+            raise stopped
         changed = sorted(s for s, word in self._kept.items() if self.best[s] != word)
         proved = len(changed) == self._changes_bound
         return Repair(
