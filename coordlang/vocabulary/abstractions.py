@@ -78,8 +78,7 @@ class _Values:
         """(states) two colours: whether the first value, or a part's, is an odd number away."""
         first = (self.away < _FAR).argmax(axis=1)
         colour = self.away[first, np.arange(len(first))] % 2
-        found: Ints = np.append(colour, 0)[self.of_state]  # the last: no value
-        return found
+        return np.append(colour, 0)[self.of_state]  # the last: no value
 
     def of_other(self, other: _Values) -> Ints | None:
         """(states) the value that has the other one's name; None if the two have none in common."""

@@ -70,8 +70,7 @@ class _Layer:
         """A move of each of these nodes: that of the best way, or one that begins some way."""
         if random is None:
             return self.choice[rows]
-        drawn: Ints = self.open_moves[random.integers(self.first[rows], self.first[rows + 1])]
-        return drawn
+        return self.open_moves[random.integers(self.first[rows], self.first[rows + 1])]
 
 
 class CounterexampleWalk:
@@ -168,10 +167,8 @@ class _Leads:
         `_PARTED` where their sentences part.  One entry for each of ``lead``.
         """
         rows, of_row = unique_rows(np.column_stack((lead, first + 1, second + 1)))
-        found: Ints = np.array(
-            [self._after(a, b - 1, c - 1) for a, b, c in rows.tolist()], np.int64
-        )
-        return found[of_row]
+        found = [self._after(a, b - 1, c - 1) for a, b, c in rows.tolist()]
+        return np.array(found, np.int64)[of_row]
 
     def _after(self, lead: int, first: int, second: int) -> int:
         mine, theirs = map(_entered, self._leads[lead], (first, second))

@@ -140,8 +140,7 @@ class FailingTuples:
 
     def sequences(self, agreeing: Agreeing, rows: Ints) -> Ints:
         """The state sequences (rows, plans, length) of images of tuples."""
-        found: Ints = agreeing.to[self.by_shape[agreeing.shape][:, :, rows].transpose(2, 1, 0)]
-        return found
+        return agreeing.to[self.by_shape[agreeing.shape][:, :, rows].transpose(2, 1, 0)]
 
     def clauses(
         self, word: Ints, agreeing: Sequence[Agreeing], random: np.random.Generator
@@ -200,8 +199,7 @@ class FailingTuples:
 def plan_states(space: PlanSpace, edges: Ints) -> Ints:
     """(tuples, robots, steps + 1) the states of plans, by their edges (tuples, steps, robots)."""
     nodes = np.concatenate((space.sources_of(edges[:, :1]), space.targets(edges)), axis=1)
-    states: Ints = space.state[nodes].transpose(0, 2, 1)
-    return states
+    return space.state[nodes].transpose(0, 2, 1)
 
 
 def _different_part(states: Ints) -> tuple[Ints, Ints]:

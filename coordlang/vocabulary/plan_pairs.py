@@ -131,8 +131,7 @@ class PlanPairs:
     def _sizes(self, places: _Places) -> Ints:
         """(places) the pairs of edges that lead from each."""
         degrees = self.space.out_degrees
-        sizes: Ints = degrees[places.nodes[:, 0]] * degrees[places.nodes[:, -1]]
-        return sizes
+        return degrees[places.nodes[:, 0]] * degrees[places.nodes[:, -1]]
 
     def _look_at(self, places: _Places) -> None:
         """Find the steps from some places."""

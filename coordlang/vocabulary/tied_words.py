@@ -277,8 +277,7 @@ def _differing(facts: Bools, sequences: Ints) -> Bools:
     """(different sets, facts) what the plans of each tuple (tuples, plans, length) differ in."""
     values = facts[:, sequences]
     differ = (values != values[:, :, :1]).any(axis=(2, 3))
-    found: Bools = np.unique(differ.T, axis=0)
-    return found
+    return np.unique(differ.T, axis=0)
 
 
 def _changing_facts(candidates: Candidates) -> Bools:

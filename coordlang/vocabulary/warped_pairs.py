@@ -97,8 +97,8 @@ class WarpedPairs:
         ]
         self._layer: list[int] = space.layer.tolist()
         self._steps = defaultdict[int, list[tuple[int, int, int]]](list)
-        for before, *after in pairs.steps.tolist():
-            self._steps[before].append((after[0], after[1], after[2]))
+        for before, one, other, after in pairs.steps.tolist():
+            self._steps[before].append((one, other, after))
         self._apart, self._waiting = apart, min(waiting, apart)
 
     def steps(self) -> Ints:
