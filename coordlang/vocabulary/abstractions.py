@@ -48,7 +48,6 @@ class _Values:
 
     @classmethod
     def of(cls, variable: StateVariable, candidates: Candidates) -> _Values:
-        """The values of one variable."""
         codec = candidates.model.codec
         atoms = [codec.facts.atoms[fact] for fact in variable.facts]
         own = set.intersection(*(set(atom.args) for atom in atoms))

@@ -82,7 +82,6 @@ class _Search(LocalSearch):
         self._take(silence, self._silence)
 
     def outcome(self, stopped: BaseException | None) -> Outcome:
-        """The best one."""
         figures = {
             "silence_mean": float(self._silence.mean),
             "silence_worst": float(self._silence.worst),

@@ -68,7 +68,6 @@ class _Search(LocalSearch):
         return replace(self._found, partition=self.partition, figures=figures, stopped=stopped)
 
     def _measures(self) -> dict[str, float]:
-        """The flexibility before and after."""
         before, after = self._measured(self._found.partition), self._measured(self.partition)
         if after.value < before.value:  # of many plans some were measured, and misled the search
             after, self.partition = before, self._found.partition

@@ -101,7 +101,6 @@ class LocalSearch(ABC):
         self._violated = self._learn_clauses()
 
     def _cool(self, moves: int) -> None:
-        """Cool once, in so many moves."""
         for number in range(moves):
             if self._work >= self._most:
                 return

@@ -41,14 +41,11 @@ class _Places(NamedTuple):
     nodes: Ints
 
     def rows(self, some: slice) -> _Places:
-        """Some of them."""
         return _Places(self.numbers[some], self.told[some], self.nodes[some])
 
 
 def _joined(tables: Sequence[_Places]) -> _Places:
-    """Tables as one."""
-    numbers, told, nodes = zip(*tables, strict=True)
-    return _Places(np.concatenate(numbers), np.concatenate(told), np.concatenate(nodes))
+    return _Places(*map(np.concatenate, zip(*tables, strict=True)))
 
 
 class PlanPairs:

@@ -53,7 +53,6 @@ class _Walked:
 
     @classmethod
     def of(cls, space: PlanSpace, tasks: Bools, images: tuple[int, ...]) -> _Walked:
-        """These tasks of a plan space."""
         part = space.with_tasks(space.starts[tasks], space.second[tasks])
         kind = CounterexampleWalk if space.robots == 2 else Mixtures
         return cls(part, kind(Choices(part)), images)

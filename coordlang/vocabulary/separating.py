@@ -68,7 +68,6 @@ class _Alpha:
         return len(self._job.states) + 1 if self.best is None else word_count(self.best)
 
     def run(self) -> None:
-        """Close the bounds."""
         if not self._job.first_differences.requiring:
             self.best = dict.fromkeys(self._job.states, 0)
             return
@@ -134,7 +133,6 @@ class _Alpha:
         return most_constrained_first(self._job.states, pairs)
 
     def figures(self) -> dict[str, float]:
-        """The work done."""
         return {
             "separating_lower_bound": self.lower,
             "rounds": self._rounds,
@@ -192,7 +190,6 @@ class _AlphaOrBeta(_Alpha):
                 yield image
 
     def figures(self) -> dict[str, float]:
-        """The work done, with that of the walks."""
         return {
             **super().figures(),
             "walk_nodes": sum(walk.nodes for walk in self._walks),

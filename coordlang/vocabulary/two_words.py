@@ -63,7 +63,6 @@ class TwoWords:
         raise Undecided
 
     def _next_formula(self, most: int) -> _Changes:
-        """The formula of more pairs."""
         wanted = max(_FIRST, _MORE * self._known)
         if wanted > most:
             raise Undecided
