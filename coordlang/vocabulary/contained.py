@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations, islice
+from itertools import combinations, islice, permutations
 
 import networkx as nx
 import numpy as np
@@ -207,8 +207,7 @@ def _convex(graph: nx.Graph[str]) -> list[frozenset[str]]:
     def nearer(one: str, other: str) -> frozenset[str]:
         return frozenset(x for x in graph if away[x].get(one, far) < away[x].get(other, far))
 
-    edges = sorted(tuple(sorted(edge)) for edge in graph.edges)
-    halves = _in_order({nearer(a, b) for a, b in edges} | {nearer(b, a) for a, b in edges})
+    halves = _in_order({nearer(a, b) for edge in graph.edges for a, b in permutations(edge)})
     found, front = set(halves), halves
     while front and len(found) < _SETS:
         grown = {one & half for one in front for half in halves} - found - {frozenset()}

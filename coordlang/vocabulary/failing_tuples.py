@@ -133,10 +133,8 @@ class FailingTuples:
             pairs = _pairs(sequences, word[sequences], self.states)
             tables.append(pairs[(pairs != -2).all(axis=1)])
         width = max(table.shape[1] for table in tables)
-        wide = [((0, 0), (0, width - table.shape[1])) for table in tables]
-        return np.concatenate(
-            [np.pad(table, by, constant_values=-1) for table, by in zip(tables, wide, strict=True)]
-        )
+        wide = [np.pad(t, ((0, 0), (0, width - t.shape[1])), constant_values=-1) for t in tables]
+        return np.concatenate(wide)
 
     def sequences(self, agreeing: Agreeing, rows: Ints) -> Ints:
         """The state sequences (rows, plans, length) of images of tuples."""
