@@ -105,5 +105,4 @@ def test_stopped_repairs_are_languages(phase: str, monkeypatch: pytest.MonkeyPat
     assert isinstance(found.stopped, OutOfTime)
     assert found.partition is checked[-1]
     assert found.changes_bound <= len(whole.changed) <= len(found.changed)
-    new_words = [distance(own.partition, kept, 1)[1] for own in (whole, found)]
-    assert found.new_words_bound <= max(new_words)
+    assert found.new_words_bound <= max(distance(o.partition, kept, 1)[1] for o in (whole, found))
