@@ -71,7 +71,7 @@ class _Search(LocalSearch):
         before, after = self._measured(self._found.partition), self._measured(self.partition)
         if after.value < before.value:  # of many plans some were measured, and misled the search
             after, self.partition = before, self._found.partition
-        bound = sum(after.plans) / len(after.plans)
+        bound = sum(min(plans, MANY) for plans in after.plans) / len(after.plans)
         if self._bound is not None:
             assert after.value <= self._bound * (1 + _ROUNDING), "no language exceeds the bound"
             bound = max(self._bound, after.value)  # in another order sums differ in last digits
