@@ -156,14 +156,13 @@ def coordination(files: Arguments, options: CoordinationOptions) -> Coordination
     A task requires coordination (RC) if some mixture of its optimal plans is no optimal plan.
     Raises `ProvedImpossible` for a task without a plan.
     """
-    read = files.read()
-    loaded = read.instance()
+    loaded = files.instance()
     with options.work.opened() as workers:
         found = answers(loaded, workers)
     slack = loaded.model.slack
     tasks = tuple(
         extended(TaskCoordination, answer, problem.source.name, slack)
-        for problem, answer in zip(read.problems, found, strict=True)
+        for problem, answer in zip(loaded.problems, found, strict=True)
     )
     return Coordination(loaded.model.robots, tasks)
 

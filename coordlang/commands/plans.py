@@ -31,12 +31,7 @@ class OptimalPlans(Presented):
     shown: ClassVar[tuple[str, ...]] = ("count", "makespan", "robots")
 
     def __init__(self, plans: Plans) -> None:
-        """Take the plans of one task; where its model says so they are listed up to timing."""
         self._plans = plans
-        if plans.space.model.is_asynchronous:
-            from planners.search.asynchronous import as_executed
-
-            self._plans = Plans.of(as_executed(plans.space))
 
     @property
     def count(self) -> int:
@@ -126,7 +121,12 @@ def plans(files: Arguments, options: PlansOptions) -> OptimalPlans:
     the joint model uses up the memory.
     """
     loaded = files.instance()
-    return OptimalPlans(Plans.of(search(loaded.model, loaded.tasks[0])))
+    space = search(loaded.model, loaded.tasks[0])
+    if loaded.model.is_asynchronous:
+        from planners.search.asynchronous import as_executed
+
+        space = as_executed(space)
+    return OptimalPlans(Plans.of(space))
 
 
 def show_plans(found: OptimalPlans, options: PlansOptions) -> None:
