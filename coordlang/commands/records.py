@@ -38,15 +38,11 @@ CoordinatesSource = File | Mapping[str, tuple[float, float]]
 #: A sentence: ``"w1 w0"``, its words ``("w1", "w0")``, or one of `explain`.
 SentenceSource = str | Iterable[str]
 
-#: What the command line has not where plans are optimal and in step, or a language file says it.
-NO_SLACK = "slack words_see_slack asynchronous"
 #: Plans that are listed where no number is given.
 DEFAULT_MAX = 10
 
 #: The files of a domain and a problem that are written.
 WRITTEN = ("domain.pddl", "problem.pddl")
-#: What `export` writes.
-Target = Literal["pddl", "ltlf", "bt"]
 
 
 class OutputFile(NamedTuple):
@@ -125,11 +121,6 @@ def ready(record: type[Record]) -> type[Record]:
     return record
 
 
-def json_option() -> Any:
-    """The field of an options record for ``--json``."""
-    return cli_option(False, "One JSON object.", names="--json")
-
-
 def output_option(help: str, metavar: str = "FILE", default: Any = None, **more: Any) -> Any:
     """The field ``output`` of an options record for ``-o``; ``-`` is stdout."""
     return cli_option(default, help, metavar, names="-o --output", is_output=True, **more)
@@ -163,13 +154,18 @@ class Source:
 class PlanningOptions(CommandOptions):
     """What a command can be asked for that reads a domain and problems."""
 
-    source: Source = group(Source, without=NO_SLACK)
+    # Plans are optimal and in step, or a language file says what they are.
+    source: Source = group(Source, without="slack words_see_slack asynchronous")
 
 
-class AnswerOptions(PlanningOptions):
-    """The same, of one whose answer can be JSON."""
+class JsonOptions(CommandOptions):
+    """What a command can be asked for whose answer can be JSON."""
 
-    as_json: bool = json_option()
+    as_json: bool = cli_option(False, "One JSON object.", names="--json")
+
+
+class AnswerOptions(JsonOptions, PlanningOptions):
+    """What a command can be asked for that is both."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,8 +208,6 @@ class Listing:
     seed: int = cli_option(0, "Seed of --sample.", needs="sample")
 
 
-#: How words are found: a key of `coordlang.vocabulary.METHODS`.
-Method = Literal["best", "greedy", "separating", "minimal", "exhaustive"]
 #: What the language should be like, of those with the fewest words, by the value of ``--prefer``.
 BuildPreference = Literal["flexible", "simple"]
 #: Effort of ``--method best`` that takes a second or two on small tasks.
@@ -222,9 +216,9 @@ EFFORT = 10
 
 @dataclass(frozen=True, slots=True)
 class MethodOptions:
-    """How the words of a language are found."""
+    """How the words of a language are found; a ``method`` is of `coordlang.vocabulary.METHODS`."""
 
-    method: Method = option(
+    method: Literal["best", "greedy", "separating", "minimal", "exhaustive"] = option(
         "best", "best: few words within some effort.  minimal: fewest, proved.  greedy: fast."
     )
     effort: int = option(
@@ -571,7 +565,9 @@ class ExportOptions(
     Exit 1: no plan fits, or the language does not cover the task and guarantees nothing for it.
     """
 
-    to: Target = option("pddl", "A problem, a temporal formula, or behaviour trees.")
+    to: Literal["pddl", "ltlf", "bt"] = option(
+        "pddl", "A problem, a temporal formula, or behaviour trees."
+    )
     output: str | None = output_option("pddl: a folder; else a file.", "PATH", files=WRITTEN)
     for_planner: Literal["fd", "kstar", "pyperplan"] = option(
         "fd", "Who reads the PDDL.", names="--for", needs="to pddl"
@@ -617,7 +613,7 @@ class ReportOptions(
 
 
 class DomainsOptions(
-    CommandOptions,
+    JsonOptions,
     doing="copying",
     keeps_plans=False,
     used="copy as_json",
@@ -628,11 +624,10 @@ class DomainsOptions(
     copy: tuple[str, str] | None = option(
         None, "Copy this domain, or all, into DIR/NAME.", "NAME|all DIR"
     )
-    as_json: bool = json_option()
 
 
 class ImportOptions(
-    CommandOptions,
+    JsonOptions,
     takes="FILES...",
     module="domains",
     function="import_site",
@@ -657,7 +652,6 @@ class ImportOptions(
         files=(*WRITTEN, "coordinates.json"),
         required=True,
     )
-    as_json: bool = json_option()
 
     def __post_init__(self) -> None:
         if self.clearance is not None and not 0 <= self.clearance < 1e6:
