@@ -9,7 +9,7 @@ from typing import Any
 
 from coordlang.commands.inputs import Arguments, public
 from coordlang.commands.records import CheckOptions
-from coordlang.commands.terminal import IMPOSSIBLE, REFUTED, echo
+from coordlang.commands.terminal import REFUTED, echo
 from planners.classical.fast_downward import optimal_cost
 from planners.search.optimal_plans import search
 from planners.system.errors import ProvedImpossible
@@ -69,7 +69,7 @@ def show_check(found: CrossCheck, options: CheckOptions) -> int:
     if not found.agree:
         echo("coordlang: the optimal costs differ", err=True)
         return REFUTED
-    return IMPOSSIBLE if found.cost is None else 0
+    return ProvedImpossible.exit_code if found.cost is None else 0
 
 
 def _cost(cost: tuple[int, int] | None, second: str) -> str:

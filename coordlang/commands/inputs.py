@@ -7,7 +7,7 @@ import functools
 import inspect
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -92,8 +92,8 @@ class Arguments:
     """
 
     source: Source
-    takes: tuple[str, ...] = ()
-    values: Mapping[str, Any] = field(default_factory=dict)
+    takes: tuple[str, ...]
+    values: Mapping[str, Any]
 
     @property
     def loaded(self) -> PlanningInstance | None:
@@ -249,9 +249,9 @@ def wishes_in(prefer: str | Sequence[str]) -> tuple[str, ...]:
     return (prefer,) if isinstance(prefer, str) else tuple(prefer)
 
 
-def extended(kind: type[Result], found: Any, *more: object, **named: object) -> Result:
+def extended(kind: type[Result], found: Any, *more: object) -> Result:
     """A result that has the fields of what was found, and after them its own."""
-    return kind(*(getattr(found, each.name) for each in fields(found)), *more, **named)
+    return kind(*(getattr(found, each.name) for each in fields(found)), *more)
 
 
 @public(Source, "DOMAIN PROBLEMS...")

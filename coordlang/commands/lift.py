@@ -144,13 +144,11 @@ def lift(files: Arguments, options: LiftOptions) -> Lifted:
             progress=say,
             workers=workers,
         )
-    worlds = [own.candidates.loaded for own in every]
-    verified = (
-        Verified(
-            own.name, world_sha256(world.domain, world.problems[0]), own.candidates.kind, *sizes
-        )
-        for own, world, sizes in zip(every, worlds, learned.sizes, strict=True)
-    )
+    verified = []
+    for own, sizes in zip(every, learned.sizes, strict=True):
+        world = own.candidates.loaded
+        sha256 = world_sha256(world.domain, world.problems[0])
+        verified.append(Verified(own.name, sha256, own.candidates.kind, *sizes))
     provenance = provenance_of(first, Guarantee.of("lifted", len(learned.words), 1), {})
     language = LiftedLanguage(
         learned.features,

@@ -278,9 +278,8 @@ def show_plan(found: PlanUnderSentence, options: PlanOptions) -> int:
     echo(text, nl=False)
     for entry in found.fulfilled:
         echo(entry.text(), err=True)
-    if not found.search.generated:
-        return covered_code(found)  # it is read off the plans
-    expanded = counted(found.expanded, "node")
-    without = f"without the sentence {found.without_sentence.expanded:,}"
-    echo(f"A* ({_BOUND}) expanded {expanded}; {without}", err=True)
+    if found.search.generated:  # else it is read off the plans
+        expanded = counted(found.expanded, "node")
+        without = f"without the sentence {found.without_sentence.expanded:,}"
+        echo(f"A* ({_BOUND}) expanded {expanded}; {without}", err=True)
     return covered_code(found)

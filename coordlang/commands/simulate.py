@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from os import fspath
 from pathlib import Path
 from typing import Any
@@ -39,7 +38,7 @@ from planners.system.writing import write_atomically
 _VISIT = "visit:"
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, slots=True, repr=False)
 class Simulated(Presented):
     """Runs of robots in a simulator.
 
@@ -61,7 +60,7 @@ class Simulated(Presented):
         """Whether the language guarantees the task."""
         return self.record.covered
 
-    @cached_property
+    @property
     def counts(self) -> dict[str, int]:
         """In how many runs all arrived, some collided, nobody moved any more, and were late."""
         return {
@@ -89,13 +88,13 @@ class Simulated(Presented):
         such run.
         """
         kind = kind_of(fspath(path))
+        is_record = kind == ".json"
         found = [run for run in self.runs if seed is None or run.seed == seed]
-        if kind != ".json" and not found:
+        if not is_record and not found:
             raise UsageError(
                 f"there is no run with seed {seed}",
                 remedy=f"There are {', '.join(str(run.seed) for run in self.runs[:8])}.",
             )
-        is_record = kind == ".json"
         data = to_bytes(self.record) if is_record else RECORDINGS[kind](self.record, found[0])
         write_atomically(fspath(path), data)
 
@@ -213,4 +212,4 @@ def show_simulate(found: Simulated, options: SimulateOptions) -> int:
         return 0
     code = covered_code(found)
     done = f"{counted(len(found.runs), 'run')} of {options.runs} done"
-    return ended_early(found.stopped, done) if found.stopped else code
+    return ended_early(found.stopped, done) or code

@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 REFUTED = 1
 #: An answer without the proof that was asked for.
 UNPROVED = 3
-#: It is proved that there is no plan.
-IMPOSSIBLE = 11
 #: From here on exit codes are of signals.
 SIGNALS = 128
 #: Interrupted from the keyboard.
