@@ -140,8 +140,6 @@ def _run(arguments: list[str], output: dict[str, bool]) -> int:
             )
         sys.stdout.flush()
         return result if isinstance(result, int) else 0
-    except click.exceptions.Exit as done:
-        return int(done.exit_code)
     except BrokenPipeError:
         # The reader has gone (`| head`): no more output, and no complaint at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

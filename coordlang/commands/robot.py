@@ -39,8 +39,6 @@ from coordlang.language.provenance import domain_sha256
 from coordlang.sites.coordinates import Point
 from planners.system.errors import BadInput, Refuted, UsageError
 
-#: What robots without wishes propose.
-_WISHES = ("most-plans",)
 #: Seconds until what could not be sent is sent again.
 _AGAIN = 0.005
 #: How fast a robot is played, in metres a second.
@@ -118,7 +116,7 @@ def robot(files: Arguments, options: RobotOptions) -> RobotInTask:
         return [read_preference(used, wish) for wish in wished]
 
     def best(wished: Sequence[str]) -> str:
-        return used.text(best_sentence(used, wanted(wished or _WISHES)).words)
+        return used.text(best_sentence(used, wanted(wished or ("most-plans",))).words)
 
     def accepts(proposed: str, wished: Sequence[str]) -> bool:
         return grants(used, used.words_of(proposed), wanted(wished))
