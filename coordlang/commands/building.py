@@ -18,7 +18,7 @@ from coordlang.commands.records import BuildPreference, MethodOptions
 from coordlang.commands.witness import witness_data, witness_text
 from coordlang.explanation.simple import simple
 from coordlang.language.candidates import Candidates, require_solvable
-from coordlang.language.provenance import Guarantee, Tolerance, provenance_of
+from coordlang.language.provenance import Guarantee, provenance_of
 from coordlang.language.words import Language, Partition, read_key
 from coordlang.required.failure import NONE, Failures
 from coordlang.required.miscoordination import Inseparable, Miscoordination
@@ -287,8 +287,8 @@ class Making:
         provenance = provenance_of(self.candidates, guarantee, {"program": "coordlang"})
         if not verdict.holds:
             slack = provenance.tolerance.slack if provenance.tolerance else None
-            tolerance = more["failures"].tolerance or Tolerance()
-            provenance = replace(provenance, tolerance=replace(tolerance, slack=slack))
+            tolerance = replace(more["failures"].tolerance, slack=slack)
+            provenance = replace(provenance, tolerance=tolerance)
         language = Language.of(partition, self.candidates.model, provenance)
         return Built(language, job, verdict, found, self.seconds, **more)
 

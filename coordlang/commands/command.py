@@ -23,7 +23,7 @@ from planners.system.options import Option, options_of, record_from
 #: Arguments that --factored stands for.
 _PDDL = ("DOMAIN", "PROBLEM", "PROBLEMS...")
 #: Options whose metavar has one of these name a file that is read or written.
-_FILES = ("FILE", "LANGUAGE", "PROBLEM", "RECORD")
+_FILES = ("FILE", "DIR", "LANGUAGE", "PROBLEM", "RECORD")
 #: Files that examples have.
 _EXAMPLES = {
     "MAP": "domains/t-map/domain.pddl domains/t-map/problem.pddl",
@@ -239,7 +239,7 @@ def check_outputs(outputs: Iterable[OutputFile], inputs: Iterable[str]) -> None:
 
 
 def _names_file(given: Option) -> bool:
-    return any(part in (given.metavar or "") for part in (*_FILES, "DIR"))
+    return any(part in (given.metavar or "") for part in _FILES)
 
 
 def _click_option(given: Option) -> click.Option:

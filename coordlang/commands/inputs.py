@@ -159,11 +159,12 @@ class Arguments:
         return Source(None, options, _FIXED | ({"robots"} if options.names else set()))
 
     def instance(self) -> PlanningInstance:
-        """Read the joint model and the task of one problem."""
+        """The joint model and the tasks of the problems; what `load` has read is not read again."""
         loaded = self.loaded
         if loaded and self.source == Source() and self.problems == list(loaded.problems):
             return loaded
-        return self.read().instance()
+        files = self.read()
+        return build(files.domain, files.problems, files.source.model)
 
     def task(self, coordinates: given.CoordinatesSource | None = None) -> ReadTask:
         """Read a language and put it into the task of a problem."""
@@ -189,10 +190,6 @@ class PlanningInput:
         from coordlang.language.recorded import options_of
 
         return options_of(language, self.source.model, self.source.given - {"factored"})
-
-    def instance(self) -> PlanningInstance:
-        """Return the joint model and the tasks of the problems."""
-        return build(self.domain, self.problems, self.source.model)
 
     def candidates(
         self, tasks: TasksSource | None, options: ModelOptions, *, skip_unsolvable: bool = False
@@ -263,7 +260,7 @@ def load(files: Arguments, options: Source) -> PlanningInstance:
     static facts.  Raises `BadInput` or `Unsupported` with file, line and column, and `UsageError`
     for options that contradict each other or the files.
     """
-    return files.read().instance()
+    return files.instance()
 
 
 def load_language(path: given.File) -> Language:
