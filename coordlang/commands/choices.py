@@ -34,6 +34,7 @@ from coordlang.language.candidates import describe
 from coordlang.language.provenance import percent
 from coordlang.required.failure import TooManyToCount, failure_of_sentence
 from coordlang.required.miscoordination import Miscoordination
+from planners.joint.states import bits
 from planners.pddl.model_options import names_in
 from planners.search.plans import Plans
 from planners.system.messages import counted, named
@@ -192,7 +193,7 @@ def _table(found: RobotsChoices, own: RobotChoices, width: int) -> list[str]:
                 for label, to in automaton.moves[state].items()
             ]
             left = f"{automaton.left[state]:,}"
-            rows.append((str(step), str(state), left, moves, " ".join(atoms)))
+            rows.append((str(step), str(state), left, moves, atoms))
     if rows := rows[:STATES_SHOWN]:
         widest = max(len(" | ".join(moves)) for *_, moves, _ in rows)
         mark = " | " if widest <= width // 2 else "\n| "
@@ -205,15 +206,9 @@ def _table(found: RobotsChoices, own: RobotChoices, width: int) -> list[str]:
     return lines
 
 
-def _distinguishing(used: TaskLanguage, own: RobotChoices, states: range) -> list[list[str]]:
+def _distinguishing(used: TaskLanguage, own: RobotChoices, states: range) -> list[str]:
     """For each state of one step the atoms known to be true there, but not in all of them."""
-    known = own.automaton.known[states.start : states.stop]
-    everywhere = reduce(and_, (knowledge.true for knowledge in known))
-    return [
-        [
-            text
-            for bit, text in enumerate(used.model.codec.facts.texts)
-            if (knowledge.true & ~everywhere) >> bit & 1
-        ]
-        for knowledge in known
-    ]
+    texts = used.model.codec.facts.texts
+    known = [each.true for each in own.automaton.known[states.start : states.stop]]
+    everywhere = reduce(and_, known)
+    return [" ".join(texts[fact] for fact in bits(true & ~everywhere)) for true in known]
