@@ -67,10 +67,7 @@ def command_of(name: str, record: type[CommandOptions]) -> click.Command:
 
     argument = click.Argument(["arguments"], nargs=-1, type=FILE, metavar=record.takes)
     params = [*([argument] if record.takes else []), *map(_click_option, on_cli.values())]
-    example = record.example
-    for word, files in _EXAMPLES.items():
-        example = example.replace(word, files)
-    example = f"\b\nExample:\n  coordlang {name} {example}"
+    example = f"\b\nExample:\n  coordlang {name} {record.example.format(**_EXAMPLES)}"
     made = _Command(name, params=params, callback=called, help=record.__doc__, epilog=example)
     made.used = tuple(record.used.split())
     return made
@@ -125,7 +122,6 @@ def _positional(
 
 
 def _usage(takes: str, alone: Option | None) -> str:
-    """What arguments there should be."""
     if alone is not None:
         return f"{alone.spelling} {alone.metavar} alone, without {takes}"
     if "DOMAIN" not in takes:

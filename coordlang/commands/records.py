@@ -93,7 +93,7 @@ class CommandOptions:
     A terminal shows what it is ``doing``.  Its ``function`` has its name and is in the ``module``
     of its name, unless others are named, and searches no task again that was searched before if it
     ``keeps_plans``.  Its help begins with the options that are ``used`` most, by name, and ends
-    with an ``example``, in which words in capitals are files (`coordlang.commands.command`).
+    with an ``example``, in which names in braces are files (`coordlang.commands.command`).
     """
 
     takes: ClassVar[str] = ""
@@ -245,7 +245,7 @@ class InspectOptions(
     doing="reading and grounding",
     keeps_plans=False,
     used="states write as_json",
-    example="MAP",
+    example="{MAP}",
 ):
     """Show what was understood of a domain: robots, subactions, constraints."""
 
@@ -259,7 +259,7 @@ class PlansOptions(
     AnswerOptions,
     takes="DOMAIN PROBLEM",
     used="only_count most sample",
-    example="MAP --count",
+    example="{MAP} --count",
 ):
     """Count, list or sample all optimal plans of a task.
 
@@ -277,7 +277,7 @@ class CheckOptions(
     doing="solving the task twice",
     keeps_plans=False,
     used="as_json",
-    example="MAP",
+    example="{MAP}",
 ):
     """Compare our optimal cost with Fast Downward's.
 
@@ -289,7 +289,7 @@ class CoordinationOptions(
     AnswerOptions,
     takes="DOMAIN PROBLEMS...",
     used="asynchronous jobs as_json",
-    example="MAP",
+    example="{MAP}",
 ):
     """Decide which tasks require coordination, with a miscoordination shown."""
 
@@ -304,7 +304,7 @@ class TasksOptions(
     doing="reading and grounding",
     keeps_plans=False,
     used="start goal output",
-    example='MAP --start "(at r1 ?)" -o tasks.json',
+    example='{MAP} --start "(at r1 ?)" -o tasks.json',
 ):
     """Write a task file: PROBLEM with other starts and goals; ? in a PATTERN is any name."""
 
@@ -317,7 +317,7 @@ class BuildOptions(
     AnswerOptions,
     takes="DOMAIN PROBLEMS...",
     used="tasks method output",
-    example="MAP --tasks all --method minimal -o t-map.json",
+    example="{MAP} --tasks all --method minimal -o t-map.json",
 ):
     """Build a coordination language and verify it.
 
@@ -356,7 +356,7 @@ class VerifyOptions(
     takes="LANGUAGE DOMAIN PROBLEMS...",
     doing="verifying by definition",
     used="tasks certificate as_json",
-    example="t-map.json MAP",
+    example="t-map.json {MAP}",
 ):
     """Check by definition that LANGUAGE is a coordination language.
 
@@ -383,7 +383,7 @@ class LiftOptions(
     AnswerOptions,
     takes="DOMAIN PROBLEMS...",
     used="tasks check output",
-    example="GRID --tasks all -o lifted.json",
+    example="{GRID} --tasks all -o lifted.json",
 ):
     """Learn words as functions of features of states, for all PROBLEMS at once.
 
@@ -410,7 +410,7 @@ class GroundOptions(
     takes="LIFTED DOMAIN PROBLEM",
     module="lift",
     used="tasks verified output",
-    example="lifted.json GRID -o 2x2.json",
+    example="lifted.json {GRID} -o 2x2.json",
 ):
     """Write the language file of one problem from a lifted language.
 
@@ -432,7 +432,7 @@ class SayOptions(
     takes="LANGUAGE DOMAIN PROBLEM PLAN",
     module="sentences",
     used="as_json",
-    example="t-map.json MAP plan.txt",
+    example="t-map.json {MAP} plan.txt",
 ):
     """Print the sentence of an optimal plan, or of each plan of a file, one a line."""
 
@@ -443,7 +443,7 @@ class UnderstandOptions(
     module="sentences",
     doing="finding the plans with the sentence",
     used="only_count most output",
-    example='t-map.json MAP "w0 w2 w1 w0" -o plan.txt',
+    example='t-map.json {MAP} "w0 w2 w1 w0" -o plan.txt',
 ):
     """Count, list or sample the optimal plans that a SENTENCE ("w1 w0") leaves open."""
 
@@ -458,7 +458,7 @@ class PlanOptions(
     module="sentences",
     doing="searching for a plan",
     used="prefer form as_json",
-    example="t-map.json MAP --prefer first:r2",
+    example="t-map.json {MAP} --prefer first:r2",
 ):
     """Find one optimal plan under SENTENCE ("w1 w0"), or under the best sentence (--prefer)."""
 
@@ -475,7 +475,7 @@ class ChoicesOptions(
     takes="LANGUAGE DOMAIN PROBLEM SENTENCE",
     doing="finding the robots' choices",
     used="robot form output",
-    example='t-map.json MAP "w0 w2 w1 w0" --robot r1',
+    example='t-map.json {MAP} "w0 w2 w1 w0" --robot r1',
 ):
     """Show what each robot may do under SENTENCE ("w1 w0"), whatever the others choose.
 
@@ -492,7 +492,7 @@ class RobotOptions(
     takes="LANGUAGE DOMAIN PROBLEM [SENTENCE]",
     doing="finding the robot's choices",
     used="robot prefer play",
-    example="events.json MAP --robot r1 --play 1",
+    example="events.json {MAP} --robot r1 --play 1",
 ):
     """Execute one robot's part under SENTENCE ("w1 w0"), or one that robots agree on.
 
@@ -522,7 +522,7 @@ class SimulateOptions(
     doing="simulating",
     alone="replay",
     used="sentence step output",
-    example="t-map.json MAP --runs 3",
+    example="t-map.json {MAP} --runs 3",
 ):
     """Let robots with wheels do a task in a simulator (`pip install 'coordlang[sim]'`)."""
 
@@ -558,7 +558,7 @@ class ExportOptions(
     takes="LANGUAGE DOMAIN PROBLEM SENTENCE",
     doing="compiling the task",
     used="to for_planner output",
-    example='t-map.json MAP "w0 w2 w1 w0" --to bt',
+    example='t-map.json {MAP} "w0 w2 w1 w0" --to bt',
 ):
     """Write a task under SENTENCE ("w1 w0") as PDDL, LTLf or behaviour trees.
 
@@ -588,7 +588,7 @@ class ExplainOptions(
     takes="LANGUAGE DOMAIN PROBLEM",
     doing="finding formulas of the words",
     used="task sentence as_json",
-    example="t-map.json MAP --task",
+    example="t-map.json {MAP} --task",
 ):
     """Show a language: words as formulas, sentences of a task."""
 
@@ -603,7 +603,7 @@ class ReportOptions(
     takes="LANGUAGE DOMAIN PROBLEMS...",
     doing="drawing the page",
     used="output coordinates seed",
-    example="t-map.json MAP -o t-map.html",
+    example="t-map.json {MAP} -o t-map.html",
 ):
     """Write a page that shows a language: words, sentences, plans played."""
 
@@ -634,7 +634,7 @@ class ImportOptions(
     doing="reading",
     keeps_plans=False,
     used="robots task output",
-    example="SITE --robots 2 -o mine",
+    example="{SITE} --robots 2 -o mine",
 ):
     """Write FILE.map with FILE.scen, or FILE.building.yaml of Open-RMF, as PDDL."""
 

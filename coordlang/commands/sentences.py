@@ -31,7 +31,7 @@ from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.provenance import tolerance_data
 from planners.search.heuristics import HEURISTICS
 from planners.search.plan_file import json_count
-from planners.search.plans import Plans, Texts
+from planners.search.plans import Plans, Texts, texts
 from planners.system.errors import CoordlangError, UsageError
 from planners.system.messages import counted
 
@@ -247,7 +247,7 @@ def plan(files: Arguments, options: PlanOptions) -> PlanUnderSentence:
     return PlanUnderSentence(
         used,
         used.text(words),
-        tuple(used.model.in_step.texts(step) for step in found.plan),
+        texts(used.model.in_step, found.plan),
         found,
         plan_under_sentence(used, None, bound, expanded),
         tuple(_fulfilled(preferences, best)) if best else (),
