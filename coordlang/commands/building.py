@@ -475,13 +475,18 @@ class Built(Presented):
         yield f"in silence they {Failures(mean, worst).text()}"
 
 
+def _mean(plans: float) -> str:
+    """A mean number of plans; three digits of one that has no exact ones after the point."""
+    return f"{plans:,.2f}" if plans < 1e15 else f"{plans:.3g}"
+
+
 def _optimised(figures: Mapping[str, Any]) -> Iterator[str]:
     """How many plans the sentences leave open or how short formulas are, where one is preferred."""
     if "flexibility" in figures:
         yield (
-            f"a sentence leaves {figures['flexibility']:,.2f} plans open on average ("
-            f"{figures['flexibility_before']:,.2f} before, "
-            f"{figures['flexibility_bound']:,.2f} at most), "
+            f"a sentence leaves {_mean(figures['flexibility'])} plans open on average ("
+            f"{_mean(figures['flexibility_before'])} before, "
+            f"{_mean(figures['flexibility_bound'])} at most), "
             f"communication saving {100 * figures['communication_saving']:.1f} %"
         )
     if "terms" in figures:

@@ -122,10 +122,11 @@ def lift(files: Arguments, options: LiftOptions) -> Lifted:
     check, is_factored = options.check, options.source.factored is not None
     given: list[Any] = [None] if is_factored else [*files.problems, *check]
     every = [_instance(files, problem, options) for problem in given]
-    if not every:
+    known = len(every) - len(check)
+    if not known:
         raise UsageError("there is no problem to learn from", remedy="Name one or more.")
     first = every[0].candidates
-    robots, known = first.model.robots, len(every) - len(check)
+    robots = first.model.robots
     for other in (own.candidates for own in every):
         if other.model.robots != robots:
             others = ", ".join(other.model.robots)

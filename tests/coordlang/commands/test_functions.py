@@ -209,6 +209,8 @@ def test_parsed_objects_stand_for_files(language: Path) -> None:
     assert door.verify(language, domain, problem)
     read = door.load_language(language)
     assert door.verify(door.Language(read.words, read.states, read.default), domain, problem)
+    with pytest.raises(door.UsageError, match="no problem to learn from"):
+        door.lift(T_MAP[0], check=[T_MAP[1]])
     with pytest.raises(door.UsageError, match="fixed"):
         door.plans(loaded, cost="makespan")
     with pytest.raises(door.UsageError, match="contradicts the language file"):
