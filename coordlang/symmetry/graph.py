@@ -14,18 +14,17 @@ P. Kaski, Engineering an efficient canonical labeling tool for large and sparse 
 from __future__ import annotations
 
 import sys
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import Any
 
 import numpy as np
 
 from coordlang.language.candidates import Candidates
-from planners.joint.model import FullState, Goal, JointModel
+from planners.joint.model import FullState, Goal
 from planners.pddl.formula_tree import Compound, Leaf, fold
-from planners.pddl.lifted import Atom, Domain, Formula, Not, Problem, StepAtom
+from planners.pddl.lifted import Atom, Formula, Not, StepAtom
 from planners.pddl.robots import fluent_predicates, natural
-from planners.search.plan_space import PlanSpace
 
 #: A renaming of objects; names that it does not hold stay.
 Renaming = Mapping[str, str]
@@ -43,13 +42,13 @@ def automorphism_generators(
     ``largest`` vertices; some of the generators may then be no symmetries of the model.
     """
     model = candidates.model
-    graph = _ModelGraph(candidates.loaded.domain, candidates.loaded.problems[0], model)
+    graph = _ModelGraph(candidates)
     if len(graph) > largest:
         return []
     if with_tasks:
         tasks = sum(len(np.unique(s.state[s.starts])) + len(s.goals) for s in candidates.spaces)
         if len(graph) + tasks <= largest:
-            graph.add_tasks(candidates.spaces)
+            graph.add_tasks()
     if len(graph) + len(model.actions) <= largest:
         graph.add_actions()
     return graph.renamings()
@@ -58,22 +57,18 @@ def automorphism_generators(
 class _ModelGraph:
     """The graph of a model with its facts; actions and tasks are added on demand."""
 
-    def __init__(self, domain: Domain, problem: Problem, model: JointModel) -> None:
-        self._model = model
+    def __init__(self, candidates: Candidates) -> None:
+        self._candidates, self._model = candidates, candidates.model
         self._colours: dict[Hashable, int] = {}
         self._colour: list[int] = []
         self._neighbours: list[list[int]] = []
-        used = _used(model)
-        self._objects = {
-            name: self._vertex(self._look(name, domain, types))
-            for name, types in problem.objects.items()
-            if name in used
-        }
+        self._objects = {name: self._vertex(self._look(name)) for name in _used(candidates)}
         self._arguments: dict[tuple[str, int], int] = {}
         self._goals: dict[Goal, int] = {}
-        for atom in _static_facts(domain, problem, used):
+        for atom in _static_facts(candidates):
             self._instance(("static", atom.predicate), atom.args)
-        self._facts = [self._instance(("fact", a.predicate), a.args) for a in model.codec.facts]
+        facts = self._model.codec.facts
+        self._facts = [self._instance(("fact", a.predicate), a.args) for a in facts]
 
     def __len__(self) -> int:
         return len(self._neighbours)
@@ -85,16 +80,17 @@ class _ModelGraph:
         self._colour.append(self._colours.setdefault(colour, len(self._colours)))
         return number
 
-    def _look(self, name: str, domain: Domain, types: Iterable[str]) -> Hashable:
+    def _look(self, name: str) -> Hashable:
         """The colour of an object: its types, and what kind of a robot it is, if it is one."""
-        model = self._model
+        model, loaded = self._model, self._candidates.loaded
         robot: Hashable = None
         if name in model.robots:
             # Joint actions name their robots in the text of the domain.
             number = model.robots.index(name)
             robot = name if model.is_joint_action else model.idling_costs[number]
-        constant = name if name in domain.constants else ""
-        return ("object", constant, tuple(sorted(types)), robot)
+        constant = name if name in loaded.domain.constants else ""
+        types = tuple(sorted(loaded.problems[0].objects[name]))
+        return ("object", constant, types, robot)
 
     def _instance(self, colour: tuple[Hashable, ...], args: Sequence[str]) -> int:
         """A vertex for a predicate or an action schema with its arguments."""
@@ -116,15 +112,15 @@ class _ModelGraph:
             shape = (_shape(action.precondition), *effects)
             self._instance(("action", action.schema, action.cost, shape), action.args)
 
-    def add_tasks(self, spaces: Sequence[PlanSpace]) -> None:
+    def add_tasks(self) -> None:
         """Add the initial states and the goals, joined to each other by the tasks."""
         goals_of: dict[int, set[int]] = {}
-        for space in spaces:
+        for space in self._candidates.spaces:
             vertices = [self._goal(goal) for goal in space.goals]
             for node in space.starts.tolist():
                 goals_of.setdefault(int(space.state[node]), set()).add(vertices[space.goal[node]])
         for state in sorted(goals_of):
-            true = self._model.codec.true_facts(spaces[0].rows[state])
+            true = self._model.codec.true_facts(self._candidates.rows[state])
             facts = [self._facts[fact] for fact in true]
             self._vertex("initial state", [*facts, *sorted(goals_of[state])])
 
@@ -191,10 +187,9 @@ def _name(leaf: Formula) -> str:
 
 def joined_order(candidates: Candidates) -> list[str]:
     """The objects of the graph, if possible each after one that shares a static fact with it."""
-    domain, problem = candidates.loaded.domain, candidates.loaded.problems[0]
-    used = _used(candidates.model) & problem.objects.keys()
+    used = _used(candidates)
     near: dict[str, set[str]] = {name: set() for name in used}
-    for fact in _static_facts(domain, problem, used):
+    for fact in _static_facts(candidates):
         for arg in fact.args:
             near[arg].update(fact.args)
     order: list[str] = []
@@ -208,14 +203,18 @@ def joined_order(candidates: Candidates) -> list[str]:
     return order
 
 
-def _static_facts(domain: Domain, problem: Problem, used: Set[str]) -> list[Atom]:
-    """The static facts about ``used`` objects alone."""
-    fluents = fluent_predicates(domain)
-    about = [a for a in problem.init if a.predicate not in fluents and used >= set(a.args)]
+def _static_facts(candidates: Candidates) -> list[Atom]:
+    """The static facts about objects of the graph alone."""
+    loaded, used = candidates.loaded, set(_used(candidates))
+    fluents = fluent_predicates(loaded.domain)
+    init = loaded.problems[0].init
+    about = [a for a in init if a.predicate not in fluents and used.issuperset(a.args)]
     return sorted(about, key=str)
 
 
-def _used(model: JointModel) -> set[str]:
-    """The objects of ground actions and facts, and the robots."""
+def _used(candidates: Candidates) -> list[str]:
+    """The objects of ground actions and facts, and the robots, as the problem lists them."""
+    model = candidates.model
     named = {arg for action in model.actions for arg in action.args} | set(model.robots)
-    return named | {arg for fact in model.codec.facts for arg in fact.args}
+    named |= {arg for fact in model.codec.facts for arg in fact.args}
+    return [name for name in candidates.loaded.problems[0].objects if name in named]

@@ -105,12 +105,10 @@ class SymmetryGroup:
     """A group of symmetries of a model and its candidate tasks.
 
     ``symmetries`` are the elements without the identity, in the order of where they take the
-    objects (those of `joined_order`, one after another); ``dropped`` counts automorphisms of the
-    graph that failed the check on the model itself.
+    objects (those of `joined_order`, one after another).
     """
 
     symmetries: tuple[Symmetry, ...]
-    dropped: int = 0
 
     @cached_property
     def permutations(self) -> list[list[int]]:
@@ -134,32 +132,29 @@ def symmetry_group(
     """
     if candidates.model.remembers or candidates.model.slack_facts:
         return SymmetryGroup(())
-    generators, dropped = checked_generators(candidates, largest_graph)
+    generators = checked_generators(candidates, largest_graph)
     if candidates.model.is_asynchronous and any(s.model.has_ties for s in candidates.spaces):
         # Robots whose events could be done in either order do them in the order of robots.
         robots = candidates.model.robots
-        fixing = [s for s in generators if all(s.renaming.get(r, r) == r for r in robots)]
-        dropped += len(generators) - len(fixing)
-        generators = fixing
+        generators = [s for s in generators if all(s.renaming.get(r, r) == r for r in robots)]
     names = joined_order(candidates)
     group = sorted(
         generated(generators, largest),
         key=lambda symmetry: [natural(symmetry.renaming[name]) for name in names],
     )
-    return SymmetryGroup(tuple(group), dropped)
+    return SymmetryGroup(tuple(group))
 
 
 def checked_generators(
     candidates: Candidates, largest_graph: int = LARGEST_GRAPH, *, with_tasks: bool = True
-) -> tuple[list[Symmetry], int]:
-    """Symmetries that generate the group, and how many automorphisms of the graph were none."""
+) -> list[Symmetry]:
+    """Symmetries that generate the group: those automorphisms of the graph that are some."""
     proposed = automorphism_generators(candidates, largest_graph, with_tasks=with_tasks)
     if not proposed:
-        return [], 0
+        return []
     itself = _renamed_model(candidates, {}, np.arange(len(candidates.rows)))
     found = [(renaming, _states_under(renaming, candidates, itself)) for renaming in proposed]
-    kept = [Symmetry(renaming, states) for renaming, states in found if states is not None]
-    return kept, len(found) - len(kept)
+    return [Symmetry(renaming, states) for renaming, states in found if states is not None]
 
 
 def generated(generators: Iterable[Symmetry], largest: int) -> list[Symmetry]:

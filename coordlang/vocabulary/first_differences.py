@@ -234,7 +234,7 @@ def symmetric_goals(
         return None
     if states**2 < for_action * (len(model.actions) + len(model.codec.facts)):
         return None
-    found, _ = checked_generators(candidates, with_tasks=False)
+    found = checked_generators(candidates, with_tasks=False)
     generators = [s.states for s in found if (s.states != np.arange(states)).any()]
     if not generators:
         return None
