@@ -7,14 +7,14 @@ import errno
 import re
 import sys
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from inspect import cleandoc
 from io import BytesIO
 from os import PathLike
-from typing import IO, Any, Generic, TypeVar, cast
+from typing import Any, Generic, TypeVar
 
 from planners.system.errors import BadInput, OutOfMemory, Position
 from planners.system.limits import memory_left, more_memory
@@ -130,12 +130,14 @@ def read_bytes(path: str | PathLike[str], *, most: int = MAX_TEXT) -> bytes:
     data = read_stored_bytes(path, most=most)
     if data[:2] != b"\x1f\x8b":
         return data
+    from gzip import GzipFile
+
     position = Position(str(path))
     try:
         # Counted to a little more than ``most``; nothing of it is kept.
-        size = sum(map(len, _pieces(_unzipped(data), most)))
+        size = sum(map(len, _pieces(GzipFile(fileobj=BytesIO(data)).read, most)))
         _require_size(size, most, position)
-        return _unzipped(data).read(size)
+        return GzipFile(fileobj=BytesIO(data)).read(size)
     except (OSError, EOFError, zlib.error) as error:
         raise BadInput(
             f"cannot be read: {error}",
@@ -151,10 +153,10 @@ def read_stored_bytes(path: str | PathLike[str], *, most: int = MAX_TEXT) -> byt
         if str(path) == "-":
             if sys.stdin is None:
                 raise OSError(errno.EBADF, "stdin is closed")
-            data = b"".join(_pieces(sys.stdin.buffer, most))
+            data = b"".join(_pieces(sys.stdin.buffer.read, most))
         else:
             with open(path, "rb") as file:
-                data = b"".join(_pieces(file, most))
+                data = b"".join(_pieces(file.read, most))
     except FileNotFoundError:
         raise BadInput(
             "there is no such file",
@@ -226,16 +228,10 @@ def require_seen(name: str, position: Position, what: str = "name") -> None:
         )
 
 
-def _unzipped(data: bytes) -> IO[bytes]:
-    from gzip import GzipFile
-
-    return cast(IO[bytes], GzipFile(fileobj=BytesIO(data)))
-
-
-def _pieces(file: IO[bytes], most: int) -> Iterator[bytes]:
+def _pieces(read: Callable[[int], bytes], most: int) -> Iterator[bytes]:
     """The bytes of a file, until there are more than ``most``."""
     size = 0
-    while size <= most and (piece := file.read(_CHUNK)):
+    while size <= most and (piece := read(_CHUNK)):
         size += len(piece)
         yield piece
 
