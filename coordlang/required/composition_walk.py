@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,45 +36,40 @@ _PIECE = 1_000_000
 _MOST = 1e10
 
 
-@dataclass(frozen=True, slots=True)
-class Moves:
+class Moves(NamedTuple):
     """Edges of a walk out of a table of nodes.
 
     ``source`` (k) numbers in the table, ``edges`` (k, robots) the plan-space edge that each plan
-    takes, ``mixed`` (k) the plan-space node that the mixture reaches; where it breaks the number of
-    nodes of the plan space, from which no edges lead.
+    takes, ``targets`` (k, robots + 1) the walk nodes that they lead to: where the mixture breaks
+    its node is the number of nodes of the plan space, from which no edges lead.
     """
 
     source: Ints
     edges: Ints
-    mixed: Ints
-
-    def targets(self, space: PlanSpace) -> Ints:
-        """The walk nodes that they lead to."""
-        return np.column_stack((space.targets(self.edges), self.mixed))
+    targets: Ints
 
 
-def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints, most: float = _MOST) -> Iterator[Moves]:
+def moves(space: PlanSpace, index: EdgeIndex, nodes: Ints) -> Iterator[Moves]:
     """All moves of n plans and their mixture out of walk nodes ``(x_1 .. x_n, y)``, in chunks.
 
-    There is one for every choice of the plans' next steps.  Raises `OutOfMemory` where there are
-    more than ``most``, or one node needs too much at once.
+    There is one for every choice of the plans' next steps.  Raises `OutOfMemory` where these are
+    hours of work, or one node needs too much at once.
     """
     robots = nodes.shape[1] - 1
     sizes = move_counts(space, nodes[:, :-1])
-    _check_size(sizes, space, most)
+    _check_size(sizes, space)
     for span in spans(sizes, _PIECE):
         source = np.arange(span.start, span.stop)
         prefix = nodes[span, robots]
-        edges: list[Ints] = []
+        columns: list[Ints] = []
         for robot in range(robots):
             which, edge = space.edges_from(nodes[source, robot])
             source, prefix = source[which], prefix[which]
-            edges = [*(old[which] for old in edges), edge]
+            columns = [*(old[which] for old in columns), edge]
             prefix = index.follow(robot, prefix, space.robot_labels(robot, edge))
-        mixed = np.full(len(source), len(space))
+        edges, mixed = np.stack(columns, axis=1), np.full(len(source), len(space))
         mixed[prefix >= 0] = space.targets(prefix[prefix >= 0])
-        yield Moves(source, np.stack(edges, axis=1), mixed)
+        yield Moves(source, edges, np.column_stack((space.targets(edges), mixed)))
 
 
 def move_counts(space: PlanSpace, plans: Ints) -> NDArray[np.float64]:
@@ -114,7 +110,7 @@ def layered(
             arriving = expand(table)
 
 
-def _check_size(sizes: NDArray[np.float64], space: PlanSpace, most: float) -> None:
+def _check_size(sizes: NDArray[np.float64], space: PlanSpace) -> None:
     """Stop before one node needs too much at once, or a layer too much work."""
     largest, total = sizes.max(initial=0), sizes.sum()
     robots, instead = space.robots, space.model.smaller("fewer robots", "smaller tasks")
@@ -126,7 +122,7 @@ def _check_size(sizes: NDArray[np.float64], space: PlanSpace, most: float) -> No
             f"{at_once / 2**30:,.1f} GiB at once",
             remedy=f"Use {instead}, or {more_memory()}.",
         )
-    if total > most:
+    if total > _MOST:
         raise OutOfMemory(
             f"the {len(sizes):,} nodes of one layer of the walk have {total:.1e} combinations "
             f"of {robots} plans' next steps",
@@ -308,11 +304,10 @@ def _walk(space: PlanSpace) -> list[_Layer]:
         nonlocal nodes
         nodes += len(table)
         links = [np.zeros((0, 1 + width), np.int64)]
-        for move in moves(space, index, table[:, :-1]):
-            targets = move.targets(space)
-            parted = (table[move.source, -1] > 0) | ~in_one_state(space, targets[:, :-1])
+        for source, _, targets in moves(space, index, table[:, :-1]):
+            parted = (table[source, -1] > 0) | ~in_one_state(space, targets[:, :-1])
             parted &= (targets != targets[:, :1]).any(axis=1)
-            rows = np.column_stack((move.source, targets, parted))[can_fail(choices, targets)]
+            rows = np.column_stack((source, targets, parted))[can_fail(choices, targets)]
             links.append(unique_rows(rows)[0])
         together = np.concatenate(links)
         sources.append(together[:, 0])

@@ -92,10 +92,9 @@ def _walked_divergences(choices: Choices, most: float) -> Ints:
         if (most := most - move_counts(space, table[:, :-1]).sum()) < 0:
             raise TooManyDivergences
         going_on = [np.zeros((0, table.shape[1]), np.int64)]
-        for move in moves(space, index, table):
-            targets = move.targets(space)
+        for source, _, targets in moves(space, index, table):
             fails = can_fail(choices, targets)
-            last, after = space.state[table[move.source, 0]], space.state[targets[:, :-1]]
+            last, after = space.state[table[source, 0]], space.state[targets[:, :-1]]
             one = in_one_state(space, targets[:, :-1])
             rows = np.column_stack((last, _distinct(after)))[fails & ~one]
             found, _ = unique_rows(np.concatenate((found, rows.astype(np.uint64))))

@@ -119,9 +119,9 @@ class CounterexampleWalk:
         def expand(nodes: Ints) -> Ints:
             # Columns: the node, the edges of the plans, the node that they lead to.
             found = [np.zeros((0, 7), np.int64)]
-            for move in moves(space, self._index, nodes[:, :3]):
-                lead = leads.after(nodes[move.source, 3], *entered[move.edges].T)
-                rows = np.column_stack((move.source, move.edges, move.targets(space), lead))
+            for source, edges, targets in moves(space, self._index, nodes[:, :3]):
+                lead = leads.after(nodes[source, 3], *entered[edges].T)
+                rows = np.column_stack((source, edges, targets, lead))
                 rows = rows[lead != _PARTED]
                 found.append(rows[can_fail(self._choices, rows[:, 3:6])])
             together = np.concatenate(found)
