@@ -20,7 +20,7 @@ from math import prod
 
 import numpy as np
 
-from planners.joint.tables import Bools, Ints, differs, unique_rows
+from planners.joint.tables import Bools, Ints, differs, of_each_row, unique_rows
 from planners.search.plan_space import LayerEdges, PlanSpace
 from planners.system.limits import reaching
 
@@ -125,9 +125,7 @@ class LabelSets:
         for position in range(1, int(sizes.max(initial=0))):
             open_groups = np.flatnonzero(sizes > position)
             pairs = np.column_stack((result[open_groups], members[first[open_groups] + position]))
-            different, inverse = unique_rows(pairs)
-            united = [self.union(a, b) for a, b in different.tolist()]
-            result[open_groups] = np.array(united, np.int64)[inverse]
+            result[open_groups] = of_each_row(pairs, self.union)
         return result
 
     def sets(self, first: Ints, sizes: Ints, labels: Ints, after: Ints) -> Ints:
@@ -137,19 +135,14 @@ class LabelSets:
             open_groups = np.flatnonzero(sizes > position)
             at = first[open_groups] + position
             rows = np.column_stack((result[open_groups], labels[at], after[at]))
-            different, inverse = unique_rows(rows)
-            extended = [self._extended(*row) for row in different.tolist()]
-            result[open_groups] = np.array(extended, np.int64)[inverse]
+            result[open_groups] = of_each_row(rows, self._extended)
         return result
 
     def within_each(self, one: Ints, other: Ints) -> Bools:
         """For each pair whether ``one[k]`` is `within` ``other[k]``."""
         answers: Bools = one == other
         left = np.flatnonzero(~answers)
-        pairs = np.column_stack((one[left], other[left]))
-        different, inverse = unique_rows(pairs)
-        known = np.array([self.within(a, b) for a, b in different.tolist()], np.bool_)
-        answers[left] = known[inverse]
+        answers[left] = of_each_row(np.column_stack((one[left], other[left])), self.within)
         return answers
 
 

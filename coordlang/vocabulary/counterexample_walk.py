@@ -19,7 +19,7 @@ import numpy as np
 from coordlang.required.choices import Choices
 from coordlang.required.composition_walk import can_fail, layered, moves
 from coordlang.vocabulary.spoken_choices import Words
-from planners.joint.tables import Ints, unique_rows
+from planners.joint.tables import Ints, of_each_row
 from planners.search.edge_index import EdgeIndex
 
 #: The lead of two sentences that are alike, what follows where they part, and in place of a word
@@ -166,12 +166,11 @@ class _Leads:
 
         `_PARTED` where their sentences part.  One entry for each of ``lead``.
         """
-        rows, of_row = unique_rows(np.column_stack((lead, first + 1, second + 1)))
-        found = [self._after(a, b - 1, c - 1) for a, b, c in rows.tolist()]
-        return np.array(found, np.int64)[of_row]
+        return of_each_row(np.column_stack((lead, first + 1, second + 1)), self._after)
 
     def _after(self, lead: int, first: int, second: int) -> int:
-        mine, theirs = map(_entered, self._leads[lead], (first, second))
+        """The same for one lead, with 1 added to the words."""
+        mine, theirs = map(_entered, self._leads[lead], (first - 1, second - 1))
         shared = min(len(mine), len(theirs))
         if mine[:shared] != theirs[:shared]:
             return _PARTED

@@ -7,7 +7,7 @@ in.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
 import numpy as np
@@ -110,6 +110,12 @@ def unique_rows(table: NDArray[T]) -> tuple[NDArray[T], Ints]:
     number = np.empty(len(table), np.int64)
     number[order] = fresh.cumsum() - 1
     return table[order[fresh]], number
+
+
+def of_each_row(table: Ints, function: Callable[..., int]) -> Ints:
+    """What a function of its numbers says of each row; it is asked once for each different row."""
+    different, number = unique_rows(table)
+    return np.array([function(*row) for row in different.tolist()], np.int64)[number]
 
 
 def find_rows(table: NDArray[T], rows: NDArray[T]) -> Ints:
