@@ -74,7 +74,6 @@ class Rules:
         self.domain, self.problem, self.team = domain, problem, team
         self.meaning = Meaning(domain, problem, team)
         self.schemas = {schema.name: schema for schema in domain.schemas}
-        self._instances: dict[str, Instance | str] = {}
         self._touched: dict[tuple[StepAtom, StepAtom | None], Touched] = {}
 
     def step(self, state: State, labels: Labels) -> State | str:
@@ -107,11 +106,6 @@ class Rules:
 
     def instance(self, label: str) -> Instance | str:
         """The subaction that a text names, or what is wrong with the text."""
-        if label not in self._instances:
-            self._instances[label] = self._read(label)
-        return self._instances[label]
-
-    def _read(self, label: str) -> Instance | str:
         name, *args = _tokens(label) or [""]
         schema = self.schemas.get(name)
         if schema is None:
