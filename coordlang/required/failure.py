@@ -182,8 +182,7 @@ class FailureCount:
         self._sets = sets
         self._most = most
         self._targets: list[int] = space.targets().tolist()
-        columns = (space.robot_labels(robot).tolist() for robot in range(space.robots))
-        self._labels: list[tuple[int, ...]] = list(zip(*columns, strict=True))
+        self._labels: list[list[int]] = space.labels.tolist()
         self._good: dict[tuple[int, ...], int] = {}
         self._sentences: dict[tuple[int, int], int] = {}
 

@@ -187,25 +187,21 @@ class Inseparable(ProvedImpossible):
     """
 
     def __init__(self, witness: Miscoordination, model: JointModel) -> None:
+        plans, waits = "optimal plans", ""
+        remedy = (
+            "Build with --remember-actions: the state then also holds each robot's last subaction."
+        )
         if model.is_asynchronous:
-            what = "optimal plans", ""
             remedy = "Robots with a common step may have a language: leave out --asynchronous."
         elif model.hides_slack:
-            what = "plans within slack", ", though they may wait in different ones"
+            plans, waits = "plans within slack", ", though they may wait in different ones"
             remedy = (
                 "Build with --words-see-slack: states then also say how much of the slack is left; "
                 "or with --remember-actions."
             )
-        else:
-            what = "optimal plans", ""
-            remedy = (
-                "Build with --remember-actions: the state then also holds each robot's last "
-                "subaction."
-            )
         super().__init__(
-            f"two {what[0]} of task {_short(witness.task)} introduce required coordination "
-            f"but pass through the same states{what[1]}: no language over states can tell them "
-            "apart",
+            f"two {plans} of task {_short(witness.task)} introduce required coordination "
+            f"but pass through the same states{waits}: no language over states can tell them apart",
             remedy=remedy,
         )
         self.witness = witness

@@ -238,23 +238,22 @@ class _Image:
     def names(self, names: Sequence[str]) -> tuple[str, ...]:
         return tuple(map(self.name, names))
 
-    def atom(self, atom: Atom | StepAtom) -> Atom | StepAtom:
-        if atom not in self._atoms:
-            self._atoms[atom] = replace(atom, args=self.names(atom.args))
-        return self._atoms[atom]
+    def leaf(self, leaf: Leaf) -> Leaf:
+        if not isinstance(leaf, Atom | StepAtom):
+            return leaf
+        if leaf not in self._atoms:
+            self._atoms[leaf] = replace(leaf, args=self.names(leaf.args))
+        return self._atoms[leaf]
 
     def form(self, formula: Goal) -> Hashable:
         """A goal or formula; the order of the parts of a conjunction or disjunction is gone."""
         if isinstance(formula, FullState):
-            return frozenset(self.atom(self._facts[fact]) for fact in formula.facts)
-
-        def leaf(part: Leaf) -> Hashable:
-            return self.atom(part) if isinstance(part, Atom | StepAtom) else str(part)
+            return frozenset(self.leaf(self._facts[fact]) for fact in formula.facts)
 
         def compound(kind: Compound, parts: Iterator[Hashable]) -> Hashable:
             return type(kind).__name__, frozenset(parts)
 
-        return fold(formula, leaf, compound)
+        return fold(formula, self.leaf, compound)
 
     def action(self, action: GroundAction, robots: Sequence[str]) -> Hashable:
         """What an action is and does; ``robots`` are those of the model, renamed."""
@@ -265,7 +264,7 @@ class _Image:
             action.cost,
             frozenset(robots[own] for own in action.owners),
             form(action.precondition),
-            frozenset((self.atom(e.atom), e.adds, form(e.condition)) for e in action.effects),
+            frozenset((self.leaf(e.atom), e.adds, form(e.condition)) for e in action.effects),
             frozenset(map(form, action.links)),
         )
 

@@ -198,15 +198,13 @@ def _all_of(names: Sequence[str], conditions: Iterable[Condition]) -> str:
 def _safe_names(texts: Iterable[str]) -> list[str]:
     """For each text a PDDL name of its own: letters, digits, ``-`` and ``_``, a letter first."""
     taken: dict[str, int] = defaultdict(int)
-    used: set[str] = set()
-    names = []
+    names: dict[str, None] = {}
     for text in texts:
         base = re.sub(r"[^a-z0-9-]+", "_", text.lower()).strip("_-")
         base = base if base[:1].isalpha() else f"x_{base}"
         name = base
-        while name in used or name in _RESERVED:
+        while name in names or name in _RESERVED:
             taken[base] += 1
             name = f"{base}__{taken[base]}"
-        used.add(name)
-        names.append(name)
-    return names
+        names[name] = None
+    return list(names)
