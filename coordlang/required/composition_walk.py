@@ -140,11 +140,9 @@ _LINKS = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class _Layer:
-    """Walk nodes ``(x_1 .. x_n, y)`` with as many joint steps to go.
+    """Walk nodes with as many joint steps to go, and what links them to the layer below.
 
-    With what links them to the layer below.
-
-    ``x`` (k, robots) are plan-space nodes, ``parts``, ``meets`` (links) say whether states differ
+    ``x`` (k, robots) are the plans' nodes, ``parts``, ``meets`` (links) say whether states differ
     after a link for the first time since all plans and their mixture were at one node, or before it
     for the last time on some way to a failure.
     """
@@ -191,9 +189,8 @@ class DifferenceWalk:
         """First and last differences that ``word`` (the word number of each state) leaves together.
 
         For every unseparated first difference of plans that introduce RC, one of their unseparated
-        last differences, drawn at random.
-
-        None at all: the partition satisfies Theorem 3 for these tasks.  O(links).
+        last differences, drawn at random.  None at all: the partition satisfies Theorem 3 for
+        these tasks.  O(links).
         """
         state = self._space.state
         x = state[self._layers[0].x]
@@ -235,10 +232,7 @@ class DifferenceWalk:
         return [(first, lasts[number]) for first, ends in firsts.items() for number in bits(ends)]
 
     def _differences(self) -> tuple[dict[Difference, int], list[Difference]]:
-        """First differences, and the list of last differences.
-
-        With each first one a set of bits: the numbers of the last ones that can follow.
-        """
+        """First differences, with bits: the numbers of the last ones that follow; all last ones."""
         state = self._space.state
         number: dict[Difference, int] = {}
         firsts: dict[Difference, int] = {}

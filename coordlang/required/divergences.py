@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Divergences: where plans that introduce RC part, in one plan space.
 
-The sets ``alpha*`` of the paper's Theorem 3: Proposition 3 of docs/concepts.md.
-
-At a node ``p`` a set of two or more different next nodes is a divergence iff for some way to give
-each robot one of them, all of them used, some choice of labels into these nodes, and of sequences
-from there on, is no optimal plan.  Minimal sets say all.  A set of states that is known to be a
-divergence, from another goal, is not looked at again.
+The sets ``alpha*`` of the paper's Theorem 3 (Proposition 3 of docs/concepts.md): at a node ``p`` a
+set of two or more different next nodes is a divergence iff for some way to give each robot one of
+them, all of them used, some choice of labels into these nodes, and of sequences from there on, is
+no optimal plan.  Minimal sets say all.  A set of states that is known to be a divergence, from
+another goal, is not looked at again.
 
 Where no plans are inseparable, the divergences at a node depend on that node only, whatever was
 done before (Proposition 2 of docs/concepts.md): one look at each node.
@@ -58,10 +57,7 @@ def divergences(choices: Choices, chunk: int = _CHUNK, most: float = inf) -> Int
 
 
 def _with_failing(known: Rows, here: _Mixing, sets: Ints, chunk: int) -> Rows:
-    """Known divergences and those among sets of next nodes of one size.
-
-    Then those among larger ones without a divergence.
-    """
+    """Known divergences, those among sets of one size, and those among larger sets without one."""
     rows = here.states_of(sets)
     open_rows = ~_among(known, rows)
     sets = sets[open_rows]

@@ -77,10 +77,7 @@ def _first_break(choices: Choices, start: int) -> _Way:
 
 
 def _shared_plans(space: PlanSpace, start: int, steps: Sequence[Labels]) -> list[list[int]]:
-    """A plan for each robot that begins with its part of some steps.
-
-    It is the same one for robots for which one is found together.
-    """
+    """A plan for each robot that begins with its part of some steps: one for several, if found."""
     groups: list[list[int]] = []
     plans: list[list[int]] = []
 

@@ -273,7 +273,6 @@ def symmetries_of_part(space: PlanSpace, end: Ints, proposed: Iterable[Renaming]
     """The group of those proposed renamings that map a part of a plan space onto itself.
 
     Each is checked on the edges of the part themselves (Proposition 20 of docs/concepts.md).
-
     ``end`` (goals) is the state that each goal of the part is.  The ``proposed`` renamings have the
     same names.  Of a group with more than `LARGEST_GROUP` elements a subgroup is taken.  States
     outside the part stay.

@@ -37,9 +37,7 @@ Literal = tuple[Atom | StepAtom, bool]
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What a formula is read against.
-
-    The state before the step, the subactions of the step, and who acts.
+    """What a formula is read against: the state before a step, its subactions, and who acts.
 
     A negative action formula never speaks of the robots in ``acting`` (empty for conditions of
     effects and goals).  ``step`` None leaves the step open, ``state`` None the state: every literal

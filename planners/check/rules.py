@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rules of joint steps, read literally.
-
-One state and one step at a time, over states that are plain sets of atoms.
+"""The rules of joint steps, read literally: one at a time, over states that are sets of atoms.
 
 The independent twin of grounding and composition (docs/pddl.md has the rules): nothing is shared
 with them, only the lifted nouns and the robots.
@@ -216,10 +214,7 @@ class Rules:
         }
 
     def _joined(self, one: Instance, other: Instance) -> bool:
-        """Linked by the network.
-
-        Of one constraint that takes two or more, or of two that depend on each other.
-        """
+        """Linked by a constraint that takes two or more, or by two that depend on each other."""
         by_name = {constraint.name: constraint for constraint in self.domain.constraints}
         pairs = [(c.name, c.name) for c in self.domain.constraints if c.low > 1]
         pairs += [pair for v, w in self.domain.dependences for pair in ((v, w), (w, v))]

@@ -70,9 +70,7 @@ class ClassicalTask:
     between: int | None = None
 
     def cost(self, total: int) -> tuple[int, int] | None:
-        """An optimal total cost as (makespan, second cost).
-
-        None if ``step_cost`` is too small to be sure.
+        """An optimal total as (makespan, second cost); None if ``step_cost`` is too small for it.
 
         A plan of ``k`` steps costs from ``step_cost * k`` to ``(step_cost + highest_cost) * k``,
         which is less than ``step_cost * m`` for every ``k < m`` when ``step_cost > highest_cost *
@@ -138,8 +136,7 @@ def with_positive_literals(task: ClassicalTask, *, only_goal: bool) -> Classical
 def to_pddl(classical: ClassicalTask, *, costs: bool = True) -> tuple[str, str]:
     """Domain and problem text: STRIPS with negative preconditions and, if asked for, action costs.
 
-    Facts become predicates without arguments; a comment keeps what each predicate and action stands
-    for.
+    Facts become predicates without arguments; comments keep what they and the actions stand for.
     """
     facts = _safe_names(classical.facts)
     actions = action_names(classical)

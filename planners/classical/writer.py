@@ -69,11 +69,9 @@ class Writer:
     ) -> None:
         """Zero-cost actions from ``start`` to ``end`` that apply exactly if ``formula`` holds.
 
-        They also add ``gain``.
-
-        With ``otherwise`` they lead there if it does not hold.  Formulas are evaluated from left to
-        right, as in a programming language, so that there is one way in every state, and the size
-        is linear.
+        They also add ``gain``.  With ``otherwise`` they lead there if it does not hold.  Formulas
+        are evaluated from left to right, as in a programming language, so that there is one way in
+        every state, and the size is linear.
         """
         is_conjunction = isinstance(formula, And) and otherwise is None
         if isinstance(formula, Junction) and formula.parts and not is_conjunction:

@@ -115,7 +115,6 @@ class Cluster:
         """Send jobs, which the scheduler begins in their order.
 
         What they share is a plugin of the workers, so that one that joins later has it, too.
-
         Raises `UsageError` if a worker has other versions than are here, `OutOfMemory` if several
         are lost in one job, `ClusterFailed` if the scheduler is gone.
         """

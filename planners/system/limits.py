@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Time and memory limits of a process.
-
-Over the limit, work in progress ends with an error that the caller can catch.
+"""Time and memory limits of a process: over them, work ends with an error that can be caught.
 
 An alarm raises `OutOfTime` wherever the program is, so that algorithms need no clock of their own;
 anytime methods catch it and return what they have.  The memory limit is the operating system's
@@ -220,9 +218,7 @@ def default_memory_limit() -> int:
 
 
 def require_memory(size: int) -> None:
-    """Raise `OutOfMemory` if the program alone already has more than ``size`` bytes.
-
-    Its libraries are loaded by then.
+    """Raise `OutOfMemory` if the program with its libraries already has more than ``size`` bytes.
 
     To be asked before `limit_memory`: numpy aborts the process when it is loaded under a limit that
     is too small.
