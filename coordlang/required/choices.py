@@ -156,9 +156,8 @@ class Choices:
     def __init__(self, space: PlanSpace, sets: LabelSets | None = None) -> None:
         self.space = space
         self.sets = sets or LabelSets()
-        self._robots = space.labels.shape[1]
         #: (robots, nodes): the number of the set ``C_i(p)``.
-        self.of_node: Ints = np.full((self._robots, len(space)), END, np.int64)
+        self.of_node: Ints = np.full((space.robots, len(space)), END, np.int64)
         #: (nodes): do some plans from the node introduce RC?
         self.requires: Bools = np.zeros(len(space), np.bool_)
         #: How often it was asked whether a mixture of given choices fails.
@@ -178,11 +177,10 @@ class Choices:
     def _fill(self) -> None:
         """From the goals up, a layer at a time."""
         for edges in self.space.edges_by_layer():
-            nodes, first = np.unique(edges.source, return_index=True)
-            degrees = np.diff(np.append(first, len(edges.source)))
+            nodes, degrees = np.unique(edges.source, return_counts=True)
             fails = self.requires[edges.target]
             combinations_of_labels = np.ones(len(nodes))
-            for robot in range(self._robots):
+            for robot in range(self.space.robots):
                 here, labels, following = self._robot_edges(robot, edges)
                 self.of_node[robot, nodes] = here
                 combinations_of_labels *= labels
@@ -205,8 +203,7 @@ class Choices:
         first = np.flatnonzero(fresh)
         following = self.sets.unions(first, np.diff(np.append(first, len(rows))), rows[:, 2])
         groups = rows[first]
-        _, start = np.unique(groups[:, 0], return_index=True)
-        sizes = np.diff(np.append(start, len(groups)))
+        _, start, sizes = np.unique(groups[:, 0], return_index=True, return_counts=True)
         here = self.sets.sets(start, sizes, groups[:, 1], following)
         group_of_row = np.cumsum(fresh) - 1
         return here, sizes, following[group_of_row[inverse]]
@@ -249,10 +246,10 @@ class Choices:
 
         ``nodes``: (k, robots + 1), of one layer in each row.
         """
-        mixed = nodes[:, self._robots]
+        mixed = nodes[:, -1]
         fails = np.zeros(len(nodes), np.bool_)
         equal = np.ones(len(nodes), np.bool_)
-        for robot in range(self._robots):
+        for robot in range(self.space.robots):
             mine = self.of_node[robot, nodes[:, robot]]
             theirs = self.of_node[robot, mixed]
             equal &= mine == theirs
@@ -261,7 +258,7 @@ class Choices:
         left = np.flatnonzero(~fails & self.requires[mixed])
         fails[left[equal[left]]] = True
         left = left[~equal[left]]
-        chosen = self.of_node[np.arange(self._robots)[:, None], nodes[left, :-1].T]
+        chosen = self.of_node[np.arange(self.space.robots)[:, None], nodes[left, :-1].T]
         table, number = unique_rows(np.column_stack((*chosen, mixed[left])))
         answers = [self.fails(tuple(row[:-1]), row[-1]) for row in table.tolist()]
         fails[left] = np.array(answers, np.bool_)[number]

@@ -170,7 +170,6 @@ class DifferenceWalk:
 
     def __init__(self, space: PlanSpace) -> None:
         self._space = space
-        self._robots = space.robots
         self._layers = _walk(space)
 
     @property
@@ -266,9 +265,10 @@ class DifferenceWalk:
         columns = (shared, np.sort(following, axis=1), ends[:, :1], np.sort(ends[:, 1:], axis=1))
         table = np.unique(np.column_stack(columns), axis=0)
         # One ending for each first difference will do in one round.
-        _, fresh = np.unique(table[:, : self._robots + 1], axis=0, return_index=True)
+        size = 1 + self._space.robots
+        _, fresh = np.unique(table[:, :size], axis=0, return_index=True)
         for row in table[fresh].tolist():
-            yield tuple(row[: self._robots + 1]), tuple(row[self._robots + 1 :])
+            yield tuple(row[:size]), tuple(row[size:])
 
 
 def _separated(word: Ints, shared: Ints, others: Ints) -> Bools:

@@ -234,8 +234,9 @@ class _SelectThenApply:
         self._actions = [action for action in actions if action.literals is not None]
         self._step_cost = step_cost
         self._parts = {_IDLE: (), **{action.label: action.parts for action in team.actions}}
-        #: The facts that it is a robot's turn to select.
+        #: The facts that it is a robot's turn to select; with the first a step begins.
         self._choosing = [own_fact("time to choose", name) for name in team.names]
+        self._first = self._choosing[0]
         late = [action for action in self._actions if not action.at_once]
         busy = {(STAGES.index(s), a.robot) for a in late for s in STAGES if a.has(s)}
         order = [(STAGES[number], robot) for number, robot in sorted(busy)]
@@ -252,11 +253,6 @@ class _SelectThenApply:
         self._tidies = last * len(marks) > _MANY
         if self._tidies:
             self.out.action("end the step", {_TIDY: True}, {self._first} | self._restored, {_TIDY})
-
-    @property
-    def _first(self) -> Atom:
-        """The fact that a step begins, and the one before is over."""
-        return self._choosing[0]
 
     def write_robot(self, robot: int) -> None:
         """Everything that one robot does in a step."""
