@@ -45,7 +45,6 @@ class LabelSets:
         self._sizes = {END: 1}
 
     def __len__(self) -> int:
-        """Count the different sets."""
         return len(self._moves)
 
     def moves(self, number: int) -> dict[int, int]:

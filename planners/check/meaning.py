@@ -62,7 +62,8 @@ class Meaning:
 
     def holds(self, formula: Formula, binding: Binding, positive: bool, moment: Moment) -> bool:
         """Whether a formula (negated unless ``positive``) holds."""
-        formula, positive = _unsigned(formula, positive)
+        if isinstance(formula, Not):
+            return self.holds(formula.part, binding, not positive, moment)
         branches = self._branches(formula, binding)
         if branches is not None:
             values = (self.holds(part, inner, positive, moment) for part, inner in branches)
@@ -77,7 +78,8 @@ class Meaning:
 
     def why_not(self, formula: Formula, binding: Binding, positive: bool, moment: Moment) -> str:
         """Why a formula that does not hold does not hold, in words."""
-        formula, positive = _unsigned(formula, positive)
+        if isinstance(formula, Not):
+            return self.why_not(formula.part, binding, not positive, moment)
         branches = self._branches(formula, binding)
         if branches is None:
             return self._literal_fails(formula, binding, positive)
@@ -99,7 +101,8 @@ class Meaning:
 
         A formula that this makes true requires nothing, whatever stands inside.
         """
-        formula, positive = _unsigned(formula, positive)
+        if isinstance(formula, Not):
+            return self.required(formula.part, binding, not positive, acting)
         branches = self._branches(formula, binding)
         if branches is None:
             fixed = self._fixed(formula, binding, positive, acting)
@@ -173,13 +176,6 @@ class Meaning:
     def fluents_of(self, atoms: Iterable[Atom]) -> State:
         """The state that a list of true atoms describes."""
         return frozenset(atom for atom in atoms if atom.predicate in self._fluents)
-
-
-def _unsigned(formula: Formula, positive: bool) -> tuple[Formula, bool]:
-    """The formula inside all negations in front, and its polarity."""
-    while isinstance(formula, Not):
-        formula, positive = formula.part, not positive
-    return formula, positive
 
 
 def _is_conjunction(formula: Formula, positive: bool) -> bool:

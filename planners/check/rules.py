@@ -311,7 +311,6 @@ class Rules:
 
 
 def _actions_in(formula: Formula) -> set[str]:
-    """The actions that a formula speaks of."""
     match formula:
         case StepAtom(action):
             return {action}

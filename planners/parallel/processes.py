@@ -155,7 +155,6 @@ def _asked_to_end(_signal: int, _frame: FrameType | None) -> None:
 
 
 def _end_with_parent() -> None:
-    """End this process soon after its parent was killed."""
     parent = parent_process()
     assert parent is not None
     parent.join()
