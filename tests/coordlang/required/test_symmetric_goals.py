@@ -67,7 +67,10 @@ def answer(candidates: Candidates, portion: float, by_symmetry: bool) -> FirstDi
             return None
 
 
-def random_worlds(seeds: range) -> int:
+@pytest.mark.parametrize(
+    "seeds", [range(15), pytest.param(range(1_000, 1_300), marks=pytest.mark.slow)]
+)
+def test_random_worlds(seeds: range) -> None:
     found = 0
     for seed in seeds:
         random = Random(seed)
@@ -78,14 +81,7 @@ def random_worlds(seeds: range) -> int:
         options = random.choice([ModelOptions(), ModelOptions(cost="makespan+actions")])
         candidates = all_pairs(GRID, [problem], options)
         found += bool(candidates.count) and agree(candidates, random.choice([PORTION, 40.0, 300.0]))
-    return found
-
-
-@pytest.mark.parametrize(
-    "seeds", [range(15), pytest.param(range(1_000, 1_300), marks=pytest.mark.slow)]
-)
-def test_random_worlds(seeds: range) -> None:
-    assert random_worlds(seeds) >= len(seeds) // 3
+    assert found >= len(seeds) // 3
 
 
 def test_random_models() -> None:

@@ -339,12 +339,6 @@ EFFECTS = """(:types robot thing - object box - thing) (:predicates (on ?t - obj
     :effect (forall (?t - thing) (when (big ?t) (forall (?t - box) (not (on ?t))))))"""
 
 
-def things(init: str) -> World:
-    return world(
-        EFFECTS, f"(:objects r1 r2 - robot t - thing b c - box) (:init {init}) (:goal (p))"
-    )
-
-
 @pytest.mark.parametrize(
     ("init", "label", "result"),
     [
@@ -368,7 +362,9 @@ def things(init: str) -> World:
     ],
 )
 def test_effects(init: str, label: str, result: str) -> None:
-    assert after(things(init), label, None) == {*result[1:-1].split(") (")}
+    objects = "(:objects r1 r2 - robot t - thing b c - box)"
+    things = world(EFFECTS, f"{objects} (:init {init}) (:goal (p))")
+    assert after(things, label, None) == {*result[1:-1].split(") (")}
 
 
 # -- joint-action PDDL
