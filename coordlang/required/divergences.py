@@ -30,6 +30,8 @@ from planners.search.edge_index import EdgeIndex
 _CHUNK = 1_000_000
 #: Ways to mix next steps that are handled together at most, where sets are few.
 _AT_ONCE = 50_000
+#: What rows are filled up with: -1 among `Rows`.
+_NONE = np.uint64(2**64 - 1)
 
 
 class TooManyDivergences(Exception):
@@ -92,8 +94,8 @@ def _walked_divergences(choices: Choices, most: float) -> Ints:
             fails = can_fail(choices, targets)
             last, after = space.state[table[source, 0]], space.state[targets[:, :-1]]
             one = in_one_state(space, targets[:, :-1])
-            rows = np.column_stack((last, _distinct(after)))[fails & ~one]
-            found, _ = unique_rows(np.concatenate((found, rows.astype(np.uint64))))
+            rows = np.column_stack((last.astype(np.uint64), _distinct(after)))[fails & ~one]
+            found, _ = unique_rows(np.concatenate((found, rows)))
             # From one node, which their mixture is at, too, all plans begin anyway.
             going_on.append(targets[fails & one & (targets != targets[:, :1]).any(axis=1)])
         return np.unique(np.concatenate(going_on), axis=0)
@@ -104,13 +106,13 @@ def _walked_divergences(choices: Choices, most: float) -> Ints:
     return found.astype(np.int64)
 
 
-def _distinct(states: Ints) -> Ints:
-    """The different numbers of each row (k, robots), sorted, filled up with -1."""
-    ordered = np.sort(states, axis=1)
+def _distinct(states: Ints) -> Rows:
+    """The different numbers of each row (k, robots), sorted, filled up."""
+    ordered = np.sort(states, axis=1).astype(np.uint64)
     again = ordered[:, 1:] == ordered[:, :-1]
-    ordered[:, 1:][again] = np.iinfo(np.int64).max
+    ordered[:, 1:][again] = _NONE
     ordered.sort(axis=1)
-    return np.where(ordered == np.iinfo(np.int64).max, -1, ordered)
+    return ordered
 
 
 def minimal(rows: Ints) -> Ints:
@@ -135,10 +137,6 @@ def _implied(known: Rows, rows: Rows, last: int | None = None) -> Bools:
             smaller = (part != rows[left]).any(axis=1)
             implied[left] = smaller & _among(known, part)
     return implied
-
-
-#: What rows are filled up with: -1 among `Rows`.
-_NONE = np.uint64(2**64 - 1)
 
 
 def _among(known: Rows, rows: Rows) -> Bools:

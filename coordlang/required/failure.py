@@ -57,8 +57,8 @@ class WeightedSets:
     that were added up.
     """
 
-    def __init__(self, sets: LabelSets) -> None:
-        self.sets = sets
+    def __init__(self) -> None:
+        self.sets = LabelSets()
         self.work = 0
         #: Each first label of a set with the multiple of what follows.
         self.moves: list[dict[int, Multiple]] = [{}]
@@ -139,7 +139,7 @@ def failure_probability(
     ``words`` are for each of the ``spaces`` the word number of each node; None: silence.  Raises
     `TooManyToCount` beyond ``most`` additions.
     """
-    sets = WeightedSets(LabelSets())
+    sets = WeightedSets()
     found: list[Fraction] = []
     for space, word in zip(spaces, words, strict=True):
         found += FailureCount(space, word, sets, most).tasks()
@@ -155,7 +155,7 @@ def failure_of_sentence(
     with the sentence, as a plan space of one task.  Raises `TooManyToCount` beyond ``most``
     additions.
     """
-    sets = WeightedSets(LabelSets())
+    sets = WeightedSets()
     begin = int(fits.starts[0])
     (parts,) = FailureCount(fits, None, sets, most).by_sentence({begin})[begin].values()
     size, good = FailureCount(space, None, sets, most).good_of(parts, start)

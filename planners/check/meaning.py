@@ -57,7 +57,7 @@ class Meaning:
         self._problem = problem
         self._team = team
         self._fluents = fluent_predicates(domain)
-        self._schemas = {schema.name: schema for schema in domain.schemas}
+        self.schemas = {schema.name: schema for schema in domain.schemas}
         self._members: dict[tuple[str, ...], tuple[str, ...]] = {}
 
     def holds(self, formula: Formula, binding: Binding, positive: bool, moment: Moment) -> bool:
@@ -126,7 +126,7 @@ class Meaning:
             case Atom(predicate) if predicate not in self._fluents:
                 return (_ground(formula, binding) in self._problem.init) == positive
             case StepAtom(action, args):
-                schema, args = self._schemas[action], _ground(formula, binding).args
+                schema, args = self.schemas[action], _ground(formula, binding).args
                 of_type = (
                     arg in self.objects(parameter.types)
                     for parameter, arg in zip(schema.parameters, args, strict=True)

@@ -71,7 +71,6 @@ class Rules:
     def __init__(self, domain: Domain, problem: Problem, team: Team) -> None:
         self.domain, self.problem, self.team = domain, problem, team
         self.meaning = Meaning(domain, problem, team)
-        self.schemas = {schema.name: schema for schema in domain.schemas}
         self._touched: dict[tuple[StepAtom, StepAtom | None], Touched] = {}
 
     def step(self, state: State, labels: Labels) -> State | str:
@@ -105,7 +104,7 @@ class Rules:
     def instance(self, label: str) -> Instance | str:
         """The subaction that a text names, or what is wrong with the text."""
         name, *args = _tokens(label) or [""]
-        schema = self.schemas.get(name)
+        schema = self.meaning.schemas.get(name)
         if schema is None:
             return f"{label} is no action of the domain"
         if len(args) != len(schema.parameters):
