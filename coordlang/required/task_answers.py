@@ -112,11 +112,10 @@ def _fewest(space: PlanSpace, found: Failures) -> FewestActions | None:
     fewer = fewest_actions(space)
     if fewer is None:
         return None
-    required = bool(Choices(fewer).requires[fewer.starts[0]])
-    own = failures([fewer], [None], _ADDITIONS) if required else NONE
-    if required and (own.mean is None or found.mean is None or own.mean >= found.mean):
+    own = failures([fewer], [None], _ADDITIONS).mean
+    if own is None or (own and (found.mean is None or own >= found.mean)):
         return None
-    return FewestActions(_plans(fewer), required, float(own.mean or 0))
+    return FewestActions(_plans(fewer), own > 0, float(own))
 
 
 def fewest_actions(space: PlanSpace) -> PlanSpace | None:

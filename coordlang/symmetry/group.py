@@ -22,7 +22,7 @@ from coordlang.language.warping import Clause, pair
 from coordlang.symmetry.graph import LARGEST_GRAPH, Renaming, automorphism_generators, joined_order
 from planners.grounding.actions import GroundAction
 from planners.joint.model import FullState, Goal
-from planners.joint.states import StateCodec
+from planners.joint.states import StateCodec, split_atoms
 from planners.joint.tables import Ints, Rows, find_rows, unique_rows
 from planners.pddl.formula_tree import Compound, Leaf, fold
 from planners.pddl.lifted import Atom, StepAtom
@@ -79,7 +79,7 @@ def _in_order(text: str, robots: Sequence[str]) -> str:
     """
     if ") (" not in text:
         return text
-    subaction, *others = re.findall(r"\((?:[^()]|\([^()]*\))*\)", text)
+    subaction, *others = split_atoms(text)
 
     def place(other: str) -> tuple[bool, int]:
         return other.startswith("(with "), robots.index(other.split()[1].rstrip(")"))
