@@ -62,10 +62,11 @@ class _ModelGraph:
         self._colours: dict[Hashable, int] = {}
         self._colour: list[int] = []
         self._neighbours: list[list[int]] = []
-        self._objects = {name: self._vertex(self._look(name)) for name in _used(candidates)}
+        used = _used(candidates)
+        self._objects = {name: self._vertex(self._look(name, used[name])) for name in used}
         self._arguments: dict[tuple[str, int], int] = {}
         self._goals: dict[Goal, int] = {}
-        for atom in _static_facts(candidates):
+        for atom in _static_facts(candidates, used):
             self._instance(("static", atom.predicate), atom.args)
         facts = self._model.codec.facts
         self._facts = [self._instance(("fact", a.predicate), a.args) for a in facts]
@@ -80,17 +81,16 @@ class _ModelGraph:
         self._colour.append(self._colours.setdefault(colour, len(self._colours)))
         return number
 
-    def _look(self, name: str) -> Hashable:
+    def _look(self, name: str, types: Iterable[str]) -> Hashable:
         """The colour of an object: its types, and what kind of a robot it is, if it is one."""
-        model, loaded = self._model, self._candidates.loaded
+        model = self._model
         robot: Hashable = None
         if name in model.robots:
             # Joint actions name their robots in the text of the domain.
             number = model.robots.index(name)
             robot = name if model.is_joint_action else model.idling_costs[number]
-        constant = name if name in loaded.domain.constants else ""
-        types = tuple(sorted(loaded.problems[0].objects[name]))
-        return ("object", constant, types, robot)
+        constant = name if name in self._candidates.loaded.domain.constants else ""
+        return ("object", constant, tuple(sorted(types)), robot)
 
     def _instance(self, colour: tuple[Hashable, ...], args: Sequence[str]) -> int:
         """A vertex for a predicate or an action schema with its arguments."""
@@ -189,7 +189,7 @@ def joined_order(candidates: Candidates) -> list[str]:
     """The objects of the graph, if possible each after one that shares a static fact with it."""
     used = _used(candidates)
     near: dict[str, set[str]] = {name: set() for name in used}
-    for fact in _static_facts(candidates):
+    for fact in _static_facts(candidates, used):
         for arg in fact.args:
             near[arg].update(fact.args)
     order: list[str] = []
@@ -203,18 +203,18 @@ def joined_order(candidates: Candidates) -> list[str]:
     return order
 
 
-def _static_facts(candidates: Candidates) -> list[Atom]:
-    """The static facts about objects of the graph alone."""
-    loaded, used = candidates.loaded, set(_used(candidates))
-    fluents = fluent_predicates(loaded.domain)
-    init = loaded.problems[0].init
-    about = [a for a in init if a.predicate not in fluents and used.issuperset(a.args)]
+def _static_facts(candidates: Candidates, used: dict[str, tuple[str, ...]]) -> list[Atom]:
+    """The static facts about ``used`` objects alone."""
+    fluents = fluent_predicates(candidates.loaded.domain)
+    init = candidates.loaded.problems[0].init
+    about = [a for a in init if a.predicate not in fluents and used.keys() >= set(a.args)]
     return sorted(about, key=str)
 
 
-def _used(candidates: Candidates) -> list[str]:
+def _used(candidates: Candidates) -> dict[str, tuple[str, ...]]:
     """The objects of ground actions and facts, and the robots, as the problem lists them."""
     model = candidates.model
     named = {arg for action in model.actions for arg in action.args} | set(model.robots)
     named |= {arg for fact in model.codec.facts for arg in fact.args}
-    return [name for name in candidates.loaded.problems[0].objects if name in named]
+    objects = candidates.loaded.problems[0].objects
+    return {name: types for name, types in objects.items() if name in named}

@@ -72,9 +72,8 @@ class Meaning:
         if fixed is not None:
             return fixed
         atom = _ground(formula, binding)
-        if isinstance(atom, Atom):
-            return moment.state is None or (atom in moment.state) == positive
-        return moment.step is None or (atom in moment.step) == positive
+        true = moment.state if isinstance(atom, Atom) else moment.step
+        return true is None or (atom in true) == positive
 
     def why_not(self, formula: Formula, binding: Binding, positive: bool, moment: Moment) -> str:
         """Why a formula that does not hold does not hold, in words."""

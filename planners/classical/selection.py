@@ -2,8 +2,6 @@
 """The select-then-apply form, of linear size: robots select one after another, then it is applied.
 
 What no other robot can see is applied as it is selected (`StagedAction`).
-A step in which all selections are of this kind is over with the last of them; else something is
-left to do, in stages: all check; all undo (rarely); all apply.
 """
 
 from __future__ import annotations
