@@ -126,7 +126,6 @@ def _joint_model(
     else:
         stepper = ComposingStepper(codec, evaluator, robots, subactions, options.cost, idling)
     return JointModel(
-        name=domain.name,
         robots=robots,
         labels=labels,
         actions=actions,

@@ -123,7 +123,7 @@ def avoids(task_language: TaskLanguage, atoms: str) -> PlanPreference:
     facts, never, codec = [], [], model.codec
     for text in wanted:  # what is always true is left out
         predicate, *args = text[1:-1].split(" ")
-        number = codec.facts.number_of(text)
+        number = codec.facts.numbers.get(text)
         if number is not None:
             facts.append(number)
         elif not _is_declared(task_language, predicate, args):

@@ -93,10 +93,10 @@ def _images(renaming: Renaming, codec: StateCodec, rows: Rows) -> Rows | None:
     for fact, text in enumerate(codec.facts.texts):
         true = codec.column(rows, fact)
         if true.any():
-            image = codec.facts.number_of(_renamed(renaming, text))
+            image = codec.facts.numbers.get(_renamed(renaming, text))
             if image is None:
                 return None
-            codec.set(images, true, [image])
+            codec.set(images, true, image)
     return images
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from planners.grounding.actions import GroundAction, GroundEffect
 from planners.joint.states import FactTable, StateCodec, TrueFacts, test_bit, test_bits
 from planners.joint.tables import Bools, Ints, Numbers, Rows, ranges
-from planners.pddl.formula_tree import Compound, Leaf, conjuncts, fold, literals, signed
+from planners.pddl.formula_tree import Compound, GroundLeaf, Leaf, conjuncts, fold, literals, signed
 from planners.pddl.lifted import TRUE, And, Atom, Formula, Junction, Not, StepAtom, Truth
 
 Labels = NDArray[np.int32]
@@ -79,13 +79,9 @@ def split_condition(
     rest: list[Formula] = []
     for part in conjuncts(precondition):
         inner, positive = signed(part)
-        if isinstance(inner, StepAtom) and not positive:
-            continue
         if isinstance(inner, Atom) and inner in evaluator.facts:
             known.append((evaluator.facts.index[inner], positive))
-        elif isinstance(inner, Atom) and not positive:
-            continue
-        else:
+        elif positive or not isinstance(inner, GroundLeaf):
             rest.append(part)
     return known, rest
 
@@ -194,4 +190,4 @@ class Operators:
             for effect in effects if len(there) else ():
                 fires = self._evaluator.holds(effect.condition, rows, source[there], beside)
                 into = changed[0] if effect.adds else changed[1]
-                self._codec.set(into, there[fires], [self._codec.facts.index[effect.atom]])
+                self._codec.set(into, there[fires], self._codec.facts.index[effect.atom])

@@ -157,7 +157,6 @@ class JointModel:
     ``step_model`` whose subactions they are, and ``has_ties`` (`planners.joint.traces.Traces`).
     """
 
-    name: str
     robots: tuple[str, ...]
     labels: tuple[tuple[str, ...], ...]
     actions: tuple[GroundAction, ...]
@@ -207,7 +206,7 @@ class JointModel:
         if not self.slack_facts:
             return rows
         rows = rows.copy()
-        self.codec.clear(rows if rows.ndim == 2 else rows[None, :], slice(None), self.slack_facts)
+        rows[..., : self.codec.fact_blocks] &= ~self.codec.mask(self.slack_facts)
         return rows
 
     @property

@@ -25,13 +25,14 @@ class FactTable:
     """The atoms that can be true in some state and false in another: the *facts* of a model.
 
     ``atoms`` are in the order of their ``texts`` (PDDL, lower case, sorted as strings), which is
-    the order in which a state's key names them.  A fact's *number* is its position.
+    the order in which a state's key names them.  A fact's *number* is its position: ``index`` has
+    it by atom, ``numbers`` by text.
     """
 
     atoms: tuple[Atom, ...]
     texts: tuple[str, ...] = field(compare=False)
     index: dict[Atom, int] = field(compare=False, repr=False)
-    _number: dict[str, int] = field(compare=False, repr=False)
+    numbers: dict[str, int] = field(compare=False, repr=False)
 
     @classmethod
     def of(cls, atoms: Iterable[Atom]) -> FactTable:
@@ -52,10 +53,6 @@ class FactTable:
     def __contains__(self, atom: Atom) -> bool:
         """Say whether an atom is a fact of the model."""
         return atom in self.index
-
-    def number_of(self, text: str) -> int | None:
-        """The number of the fact with this text, None if there is none."""
-        return self._number.get(text)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +99,7 @@ class StateCodec:
             if self.memory is not None and atom.startswith("(last "):
                 self._encode_last(row, atom)
                 continue
-            number = self.facts.number_of(atom)
+            number = self.facts.numbers.get(atom)
             if number is None:
                 raise BadInput(
                     f"{atom} can never be true in this model",
@@ -115,11 +112,7 @@ class StateCodec:
 
     def true_facts(self, row: Rows) -> list[int]:
         """The numbers of the facts that are true in a state, in order."""
-        return [
-            block * _BLOCK_BITS + bit
-            for block in range(self.fact_blocks)
-            for bit in bits(int(row[block]))
-        ]
+        return [*bits(self.fact_bits(row))]
 
     def fact_bits(self, row: Rows) -> int:
         """The facts that are true in a state as one number: bit k says whether fact k is."""
@@ -147,15 +140,9 @@ class StateCodec:
         """In which states of a table a fact is true."""
         return test_bit(rows, slice(None), fact)
 
-    def set(self, rows: Rows, which: Ints | Bools | slice, facts: Iterable[int]) -> None:
-        """Make facts true in some states of a table (by number or mask), in place."""
-        for fact in facts:
-            rows[which, fact // _BLOCK_BITS] |= np.uint64(1 << fact % _BLOCK_BITS)
-
-    def clear(self, rows: Rows, which: Ints | Bools | slice, facts: Iterable[int]) -> None:
-        """Make facts false in some states of a table (by number or mask), in place."""
-        for fact in facts:
-            rows[which, fact // _BLOCK_BITS] &= ~np.uint64(1 << fact % _BLOCK_BITS)
+    def set(self, rows: Rows, which: Ints | Bools | slice, fact: int) -> None:
+        """Make a fact true in some states of a table (by number or mask), in place."""
+        rows[which, fact // _BLOCK_BITS] |= np.uint64(1 << fact % _BLOCK_BITS)
 
     def facts_part(self, rows: Rows) -> Rows:
         """One state or a table of states without remembered actions."""

@@ -91,7 +91,7 @@ def seen_rows(model: JointModel, rows: Rows) -> Rows:
         return rows
     every = np.tile(rows, (len(model.slack_facts), 1))
     for left, fact in enumerate(model.slack_facts):
-        model.codec.set(every, slice(left * len(rows), (left + 1) * len(rows)), [fact])
+        model.codec.set(every, slice(left * len(rows), (left + 1) * len(rows)), fact)
     return unique_rows(every)[0]
 
 
@@ -100,5 +100,5 @@ def seeing(graph: PlanSpace, left: Ints, rows: Rows) -> PlanSpace:
     model = graph.model
     own = graph.rows[graph.state].copy()
     for slack, fact in enumerate(model.slack_facts):
-        model.codec.set(own, left == slack, [fact])
+        model.codec.set(own, left == slack, fact)
     return replace(graph, rows=rows, state=find_rows(rows, own))
