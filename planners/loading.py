@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import chain
 from os import PathLike
 
 from planners.grounding.actions import GroundAction, apply_network, impossible_actions
@@ -28,9 +27,6 @@ from planners.pddl.robots import (
 from planners.system.errors import BadInput, Position, UsageError
 from planners.system.limits import reaching
 from planners.system.messages import echoed
-
-#: The texts of a robot's labels, idling first.
-Labels = tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +76,9 @@ def build(
     for other in problems[1:]:
         _check_same_world(domain, first, other)
     team = find_team(domain, first, options)
-    starts = [*(problem.init for problem in problems), *inits]
+    starts = frozenset().union(*(problem.init for problem in problems), *inits)
     with_costs = options.cost == "makespan+cost"
-    actions = ground_actions(domain, first, team, also={*chain(*starts)}, costs=with_costs)
+    actions = ground_actions(domain, first, team, starts, costs=with_costs)
     with reaching(
         lambda: f"comparing {len(actions):,} ground actions of {len(team.robots)} robots", FEWER
     ):
@@ -98,7 +94,7 @@ def _joint_model(
     problem: Problem,
     team: Team,
     actions: tuple[GroundAction, ...],
-    starts: Sequence[frozenset[Atom]],
+    starts: frozenset[Atom],
     options: ModelOptions,
 ) -> JointModel:
     """The joint model of a team's ground actions: its facts, labels and stepper.
@@ -112,7 +108,9 @@ def _joint_model(
         labels = _labels_of_parts(actions, robots)
     seen = options.words_see_slack
     left = [Atom(SLACK_LEFT, (str(k),)) for k in range(slack + 1)] if seen else []
-    facts = FactTable.of({*_facts(domain, actions, starts), *left})
+    possible = starts | {e.atom for action in actions for e in action.effects if e.adds}
+    fluents = fluent_predicates(domain)
+    facts = FactTable.of([*(atom for atom in possible if atom.predicate in fluents), *left])
     codec = StateCodec(facts, robots, labels if options.remember_actions else None)
     evaluator = Evaluator(codec.facts, {} if domain.is_joint_action else _step_atoms(subactions))
     costs = options.cost == "makespan+cost"
@@ -139,20 +137,13 @@ def _joint_model(
         slack=slack,
         slack_facts=tuple(facts.index[atom] for atom in left),
         is_asynchronous=options.asynchronous,
-        impossible=impossible_actions(domain, problem, team, actions, {*chain(*starts)}),
+        impossible=impossible_actions(domain, problem, team, actions, possible),
     )
 
 
-def _facts(
-    domain: Domain, actions: Sequence[GroundAction], starts: Sequence[frozenset[Atom]]
-) -> set[Atom]:
-    """The fluent atoms that some initial state has or some action adds."""
-    fluents = fluent_predicates(domain)
-    possible = {atom for start in starts for atom in start if atom.predicate in fluents}
-    return possible | {e.atom for a in actions for e in a.effects if e.adds}
-
-
-def _labels_of_parts(actions: Sequence[GroundAction], robots: Sequence[str]) -> tuple[Labels, ...]:
+def _labels_of_parts(
+    actions: Sequence[GroundAction], robots: Sequence[str]
+) -> tuple[tuple[str, ...], ...]:
     """The labels of joint-action PDDL: what the robots' parts are called, in natural order."""
     parts = [{action.parts[robot] for action in actions} for robot in range(len(robots))]
 
@@ -196,6 +187,3 @@ def _check_same_world(domain: Domain, first: Problem, other: Problem) -> None:
                 remedy=f"Compared with {first.source.name}: the problems of one model have the "
                 "same objects and statics.",
             )
-
-
-__all__ = ["ModelOptions", "PlanningInstance", "build", "load", "task_of"]

@@ -8,7 +8,7 @@ and all but the required atoms are left out; so what is said of them is true of 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from itertools import chain, combinations, islice, product
 from typing import NamedTuple
@@ -99,16 +99,15 @@ def impossible_actions(
     problem: Problem,
     team: Team,
     actions: Sequence[GroundAction],
-    starts: Iterable[Atom],
+    possible: Set[Atom],
 ) -> tuple[Impossible, ...]:
     """The actions whose robot can do no instance of them, for want of one atom.
 
     Atoms without variables come first: what a robot lacks itself.  ``actions`` are all that are
-    ever possible, ``starts`` the true atoms of all initial states.
+    ever possible, ``possible`` the atoms that some initial state has or one of them adds.
     """
     acting = {(action.schema, owner) for action in actions for owner in action.owners}
     fluents = fluent_predicates(domain)
-    possible = {*starts, *(e.atom for a in actions for e in a.effects if e.adds)}
     found = [
         Impossible(schema.name, robot, atom, atom.predicate in fluents)
         for schema in domain.schemas

@@ -13,7 +13,7 @@ from itertools import product
 from math import prod
 
 from planners.grounding.actions import GroundAction, GroundEffect
-from planners.grounding.reachability import reachable_arguments
+from planners.grounding.reachability import Arguments, reachable_arguments
 from planners.pddl.formula_tree import (
     GroundLeaf,
     conjuncts,
@@ -51,8 +51,6 @@ from planners.system.limits import reaching
 
 #: Variable -> the object that it stands for.
 Binding = dict[str, str]
-#: What stands behind a predicate or an action.
-Arguments = tuple[str, ...]
 #: An atom without which an instance of a quantified part is no matter.
 Guard = Atom | StepAtom
 #: A quantified formula, the variables in it and its guards (`_Grounder._shape`).
@@ -149,21 +147,19 @@ FEWER = "fewer objects, or actions with fewer parameters"
 
 
 def ground_actions(
-    domain: Domain, problem: Problem, team: Team, *, also: Iterable[Atom] = (), costs: bool = False
+    domain: Domain, problem: Problem, team: Team, starts: Set[Atom], *, costs: bool
 ) -> tuple[GroundAction, ...]:
     """All ground actions that may ever be applied; those that are idling are left out.
 
-    Sorted by schema (in domain order) and arguments.  ``also`` are fluent atoms of further initial
-    states; without ``costs`` every cost is 1.  Raises `BadInput` for an action that no robot owns
-    (``--unowned error``), or a missing cost value.
+    Sorted by schema (in domain order) and arguments.  ``starts`` are the true atoms of all
+    initial states; without ``costs`` every cost is 1.  Raises `BadInput` for an action that no
+    robot owns (``--unowned error``), or a missing cost value.
     """
     idling = idling_schemas(domain)
     domain = replace(domain, schemas=tuple(s for s in domain.schemas if s.name not in idling))
     world = f"{len(domain.schemas):,} action schemas over {len(problem.objects):,} objects"
     with reaching(lambda: f"looking for the applicable instances of {world}", FEWER):
-        reachable = reachable_arguments(
-            domain, problem.objects, sorted({*problem.init, *also}, key=str)
-        )
+        reachable = reachable_arguments(domain, problem, sorted(starts, key=str))
     grounder = _Grounder(domain, problem, team, reachable)
     total = sum(map(len, reachable.values()))
     actions: list[GroundAction] = []
@@ -224,7 +220,6 @@ class _Grounder:
         team: Team,
         reachable: Mapping[str, Sequence[tuple[str, ...]]],
     ) -> None:
-        self._domain = domain
         self._problem = problem
         self._team = team
         self._fluents = fluent_predicates(domain)

@@ -20,8 +20,8 @@ from math import prod
 from typing import TYPE_CHECKING, Any
 
 from planners.pddl.formula_tree import required_atoms
-from planners.pddl.lifted import Atom, Domain, Formula, Schema, Variable
-from planners.pddl.robots import natural
+from planners.pddl.lifted import Atom, Domain, Formula, Problem, Schema, Variable
+from planners.pddl.robots import objects_of
 from planners.system.errors import CoordlangError, OutOfMemory
 from planners.system.limits import memory_left
 from planners.system.signals import postponed_signals
@@ -41,32 +41,30 @@ _VARIABLE = re.compile(r"\bV\d+\b")
 
 
 def reachable_arguments(
-    domain: Domain, objects: dict[str, tuple[str, ...]], init: Iterable[Atom]
+    domain: Domain, problem: Problem, init: Iterable[Atom]
 ) -> dict[str, list[Arguments]]:
     """Find the argument tuples of a superset of each schema's applicable instances, sorted.
 
-    They come by the schema's name, in the natural order of the objects' names.  ``objects`` have
-    their types, ``init`` are all atoms that hold in some initial state.
+    They come by the schema's name, in the natural order of the objects' names.  ``init`` are all
+    atoms that hold in some initial state.
 
     Raises `OutOfMemory` if the instances of a schema without conditions alone would not fit,
     `MemoryError` if clingo meets the memory limit, `CoordlangError` if it grounds nothing.
     """
     from tarski.reachability import create_reachability_lp
 
-    _require_memory(domain, objects)
-    names = sorted(objects, key=natural)
+    _require_memory(domain, problem)
+    names = objects_of(domain, problem, ("object",))
     core = _Core(names)
     for schema in domain.schemas:
         core.add_action(schema)
     for atom in init:
         core.problem.init.add(*core.atom(atom, {}))
-    for name in names:
-        above = frozenset().union(*map(domain.supertypes, objects[name]))
-        for types in sorted(core.types):
-            if not above.isdisjoint(types):
-                core.problem.init.add(core.predicate(types, 1), core.objects[name])
+    for types in sorted(core.types):
+        for name in objects_of(domain, problem, types):
+            core.problem.init.add(core.predicate(types, 1), core.objects[name])
     program, _ = create_reachability_lp(core.problem)
-    found = _least_model([_interruptible(rule, len(objects)) for rule in program.rules])
+    found = _least_model([_interruptible(rule, len(names)) for rule in program.rules])
     return {
         schema.name: [
             tuple([names[number] for number in args])
@@ -76,19 +74,15 @@ def reachable_arguments(
     }
 
 
-def _require_memory(domain: Domain, objects: Mapping[str, tuple[str, ...]]) -> None:
+def _require_memory(domain: Domain, problem: Problem) -> None:
     """Raise `OutOfMemory` if what surely is reachable would not fit.
 
     Of a schema that requires no atom these are all arguments of the right types.
     """
-    types = [frozenset().union(*map(domain.supertypes, own)) for own in objects.values()]
     for schema in domain.schemas:
         if required_atoms(schema.precondition):
             continue
-        count = prod(
-            sum(not own.isdisjoint(parameter.types) for own in types)
-            for parameter in schema.parameters
-        )
+        count = prod(len(objects_of(domain, problem, p.types)) for p in schema.parameters)
         if count * _INSTANCE > (left := memory_left()):
             raise OutOfMemory(
                 f"action {schema.name!r} has {count:,} instances: they take "

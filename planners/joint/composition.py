@@ -20,6 +20,7 @@ from planners.pddl.lifted import FALSE, And, Atom, Formula, Junction, StepAtom
 from planners.pddl.model_options import Cost
 from planners.system.errors import BadInput, OutOfMemory, Position
 from planners.system.limits import memory_left, more_memory
+from planners.system.messages import counted
 
 
 class ComposingStepper(Stepper):
@@ -197,8 +198,7 @@ class ComposingStepper(Stepper):
         if combinations > self.piece and needed > self.memory_left():
             raise OutOfMemory(
                 f"{robot + 1} of {len(self._robots)} robots have {combinations:,} combinations of "
-                f"subactions in {states:,} "
-                f"state{'s' * (states != 1)}: about {needed / 2**30:,.1f} GiB, "
+                f"subactions in {counted(states, 'state')}: about {needed / 2**30:,.1f} GiB, "
                 f"and {self.memory_left() / 2**30:.1f} GiB are left",
                 remedy=f"Use fewer robots, or {more_memory()}.",
             )

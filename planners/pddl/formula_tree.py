@@ -97,13 +97,8 @@ def required_atoms(formula: Formula) -> tuple[Atom, ...]:
 
 def forbidden_steps(precondition: Formula) -> tuple[StepAtom, ...]:
     """The actions that must not be in the same joint step: negated among the `conjuncts`."""
-    return tuple(
-        [
-            part.part
-            for part in conjuncts(precondition)
-            if isinstance(part, Not) and isinstance(part.part, StepAtom)
-        ]
-    )
+    negations = [part.part for part in conjuncts(precondition) if isinstance(part, Not)]
+    return tuple([part for part in negations if isinstance(part, StepAtom)])
 
 
 def signed(formula: Formula) -> tuple[Formula, bool]:

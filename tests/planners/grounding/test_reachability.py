@@ -42,7 +42,7 @@ def views(places: int) -> tuple[Domain, Problem]:
 
 def ground(places: int) -> dict[str, list[tuple[str, ...]]]:
     domain, problem = views(places)
-    return reachable_arguments(domain, problem.objects, sorted(problem.init, key=str))
+    return reachable_arguments(domain, problem, sorted(problem.init, key=str))
 
 
 def test_all_arguments_in_the_natural_order_of_the_names() -> None:
