@@ -19,6 +19,7 @@ from planners.pddl.lifted import (
     Atom,
     Constraint,
     Domain,
+    Effect,
     Formula,
     Or,
     Problem,
@@ -27,14 +28,6 @@ from planners.pddl.lifted import (
 )
 from planners.pddl.model_options import Cost
 from planners.pddl.robots import Team, fluent_predicates, objects_of
-
-
-class GroundEffect(NamedTuple):
-    """``atom`` becomes true (``adds``) or false if ``condition`` holds before the step."""
-
-    atom: Atom
-    adds: bool
-    condition: Formula
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +44,7 @@ class GroundAction:
     args: tuple[str, ...]
     owners: tuple[int, ...]
     precondition: Formula
-    effects: tuple[GroundEffect, ...]
+    effects: tuple[Effect, ...]
     parts: tuple[str | None, ...] = ()
     cost: int = 1
     links: frozenset[StepAtom] = frozenset()

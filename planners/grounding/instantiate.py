@@ -12,7 +12,7 @@ from functools import cache
 from itertools import product
 from math import prod
 
-from planners.grounding.actions import GroundAction, GroundEffect
+from planners.grounding.actions import GroundAction
 from planners.grounding.reachability import Arguments, reachable_arguments
 from planners.pddl.formula_tree import (
     GroundLeaf,
@@ -340,12 +340,12 @@ class _Grounder:
                 return None
         return frozenset(self._team.owners(schema, args))
 
-    def _effect(self, effect: Effect, binding: Binding) -> Iterator[GroundEffect]:
+    def _effect(self, effect: Effect, binding: Binding) -> Iterator[Effect]:
         guards = self._static_atoms(effect.condition) if effect.variables else ()
         for inner in self._bindings.values(effect.variables, binding, guards):
             condition = self.formula(effect.condition, inner, True)
             if condition != FALSE:
-                yield GroundEffect(self._atom(effect.atom, inner), effect.adds, condition)
+                yield Effect(self._atom(effect.atom, inner), effect.adds, condition)
 
     def _literal(self, atom: GroundLeaf, positive: bool) -> Formula:
         found = self._literals.setdefault(atom, atom)

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, pairwise, product
+from math import prod
 
 import numpy as np
 
@@ -106,10 +107,8 @@ class ComposingStepper(Stepper):
 
     def most_steps(self, rows: Rows) -> int:
         """Products of the own choices."""
-        products = [1] * len(rows)
-        for first, _ in self.choices(rows):
-            products = [n * own for n, own in zip(products, np.diff(first).tolist(), strict=True)]
-        return sum(products)
+        counts = [np.diff(first).tolist() for first, _ in self.choices(rows)]
+        return sum(map(prod, zip(*counts, strict=True)))
 
     def why_not(self, row: Rows, labels: Sequence[int]) -> str:
         """The first rule that these labels break in a state."""
@@ -378,7 +377,6 @@ class JointActionStepper(Stepper):
 
         The cheapest, as `steps` takes it.
         """
-        found = np.flatnonzero((self._labels == np.array(labels)).all(axis=1))
         _, operators = self._operators.applicable(row[None, :])
-        here = set(found.tolist()) & set(operators.tolist())
-        return self._actions[min(here, key=lambda n: (int(self._cost[n]), n))].label
+        here = operators[(self._labels[operators] == np.array(labels)).all(axis=1)]
+        return self._actions[int(here[self._cost[here].argmin()])].label

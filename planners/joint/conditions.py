@@ -11,11 +11,11 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.grounding.actions import GroundAction, GroundEffect
+from planners.grounding.actions import GroundAction
 from planners.joint.states import FactTable, StateCodec, TrueFacts, test_bit, test_bits
 from planners.joint.tables import Bools, Ints, Numbers, Rows, ranges
 from planners.pddl.formula_tree import Compound, GroundLeaf, Leaf, conjuncts, fold, literals, signed
-from planners.pddl.lifted import TRUE, And, Atom, Formula, Junction, Not, StepAtom, Truth
+from planners.pddl.lifted import TRUE, And, Atom, Effect, Formula, Junction, Not, StepAtom, Truth
 
 Labels = NDArray[np.int32]
 
@@ -100,7 +100,7 @@ class Operators:
         self._codec, self._evaluator = codec, evaluator
         self._state_formulas: dict[int, list[Formula]] = {}
         self.step_formulas: dict[int, list[Formula]] = {}
-        self.conditional: dict[int, list[GroundEffect]] = {}
+        self.conditional: dict[int, list[Effect]] = {}
         self.adds = np.zeros((len(actions), codec.fact_blocks), np.uint64)
         self.deletes = np.zeros_like(self.adds)
         self._required, self._forbidden = np.zeros_like(self.adds), np.zeros_like(self.adds)

@@ -9,10 +9,10 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from planners.grounding.actions import GroundAction, GroundEffect
+from planners.grounding.actions import GroundAction
 from planners.joint.tables import Bools
 from planners.pddl.formula_tree import Leaf, forbidden_steps, label, literals, substituted
-from planners.pddl.lifted import FALSE, Atom, Formula, StepAtom, Truth
+from planners.pddl.lifted import FALSE, Atom, Effect, Formula, StepAtom, Truth
 
 T = TypeVar("T")
 
@@ -51,7 +51,7 @@ def footprint(action: GroundAction, step: frozenset[StepAtom] | None = None) -> 
     are left out.  None: every effect counts.
     """
     precondition = literals(action.precondition)
-    required, named, effects = [*precondition], [*precondition], list[GroundEffect]()
+    required, named, effects = [*precondition], [*precondition], list[Effect]()
     for effect in action.effects:
         found = literals(effect.condition)
         named += found

@@ -110,10 +110,11 @@ FALSE = Truth(False)
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """One literal effect with the variables it ranges over and its condition.
+    """``atom`` becomes true (``adds``) or false if ``condition`` holds before the step.
 
     Nested ``forall`` and ``when`` are flattened: ``variables`` lists every enclosing universal
     variable, outermost first, and ``condition`` is the conjunction of every enclosing condition.
+    The effects of ground actions have no variables.
     """
 
     atom: Atom
