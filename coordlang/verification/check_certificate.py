@@ -202,5 +202,5 @@ def _canonical(goal: Iterable[str]) -> object:
 def _tree(node: Expression) -> object:
     if isinstance(node, Token):
         return node.text
-    parts = [_tree(part) for part in node]
+    parts = [_tree(part) for part in node.items]
     return (node.head, frozenset(parts[1:])) if node.head in ("and", "or") else tuple(parts)

@@ -216,13 +216,12 @@ class ComposingStepper(Stepper):
             result |= robot.operators.adds[mine[first]]
             cost += robot.cost[mine]
         if any(robot.operators.conditional for robot in self._robot):
-            adds = np.zeros_like(result)
+            adds, deletes = np.zeros_like(result), np.zeros_like(result)
             for i, robot in enumerate(self._robot):
-                adds |= robot.operators.adds[labels[:, i]]
-            changed = adds, np.zeros_like(adds)
-            for i, robot in enumerate(self._robot):
-                robot.operators.enter_conditional(changed, rows, source, labels[:, i], labels)
-            result = (result & ~changed[1]) | changed[0]
+                mine = labels[:, i]
+                adds |= robot.operators.adds[mine]
+                robot.operators.enter_conditional((adds, deletes), rows, source, mine, labels)
+            result = (result & ~deletes) | adds
         return result, cost
 
 

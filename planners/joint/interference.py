@@ -78,7 +78,6 @@ def footprint(action: GroundAction, step: frozenset[StepAtom] | None = None) -> 
 def _leaves(
     kind: type[T], found: Iterable[tuple[object, bool]], signs: tuple[bool, ...]
 ) -> frozenset[T]:
-    """The leaves of a kind and of these signs."""
     return frozenset([a for a, positive in found if isinstance(a, kind) and positive in signs])
 
 

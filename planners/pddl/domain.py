@@ -252,7 +252,6 @@ def _parameter_items(
 
 
 def _read_schema(names: Names, head: _Head) -> Schema:
-    """Read an action; raises `BadInput` or `Unsupported` with the position."""
     inner, fields = names.with_variables(head.parameters), head.fields
     conditions, effect = fields.get(":precondition"), fields.get(":effect")
     precondition = read_formula(inner, conditions[0]) if conditions else TRUE
@@ -359,7 +358,7 @@ def _constraint(names: Names, schemas: Mapping[str, Schema], section: Group) -> 
     parameters = names.read_variables(listed)
     low, high = _bounds(bounds.group("'(LOW HIGH)'"))
     bound = []
-    for item in actions.group("a list of actions"):
+    for item in actions.group("a list of actions").items:
         entry = item.group("'(action POSITION ..)'")
         if entry.head not in schemas:
             raise unknown("action", entry, schemas)

@@ -209,7 +209,7 @@ class Names:
 
 def unknown(what: str, item: Group, declared: Iterable[str]) -> BadInput | Unsupported:
     """The error for a list whose head is no ``what`` that is declared."""
-    timed = item.head == "at" and any(is_token(part, "end", "start") for part in item)
+    timed = item.head == "at" and any(is_token(part, "end", "start") for part in item.items)
     feature = _FEATURES.get("within" if timed else item.head)
     if feature is not None:
         return item.unsupported(f"{feature.format(item.head)} is")

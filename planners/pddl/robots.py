@@ -103,7 +103,6 @@ def find_team(domain: Domain, problem: Problem, choice: ModelOptions) -> Team:
 
 
 def _found(domain: Domain, problem: Problem, choice: ModelOptions) -> tuple[tuple[str, ...], str]:
-    """The robots' names, and how they were found."""
     kinds = _Kinds(domain, problem)
     declared = _declared(domain, problem)
     if declared is not None:

@@ -173,9 +173,6 @@ class Group(_Placed):
         """The first token, or the empty string."""
         return first_text(self.items)
 
-    def __iter__(self) -> Iterator[Token | Group]:
-        return iter(self.items)
-
     def __len__(self) -> int:
         return len(self.items)
 
