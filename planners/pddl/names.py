@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
+from string import ascii_lowercase
 
 from planners.pddl.lifted import Atom, Domain, Signatures, Variable, have_common
 from planners.pddl.sexpr import SECTIONS, UNSUPPORTED, Expression, Group, Token
@@ -26,8 +27,6 @@ _FEATURES = {
     **dict.fromkeys(("oneof", "probabilistic", "unknown"), "non-deterministic effect '({} ..)'"),
     "preference": "a preference",
 }
-#: Arguments in an example.
-_LETTERS = tuple("abcdefghij")
 #: Characters of a name in an example.
 _SHOWN = 60
 
@@ -201,7 +200,7 @@ class Names:
         if found not in arities:
             numbers, name = sorted(arities), visible(item.head[:_SHOWN])
             wanted = " or ".join(map(str, numbers)) + f" argument{'s' * (numbers != [1])}"
-            forms = " or ".join(f"({' '.join((name, *_LETTERS[:n]))})" for n in numbers)
+            forms = " or ".join(f"({' '.join((name, *ascii_lowercase[:n]))})" for n in numbers)
             said = f"{what} {echoed(item.head)} takes {wanted}, found {found}"
             raise item.fail(said, f"Write {forms}, or declare it with {found}.")
         return tuple(self.term(term) for term in item.items[1:])

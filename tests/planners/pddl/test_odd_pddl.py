@@ -149,6 +149,11 @@ SAME_DOMAIN: dict[str, tuple[str, ...]] = {
         "(and (at ?r ?y) (forall (?p - room) "
         "(forall (?p - room) (when (= ?p ?x) (not (at ?r ?p))))))",
     ),
+    "a name that a shadowing variable could get": (
+        EFFECT,
+        "(and (at ?r ?y) (forall (?x - room) (forall (?x.1 - room) "
+        "(when (and (at ?r ?x) (= ?x.1 ?y) (not (= ?x ?x.1))) (not (at ?r ?x))))))",
+    ),
     "an atom both deleted and added": (
         EFFECT,
         "(and (not (at ?r ?y)) (at ?r ?y) (not (at ?r ?x)))",
