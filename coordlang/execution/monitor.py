@@ -18,7 +18,7 @@ import re
 import zlib
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from fnmatch import fnmatchcase
 from functools import cache, partial
@@ -59,14 +59,14 @@ class NotAllowed(MonitorError):
     ``step`` counts from 0, ``allowed`` are what it could have done (None: idle).
     """
 
-    def __init__(
-        self, robot: str, did: str | None, step: int, allowed: Sequence[str | None], unit: str
-    ) -> None:
+    def __init__(self, monitor: Monitor, did: str | None) -> None:
+        robot, step, unit = monitor.robot, monitor.step, monitor.unit
+        allowed = monitor.allowed()
         could = " or ".join(text or IDLE for text in allowed[:_SHOWN])
         more = " or .." if len(allowed) > _SHOWN else ""
         may = f"it may do {could}{more}" if allowed else f"all its {unit}s are done"
         super().__init__(f"{unit} {step + 1}: {robot} may not do {_shown(did or IDLE)}; {may}")
-        self.robot, self.did, self.step, self.allowed = robot, did, step, tuple(allowed)
+        self.robot, self.did, self.step, self.allowed = robot, did, step, allowed
 
 
 class NotPossible(MonitorError):
@@ -142,7 +142,9 @@ class Monitor:
         self._atoms = {**dict.fromkeys(facts, False), **dict.fromkeys(sorted(others))}
         if len(self._atoms) < len(facts) + len(others):
             raise _broken(f"{where}: an atom occurs twice in 'facts' and 'others'")
-        states = _read_states(entry, facts, where, self._own_texts(entry, where))
+        #: What the file says that the robot may do, as it is written there.
+        self._written = self._own_texts(entry, where)
+        states = _read_states(entry, facts, where, self._written)
         self._most = max(MAX_NODES, _NODES_OF_STATE * len(states))
         self._start = self._here = states[0]  # both, so that no step has states to give back
         self._has_promised = False
@@ -185,21 +187,14 @@ class Monitor:
             for to in state.moves.values():
                 if number.setdefault(to, len(states)) == len(states):
                     states.append(to)
-        table = [
-            (
-                state.step,
-                state.known,
-                [(t, number[to]) for t, to in state.moves.items()],
-                state.left,
-            )
-            for state in states
-        ]
-        return {**self.__dict__, "_start": table, "_here": None}
+        moves = [{text: number[to] for text, to in state.moves.items()} for state in states]
+        alone = [replace(state, moves={}) for state in states]
+        return {**self.__dict__, "_start": (alone, moves), "_here": None}
 
     def __setstate__(self, data: dict[str, Any]) -> None:
-        states = [_State(step, known, {}, left) for step, known, _, left in data["_start"]]
-        for state, (_, _, moves, _) in zip(states, data["_start"], strict=True):
-            state.moves = {text: states[to] for text, to in moves}
+        states, moves = data["_start"]
+        for state, own in zip(states, moves, strict=True):
+            state.moves = {text: states[to] for text, to in own.items()}
         self.__dict__.update({**data, "_start": states[0], "_here": states[0]})
 
     @property
@@ -228,14 +223,13 @@ class Monitor:
         """
         text = self._own(subaction)
         if text not in self._here.moves:
-            raise NotAllowed(self.robot, text, self.step, self.allowed(), self.unit)
+            raise NotAllowed(self, text)
         self._here = self._here.moves[text]
 
     def _own(self, subaction: str | None) -> str | None:
         """What the robot does as it is written in the file; None for idling."""
-        if isinstance(subaction, str) and subaction in self._here.moves:
-            return subaction
-        plain = _plain(subaction)
+        is_written = isinstance(subaction, str) and subaction in self._written
+        plain = subaction if is_written else _plain(subaction)
         return None if plain == IDLE else plain
 
     def known(self, atom: str) -> bool | None:
@@ -258,7 +252,7 @@ class Monitor:
         O(automaton * 2^(visits and dos)), of the steps still to be done.  (With any number of
         visits the question is NP-complete.)  Raises `MonitorError` beyond `MAX_NODES` nodes.
         """
-        found = self._making(*map(_texts, (visit, avoid, do, never)))
+        found = self._making(visit, avoid, do, never)
         if found is None:
             return Answer(None, 0)
         at, subplan = found, []
@@ -274,7 +268,7 @@ class Monitor:
 
         As much work as `can`.  Raises `NotPossible`, and is then as it was before.
         """
-        found = self._making(*map(_texts, (visit, avoid, do, never)))
+        found = self._making(visit, avoid, do, never)
         if found is None:
             kept = " together with what was promised before" if self._has_promised else ""
             raise NotPossible(
@@ -283,18 +277,13 @@ class Monitor:
         self._has_promised = True
         self._start = self._here = found
 
-    def _making(
-        self,
-        visit: Sequence[str],
-        avoid: Sequence[str],
-        do: Sequence[str],
-        never: Sequence[str],
-    ) -> _State | None:
+    def _making(self, *detour: Texts) -> _State | None:
         """The subplans from here on that make a detour and keep the promises; None if none do.
 
         Its states are pairs: one that was open, and the parts of the detour that are made by then
         (bits: the visits, then the dos).
         """
+        visit, avoid, do, never = map(_texts, detour)
         for atom in (*visit, *avoid):
             self._check_atom(atom)
         made_in = cache(partial(self._made_in, visit, avoid))
@@ -448,7 +437,7 @@ class EventMonitor(Monitor):
         """
         event = self._own(event)
         if event not in self.allowed():
-            raise NotAllowed(self.robot, event, self.step, self.allowed(), self.unit)
+            raise NotAllowed(self, event)
         if event is None or event == self._underway:
             return {}
         own = self._events[event]
@@ -541,10 +530,6 @@ class EventMonitor(Monitor):
         """Tell that another robot is ready to start this together with an own event."""
         self._events_of(robot)
         self._ready = {**self._ready, robot: _plain(subaction)}
-
-    def _own(self, subaction: str | None) -> str | None:
-        is_event = isinstance(subaction, str) and subaction in self._events
-        return subaction if is_event else super()._own(subaction)
 
     def _event(self, event: str) -> _OwnEvent:
         if event not in self._events:
