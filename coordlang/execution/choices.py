@@ -70,10 +70,6 @@ class SentenceChoices:
         """Whether every combination is optimal, by a walk of all or by the language's guarantee."""
         return self.task_language.guaranteed if self.mixtures is None else self.mixtures.holds
 
-    def of(self, robots: Sequence[int] | None) -> tuple[RobotChoices, ...]:
-        """The choices of the robots with these numbers; of all robots for None."""
-        return self.robots if robots is None else tuple(self.robots[robot] for robot in robots)
-
 
 def choices(task_language: TaskLanguage, words: Sequence[int], most: int = MOST) -> SentenceChoices:
     """The choices of every robot under a sentence, given by its word numbers.
@@ -264,10 +260,11 @@ CHOICES = FileFormat("choices", "choices file", ChoicesFile, FORMAT, VERSION)
 def to_record(choices: SentenceChoices, robots: Sequence[int] | None = None) -> ChoicesFile:
     """The content of a choices file, of all robots or of those with these numbers."""
     task_language = choices.task_language
+    chosen = range(len(choices.robots)) if robots is None else robots
     return ChoicesFile(
         format=FORMAT,
         version=VERSION,
-        domain=dict(task_language.language.provenance.domain) if task_language.language else {},
+        domain=dict(task_language.language.provenance.domain),
         robots=list(task_language.model.robots),
         task=describe(task_language.space, task_language.task),
         sentence=task_language.text(choices.words),
@@ -276,7 +273,7 @@ def to_record(choices: SentenceChoices, robots: Sequence[int] | None = None) -> 
         guaranteed=choices.guaranteed,
         tolerance=tolerance_data(task_language.tolerance).get("tolerance", UNSET),
         combinations_walked=choices.mixtures.nodes if choices.mixtures is not None else None,
-        choices=[_robot(choices.fits, own) for own in choices.of(robots)],
+        choices=[_robot(choices.fits, choices.robots[robot]) for robot in chosen],
     )
 
 

@@ -60,7 +60,7 @@ class TaskLanguage:
     ``partition`` is the language over the model's states, ``word`` the word number of every node of
     ``space``, which holds the plans of ``task`` (a number) and perhaps of further ones.
     ``covered``: it is one of the language's candidate tasks, and nothing worse happens in it than
-    the language says; for any other task nothing is guaranteed.  ``holds``: the plans of each
+    the language says; for any other task nothing is guaranteed.  ``guaranteed``: the plans of each
     sentence mix freely in the task, as ``verdict`` (None: there was none, or it did not fit into
     the memory) said here. ``declared`` are domain and problem, None where there is only a model.
     """
@@ -72,7 +72,7 @@ class TaskLanguage:
     word: Ints
     covered: bool
     declared: tuple[Domain, Problem] | None = None
-    holds: bool = True
+    guaranteed: bool = True
     verdict: Verdict | None = None
 
     @property
@@ -81,14 +81,9 @@ class TaskLanguage:
         return int(self.space.starts[self.task])
 
     @property
-    def guaranteed(self) -> bool:
-        """Whether the plans of a sentence mix freely in this task, one of the language's."""
-        return self.covered and self.holds
-
-    @property
     def tolerance(self) -> Tolerance | None:
         """What may go wrong, or be longer, under the language; None: nothing."""
-        return self.language.tolerance if self.language else None
+        return self.language.tolerance
 
     @property
     def model(self) -> JointModel:
@@ -202,11 +197,11 @@ def language_in_task(
     partition = language.partition(loaded.model)
     covered = _covers(language, space, recorded)
     verdict = _verdict(partition, space) if covered else None
-    holds = verdict is not None and verdict.holds
-    covered &= holds or language.may_fail
+    guaranteed = verdict is not None and verdict.holds
+    covered &= guaranteed or language.may_fail
     word = partition.word_of(space.rows)[space.state]
     read = domain, problem
-    return TaskLanguage(language, partition, space, 0, word, covered, read, holds, verdict)
+    return TaskLanguage(language, partition, space, 0, word, covered, read, guaranteed, verdict)
 
 
 def _verdict(partition: Partition, space: PlanSpace) -> Verdict | None:

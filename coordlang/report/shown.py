@@ -136,7 +136,9 @@ def _candidates(
         except ProvedImpossible:
             continue  # of two states one need not be reachable from the other
         word = first.partition.word_of(space.rows)[space.state]
-        yield replace(first, space=space, task=0, word=word, covered=True, holds=True, verdict=None)
+        yield replace(
+            first, space=space, task=0, word=word, covered=True, guaranteed=True, verdict=None
+        )
 
 
 def _pairs(first: TaskLanguage, random: Random) -> Iterator[PlanningTask]:

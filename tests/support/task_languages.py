@@ -62,7 +62,7 @@ def in_words(
     language: Language | None, table: Partition, space: PlanSpace, task: int
 ) -> TaskLanguage:
     word = table.word_of(space.rows)[space.state]
-    return TaskLanguage(language, table, space, task, word, True)  # type: ignore[arg-type]
+    return TaskLanguage(language or language_of({}, table.words), table, space, task, word, True)
 
 
 def language_of(words: dict[str, str], names: tuple[str, ...]) -> Language:
