@@ -71,7 +71,7 @@ class WordsExplained:
     @property
     def states(self) -> dict[str, int]:
         """Word -> how many of the mapped states it holds."""
-        return dict(zip(self.mapped.words, self.mapped.states, strict=True))
+        return self.mapped.states
 
     def data(self) -> dict[str, Any]:
         """Words, variables and formulas, as ``--json`` has them."""
@@ -101,7 +101,7 @@ class WordsExplained:
         if not self.mapped.word.size:
             return "\n".join([*lines, f"No state is mapped: the word is always {default}."])
         lines.append(
-            f"Exact in all {counted(sum(self.mapped.states), 'mapped state')}. No "
+            f"Exact in all {counted(len(self.mapped.word), 'mapped state')}. No "
             f"{self.used.model.kept_plan} of these tasks leaves them; elsewhere the word is "
             f"{default}."
         )

@@ -129,14 +129,8 @@ def robot(files: Arguments, options: RobotOptions) -> RobotInTask:
 
     wanted(wishes)  # what is wrong with them is said now
     run = _run_of(read)
-    executive = Executive(
-        options.robot,
-        others,
-        run,
-        Agreement(options.robot, others, sentence, wishes, best, accepts),
-        monitor_of,
-        options.silent_after,
-    )
+    agreement = Agreement(options.robot, others, sentence, wishes, best, accepts)
+    executive = Executive(run, agreement, monitor_of, options.silent_after)
     points = read_coordinates_of(options.coordinates, read.files.problems[0])
     return RobotInTask(used, executive, run, points)
 

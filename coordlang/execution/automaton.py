@@ -119,7 +119,7 @@ def _subsets(
     labels, targets = space.robot_labels(robot).tolist(), space.targets().tolist()
     alike = _alike(space, true, labels, targets)  # no set of own continuations is another one then
     subsets: dict[_Nodes, None] = {(alike[int(space.starts[0])],): None}
-    steps, members = len(space.layers) - 1, 0
+    steps, members = space.cost_of(0)[0], 0
     layers: list[dict[_Nodes, tuple[Knowledge, dict[int, _Nodes]]]] = []
     for depth in range(steps + 1):
         layers.append({})
@@ -132,7 +132,7 @@ def _subsets(
             layers[-1][subset] = Knowledge(reduce(and_, facts), reduce(or_, facts)), moves
             members += len(subset)
             if number % 1024 == 0 or number == len(subsets) - 1:
-                _check(space, robot, members, most, depth, steps)
+                _check(space, robot, members, most, depth)
         every = (moves.values() for _, moves in layers[-1].values())
         subsets = dict.fromkeys(chain.from_iterable(every))
     return layers
@@ -170,20 +170,18 @@ def _numbered(merged: Sequence[Sequence[_State]]) -> Automaton:
     return Automaton(tuple(layers), tuple(numbered), tuple(left), tuple(known))
 
 
-def _check(
-    space: PlanSpace, robot: int, members: int, most: int | None, depth: int, steps: int
-) -> None:
+def _check(space: PlanSpace, robot: int, members: int, most: int | None, depth: int) -> None:
     size = members * _MEMBER_BYTES
     if (most is None or members <= most) and (size < _SMALL or size < memory_left()):
         return
     # The rest at the rate at which they grew so far.
-    growth = log10(max(members, 1)) / max(depth, 1)
-    estimate = 10 ** min(18.0, log10(size / 2**30) + growth * max(steps - depth, 0))
+    steps = space.cost_of(0)[0]
+    growth = log10(members) / max(depth, 1)
+    estimate = 10 ** min(18.0, log10(size / 2**30) + growth * (steps - depth))
     smaller = space.model.smaller("another sentence", "a smaller task")
     raise OutOfMemory(
         f"the choices of {space.model.robots[robot]} have too many different histories: "
-        f"after {depth + 1} of {steps} "
-        f"steps their subsets have {members:,} members, at this rate about {estimate:,.1f} GiB in "
-        "the end",
+        f"after {depth + 1} of {steps} steps their subsets have {members:,} members, at this rate "
+        f"about {estimate:,.1f} GiB in the end",
         remedy=f"Use {smaller}, or {more_memory()}.",
     )

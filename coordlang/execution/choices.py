@@ -16,7 +16,6 @@ from operator import or_
 from typing import Annotated, Any, Literal
 
 import msgspec
-import numpy as np
 from msgspec import UNSET, Meta, UnsetType
 
 from coordlang.execution.automaton import Automaton, Knowledge, determinise
@@ -369,10 +368,9 @@ def _events_of(fits: PlanSpace, robot: int, waiting_for: int) -> list[dict[int, 
     With the least number of events of another robot that it waits for.
     """
     found: list[dict[int, int]] = []
-    for layer in range(len(fits.layers) - 1, 0, -1):
-        numbers = np.unique(fits.robot_labels(robot, fits.layer_edges(layer).edges))
+    for numbers in fits.labels_by_step(robot):
         waits: dict[int, int] = {}
-        for event in (fits.model.events[robot][number] for number in numbers.tolist()):
+        for event in (fits.model.events[robot][number] for number in numbers):
             if event is not None:
                 least = waits.get(event.label, event.waits[waiting_for])
                 waits[event.label] = min(least, event.waits[waiting_for])

@@ -48,24 +48,23 @@ _SHOWN, _REFUSED = 200, 100
 class Executive:
     """One robot's executive.
 
-    ``run`` names what all must have alike (domain, task and words), ``monitor_of`` has the robot's
-    choices under a sentence; after ``silent_after`` seconds a robot that says nothing is named to
-    the driver.  ``lines`` are for the driver, oldest first; whoever writes them takes them away.
-    ``life`` is another number for every process that ever is this robot.  ``random`` draws what to
-    do; without it the robot does as little as it may, and keeps most open.  So many messages were
-    ``sent``.
+    ``run`` names what all must have alike (domain, task and words), ``agreement`` the robot and the
+    others, ``monitor_of`` has its choices under a sentence; after ``silent_after`` seconds a robot
+    that says nothing is named to the driver.  ``lines`` are for the driver, oldest first; whoever
+    writes them takes them away.  ``life`` is another number for every process that ever is this
+    robot.  ``random`` draws what to do; without it the robot does as little as it may, and keeps
+    most open.  So many messages were ``sent``.
     """
 
     def __init__(
         self,
-        robot: str,
-        others: Sequence[str],
         run: str,
         agreement: Agreement,
         monitor_of: Callable[[str], EventMonitor],
         silent_after: float,
     ) -> None:
-        self.robot, self.others, self.lines = robot, tuple(others), list[dict[str, Any]]()
+        self.robot, self.others = agreement.robot, agreement.others
+        self.lines = list[dict[str, Any]]()
         self.life = self.sent = 0
         self._late_by: float | None = None
         self.random: Random | None = None
@@ -74,18 +73,18 @@ class Executive:
         self._run, self._agreement = run, agreement
         self._monitor_of, self._silent_after = monitor_of, silent_after
         self._monitor: EventMonitor | None = None
-        self._logs = {name: RobotLog() for name in (robot, *others)}
-        self._own = self._logs[robot]
+        self._logs = {name: RobotLog() for name in (self.robot, *self.others)}
+        self._own = self._logs[self.robot]
         #: What the monitor was told: own events that started and ended, and those of the others.
         self._started = 0
         self._counted = dict.fromkeys(self._logs, 0)
         #: The last message of each other robot: its process, what it has heard of and knows.
-        self._last = {name: Message(run, name, 0) for name in others}
+        self._last = {name: Message(run, name, 0) for name in self.others}
         self._heard_at: dict[str, float] = {}
         self._silent: set[str] = set()
         self._refused: set[str] = set()
         self._wishes: list[dict[str, Any]] = []
-        self._to_tell = set(others)
+        self._to_tell = {*self.others}
         self._beat_at = 0.0
         self._has_finished = False
 

@@ -177,7 +177,8 @@ class Agreement:
         best: Callable[[Sequence[str]], str],
         grants: Callable[[str, Sequence[str]], bool],
     ) -> None:
-        self.robot, self.sentence, self._wishes = robot, sentence, tuple(wishes)
+        self.robot, self.others = robot, tuple(others)
+        self.sentence, self._wishes = sentence, tuple(wishes)
         self._best, self._grants = best, grants
         self._proposal: str | None = None
         self._answer: Answer | None = None

@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import combinations, pairwise
 from typing import Any, Literal
 
@@ -172,20 +171,14 @@ def _first_users(space: PlanSpace) -> dict[str, set[tuple[str, ...]]]:
     """
     robots = space.model.robots
     named = [
-        [
-            frozenset((text or "").strip("()").split()[1:]) - {*robots}
-            for text in map(partial(space.model.label_text, robot), range(len(labels)))
-        ]
-        for robot, labels in enumerate(space.model.labels)
+        [frozenset(text.strip("()").split()[1:]) - {*robots} for text in labels]
+        for labels in space.model.labels
     ]
     users: dict[str, set[tuple[str, ...]]] = defaultdict(set)
     nothing: frozenset[str] = frozenset()
     unused = {int(space.starts[0]): nothing.union(*(own for part in named for own in part))}
     for layer in range(space.cost_of(0)[0], 0, -1):
-        found = space.layer_edges(layer)
-        for edge, source, target in np.column_stack(
-            (found.edges, found.source, found.target)
-        ).tolist():
+        for edge, source, target in np.column_stack(space.layer_edges(layer)).tolist():
             does = [named[robot][label] for robot, label in enumerate(space.labels_of(edge))]
             used = nothing.union(*does)
             for name in used & unused[source]:
@@ -202,8 +195,6 @@ def _first_users(space: PlanSpace) -> dict[str, set[tuple[str, ...]]]:
 
 def _part(choices: Choices, robot: int) -> RobotPart:
     space = choices.space
-    steps = (space.layer_edges(layer).edges for layer in range(space.cost_of(0)[0], 0, -1))
-    labels = [np.unique(space.robot_labels(robot, edges)).tolist() for edges in steps]
     own = int(choices.of_node[robot, space.starts[0]])
     subplans = choices.sets.size(own)
     listed = choices.sets.sequences(own) if subplans <= FEW else ()
@@ -211,8 +202,8 @@ def _part(choices: Choices, robot: int) -> RobotPart:
     def texts(used: Sequence[int]) -> Subplan:
         return [_own_text(space.model, robot, label) for label in used]
 
-    name = space.model.robots[robot]
-    return RobotPart(name, subplans, list(map(texts, listed)), list(map(texts, labels)))
+    name, by_step = space.model.robots[robot], list(map(texts, space.labels_by_step(robot)))
+    return RobotPart(name, subplans, list(map(texts, listed)), by_step)
 
 
 def _own_text(model: JointModel, robot: int, label: int) -> str | None:

@@ -97,7 +97,7 @@ def cover_data(cover: Cover) -> dict[str, Any]:
 def descriptions_text(descriptions: WordDescriptions, mapped: MappedStates) -> str:
     """The words and their formulas, a term a line where there are several."""
     lines = []
-    states = dict(zip(mapped.words, mapped.states, strict=True))
+    states = mapped.states
     for word, formula in descriptions.rules:
         head = f"  {word} ({counted(states[word], 'state')}):"
         if formula is None:
@@ -143,7 +143,7 @@ def demands_text(demands: SentenceDemands) -> str:
     """What a sentence demands, in plain sentences."""
     lines = [f'"{" ".join(demands.sentence)}" leaves {counted(demands.plans, "plan")} open.']
     for part in demands.parts:
-        lines += _part_lines(part, demands.unit) or [f"  {part.robot} has nothing to do."]
+        lines += _part_lines(part, demands.unit)
     for change in demands.changes:
         when = f"in step {change.earliest}"
         if change.earliest < change.latest:
@@ -153,10 +153,10 @@ def demands_text(demands: SentenceDemands) -> str:
 
 
 def _part_lines(part: RobotPart, unit: str) -> list[str]:
-    """What one robot may do; no line for nothing."""
+    """What one robot may do."""
     if part.subplans == 1:
         only = _sequence([own[0] for own in part.by_step], unit)
-        return [f"  {part.robot}: {only}."] if only else []
+        return [f"  {part.robot}: {only}." if only else f"  {part.robot} has nothing to do."]
     if part.listed:
         by_step = zip(*part.listed, strict=True)
         first = len(list(takewhile(lambda own: len(set(own)) == 1, by_step)))

@@ -122,9 +122,10 @@ class MappedStates:
     word: Ints
 
     @property
-    def states(self) -> list[int]:
-        """The number of states of each word."""
-        return [int(n) for n in np.bincount(self.word, minlength=len(self.words))]
+    def states(self) -> dict[str, int]:
+        """Word -> how many of the states it holds."""
+        numbers = np.bincount(self.word, minlength=len(self.words)).tolist()
+        return dict(zip(self.words, numbers, strict=True))
 
 
 def mapped_states(language: Language, model: JointModel, also: Rows | None = None) -> MappedStates:
@@ -323,10 +324,9 @@ def _terms(
     """Word -> terms, of the words that have values."""
     vectors = sorted(values)
     word = np.array([values[vector] for vector in vectors], object)
-    table = np.array(vectors, np.int64).reshape(len(vectors), len(features))
-    domains = [np.unique(column) for column in table.T]
-    number = table.copy()
-    for own, column in zip(domains, number.T, strict=True):
+    number = np.array(vectors, np.int64).reshape(len(vectors), len(features))
+    domains = [np.unique(column) for column in number.T]
+    for own, column in zip(domains, number.T, strict=True):  # values become numbers of values
         column[:] = np.searchsorted(own, column)
     found = {}
     for name in words:

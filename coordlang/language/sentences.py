@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,14 +128,11 @@ def _too_many() -> OutOfMemory:
 
 def _choices(plans: PlanSpace) -> tuple[tuple[tuple[str | None, ...], ...], ...]:
     """What each robot does in each step of some plans."""
-    steps = [
-        tuple(
-            tuple(plans.model.label_text(robot, label) for label in np.unique(labels).tolist())
-            for robot, labels in enumerate(plans.labels[edges.edges].T)
-        )
-        for edges in plans.edges_by_layer()
-    ]
-    return tuple(reversed(steps))
+    of_robots = []
+    for robot in range(plans.robots):
+        text = partial(plans.model.label_text, robot)
+        of_robots.append([tuple(map(text, labels)) for labels in plans.labels_by_step(robot)])
+    return tuple(zip(*of_robots, strict=True))
 
 
 # ---- how much a language leaves open, and how much it need not say

@@ -220,6 +220,11 @@ class PlanSpace:
         """`layer_edges` of every layer above the goals, the lowest first."""
         return map(self.layer_edges, range(1, int(self.layer.max(initial=0)) + 1))
 
+    def labels_by_step(self, robot: int) -> list[list[int]]:
+        """One robot's different labels in each step from the start down, in order."""
+        steps = [np.unique(self.robot_labels(robot, own.edges)) for own in self.edges_by_layer()]
+        return [labels.tolist() for labels in reversed(steps)]
+
     def descendants(self, nodes: Ints) -> Bools:
         """Which nodes paths from these nodes reach, these included (nodes).  O(edges)."""
         reached = np.zeros(len(self), np.bool_)

@@ -55,7 +55,7 @@ def executive(data: dict[str, Any], name: str, life: int) -> Executive:
     words = data["sentence"]
     agreement = Agreement(name, others, words, (), lambda _: words, lambda *_: True)
     choices = lambda _: EventMonitor(data, name)  # noqa: E731
-    own = Executive(name, others, "run", agreement, choices, SILENT_AFTER)
+    own = Executive("run", agreement, choices, SILENT_AFTER)
     own.life = life
     return own
 
