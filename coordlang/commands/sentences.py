@@ -21,13 +21,9 @@ from coordlang.execution.best_sentence import (
     read_preference,
 )
 from coordlang.execution.guided_search import ExpandedStates, GuidedPlan, plan_under_sentence
-from coordlang.execution.plan_sentence import (
-    PlanDag,
-    open_plans_data,
-    read_plan_file,
-    sentence_of_plan,
-)
+from coordlang.execution.plan_sentence import PlanDag, read_plan_file, sentence_of_plan
 from coordlang.execution.task_language import TaskLanguage
+from coordlang.language.candidates import describe
 from coordlang.language.provenance import tolerance_data
 from planners.search.heuristics import HEURISTICS
 from planners.search.plan_file import json_count
@@ -123,8 +119,14 @@ class SentencePlans(OptimalPlans, InTask):
 
     def data_with(self, listed: Sequence[Sequence[Texts]], graph: PlanDag | None) -> dict[str, Any]:
         """Return a JSON plan file with sentence and guarantee, and with the DAG if one is given."""
-        numbers = [self._known(plan) for plan in listed]
-        return open_plans_data(self.used, self._words, self._plans, numbers, graph)
+        return {
+            "sentence": self.sentence,
+            "covered": self.covered,
+            "task": describe(self.used.space, self.used.task),
+            **tolerance_data(self.tolerance),
+            **self.data(listed),
+            **(graph.data() if graph else {}),
+        }
 
 
 @public(UnderstandOptions)

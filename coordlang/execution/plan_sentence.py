@@ -11,13 +11,11 @@ from typing import Any
 
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import words_passed
-from coordlang.language.candidates import describe
-from coordlang.language.provenance import tolerance_data
 from coordlang.language.sentences import sentence
 from planners.joint.model import IDLE, FullState, Goal, JointModel
 from planners.joint.tables import Rows
 from planners.pddl.formula_tree import conjuncts, formula_text
-from planners.search.plan_file import NoSuchAction, json_count, read_plans, to_json
+from planners.search.plan_file import NoSuchAction, json_count, read_plans
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, Texts, counts
 from planners.system.errors import BadInput, Position, Refuted
@@ -268,6 +266,24 @@ class PlanDag:
                 found.setdefault(ends, []).append(model.texts(space.labels_of(edge)))
         self.edges = [DagEdge(*ends, tuple(actions)) for ends, actions in sorted(found.items())]
 
+    def data(self) -> dict[str, Any]:
+        """Nodes and edges as a JSON plan file has them (docs/formats.md)."""
+        nodes = [
+            {
+                "state": node.key,
+                "word": node.word,
+                "said": node.words,
+                "step": node.step,
+                "plans": json_count(node.plans),
+            }
+            for node in self.nodes
+        ]
+        edges = [
+            {"from": edge.source, "to": edge.target, "actions": [list(a) for a in edge.actions]}
+            for edge in self.edges
+        ]
+        return {"nodes": nodes, "edges": edges}
+
 
 def _plans_through(space: PlanSpace) -> list[int]:
     below = counts(space)
@@ -278,40 +294,3 @@ def _plans_through(space: PlanSpace) -> list[int]:
         for source, target in zip(edges.source.tolist(), edges.target.tolist(), strict=True):
             above[target] += above[source]
     return [a * b for a, b in zip(above, below, strict=True)]
-
-
-def open_plans_data(
-    task_language: TaskLanguage,
-    words: Sequence[int],
-    plans: Plans,
-    listed: Sequence[Plan],
-    graph: PlanDag | None,
-) -> dict[str, Any]:
-    """The JSON form: a plan file (docs/formats.md) with the sentence, its guarantee and the DAG.
-
-    ``listed`` are those of the ``plans`` to write out; ``graph`` is the DAG to write as ``nodes``
-    and ``edges``, or None.
-    """
-    data = {
-        "sentence": task_language.text(words),
-        "covered": task_language.covered,
-        "task": describe(task_language.space, task_language.task),
-        **tolerance_data(task_language.tolerance),
-        **to_json(plans, listed),
-    }
-    if graph is not None:
-        data["nodes"] = [
-            {
-                "state": node.key,
-                "word": node.word,
-                "said": node.words,
-                "step": node.step,
-                "plans": json_count(node.plans),
-            }
-            for node in graph.nodes
-        ]
-        data["edges"] = [
-            {"from": edge.source, "to": edge.target, "actions": [list(a) for a in edge.actions]}
-            for edge in graph.edges
-        ]
-    return data

@@ -136,13 +136,11 @@ def mapped_states(language: Language, model: JointModel, also: Rows | None = Non
     another model.
     """
     table = language.partition(model)
-    rows, word = table.rows, table.word
+    rows = table.rows
     if also is not None:
         more, _ = unique_rows(also)
-        more = more[find_rows(rows, more) < 0] if len(rows) else more
-        rows = np.concatenate((rows, more))
-        word = np.concatenate((word, np.full(len(more), table.default)))
-    return MappedStates(table.words, *valuation(model, rows), word)
+        rows = np.concatenate((rows, more[find_rows(rows, more) < 0]))
+    return MappedStates(table.words, *valuation(model, rows), table.word_of(rows))
 
 
 def all_covers(mapped: MappedStates) -> dict[str, Cover]:
