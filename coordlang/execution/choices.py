@@ -215,7 +215,7 @@ class RobotRecord(msgspec.Struct, frozen=True):
     steps: Annotated[int, doc("The number of steps of each plan.")]
     subplans: Annotated[Count, doc("The number of its own subplans.")]
     atoms: Annotated[
-        Literal["exact", "own"],
+        Atoms,
         doc(
             "How 'true' and 'unknown' were found: over all combinations of the robots' "
             "choices, or from the robot's own subactions alone."

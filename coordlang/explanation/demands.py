@@ -131,12 +131,11 @@ def words_passed(space: PlanSpace, word: Ints) -> Ints:
     ``space`` holds one task's plans with one sentence, and each node is on one of them; so it is
     one number for each node.
     """
-    passed = np.ones(len(space), np.int64)
-    for layer in range(space.cost_of(0)[0], 0, -1):
-        edges = space.layer_edges(layer)
+    to_come = np.zeros(len(space), np.int64)
+    for edges in space.edges_by_layer():
         changes = word[edges.target] != word[edges.source]
-        passed[edges.target] = passed[edges.source] + changes
-    return passed
+        to_come[edges.source] = to_come[edges.target] + changes
+    return 1 + int(to_come[space.starts[0]]) - to_come
 
 
 #: Edges of a sentence's plans up to which it is looked for what the sentences mean.

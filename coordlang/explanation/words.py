@@ -57,12 +57,10 @@ class Literal:
         One conjunction where one value is allowed, or where excluding the others is the same; else
         one for each atom.
         """
-        allowed = [value for value in self.values if value is not None]
-        if len(self.values) == 1 and allowed:
-            return [{allowed[0]: True}]
-        if None in self.values or None not in self.variable.values:
+        always_one = None not in self.variable.values
+        if None in self.values or (always_one and len(self.values) > 1):
             return [{atom: False for atom in self.others if atom is not None}]
-        return [{atom: True} for atom in allowed]
+        return [{atom: True} for atom in self.values if atom is not None]
 
 
 #: A conjunction.  The empty term is true.
