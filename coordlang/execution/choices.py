@@ -20,7 +20,7 @@ from msgspec import UNSET, Meta, UnsetType
 
 from coordlang.execution.automaton import Automaton, Knowledge, determinise
 from coordlang.execution.mixtures import Mixtures, walk_mixtures
-from coordlang.execution.monitor import FORMAT, IDLE, VERSION, EventMonitor, Monitor
+from coordlang.execution.monitor import FORMAT, VERSION, EventMonitor, Monitor
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import describe
 from coordlang.language.provenance import tolerance_data
@@ -289,8 +289,8 @@ def monitor(fits: PlanSpace, own: RobotChoices, sentence: str) -> Monitor:
 
 
 def _robot(fits: PlanSpace, own: RobotChoices) -> RobotRecord:
-    model = fits.model
-    automaton, texts = own.automaton, model.codec.facts.texts
+    model, automaton = fits.model, own.automaton
+    labels, texts = model.labels[own.robot], model.codec.facts.texts
     sometimes_known = reduce(or_, (known.true | ~known.possible for known in automaton.known))
     facts = [fact for fact in range(len(texts)) if sometimes_known >> fact & 1]
     others = sorted({*range(len(texts))} - {*facts})
@@ -309,10 +309,7 @@ def _robot(fits: PlanSpace, own: RobotChoices) -> RobotRecord:
             StateRecord(
                 step=step,
                 left=json_count(automaton.left[state]),
-                next={
-                    model.label_text(own.robot, label) or IDLE: to
-                    for label, to in automaton.moves[state].items()
-                },
+                next={labels[label]: to for label, to in automaton.moves[state].items()},
                 true=numbers(automaton.known[state].true),
                 unknown=numbers(automaton.known[state].unknown),
             )
