@@ -233,7 +233,7 @@ def explain(files: Arguments, options: ExplainOptions) -> Explanation:
     only = None if options.sentence is None else used.words_of(options.sentence)
     if only is not None:
         used.plans_with(only)
-    mapped = mapped_states(used.language, used.model)
+    mapped = mapped_states(used.partition, used.model)
     covers = all_covers(mapped)
     descriptions = describe_words(mapped, covers)
     points = read_coordinates_of(None, first)

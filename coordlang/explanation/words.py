@@ -12,7 +12,7 @@ import numpy as np
 
 from coordlang.explanation.minimise import Points, minimise
 from coordlang.explanation.variables import Variable, valuation
-from coordlang.language.words import Language
+from coordlang.language.words import Language, Partition
 from coordlang.lifted.features import Feature, condition, english, feature_of, formula
 from coordlang.lifted.language import LiftedLanguage, Vector, read_values, vectors
 from coordlang.lifted.world import States, World
@@ -126,14 +126,12 @@ class MappedStates:
         return dict(zip(self.words, numbers, strict=True))
 
 
-def mapped_states(language: Language, model: JointModel, also: Rows | None = None) -> MappedStates:
+def mapped_states(table: Partition, model: JointModel, also: Rows | None = None) -> MappedStates:
     """The states that a language maps, and ``also`` these, which have its default word.
 
     States that the language does not map are on no optimal plan of a candidate task; ``also``
-    (states, blocks) are for tasks that are no candidates.  Raises `BadInput` for a language of
-    another model.
+    (states, blocks) are for tasks that are no candidates.
     """
-    table = language.partition(model)
     rows = table.rows
     if also is not None:
         more, _ = unique_rows(also)

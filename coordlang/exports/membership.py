@@ -29,7 +29,7 @@ def short_terms(task_language: TaskLanguage, states: int = _STATES) -> Terms:
     rows = _rows(task_language)
     if len(rows) > states:
         return exclusive_terms(task_language)
-    formulas = all_covers(mapped_states(task_language.language, task_language.model, rows))
+    formulas = all_covers(mapped_states(task_language.partition, task_language.model, rows))
     words = task_language.partition.words
     return tuple(tuple(formulas[word].conjunctions()) for word in words)
 

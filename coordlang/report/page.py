@@ -128,7 +128,7 @@ def word_rows(
     if lifted:
         terms_of |= {word: lifted.terms.get(word, ()) for word in language.words}
     elif 0 < len(language.states) <= _STATES_EXPLAINED:
-        mapped = mapped_states(language, model)
+        mapped = mapped_states(language.partition(model), model)
         described = describe_words(mapped, all_covers(mapped))
         in_order = described.in_order
         others = {word for word, cover in described.rules if not cover}

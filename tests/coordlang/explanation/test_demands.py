@@ -74,7 +74,7 @@ def test_against_listed_plans(robots: int, monkeypatch: pytest.MonkeyPatch) -> N
     for seed, candidates in random_candidates(range(20), robots, 300):
         # A coordination language or not: what is asked is about listed plans.
         language = random_language(Random(seed), candidates)
-        formulas = all_covers(mapped_states(language, candidates.model))
+        formulas = all_covers(mapped_states(language.partition(candidates.model), candidates.model))
         for task_language in list(languages_in_tasks(language, candidates))[:8]:
             try:
                 groups = naive.numbered_sentences(task_language, 60)
@@ -102,7 +102,7 @@ def test_who_decides_a_change(folder: str, stem: str, every: int) -> None:
     """Before the change these robots' subactions always settle it; no smaller set of robots does."""
     candidates = all_tasks(folder, stem)
     language = build_language(candidates, "greedy").language
-    formulas = all_covers(mapped_states(language, candidates.model))
+    formulas = all_covers(mapped_states(language.partition(candidates.model), candidates.model))
     sizes: Counter[int] = Counter()
     for task_language in list(languages_in_tasks(language, candidates))[::every]:
         for words in naive.numbered_sentences(task_language, 1000):

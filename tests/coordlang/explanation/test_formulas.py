@@ -69,7 +69,7 @@ def test_exactly_one_formula_is_true_in_every_mapped_state(robots: int) -> None:
     seen: Counter[str] = Counter()
     for seed, candidates in random_candidates(range(24), robots, 600):
         language = random_language(Random(seed), candidates)
-        mapped = mapped_states(language, candidates.model)
+        mapped = mapped_states(language.partition(candidates.model), candidates.model)
         formulas = all_covers(mapped)
         check_exact(language, candidates, formulas)
         told = describe_words(mapped, formulas)
@@ -99,7 +99,7 @@ def test_where_a_robot_is() -> None:
     """The three words of the running example say where one of the robots is."""
     candidates = all_tasks("three-cells")
     language = build_language(candidates, "minimal").language
-    formulas = all_covers(mapped_states(language, candidates.model))
+    formulas = all_covers(mapped_states(language.partition(candidates.model), candidates.model))
     for robot in ("r1", "r2"):
         if {shown(f) for f in formulas.values()} == {f"at({robot}) = {cell}" for cell in "abc"}:
             break
@@ -115,14 +115,13 @@ def test_text_and_pddl() -> None:
     language = language_of(
         {key: "w1" if "(at r1 a)" in key else "w0" for key in keys}, ("w0", "w1")
     )
-    formulas = all_covers(mapped_states(language, candidates.model))
+    formulas = all_covers(mapped_states(language.partition(candidates.model), candidates.model))
     assert shown(formulas["w1"]) == "at(r1) = a"
     assert pddl_condition(formulas["w1"]) == "(at r1 a)"
     assert shown(formulas["w0"]) == "at(r1) != a"
     assert pddl_condition(formulas["w0"]) == "(not (at r1 a))"
-    one = all_covers(
-        mapped_states(language_of(dict.fromkeys(keys, "w0"), ("w0", "w1")), candidates.model)
-    )
+    single = language_of(dict.fromkeys(keys, "w0"), ("w0", "w1")).partition(candidates.model)
+    one = all_covers(mapped_states(single, candidates.model))
     assert [shown(one["w0"]), shown(one["w1"])] == ["true", "false"]
     assert [pddl_condition(one["w0"]), pddl_condition(one["w1"])] == ["(and)", "(or)"]
 
@@ -153,8 +152,9 @@ def test_further_states_have_the_default() -> None:
     candidates = all_tasks("three-cells")
     keys = [candidates.model.codec.key(row) for row in candidates.rows]
     language = language_of({keys[0]: "w0", keys[1]: "w1"}, ("w0", "w1"))
-    free = all_covers(mapped_states(language, candidates.model))
-    exact = all_covers(mapped_states(language, candidates.model, candidates.rows))
+    table = language.partition(candidates.model)
+    free = all_covers(mapped_states(table, candidates.model))
+    exact = all_covers(mapped_states(table, candidates.model, candidates.rows))
     states = [set(candidates.model.codec.decode(row)) for row in candidates.rows]
     assert all(
         [w for w, f in exact.items() if holds(f, s)] == [language.states.get(k, "w0")]
@@ -281,9 +281,9 @@ def test_remembered_actions_are_one_variable_a_robot() -> None:
     problem = read_problem(DOMAINS / "three-cells" / "problem.pddl", domain)
     candidates = from_problems(domain, [problem], ModelOptions(remember_actions=True))
     language = build_language(candidates, "greedy").language
-    formulas = all_covers(mapped_states(language, candidates.model))
-    check_exact(language, candidates, formulas)
     table = language.partition(candidates.model)
+    formulas = all_covers(mapped_states(table, candidates.model))
+    check_exact(language, candidates, formulas)
     names = {variable.name for variable in valuation(candidates.model, table.rows)[0]}
     assert {"last(r1)", "last(r2)"} <= names
 
@@ -404,7 +404,7 @@ def test_stopped_searches_return_languages(phase: str, monkeypatch: pytest.Monke
 def test_a_search_gives_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """With no conflicts to spend: the formulas that there were, and a bound that is true."""
     candidates, built = all_tasks("grid", "gw2-2x3"), two_rows()
-    mapped = mapped_states(built.language, candidates.model)
+    mapped = mapped_states(built.language.partition(candidates.model), candidates.model)
     found = Outcome(dict(zip(built.job.states, mapped.word.tolist(), strict=True)), 5)
     monkeypatch.setattr("coordlang.explanation.simple._CONFLICTS", 0)
     outcome = simple(built.job, found)
