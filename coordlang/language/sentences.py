@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,8 +129,8 @@ def _choices(plans: PlanSpace) -> tuple[tuple[tuple[str | None, ...], ...], ...]
     """What each robot does in each step of some plans."""
     of_robots = []
     for robot in range(plans.robots):
-        text = partial(plans.model.label_text, robot)
-        of_robots.append([tuple(map(text, labels)) for labels in plans.labels_by_step(robot)])
+        steps = plans.labels_by_step(robot)
+        of_robots.append([tuple(plans.model.label_text(robot, own) for own in s) for s in steps])
     return tuple(zip(*of_robots, strict=True))
 
 
