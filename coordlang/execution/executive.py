@@ -189,8 +189,9 @@ class Executive:
         """
         try:
             message = decoded(data, self._run, self.robot, self.others)
-            self._agreement.hears(message)
+            self._agreement.check(message)
             self._take_in(message, now)
+            self._agreement.hears(message)
         except (Contradiction, Refuted) as error:
             if self._monitor is None and isinstance(error, Refuted):
                 self._to_tell |= {*self.others}

@@ -184,11 +184,14 @@ class Agreement:
         self._answer: Answer | None = None
         self._heard: dict[str, Message | None] = dict.fromkeys(others)
 
-    def hears(self, message: Message) -> None:
-        """Take in what another robot says; `Refuted` if it follows another sentence."""
+    def check(self, message: Message) -> None:
+        """Raise `Refuted` if another robot follows another sentence."""
         if message.sentence is not None and self.sentence not in (None, message.sentence):
             what = f'{message.by} follows "{message.sentence}", {self.robot} "{self.sentence}"'
             raise Refuted(what, remedy="Give all robots one SENTENCE, or none.")
+
+    def hears(self, message: Message) -> None:
+        """Take in what another robot says, where that is no contradiction."""
         self._heard[message.by] = message
 
     def advance(self) -> bool:

@@ -405,6 +405,7 @@ def test_a_wish_is_promised_and_being_late_is_told() -> None:
 
 
 GO = Event("(go r1 a)", "(go r1 a)")
+WRONG = LogPart(Version(0, 1))
 
 
 @pytest.mark.parametrize(
@@ -459,7 +460,7 @@ def test_messages_that_are_none_are_refused_once() -> None:
         good.replace(b'"run":"run"', b'"run":"another"'): "another task, or with other words",
         encoded(Message("run", "r2", 1, knows={"r9": Version()})): "a robot that there is not: r9",
         encoded(Message("run", "r2", 1, sentence="w9")): 'r2 follows "w9", r1 "w',
-        encoded(Message("run", "r2", 1, logs={"r2": LogPart(Version(0, 1))})): "no robot can be",
+        encoded(Message("run", "r2", 1, logs={"r2": WRONG})): "no robot can be",
     }
     for data, why in cases.items():
         own.hears(data, 1)
@@ -478,6 +479,14 @@ def test_messages_that_are_none_are_refused_once() -> None:
     (said,) = pair.lines("r1", "why")
     assert "it waits for r1" in said
     assert pair.lines("r1", "from") == []
+
+
+def test_a_refused_message_decides_no_sentence() -> None:
+    agreement = Agreement("r1", ["r2"], None, (), lambda _: "w0", lambda *_: True)
+    own = Executive("run", agreement, pytest.fail, 5.0)
+    own.hears(encoded(Message("run", "r2", 1, sentence="w9", logs={"r2": WRONG})), 1)
+    own.tick(2)
+    assert agreement.sentence is None
 
 
 # ---- agreeing
@@ -503,6 +512,7 @@ def talk(
         for name, own in agreements.items():
             for other, message in said.items():
                 if other != name:
+                    own.check(message)
                     own.hears(message)
             own.advance()
     return {name: own.sentence for name, own in agreements.items()}
