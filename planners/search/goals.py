@@ -83,15 +83,13 @@ def searched(model: JointModel, goal: Goal, seen: Rows, left_out: int = 0) -> st
 
     Facts that no action makes true, of the goal or of what actions of a robot need, else what kept
     robots from acting together most often.  ``seen`` are the states that were searched,
-    ``left_out`` counts those next to them from which not even actions that delete nothing lead to
-    the goal.
+    ``left_out`` counts those next to them from which a heuristic proves that there is no way.
     """
     said = "No other state can be reached."
     if left_out:
         said = (
             f"{len(seen):,} {'state was' if len(seen) == 1 else 'states were'} searched. "
-            f"From {left_out:,} more the goal could not be reached even if no action deleted "
-            "anything."
+            f"From {left_out:,} more the goal cannot be reached, as a lower bound proves."
         )
     elif len(seen) > 1:
         said = f"All {len(seen):,} reachable states were searched."

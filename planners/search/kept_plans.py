@@ -14,7 +14,7 @@ import numpy as np
 
 from planners.grounding.actions import GroundAction
 from planners.joint.model import FullState, JointModel, PlanningTask
-from planners.pddl.formula_tree import formula_text, label
+from planners.pddl.formula_tree import formula_text
 from planners.search import optimal_plans
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import CoordlangError, note
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from planners.parallel.batch import Store
 
 #: The version of the tables: those of another one are never looked at, and go in time.
-_FORM = 5
+_FORM = 6
 #: Bytes that all tables together may take.
 _MOST_BYTES = 2**30
 #: The arrays of a plan space that are kept; goals are those of the task.
@@ -154,12 +154,11 @@ def key_of(model: str, task: PlanningTask) -> str:
 
 
 def _texts(actions: Iterable[GroundAction]) -> Iterator[str]:
-    """All that a search reads of ground actions."""
+    """All that a search reads of ground actions.
+
+    As `repr` has it: in PDDL an atom and an action as a literal may be one text.
+    """
     for action in actions:
-        effects = [
-            (effect.adds, formula_text(effect.atom), formula_text(effect.condition))
-            for effect in action.effects
-        ]
-        links = sorted(label(link.action, link.args) for link in action.links)
-        rest = (action.owners, action.parts, action.cost, links, effects)
-        yield f"{action.label} {formula_text(action.precondition)} {rest}"
+        links = sorted(map(repr, action.links))
+        rest = (action.owners, action.parts, action.cost, links, action.effects)
+        yield f"{action.label} {action.precondition!r} {rest!r}"

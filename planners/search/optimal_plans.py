@@ -155,10 +155,10 @@ def _plan_space(space: Space, tasks: Sequence[tuple[Goal, Rows | None]]) -> Plan
     goal = np.repeat(np.arange(len(tasks)), [len(own) for own in states])
     graph = _shortest_ways(space, distance, goal, np.concatenate(states))
     plans = replace(graph, goals=tuple(goal for goal, _ in tasks))
-    second = plans.least_sums(plans.cost)[plans.starts]
-    plans = replace(plans.cheapest(plans.cost), second=second)
     if space.model.slack:
         require_rest(plans)
+    second = plans.least_sums(plans.cost)[plans.starts]
+    plans = replace(plans.cheapest(plans.cost), second=second)
     if space.model.slack_facts:
         left = plans.layer - distance[plans.goal, plans.state]
         plans = seeing(plans, left, seen_rows(space.model, space.rows))

@@ -164,8 +164,11 @@ class Plans:
         return plan[:length]
 
     def _rest(self, node: int) -> int | None:
-        """The first edge from a node in which every robot idles, None if there is none."""
-        return self.space.edge_with(node, (0,) * self.space.robots)
+        """The edge from a goal's node in which every robot idles, None if there is none."""
+        space = self.space
+        row = space.model.forgetting_slack(space.rows[space.state[[node]]])
+        is_over = space.model.holds(space.goals[space.goal[node]], row)[0]
+        return space.edge_with(node, (0,) * space.robots) if is_over else None
 
     def sample(self, number: int, seed: int) -> Iterator[Plan]:
         """Plans drawn uniformly and independently; the same seed draws the same plans."""

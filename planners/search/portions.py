@@ -19,6 +19,7 @@ from planners.joint.tables import Ints, Rows
 from planners.parallel.batch import digest
 from planners.search.asynchronous import as_executed
 from planners.search.graphs import parts_of_graph
+from planners.search.kept_plans import model_digest
 from planners.search.optimal_plans import distances_to, plan_space, plan_spaces
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, Space
@@ -107,7 +108,7 @@ class Explored:
         )
         inits = tuple(inits for _, inits in self.goals)
         steps = (space.rows, space.first, space.target, space.labels, space.cost)
-        return digest(*_of_model(space.model), *steps, goals, inits)
+        return digest(_of_model(space.model), *steps, goals, inits)
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +156,7 @@ class Searched:
         plans = self.plans
         nodes = (plans.rows, plans.state, plans.goal, plans.layer, plans.first, plans.target)
         edges = (plans.labels, plans.cost, plans.starts, plans.second)
-        return digest(*_of_model(plans.model), *nodes, *edges)
+        return digest(_of_model(plans.model), *nodes, *edges)
 
 
 #: Where plan spaces come from; it is sent to other processes.
@@ -244,6 +245,5 @@ def _pairs(space: Space, goals: Sequence[Goal]) -> int:
 
 
 def _of_model(model: JointModel) -> tuple[object, ...]:
-    """What the numbers of states and labels mean, for a hash."""
-    facts = tuple(model.codec.facts.texts)
-    return model.robots, model.labels, model.cost, model.slack, model.is_asynchronous, facts
+    """A hash of what a model's plans are, and of what they are like without a common step."""
+    return model_digest(model), model.slack, model.is_asynchronous

@@ -27,6 +27,8 @@ from planners.search.kept_plans import (
     search,
     store_in_use,
 )
+from planners.search.portions import Explored
+from planners.search.reachable import explore
 from planners.system.errors import BadInput, Note, ProvedImpossible
 from tests.support.domains import DOMAINS
 from tests.support.random_pddl import KINDS, random_model
@@ -35,6 +37,18 @@ from tests.support.texts import model_of
 
 GRID = (DOMAINS / "grid" / "domain.pddl").read_text()
 PROBLEM = (DOMAINS / "grid" / "gw4-3x3.pddl").read_text()
+#: A literal about an action; and the same text with a predicate of that name, which wins.
+PUSH = """(define (domain d) (:types robot) (:predicates (up ?r - robot) (done) (no))
+ (:action lift :agent ?r - robot :parameters () :precondition (not (up ?r)) :effect (up ?r))
+ (:action push :agent ?r - robot :parameters ()
+  :precondition (forall (?o - robot) (or (= ?o ?r) (not (lift ?o)))) :effect (done)))"""
+NEVER = "(:action never :agent ?r - robot :parameters () :precondition (no) :effect (lift ?r)))"
+#: Who reads (power) says who waits for whom; the joint steps are the same.
+POWER = """(define (domain d) (:types robot) (:constants r1 r2 - robot) (:predicates (a) (b) (power))
+ (:action go :agent ?r - robot :parameters ()
+  :precondition (and (= ?r r1) (not (a))) :effect (and (a) (power)))
+ (:action up :agent ?r - robot :parameters ()
+  :precondition (and (= ?r r2) (not (b))) :effect (b)))"""
 
 
 def loaded(
@@ -101,6 +115,22 @@ def test_what_changes_plans_changes_the_key() -> None:
     assert key_of(model_digest(again.model), again.tasks[0]) == keys[0]
     state = PlanningTask("t", again.tasks[0].init, again.model.full_state(again.tasks[0].init))
     assert key_of(model_digest(again.model), state) not in keys
+
+
+def test_an_action_and_a_predicate_of_one_name_are_two() -> None:
+    named = PUSH.replace("(no)", "(no) (lift ?r - robot)")[:-1] + NEVER
+    task = "(define (problem p) (:domain d) (:objects r1 r2 - robot) (:goal (and (done) (up r1))))"
+    assert len({model_digest(loaded(text, task).model) for text in (PUSH, named)}) == 2
+
+
+def test_jobs_without_a_common_step_are_those_of_one_model() -> None:
+    task = "(define (problem p) (:domain d) (:init (power)) (:goal (and (a) (b))))"
+    found = set()
+    for text in (POWER, POWER.replace("(not (b))", "(not (b)) (power)")):
+        world = loaded(text, task, ModelOptions(asynchronous=True))
+        space = explore(world.model, world.tasks[0].init[None, :])
+        found.add(Explored(space, [(world.tasks[0].goal, None)]).identity)
+    assert len(found) == 2
 
 
 def test_the_oldest_entries_go(tmp_path: Path) -> None:

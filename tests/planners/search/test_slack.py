@@ -19,6 +19,7 @@ from planners.search.reachable import explore
 from planners.system.errors import BadInput, ProvedImpossible, UsageError
 from tests.support.domains import loaded_from
 from tests.support.random_models import random_model
+from tests.support.texts import model_of
 
 #: Problems, their least makespans, and their numbers of plans within slack 0, 1 and 2 (the sums
 #: are those of K* in its top-quality mode).
@@ -123,6 +124,30 @@ def test_the_cheapest_within_the_bound_under_a_second_cost() -> None:
         costs.append(space.cost_of(0))
     assert [steps for steps, _ in costs] == [costs[0][0] + slack for slack in (0, 1, 2)]
     assert [second for _, second in costs] == sorted((s for _, s in costs), reverse=True)
+
+
+#: A step in which both robots idle that reaches the goal, and idling that costs more than doing.
+TICK = """(define (domain d) (:constants r1 r2) (:predicates (a) (done))
+ (:action tick :parameters () ; subaction r1 idle
+  ; subaction r2 idle
+  :precondition (a) :effect (done))
+ (:action go :parameters () ; subaction r1 (go r1)
+  ; subaction r2 idle
+  :precondition () :effect (a)))"""
+DEAR = """(define (domain d) (:types robot) (:constants r1 r2 - robot)
+ (:predicates (a ?r - robot) (done)) (:functions (total-cost) - number)
+ (:action wait :agent ?r - robot :parameters () :effect (increase (total-cost) 2))
+ (:action do :agent ?r - robot :parameters () :effect (and (done) (increase (total-cost) 1)))
+ (:action nop :agent ?r - robot :parameters () :effect (a ?r)))"""
+
+
+@pytest.mark.parametrize(("domain", "lengths"), [(TICK, [2, 3, 3]), (DEAR, [2] * 4)])
+def test_a_rest_is_in_the_goal_and_may_be_dear(domain: str, lengths: list[int]) -> None:
+    problem = "(define (problem p) (:domain d) (:goal (done)))"
+    found = model_of(domain, problem, ModelOptions(slack=1, cost="makespan+cost"))
+    plans = Plans.of(search(found.model, found.tasks[0]))
+    assert {*plans} == Sequences(found.model, found.tasks[0]).within(1)
+    assert sorted(len(plans.without_rest(plan)) for plan in plans) == lengths
 
 
 @pytest.mark.parametrize(
