@@ -16,9 +16,10 @@ from coordlang.language.candidates import (
     from_problems,
     from_recorded,
 )
-from coordlang.language.listed import ListedTask
+from coordlang.language.listed import ListedTask, goal_text, ground_task
 from coordlang.language.provenance import domain_sha256, states_sha256, world_sha256
 from coordlang.language.words import Language
+from planners.joint.tables import unique_rows
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
 from planners.pddl.robots import ENVIRONMENT
@@ -173,10 +174,10 @@ def with_recorded(language: Language, candidates: Candidates, position: Position
     """Candidate tasks together with those that a language records.
 
     On another map, where problems have other objects or static facts, the recorded tasks do not
-    count.  Among all pairs of states no recorded tasks are added.
+    count.  All pairs of states are with the recorded tasks, if these have one goal state each.
 
     Raises `BadInput` for a language for all pairs of states, where the candidate tasks are not, or
-    are fewer.
+    are fewer, and for tasks that are no pairs where the candidate tasks are all pairs.
     """
     domain, problems = candidates.loaded.domain, list(candidates.loaded.problems)
     if not all(_is_of_world(language, domain, problem) for problem in problems):
@@ -185,14 +186,33 @@ def with_recorded(language: Language, candidates: Candidates, position: Position
         _require_all_pairs(language, candidates, position)
         return candidates
     recorded = recorded_list(language)
-    more = [task for task in recorded if task not in candidates.listed]
-    if candidates.kind == "all" or not more:
+    if candidates.kind == "all":
+        _require_pairs(recorded, candidates, position)
+        return candidates
+    if all(task in candidates.listed for task in recorded):
         return candidates
     listed = [*recorded, *(task for task in candidates.listed if task not in recorded)]
     kinds = {candidates.kind, language.provenance.tasks["kind"]}
     make = from_recorded if kinds == {"problems"} else from_listed
     together = make(domain, problems, listed, candidates.loaded.options, position)
     return replace(together, skipped=candidates.skipped)
+
+
+def _require_pairs(
+    recorded: list[ListedTask], candidates: Candidates, position: Position
+) -> None:
+    """Raise `BadInput` for a recorded task whose goal several states satisfy."""
+    loaded, model = candidates.loaded, candidates.model
+    states, _ = unique_rows(model.forgetting_slack(model.codec.facts_part(candidates.rows)))
+    for task in recorded:
+        _, goal = ground_task(loaded.domain, loaded.problems[0], task, position)
+        if model.holds(goal, states).sum() > 1:
+            raise BadInput(
+                f"the recorded goal {goal_text(model, goal)} is one of several states, and would "
+                "not be served with all pairs of states",
+                position=position,
+                remedy="Say --tasks FILE with the tasks that count, or leave out --start.",
+            )
 
 
 def _require_all_pairs(language: Language, candidates: Candidates, position: Position) -> None:

@@ -89,6 +89,8 @@ def test_tasks_are_added_to_those_recorded(shell: Shell) -> None:
     line = "SMALL --tasks tasks.json --start new.json -o 3.json"
     assert build(shell, line)["tasks"] == 3
     shell("verify 3.json SMALL")
+    said = "the recorded goal (at r1 c0-1) is one of several states"
+    shell("build SMALL --tasks all --start 3.json -o all.json", 31, said)
 
 
 def test_a_changed_map(shell: Shell) -> None:
