@@ -14,6 +14,7 @@ are worked out once for each different pair.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from itertools import product
 from math import prod
@@ -23,6 +24,9 @@ import numpy as np
 from planners.joint.tables import Bools, Ints, differs, of_each_row, unique_rows
 from planners.search.plan_space import LayerEdges, PlanSpace
 from planners.system.limits import reaching
+
+# Sets are followed along plans by recursion, with some calls a step: plans may have 1,500 steps.
+sys.setrecursionlimit(max(sys.getrecursionlimit(), 5_000))
 
 #: The set that holds only the empty sequence.
 END = 0

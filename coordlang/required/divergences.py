@@ -127,8 +127,9 @@ def _implied(known: Rows, rows: Rows, last: int | None = None) -> Bools:
     With ``last`` those alone are looked for that have the state of this column, the last one used.
     """
     implied = np.zeros(len(rows), np.bool_)
-    every = range(1, rows.shape[1] if last is None else last)
-    for size in range(2, rows.shape[1] - 1 if last is None else last):
+    used = int((rows != _NONE).any(axis=0).sum())  # with many robots few columns are
+    every = range(1, used if last is None else last)
+    for size in range(2, used - 1 if last is None else last):
         for others in combinations(every, size if last is None else size - 1):
             some = others if last is None else (*others, last)
             left = np.flatnonzero(~implied)
