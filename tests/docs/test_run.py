@@ -22,7 +22,7 @@ from coordlang.language.recorded import options_of
 from coordlang.language.sentences import sentence
 from planners.search.plans import Plans, counts
 from tests.support.command import Command
-from tests.support.domains import ROOT, read
+from tests.support.domains import ROOT, files_of, read
 from tests.support.pages import DOCS, PAGES, blocks, commands, matches, run_command, run_python
 
 #: Pages of many commands, which take a while.
@@ -165,9 +165,6 @@ def test_the_answers_of_both_programs_count(tmp_path: Path) -> None:
     assert refutation(tmp_path / "none.cnf").returncode == 2
 
 
-DOMAIN, PROBLEM = (ROOT / "domains" / "t-map" / name for name in ("domain.pddl", "problem.pddl"))
-
-
 @pytest.fixture(scope="module")
 def reader() -> dict[str, Any]:
     text = next(b.text for b in blocks(DOCS / "formats.md") if b.kind == "python")
@@ -189,7 +186,7 @@ def test_reader_says_the_same(
     flags: list[str], ending: str, reader: dict[str, Any], tmp_path: Path
 ) -> None:
     path = tmp_path / f"language{ending}"
-    build = "build", str(DOMAIN), str(PROBLEM), "--method", "greedy"
+    build = "build", *map(str, files_of("t-map")), "--method", "greedy"
     assert run([*build, "--tasks", "all", "-o", str(path), *flags]) == 0
     plain = reader["read_language"](path)
     language = read_language(path)
@@ -218,7 +215,7 @@ def test_files_of_the_page(reader: dict[str, Any], tmp_path: Path) -> None:
     shown = [b.text for b in blocks(DOCS / "formats.md") if b.kind == "json"]
     for path, text in zip((tasks, by_hand), shown, strict=False):
         path.write_text(text)
-    cells = [str(ROOT / "domains" / "three-cells" / f"{n}.pddl") for n in ("domain", "problem")]
+    cells = [*map(str, files_of("three-cells"))]
     assert len(read_task_file(tasks)) == 2
     build = ["build", *cells, "--tasks", str(tasks), "--method", "greedy", "-o", str(built)]
     assert run(build) == 0

@@ -27,22 +27,14 @@ from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 from planners.search.reachable import Space, explore
 from planners.system.errors import BadInput
-from tests.support.domains import DOMAINS, read, world_of
+from tests.support.domains import DOMAINS, MAPS, read, world_of
 from tests.support.texts import model_of
 
-#: The folders that the generator writes; the other worlds are written by hand.
-MAPS = ("grid", "grid-joint", "three-cells", "t-map", "corridor")
 #: What people write in them; everything else there comes from the generator.
 BY_HAND = {
-    *[
-        "README.md",
-        "generate.py",
-        "gridmap.py",
-        "picture.py",
-        "grid/domain.pddl",
-        "grid-joint/domain.pddl",
-    ],
-    *["t-map/t-map.map", "t-map/t-map.scen", "corridor/corridor.map", "corridor/rooms.tasks.json"],
+    *("README.md", "generate.py", "gridmap.py", "picture.py"),
+    *("grid/domain.pddl", "grid-joint/domain.pddl", "corridor/rooms.tasks.json"),
+    *("t-map/t-map.map", "t-map/t-map.scen", "corridor/corridor.map"),
     *(f"{folder}/README.md" for folder in MAPS),
 }
 

@@ -19,12 +19,11 @@ from coordlang.language.words import Language
 from coordlang.required.miscoordination import miscoordination
 from coordlang.verification.by_definition import verify
 from planners.joint.states import split_atoms
-from planners.loading import PlanningInstance, build
 from planners.pddl import read_domain
 from planners.pddl.model_options import Cost, ModelOptions
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
-from tests.support.domains import DOMAINS, read, world_of
+from tests.support.domains import DOMAINS, MAPS, loaded_from, world_of
 from tests.support.pages import Row, blocks, candidates, commands, run_command, table
 
 #: The folders, and how the robots are found in each.
@@ -45,8 +44,7 @@ COSTS: dict[Cost, str] = {
     "makespan+actions": "with fewest actions",
     "makespan+cost": "with least fuel",
 }
-#: The maps, whose tables have fewer columns.
-MAPS = ("grid", "grid-joint", "three-cells", "t-map", "corridor")
+#: The tables of maps have fewer columns.
 PROBLEMS = [(folder, row) for folder in (*WORLDS, *MAPS) for row in table(folder, "problem")]
 LANGUAGES = [(folder, row) for folder in (*WORLDS, *MAPS) for row in table(folder, "language for")]
 
@@ -82,16 +80,11 @@ def test_the_table_of_problems(folder: str, row: Row) -> None:
         assert here.loaded.team.by == WORLDS[folder]
         for cost, column in COSTS.items():
             if column in row:
-                loaded = loaded_under(folder, row, cost)
+                loaded = loaded_from(folder, row["problem"], ModelOptions(cost=cost))
                 plans = Plans.of(search(loaded.model, loaded.tasks[0]))
                 assert plans.count == int(row[column])
         required = miscoordination(here.plans, 0) is not None
         assert row["coordination"] == ("required" if required else "not required")
-
-
-def loaded_under(folder: str, row: Row, cost: Cost) -> PlanningInstance:
-    domain, problem = read(folder, row["problem"])
-    return build(domain, [problem], ModelOptions(cost=cost))
 
 
 @pytest.mark.parametrize(

@@ -26,10 +26,10 @@ import coordlang
 from coordlang.verification.certificate_file import write_certificate
 from planners.system.errors import UsageError
 from planners.system.writing import copy_folders
-from tests.support.domains import DOMAINS
+from tests.support.domains import DOMAINS, files_of
 from tests.support.forks import Fork, fork, fork_command
 
-FILES = [str(DOMAINS / "grid" / name) for name in ("domain.pddl", "gw1-2x2.pddl")]
+FILES = [*map(str, files_of("grid", "gw1-2x2"))]
 OLD = b"the old file\n"
 #: Commands, in which words in capitals stand for files and a sentence, and their outputs.
 WRITING = {
@@ -61,8 +61,7 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
     write_certificate(built.certificate(), files["PROOF"])
     coordlang.lift(*FILES, tasks="all", jobs=1).save(files["LIFTED"])
     sentence = coordlang.plan(built.language, *FILES, prefer=["shortest"]).sentence
-    small = [str(DOMAINS / "three-cells" / name) for name in ("domain.pddl", "problem.pddl")]
-    every = [*small, "--tasks", "all", "--method", "minimal"]
+    every = [*map(str, files_of("three-cells")), "--tasks", "all", "--method", "minimal"]
     words = {name: [path] for name, path in files.items()}
     return {**words, "PDDL": FILES, "ALL": every, "SENTENCE": [sentence]}
 
@@ -245,7 +244,7 @@ def test_plans_write_nothing(tmp_path: Path) -> None:
         os.environ["TMPDIR"] = tempfile.tempdir = str(tmp_path / "none")
         resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
 
-    files = [DOMAINS / "grid" / name for name in ("domain.pddl", "corners-6x6.pddl")]
+    files = files_of("grid", "corners-6x6")
     ended = fork_command("plans", *files, "--count", before=before).join()
     assert (ended.code, ended.out) == (0, "42252\n"), ended
 

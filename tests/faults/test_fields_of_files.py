@@ -22,7 +22,7 @@ from planners.search.plan_space import PlanSpace
 from tests.fuzz.mutations import places
 from tests.support import naive
 from tests.support.command import Command, Outcome
-from tests.support.domains import DOMAINS, read
+from tests.support.domains import files_of, read
 
 CELLS = "three-cells"
 #: Every seventh edit always, all of them at night.
@@ -92,10 +92,6 @@ def others(key: object, value: Any, words: tuple[str, ...]) -> list[Any]:
 
 
 # ---- what is true
-
-
-def files_of(folder: str) -> tuple[Path, Path]:
-    return DOMAINS / folder / "domain.pddl", DOMAINS / folder / "problem.pddl"
 
 
 @cache
@@ -274,7 +270,7 @@ def test_certificates(coordlang: Command, tmp_path: Path, every: int) -> None:
 
 @SOME
 def test_lifted_files_and_coordinates(coordlang: Command, tmp_path: Path, every: int) -> None:
-    files = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "gw1-2x2.pddl"
+    files = files_of("grid", "gw1-2x2")
     lifted, edited, ground = (tmp_path / name for name in ("f.json", "e.json", "l.json"))
     library.lift(*map(str, files), tasks="all", jobs=1).save(lifted)
     data = json.loads(lifted.read_text())

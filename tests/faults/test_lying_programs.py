@@ -14,7 +14,6 @@ import msgspec
 import pytest
 from pysat.solvers import Solver
 
-from coordlang.commands.inputs import load
 from coordlang.verification.certificate_file import Certificate
 from coordlang.verification.make_certificate import certify
 from planners.classical import compile_classical, fast_downward
@@ -22,18 +21,13 @@ from planners.classical.fast_downward import FastDownwardFailed, answered, total
 from planners.classical.task import LONGEST
 from planners.search import sat
 from tests.support.command import Command
-from tests.support.domains import DOMAINS
+from tests.support.domains import files_of, loaded_from
 
 #: Worlds in which three words are least for all pairs of states.
-_WORLDS = ("t-map/problem", "grid/gw1-2x2", "three-cells/problem")
+_WORLDS = (("t-map", "problem"), ("grid", "gw1-2x2"), ("three-cells", "problem"))
 #: The solver that checks certificates, by which no language is built.
 _CHECKS = "maplesat"
 _INTERNAL = 32
-
-
-def files(world: str) -> tuple[Path, Path]:
-    path = DOMAINS / f"{world}.pddl"
-    return path.with_name("domain.pddl"), path
 
 
 # ---- a SAT solver
@@ -61,12 +55,17 @@ def _lying(random: Random) -> type:
     "world", [pytest.param(_WORLDS[0], marks=pytest.mark.thorough), *_WORLDS[1:]]
 )
 def test_a_false_refutation_is_not_told(
-    coordlang: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, world: str, certified: bool
+    coordlang: Command,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    world: tuple[str, str],
+    certified: bool,
 ) -> None:
     """Code 0 with a certificate that holds, or an error with every file as it was."""
+    files = files_of(*world)
     language, proof = tmp_path / "language.json", tmp_path / "proof.json"
     outputs = ("-o", language, *(("--certificate", proof) if certified else ()))
-    build = ("build", *files(world), "--tasks", "all", "--method", "minimal", "--jobs", 1, *outputs)
+    build = ("build", *files, "--tasks", "all", "--method", "minimal", "--jobs", 1, *outputs)
     codes = []
     for seed in range(5):
         language.write_text("old language")
@@ -85,7 +84,7 @@ def test_a_false_refutation_is_not_told(
         assert guarantee["lower_bound"] <= guarantee["size"]
         if certified:
             assert guarantee["size"] == guarantee["lower_bound"] == 3
-            assert coordlang("verify", language, *files(world), "--certificate", proof).code == 0
+            assert coordlang("verify", language, *files, "--certificate", proof).code == 0
     assert _INTERNAL in codes or not certified
 
 
@@ -100,9 +99,8 @@ def test_a_certificate_with_too_few_reasons_is_not_written(
 
     monkeypatch.setattr("coordlang.commands.building.certify", too_few)
     outputs = ("-o", tmp_path / "language.json", "--certificate", tmp_path / "proof.json")
-    ended = coordlang(
-        "build", *files(_WORLDS[0]), "--tasks", "all", "--method", "minimal", *outputs
-    )
+    build = ("build", *files_of(*_WORLDS[0]), "--tasks", "all", "--method", "minimal")
+    ended = coordlang(*build, *outputs)
     assert ended.code == _INTERNAL
     assert "the lower bound is not proved" in ended.err
     assert not [*tmp_path.iterdir()]
@@ -113,7 +111,7 @@ def test_a_certificate_with_too_few_reasons_is_not_written(
 
 def test_a_plan_that_is_cut_off_or_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The line with the cost is the last one, and it must be whole."""
-    loaded = load(*files(_WORLDS[2]))
+    loaded = loaded_from(*_WORLDS[2])
     task = compile_classical(loaded.model, loaded.tasks[0], 2000, LONGEST)
     plan, found = tmp_path / "plan", list[str]()
 

@@ -20,6 +20,8 @@ ROOT = Path(__file__).resolve().parents[2]
 DOMAINS = ROOT / "domains"
 #: Data of others, where it is there; tests that read it are skipped elsewhere.
 SHARED = ROOT.parent / "shared" / "data"
+#: The folders that the generator writes; the other worlds are written by hand.
+MAPS = ("grid", "grid-joint", "three-cells", "t-map", "corridor")
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,11 +33,17 @@ class World:
     plans: PlanSpace
 
 
+def files_of(folder: str, stem: str = "problem") -> tuple[Path, Path]:
+    """A shipped domain and its problem ``domains/FOLDER/STEM.pddl``."""
+    return DOMAINS / folder / "domain.pddl", DOMAINS / folder / f"{stem}.pddl"
+
+
 def loaded_from(
     folder: str, stem: str = "problem", options: ModelOptions | None = None
 ) -> PlanningInstance:
     """The joint model of ``domains/FOLDER/STEM.pddl``, made anew."""
-    return load(DOMAINS / folder / "domain.pddl", [DOMAINS / folder / f"{stem}.pddl"], options)
+    domain, problem = files_of(folder, stem)
+    return load(domain, [problem], options)
 
 
 @cache

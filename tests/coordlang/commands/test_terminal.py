@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -19,7 +20,7 @@ from coordlang.commands.terminal import WIDTH, columns, fitted, wrapped
 from coordlang.commands.witness import witness_text
 from planners.joint.states import split_atoms
 from tests.support.command import Command, Outcome, on_a_terminal
-from tests.support.domains import DOMAINS, ROOT
+from tests.support.domains import ROOT, files_of
 from tests.support.forks import fork_command
 
 CODE = """
@@ -140,7 +141,7 @@ _coordlang_completion coordlang; echo "${COMPREPLY[@]}"; complete -p coordlang >
 
 
 def test_equal_plans_are_shown_once_and_lines_fit(coordlang: Command) -> None:
-    files = DOMAINS / "vans" / "domain.pddl", DOMAINS / "vans" / "two-each.pddl"
+    files = files_of("vans", "two-each")
     lines = coordlang("coordination", *files).out.split("\n")
     assert "  d1, v1 and v2 follow this optimal plan:" in lines
     assert "  d2 follows this optimal plan:" in lines
@@ -173,16 +174,11 @@ def test_atoms_are_not_broken() -> None:
     ]
 
 
-class Screen:
-    def isatty(self) -> bool:
-        return True
-
-
 def test_the_width_is_the_terminals(monkeypatch: pytest.MonkeyPatch) -> None:
     """A page where the output is no terminal, whatever COLUMNS says."""
     monkeypatch.setenv("COLUMNS", "90")
     assert terminal.line_width() == WIDTH
-    monkeypatch.setattr(sys, "stdout", Screen())
+    monkeypatch.setattr(sys, "stdout", Mock(isatty=lambda: True))
     assert terminal.line_width() == 90
     assert terminal.line_width(err=True) == WIDTH
     monkeypatch.setenv("COLUMNS", "7")
@@ -191,8 +187,7 @@ def test_the_width_is_the_terminals(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_tables_of_choices_fit(coordlang: Command, tmp_path: object) -> None:
     """Shipped problems with three robots: robots that only idle share a table."""
-    charger = DOMAINS / "charger"
-    files = charger / "domain.pddl", charger / "three-robots.pddl"
+    files = files_of("charger", "three-robots")
     language, plan = f"{tmp_path}/l.json", f"{tmp_path}/plan"
     coordlang("build", *files, "--method", "greedy", "-o", language)
     with open(plan, "w") as file:

@@ -17,7 +17,7 @@ from planners.joint.model import show
 from planners.loading import load
 from planners.search.plan_file import read_plans
 from tests.support.command import Command, Outcome
-from tests.support.domains import DOMAINS, own_task
+from tests.support.domains import files_of, own_task
 
 #: World -> problem, and which tasks its language is for.
 WORLDS = {
@@ -30,8 +30,7 @@ Ask = Callable[..., Outcome]
 
 
 def pddl(world: str) -> tuple[Path, Path]:
-    problem = DOMAINS / f"{WORLDS[world][0]}.pddl"
-    return problem.with_name("domain.pddl"), problem
+    return files_of(*WORLDS[world][0].split("/"))
 
 
 @pytest.fixture(scope="module")
@@ -296,11 +295,8 @@ def test_what_became_of_the_wishes(ask: Ask) -> None:
 def test_choices_as_a_table(ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:
     outcome = ask("choices", "cells", "w1 w0")
     assert (outcome.code, outcome.err) == (0, "")
-    for part in (
-        "r1 may follow 1 subplan (3 states):",
-        "idle -> 1 | (move r2 b a) -> 2",
-    ):
-        assert part in outcome.out
+    assert "r1 may follow 1 subplan (3 states):" in outcome.out
+    assert "idle -> 1 | (move r2 b a) -> 2" in outcome.out
     assert "r1 may" not in ask("choices", "cells", "w1 w0", "--robot", "R2").out
     monkeypatch.setattr("coordlang.commands.choices.STATES_SHOWN", 2)
     outcome = ask("choices", "cells", "w1 w0", "--robot", "r2")

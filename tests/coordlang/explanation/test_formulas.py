@@ -19,12 +19,11 @@ from coordlang.explanation.simple import _Search, simple
 from coordlang.explanation.text import literal_text, pddl_condition, shown
 from coordlang.explanation.variables import Variable, truth, valuation
 from coordlang.explanation.words import Cover, Literal, all_covers, describe_words, mapped_states
-from coordlang.language.candidates import Candidates, from_problems
+from coordlang.language.candidates import Candidates
 from coordlang.language.words import Language
 from coordlang.vocabulary.job import Assignment, Outcome
 from coordlang.vocabulary.loop import Budget
 from planners.joint.model import show
-from planners.pddl import read_domain, read_problem
 from planners.pddl.lifted import Atom
 from planners.pddl.model_options import ModelOptions
 from planners.search.reachable import explore
@@ -36,7 +35,7 @@ from tests.support.candidates import (
     random_candidates,
     small_worlds,
 )
-from tests.support.domains import DOMAINS, all_tasks
+from tests.support.domains import all_tasks, own_task
 from tests.support.task_languages import language_of, random_language
 
 
@@ -263,8 +262,7 @@ def test_a_single_term_limits_as_few_variables_as_possible() -> None:
 )
 def test_variables_are_invariants(folder: str, stem: str, names: set[str]) -> None:
     """At most one atom of a variable is true at a time; "none" is a value if it can happen."""
-    domain = read_domain(DOMAINS / folder / "domain.pddl")
-    candidates = from_problems(domain, [read_problem(DOMAINS / folder / f"{stem}.pddl", domain)])
+    candidates = own_task(folder, stem)
     space = explore(candidates.model, np.stack([task.init for task in candidates.loaded.tasks]))
     variables, value = valuation(candidates.model, space.rows)
     assert names <= {variable.name for variable in variables}
@@ -277,9 +275,7 @@ def test_variables_are_invariants(folder: str, stem: str, names: set[str]) -> No
 
 
 def test_remembered_actions_are_one_variable_a_robot() -> None:
-    domain = read_domain(DOMAINS / "three-cells" / "domain.pddl")
-    problem = read_problem(DOMAINS / "three-cells" / "problem.pddl", domain)
-    candidates = from_problems(domain, [problem], ModelOptions(remember_actions=True))
+    candidates = own_task("three-cells", options=ModelOptions(remember_actions=True))
     language = build_language(candidates, "greedy").language
     table = language.partition(candidates.model)
     formulas = all_covers(mapped_states(table, candidates.model))

@@ -23,7 +23,7 @@ from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
 from planners.system.errors import UsageError
 from tests.support.command import Command, Outcome
-from tests.support.domains import DOMAINS
+from tests.support.domains import files_of
 from tests.support.naive_classical import optimal_plans
 from tests.support.task_languages import SHIPPED
 
@@ -33,11 +33,7 @@ SENTENCE, OF_CELLS = "w0 w2 w1 w0", "w1 w0"
 Ask = Callable[..., Outcome]
 
 
-def pddl(folder: str, stem: str = "problem") -> tuple[Path, Path]:
-    return DOMAINS / folder / "domain.pddl", DOMAINS / folder / f"{stem}.pddl"
-
-
-T_MAP, CELLS = pddl("t-map"), pddl("three-cells")
+T_MAP, CELLS = files_of("t-map"), files_of("three-cells")
 
 
 @pytest.fixture(scope="module")
@@ -182,7 +178,7 @@ def built(name: str, cost: str = "makespan") -> tuple[Any, Any, str, int]:
         domain: Any = parse_domain(Source("d.pddl", LIFT))
         files: Any = domain, parse_problem(Source("p.pddl", BOTH), domain)
     else:
-        files = pddl(*name.split("/"))
+        files = files_of(*name.split("/"))
     language = door.build(*files, cost=cost, method="greedy").language
     sentence = " ".join(door.explain(language, *files).sentences[0].words)
     return files, language, sentence, door.understand(language, *files, sentence).count

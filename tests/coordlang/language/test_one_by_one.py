@@ -17,31 +17,22 @@ from coordlang.language.candidates import Candidates, describe, from_listed
 from coordlang.language.file import to_bytes
 from coordlang.language.listed import ListedTask, goal_text
 from planners.joint.model import JointModel
-from planners.pddl import parse_domain, parse_problem, read_domain, read_problem
-from planners.pddl.lifted import Domain, Problem
+from planners.pddl import parse_domain, parse_problem
 from planners.pddl.model_options import ModelOptions
 from planners.pddl.sexpr import Source
 from planners.search.plans import Plans, counts
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, Note, ProvedImpossible
 from tests.support.command import Command
-from tests.support.domains import DOMAINS
+from tests.support.domains import files_of, read
 from tests.support.joint_twin import built
 from tests.support.random_pddl import random_model
-
-GRID = DOMAINS / "grid" / "domain.pddl"
-CORNERS = DOMAINS / "grid" / "gw4-3x3.pddl"
 
 
 @pytest.fixture
 def large(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every space is too large to be explored."""
     monkeypatch.setattr(room, "MOST_STATES", 0)
-
-
-def grid() -> tuple[Domain, list[Problem]]:
-    domain = read_domain(GRID)
-    return domain, [read_problem(CORNERS, domain)]
 
 
 def answers(candidates: Candidates) -> Counter[tuple[object, ...]]:
@@ -108,11 +99,11 @@ def test_random_tasks_have_the_same_plans(
 
 
 def test_tasks_on_one_plan_share_its_search(large: None, searches: list[str]) -> None:
-    domain, problems = grid()
+    domain, problem = read("grid", "gw4-3x3")
     cells = ["c0-0", "c0-1", "c0-2", "c1-2"]
     tasks = [ListedTask((f"(at r1 {c})", "(at r2 c2-0)"), ("(at r1 c2-2)",)) for c in cells]
     with pytest.warns(Note, match="4 of 4 tasks start elsewhere .* is not checked"):
-        found = from_listed(domain, problems, tasks)
+        found = from_listed(domain, [problem], tasks)
     assert searches == ["1"]
     costs = [found.spaces[0].cost_of(task)[0] for task in range(4)]
     assert costs == [4, 3, 2, 1]
@@ -125,10 +116,10 @@ def test_tasks_on_one_plan_share_its_search(large: None, searches: list[str]) ->
 def test_a_robot_that_is_nowhere_or_in_two_places_is_a_mistake(
     large: None, init: tuple[str, ...]
 ) -> None:
-    domain, problems = grid()
+    domain, problem = read("grid", "gw4-3x3")
     good = ListedTask(("(at r1 c0-0)", "(at r2 c1-1)"), ())
     with pytest.raises(BadInput, match=r"task 2: the state .* cannot be reached from the initial"):
-        from_listed(domain, problems, [good, ListedTask(init, ())])
+        from_listed(domain, [problem], [good, ListedTask(init, ())])
 
 
 # ---- idling is a rule of the model: nothing else changes a task's plans
@@ -141,8 +132,7 @@ _REST = """(:action rest :agent ?r - robot :parameters () :precondition (awake ?
 @pytest.fixture
 def files(tmp_path: Path) -> tuple[Path, Path, Path]:
     """A T-map with a cell ``far`` and an action ``rest``; r2 is awake in problem A, not in B."""
-    domain = (DOMAINS / "t-map" / "domain.pddl").read_text()
-    problem = (DOMAINS / "t-map" / "problem.pddl").read_text()
+    domain, problem = (path.read_text() for path in files_of("t-map"))
     domain = domain.replace("(:predicates", "(:predicates (awake ?r - robot)")
     domain = domain.rstrip().removesuffix(")") + _REST + ")"
     problem = problem.replace("c0-1\n", "c0-1 far\n", 1)
@@ -213,8 +203,8 @@ def test_a_plan_with_what_is_left_out(
 
 def test_all_pairs_are_those_of_the_same_states(tmp_path: Path) -> None:
     """As many states are reachable from a mirrored start, but other ones."""
-    folder = DOMAINS / "t-map"
-    domain, text = folder / "domain.pddl", (folder / "problem.pddl").read_text()
+    domain, shipped = files_of("t-map")
+    text = shipped.read_text()
     walls = text.replace("(adjacent c1-0 c1-1)", "").replace("(adjacent c1-1 c1-0)", "")
     problems = []
     for number, start in enumerate(("(at r1 c1-0) (at r2 c1-1)", "(at r2 c1-0) (at r1 c1-1)")):

@@ -43,10 +43,9 @@ from coordlang.lifted.features import (
 from coordlang.lifted.pool import pool_of
 from coordlang.lifted.world import States, World
 from planners.joint.tables import Rows
-from planners.loading import load
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, Position
-from tests.support.domains import DOMAINS
+from tests.support.domains import loaded_from
 from tests.support.naive_features import members, value
 
 HERE = Position("test")
@@ -69,7 +68,7 @@ def thorough(world: tuple[str, str]) -> ParameterSet:
 @cache
 def states_of(folder: str, stem: str, each: int = 1) -> States:
     """Every so many-th reachable state of a shipped problem."""
-    loaded = load(DOMAINS / folder / "domain.pddl", [DOMAINS / folder / f"{stem}.pddl"])
+    loaded = loaded_from(folder, stem)
     rows = explore(loaded.model, loaded.tasks[0].init[None, :]).rows
     return States(World.loaded(loaded), rows[::each])
 
@@ -227,7 +226,7 @@ def partition_of(values: list[int]) -> tuple[int, ...]:
 
 def test_coordinates_of_a_file() -> None:
     """From the least one; where they are no whole numbers, in their order."""
-    loaded = load(DOMAINS / "handover" / "domain.pddl", [DOMAINS / "handover" / "exchange.pddl"])
+    loaded = loaded_from("handover", "exchange")
     names = ("east", "east-north", "west", "west-north")
     rows = loaded.tasks[0].init[None, :]
     column = feature("(mod (column (at r1)) 4)")  # r1 is at west

@@ -32,7 +32,7 @@ from tests.coordlang.report.conftest import (
     refuted,
 )
 from tests.support.command import Command
-from tests.support.domains import DOMAINS
+from tests.support.domains import files_of
 from tests.support.random_models import random_model
 
 WORLDS: list[tuple[str, str, str | None]] = [
@@ -200,9 +200,7 @@ def test_a_file_need_not_name_the_robots() -> None:
 
 def test_plans_within_slack_are_called_so() -> None:
     """The page says "optimal plan" of no other plans."""
-    folder = DOMAINS / "three-cells"
-    files = folder / "domain.pddl", folder / "problem.pddl"
-    built = door.build(*files, slack=2, words_see_slack=True, method="separating")
+    built = door.build(*files_of("three-cells"), slack=2, words_see_slack=True, method="separating")
     _, domain, problem = make_language("three-cells", "problem", None)
     html = make_report(built.language, domain, [problem], tasks_shown=1).html
     kept = data_of(html)["kept"]
@@ -213,7 +211,7 @@ def test_plans_within_slack_are_called_so() -> None:
 
 # ---- ``coordlang report``
 
-FILES = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
+FILES = files_of("t-map")
 
 
 def test_a_page_is_written(coordlang: Command, language: Path, tmp_path: Path) -> None:

@@ -10,21 +10,19 @@ import pytest
 
 from coordlang.required.task_answers import fewest_actions, requiring
 from planners.loading import PlanningInstance, build
-from planners.pddl import parse_problem, read_domain
 from planners.pddl.model_options import ModelOptions
-from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans
 from planners.system.errors import ProvedImpossible
 from tests.support import naive
 from tests.support.command import Command
-from tests.support.domains import DOMAINS
+from tests.support.domains import files_of
 from tests.support.joint_twin import built
 from tests.support.random_pddl import Kind, random_model
+from tests.support.texts import parsed
 
 _MOST = 400
-PAIR = ("domain", "problem")
 Plan = tuple[tuple[str | None, ...], ...]
 
 
@@ -66,11 +64,9 @@ def test_they_are_the_plans_of_the_other_cost(kind: Kind, number: int) -> None:
 
 
 def test_of_joint_actions_the_parts_count() -> None:
-    folder = DOMAINS / "grid-joint"
-    domain = read_domain(folder / "domain.pddl")
-    text = (folder / "gw1-2x2.pddl").read_text()
-    text = text[: text.index("(:goal")] + "(:goal (at r1 c1-1)))"
-    problem = parse_problem(Source("p", text), domain)
+    domain_text, text = (path.read_text() for path in files_of("grid-joint", "gw1-2x2"))
+    goal = "(:goal (at r1 c1-1)))"
+    domain, problem = parsed(domain_text, text[: text.index("(:goal")] + goal)
     least, cheap = (
         build(domain, [problem], ModelOptions(cost=cost))
         for cost in ("makespan", "makespan+actions")
@@ -90,25 +86,23 @@ WANDER = """(define (problem wander) (:domain three-cells)
 
 
 def test_coordination_says_so_in_one_line(coordlang: Command) -> None:
-    domain, problem = (DOMAINS / "grid" / f"{n}.pddl" for n in ("domain", "three-robots-3x3"))
-    outcome = coordlang("coordination", domain, problem)
+    files = files_of("grid", "three-robots-3x3")
+    outcome = coordlang("coordination", *files)
     line = "With --cost makespan+actions, which leaves 112 plans, they fail in 19.7 %.\n"
     assert outcome.out.count(line) == 1
-    data = json.loads(coordlang("coordination", domain, problem, "--json").out)["tasks"][0]
+    data = json.loads(coordlang("coordination", *files, "--json").out)["tasks"][0]
     assert data["fewest_actions"]["plans"] == 112
-    other = json.loads(
-        coordlang("coordination", domain, problem, "--json", "--cost", "makespan+actions").out
-    )["tasks"][0]
+    said = coordlang("coordination", *files, "--json", "--cost", "makespan+actions").out
+    other = json.loads(said)["tasks"][0]
     assert data["fewest_actions"] == {
         key: other[key] for key in ("plans", "requires_coordination", "failure")
     }
     assert "fewest_actions" not in other
-    alike = coordlang("coordination", *(DOMAINS / "three-cells" / f"{n}.pddl" for n in PAIR))
-    assert "With --cost" not in alike.out
+    assert "With --cost" not in coordlang("coordination", *files_of("three-cells")).out
 
 
 def test_build_says_so_in_one_line(coordlang: Command, tmp_path: Path) -> None:
-    domain, problem = DOMAINS / "three-cells" / "domain.pddl", tmp_path / "wander.pddl"
+    (domain, shipped), problem = files_of("three-cells"), tmp_path / "wander.pddl"
     problem.write_text(WANDER)
     files = domain, problem, "-o", tmp_path / "l.json"
     key = "tasks_requiring_coordination_with_fewest_actions"
@@ -124,5 +118,4 @@ def test_build_says_so_in_one_line(coordlang: Command, tmp_path: Path) -> None:
     assert "With --cost makespan+actions, which leaves 2 plans, coordination is not required." in (
         coordlang("coordination", domain, problem).out.splitlines()
     )
-    both = coordlang("build", domain, DOMAINS / "three-cells" / "problem.pddl", *files[2:])
-    assert "with --cost" not in both.out
+    assert "with --cost" not in coordlang("build", domain, shipped, *files[2:]).out

@@ -24,12 +24,12 @@ from coordlang.vocabulary.first_differences import FirstDifferences, differences
 from planners.loading import load
 from planners.parallel.batch import Store
 from planners.parallel.workers import Workers
-from planners.pddl import parse_problem, read_domain, read_problem
+from planners.pddl import parse_problem
 from planners.pddl.model_options import ModelOptions
 from planners.pddl.sexpr import Source
 from planners.search.portions import PORTION
 from planners.system.errors import BadInput, ProvedImpossible
-from tests.support.domains import DOMAINS, all_tasks
+from tests.support.domains import all_tasks, files_of, own_task, read
 from tests.support.random_models import random_model
 from tests.support.symmetric_worlds import GRID, world
 
@@ -97,13 +97,12 @@ def test_random_models() -> None:
 
 
 def test_where_symmetries_are_not_looked_for() -> None:
-    grid = read_domain(DOMAINS / "grid" / "domain.pddl")
-    problem = read_problem(DOMAINS / "grid" / "gw2-2x3.pddl", grid)
-    small = all_pairs(grid, [problem])
+    grid, problem = read("grid", "gw2-2x3")
+    small = all_tasks("grid", "gw2-2x3")
     assert symmetric_goals(small) is None  # less work than symmetries take
     assert symmetric_goals(small, 0, 0) is not None
     assert symmetric_goals(small, least=0, for_action=10**6) is None
-    assert symmetric_goals(from_problems(grid, [problem]), 0, 0) is None
+    assert symmetric_goals(own_task("grid", "gw2-2x3"), 0, 0) is None
     remembering = all_pairs(grid, [problem], ModelOptions(remember_actions=True))
     assert symmetric_goals(remembering, 0, 0) is None
 
@@ -187,7 +186,7 @@ def test_processes_and_kept_jobs_change_nothing(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("workers", [HERE, EAGER])
 def test_problems_are_jobs_of_coordination(workers: Workers, tmp_path: Path) -> None:
-    domain, corners = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "corners-3x3.pddl"
+    domain, corners = files_of("grid", "corners-3x3")
     near = tmp_path / "near.pddl"
     near.write_text(corners.read_text().replace("(at r1 c2-2) (at r2 c0-0)", "(at r1 c0-1)"))
     files = [corners, near, corners]

@@ -15,7 +15,7 @@ from coordlang.simulation.recording import RECORDINGS
 from coordlang.sites.world import Link, World
 from planners.system.errors import BadInput, Note, UsageError
 from planners.system.signals import Interrupted
-from tests.support.domains import DOMAINS
+from tests.support.domains import files_of
 from tests.support.simulation import floor_for, language_of_task, mission_of
 
 _PLANES = """
@@ -54,9 +54,8 @@ def test_a_plane_is_in_a_city_and_not_in_its_fuel(tmp_path: Path) -> None:
 
 def test_a_robot_may_be_called_wall(tmp_path: Path) -> None:
     problem, words = tmp_path / "problem.pddl", tmp_path / "words.json"
-    domain = DOMAINS / "corridor" / "domain.pddl"
-    text = (DOMAINS / "corridor" / "problem.pddl").read_text()
-    problem.write_text(text.replace("r2", "wall"))
+    domain, shipped = files_of("corridor")
+    problem.write_text(shipped.read_text().replace("r2", "wall"))
     coordlang.build(domain, problem, method="greedy").language.save(words)
     found = coordlang.simulate(words, domain, problem, seed=1)
     run = found.runs[0]
@@ -66,8 +65,7 @@ def test_a_robot_may_be_called_wall(tmp_path: Path) -> None:
 
 def test_nothing_is_said_where_all_is_simulated(recwarn: pytest.WarningsRecorder) -> None:
     language = language_of_task("t-map").language
-    t_map = DOMAINS / "t-map"
-    coordlang.simulate(language, t_map / "domain.pddl", t_map / "problem.pddl")
+    coordlang.simulate(language, *files_of("t-map"))
     assert not [one for one in recwarn if issubclass(one.category, Note)]
 
 
@@ -77,8 +75,7 @@ def test_a_signal_ends_a_recording_without_a_word_of_others(
     from PIL import GifImagePlugin
 
     language = language_of_task("t-map").language
-    t_map = DOMAINS / "t-map"
-    found = coordlang.simulate(language, t_map / "domain.pddl", t_map / "problem.pddl")
+    found = coordlang.simulate(language, *files_of("t-map"))
     monkeypatch.setattr(GifImagePlugin, "_write_frame_data", Mock(side_effect=Interrupted(2)))
     with pytest.raises(Interrupted):
         RECORDINGS[".gif"](found.record, found.runs[0])

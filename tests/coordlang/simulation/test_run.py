@@ -39,11 +39,12 @@ from coordlang.simulation.recording import RECORDINGS, ROBOTS, Scene, frames, ne
 from coordlang.simulation.run import record_of, runs_of
 from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Mission
-from planners.pddl import parse_problem, read_domain
+from planners.pddl import parse_problem
 from planners.pddl.sexpr import Source
 from planners.system.errors import BadInput
-from tests.support.domains import DOMAINS, ROOT
+from tests.support.domains import ROOT
 from tests.support.simulation import floor_for, mission_of, runs
+from tests.support.symmetric_worlds import GRID
 
 
 def nearest(found: RunRecord) -> float:
@@ -78,14 +79,13 @@ def ring() -> Mission:
         " ".join(f"(at {robot} {cells[(number + n) % 4]})" for n, robot in enumerate(robots))
         for number in (0, 1)
     )
-    domain = read_domain(DOMAINS / "grid" / "domain.pddl")
     text = (
         f"(define (problem ring) (:domain grid) (:objects {' '.join(robots)} - robot "
         f"{' '.join(cells)} - cell) (:init {at} {' '.join(ways)}) (:goal (and {to})))"
     )
-    problem = parse_problem(Source("ring.pddl", text), domain)
-    language = build_language(from_problems(domain, [problem]), "greedy").language
-    used = language_in_task(language, domain, problem)
+    problem = parse_problem(Source("ring.pddl", text), GRID)
+    language = build_language(from_problems(GRID, [problem]), "greedy").language
+    used = language_in_task(language, GRID, problem)
     return Mission(used, "sentence", best_sentence(used, ["most-plans"]).words)
 
 

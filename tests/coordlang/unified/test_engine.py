@@ -46,13 +46,11 @@ from coordlang.unified import register
 from coordlang.unified.engine import PLAN_KINDS, CoordlangEngine
 from coordlang.unified.plans import label
 from coordlang.unified.translation import PddlNames, translate
-from planners.loading import load
-from planners.pddl import read_domain
 from planners.pddl.model_options import ModelOptions
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
 from tests.support.command import Command
-from tests.support.domains import DOMAINS, ROOT
+from tests.support.domains import ROOT, files_of, loaded_from
 
 
 @pytest.fixture(autouse=True)
@@ -100,9 +98,7 @@ def crossing(cells: int = 4, kind: str = "robot", more: str = "") -> Any:
 
 def read(folder: str, problem: str) -> Any:
     """A shipped domain by unified-planning's own reader."""
-    return PDDLReader().parse_problem(
-        str(DOMAINS / folder / "domain.pddl"), str(DOMAINS / folder / f"{problem}.pddl")
-    )
+    return PDDLReader().parse_problem(*map(str, files_of(folder, problem)))
 
 
 def steps_of(found: Any, plan: PartialOrderPlan) -> list[list[str]]:
@@ -122,11 +118,6 @@ def steps_of(found: Any, plan: PartialOrderPlan) -> list[list[str]]:
     return [sorted(layer) for layer in layers]
 
 
-def our_steps(space: Any) -> list[list[list[str]]]:
-    texts = space.model.texts
-    return [[sorted({t for t in texts(step) if t}) for step in plan] for plan in Plans.of(space)]
-
-
 @pytest.mark.parametrize(
     ("folder", "name", "robots"),
     [
@@ -138,16 +129,14 @@ def our_steps(space: Any) -> list[list[list[str]]]:
 def test_the_plans_are_those_of_the_pddl_files(
     folder: str, name: str, robots: dict[str, Any]
 ) -> None:
-    path = DOMAINS / folder
-    choice = ModelOptions(tuple(robots.get("robots", ())))
-    loaded = load(path / "domain.pddl", [path / f"{name}.pddl"], choice)
-    space = search(loaded.model, loaded.tasks[0])
+    loaded = loaded_from(folder, name, ModelOptions(tuple(robots.get("robots", ()))))
+    ours, texts = Plans.of(search(loaded.model, loaded.tasks[0])), loaded.model.texts
+    wanted = ([sorted({t for t in texts(step) if t}) for step in plan] for plan in ours)
     problem = read(folder, name)
     found = translate(problem)
     plans = all_plans(problem, **robots)
     assert plans
-    ours = Counter(map(str, our_steps(space)))
-    assert Counter(str(steps_of(found, plan)) for plan in plans) == ours
+    assert Counter(str(steps_of(found, plan)) for plan in plans) == Counter(map(str, wanted))
     for plan in plans[:5]:
         assert verdict(problem, plan, **robots).status == Validity.VALID
         assert sequential_verdicts(problem, plan) == {Validity.VALID}
@@ -431,14 +420,13 @@ def test_concurrency_constraints() -> None:
 
 def test_joint_actions() -> None:
     """Each action is a whole step; the comments that say so in PDDL are given as an argument."""
-    path = DOMAINS / "grid-joint"
-    loaded = load(path / "domain.pddl", [path / "three-cells.pddl"])
+    loaded = loaded_from("grid-joint", "three-cells")
     problem = read("grid-joint", "three-cells")
     parts: dict[str, dict[str, str | None]] = {
         schema.name: {
             p.robot: f"({' '.join(p.template)})" if p.template else None for p in schema.parts
         }
-        for schema in read_domain(path / "domain.pddl").schemas
+        for schema in loaded.domain.schemas
     }
     plans = all_plans(problem, subactions=parts)
     assert len(plans) == Plans.of(search(loaded.model, loaded.tasks[0])).count == 4
@@ -486,9 +474,8 @@ def test_a_sentence_leaves_exactly_its_plans() -> None:
 def test_a_language_for_plans_within_slack_is_refused(coordlang: Command, tmp_path: Path) -> None:
     """The engine's plans are optimal ones."""
     file = tmp_path / "language.json"
-    files = [DOMAINS / "three-cells" / f"{name}.pddl" for name in ("domain", "problem")]
-    made = coordlang("build", *files, "--slack", "1", "--words-see-slack", "-o", file)
-    assert made.code == 0
+    options = ("--slack", "1", "--words-see-slack", "-o", file)
+    assert coordlang("build", *files_of("three-cells"), *options).code == 0
     with pytest.raises(UPUsageError, match="plans within slack"):
         solve(crossing(), language=str(file))
 
@@ -496,13 +483,8 @@ def test_a_language_for_plans_within_slack_is_refused(coordlang: Command, tmp_pa
 def test_a_language_file_for_the_problem_that_the_library_read(
     coordlang: Command, tmp_path: Path
 ) -> None:
-    path, file = DOMAINS / "handover", tmp_path / "language.json"
-    assert (
-        coordlang(
-            "build", path / "domain.pddl", path / "two-doors.pddl", "--method", "greedy", "-o", file
-        ).code
-        == 0
-    )
+    files, file = files_of("handover", "two-doors"), tmp_path / "language.json"
+    assert coordlang("build", *files, "--method", "greedy", "-o", file).code == 0
     problem = read("handover", "two-doors")
     result = solve(problem, language=str(file))
     assert (result.status, result.log_messages) == (Status.SOLVED_OPTIMALLY, [])
@@ -511,7 +493,6 @@ def test_a_language_file_for_the_problem_that_the_library_read(
     result = solve(problem, language=str(file))
     assert result.status == Status.SOLVED_OPTIMALLY
     assert "does not cover this task" in str(result.log_messages)
-    files = path / "domain.pddl", path / "two-doors.pddl"
     assert coordlang("build", *files, "-o", file, "--words", 1).code == 0
     result = solve(read("handover", "two-doors"), language=str(file))
     assert result.status == Status.SOLVED_OPTIMALLY

@@ -18,7 +18,7 @@ from planners.system.errors import OutOfMemory, OutOfTime
 from tests.support import naive
 from tests.support.candidates import requiring, small_candidates
 from tests.support.command import Command
-from tests.support.domains import DOMAINS, all_tasks, own_task, read
+from tests.support.domains import all_tasks, files_of, own_task, read
 
 
 @pytest.mark.thorough
@@ -66,10 +66,6 @@ def test_stopped_while_it_checks(
     assert not built.language.guarantee.proved_minimal
 
 
-CORNERS = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "corners-3x3.pddl"
-NINE = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "gw4-3x3.pddl"
-
-
 def test_few_words_that_leave_many_plans_open() -> None:
     """Of one task: as few words as the exact method proves, and no less freedom than it leaves."""
     found = build_language(own_task("grid", "corners-4x4"))
@@ -97,12 +93,13 @@ def test_effort_buys_words_and_bounds(stem: str, least: int) -> None:
 
 def test_what_more_effort_might_bring(coordlang: Command, tmp_path: Path) -> None:
     path = tmp_path / "l.json"
-    built = coordlang("build", *NINE, "--tasks", "all", "--effort", 1, "-o", path)
+    nine = files_of("grid", "gw4-3x3")
+    built = coordlang("build", *nine, "--tasks", "all", "--effort", 1, "-o", path)
     assert built.code == 0
     guarantee = json.loads(path.read_text())["guarantee"]
     said = f"between {guarantee['lower_bound']} and {guarantee['size']} words are needed"
     assert f"{said}: a larger --effort than 1 may find fewer" in built.out
-    proved = coordlang("build", *CORNERS, "-o", path)
+    proved = coordlang("build", *files_of("grid", "corners-3x3"), "-o", path)
     assert "proved minimal" in proved.out
     assert "--effort" not in proved.out
 

@@ -30,13 +30,12 @@ from planners.search.kept_plans import (
 from planners.search.portions import Explored
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, Note, ProvedImpossible
-from tests.support.domains import DOMAINS
+from tests.support.domains import files_of
 from tests.support.random_pddl import KINDS, random_model
 from tests.support.random_spaces import equal
 from tests.support.texts import model_of
 
-GRID = (DOMAINS / "grid" / "domain.pddl").read_text()
-PROBLEM = (DOMAINS / "grid" / "gw4-3x3.pddl").read_text()
+GRID, PROBLEM = (path.read_text() for path in files_of("grid", "gw4-3x3"))
 #: A literal about an action; and the same text with a predicate of that name, which wins.
 PUSH = """(define (domain d) (:types robot) (:predicates (up ?r - robot) (done) (no))
  (:action lift :agent ?r - robot :parameters () :precondition (not (up ?r)) :effect (up ?r))
