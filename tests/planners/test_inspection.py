@@ -7,6 +7,7 @@ import math
 import re
 import sys
 import time
+from itertools import permutations
 from unittest.mock import DEFAULT, Mock
 
 import pytest
@@ -83,12 +84,7 @@ def both_possible(loaded: PlanningInstance, first: str, second: str) -> bool:
             {own[label] for label in labels[begin[state] : begin[state + 1]]}
             for own, (begin, labels) in zip(model.labels, choices, strict=True)
         ]
-        if any(
-            first in a and second in b
-            for i, a in enumerate(texts)
-            for j, b in enumerate(texts)
-            if i != j
-        ):
+        if any(first in a and second in b for a, b in permutations(texts, 2)):
             return True
     return False
 

@@ -298,14 +298,14 @@ class Plans:
     """Plans up to timing; ``states``: for the parts of each those passed as soon as possible."""
 
     def __init__(self, world: World, space: PlanSpace, task: int, most: int) -> None:
-        best: dict[Parts, tuple[tuple[tuple[int, ...], ...], tuple[int, ...]]] = {}
+        best: dict[Parts, tuple[int, tuple[tuple[int, ...], ...], tuple[int, ...]]] = {}
         row = space.rows[space.state[space.starts[task]]]
         self.listed = naive.listed(space, task, most)
         for plan in self.listed:
             parts, when = world.parts(row, plan)
-            own = when, naive.states(space, task, plan)
-            best[parts] = min(best.get(parts, own), own, key=lambda one: _hurry(one[0]))
-        self.states = {parts: states for parts, (_, states) in best.items()}
+            own = sum(map(sum, when)), when, naive.states(space, task, plan)
+            best[parts] = min(best.get(parts, own), own)
+        self.states = {parts: states for parts, (*_, states) in best.items()}
 
     def by_sentence(self, word: Mapping[int, int]) -> dict[tuple[int, ...], list[Parts]]:
         """The parts of the plans with each sentence."""
@@ -341,10 +341,6 @@ def texts(model: JointModel, parts: Parts) -> tuple[tuple[str, ...], ...]:
         )
         for robot, part in enumerate(parts)
     )
-
-
-def _hurry(when: tuple[tuple[int, ...], ...]) -> tuple[int, tuple[tuple[int, ...], ...]]:
-    return sum(map(sum, when)), when
 
 
 def least_words(plans: Sequence[Plans], states: Sequence[int]) -> tuple[int, dict[int, int]]:

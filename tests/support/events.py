@@ -22,6 +22,9 @@ from tests.support.texts import parsed
 EITHER_WAY = """(define (domain either) (:types robot way) (:predicates (there ?r - robot))
  (:action go :agent ?r - robot :parameters (?w - way)
   :precondition (not (there ?r)) :effect (there ?r)))"""
+EITHER_WAY_BOTH = """(define (problem p) (:domain either) (:objects r1 r2 - robot a b - way)
+ (:init) (:goal (and (there r1) (there r2))))"""
+ONLY_R1 = EITHER_WAY_BOTH.replace("(and (there r1) (there r2))", "(there r1)")
 
 LIFT = """(define (domain lift) (:types robot)
  (:predicates (middle ?r - robot) (once ?r - robot) (twice ?r - robot))

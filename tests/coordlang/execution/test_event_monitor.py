@@ -18,6 +18,7 @@ from tests.support.events import (
     EITHER_WAY,
     LIFT,
     LIFT_TWICE,
+    ONLY_R1,
     choices_in,
     random_choices,
     turning_round,
@@ -191,9 +192,7 @@ def test_each_file_has_its_kind_of_monitor() -> None:
 
 
 def test_while_an_event_is_under_way_it_is_all_that_may_end() -> None:
-    problem = """(define (problem p) (:domain either) (:objects r1 r2 - robot a b - way)
-     (:init) (:goal (there r1)))"""
-    r1, _ = monitors_of(choices_in(EITHER_WAY, problem))
+    r1, _ = monitors_of(choices_in(EITHER_WAY, ONLY_R1))
     one, other = r1.allowed()
     assert one is not None
     with pytest.raises(NotPossible, match="it has not started it"):

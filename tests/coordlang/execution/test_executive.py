@@ -36,17 +36,16 @@ from planners.system.errors import Refuted
 from tests.support.asynchronous import World, texts
 from tests.support.events import (
     EITHER_WAY,
+    EITHER_WAY_BOTH,
     LIFT,
     LIFT_TWICE,
+    ONLY_R1,
     choices_in,
     random_choices,
     turning_round,
 )
 
 SILENT_AFTER = 5.0
-EITHER_WAY_BOTH = """(define (problem p) (:domain either) (:objects r1 r2 - robot a b - way)
- (:init) (:goal (and (there r1) (there r2))))"""
-ONLY_R1 = EITHER_WAY_BOTH.replace("(and (there r1) (there r2))", "(there r1)")
 
 
 def executive(data: dict[str, Any], name: str, life: int) -> Executive:
@@ -71,18 +70,11 @@ class Fleet:
     def __init__(
         self, found: SentenceChoices, world: World, random: Random, faults: float, kills: int
     ) -> None:
-        self.data, self.world, self.random, self.faults = (
-            json.loads(to_bytes(found)),
-            world,
-            random,
-            faults,
-        )
+        self.data, self.world = json.loads(to_bytes(found)), world
+        self.random, self.faults = random, faults
         self.names: Sequence[str] = world.model.robots
-        self.now, self.order, self.queue = (
-            0.0,
-            count(),
-            list[tuple[float, int, Callable[[], None]]](),
-        )
+        self.now, self.order = 0.0, count()
+        self.queue: list[tuple[float, int, Callable[[], None]]] = []
         self.at: dict[str, Executive] = {}
         self.wakes: dict[str, float] = {}
         self.logs: dict[str, tuple[str, ...]] = {}
@@ -179,12 +171,7 @@ class Fleet:
         self.later(self.random.expovariate(1), self.ender(name, line["event"], subaction))
 
     def label(self, robot: int, subaction: str) -> int:
-        model = self.world.model
-        return next(
-            n
-            for n in range(len(model.labels[robot]))
-            if model.subaction_text(robot, n) == subaction
-        )
+        return self.world.model.labels[robot].index(subaction)
 
     def ender(self, name: str, number: int, subaction: str) -> Callable[[], None]:
         """The driver ends the event, and says so as soon as its executive is there."""
@@ -387,8 +374,7 @@ def test_what_a_driver_may_not_say_is_refused_and_changes_nothing() -> None:
 
 
 def test_a_wish_is_promised_and_being_late_is_told() -> None:
-    problem = EITHER_WAY_BOTH
-    pair = Pair(choices_in(EITHER_WAY, problem), "r1", "r2")
+    pair = Pair(choices_in(EITHER_WAY, EITHER_WAY_BOTH), "r1", "r2")
     pair.at["r1"].reads('{"wish": {"do": "(go r1 b)"}}', 0)  # before anything is agreed
     pair.tick(0)
     assert pair.lines("r1", "granted") == [True]

@@ -198,19 +198,14 @@ def check_open(task_language: TaskLanguage, seed: int) -> None:
         fits = task_language.plans_with(said)
         assert Plans.of(fits).count == len(plans)
         assert set(Plans.of(fits)) == plans
-        check_dag(task_language, PlanDag(task_language, said, fits), plans)
+        check_paths(task_language, PlanDag(task_language, said, fits), plans)
     random = Random(seed)
     for _ in range(8):
         check_broken(task_language, near(task_language, random, list(groups)), groups)
 
 
-def check_dag(task_language: TaskLanguage, graph: PlanDag, plans: set[Plan]) -> None:
-    """Its paths are the plans, its nodes have the right words and counts."""
-    check_paths(task_language, graph, plans)
-    assert all(graph.sentence[node.words - 1] == node.word for node in graph.nodes)
-
-
 def check_paths(task_language: TaskLanguage, graph: PlanDag, plans: set[Plan]) -> None:
+    """They are the plans, and the nodes have the right words and counts."""
     through: Counter[int] = Counter()
     found = set()
     out: dict[int, list[tuple[int, tuple[str | None, ...]]]] = {}
@@ -225,6 +220,7 @@ def check_paths(task_language: TaskLanguage, graph: PlanDag, plans: set[Plan]) -
         stack += [([*path, target], [*actions, action]) for target, action in out.get(path[-1], [])]
     assert found == {texts(task_language.model, plan) for plan in plans}
     for number, node in enumerate(graph.nodes):
+        assert graph.sentence[node.words - 1] == node.word
         assert node.word == task_language.language.states.get(
             node.key, task_language.language.default
         )

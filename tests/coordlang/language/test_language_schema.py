@@ -179,30 +179,21 @@ def test_by_hand(coordlang: Command, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "key"),
+    ("at", "added", "key"),
     [
-        (
-            '"(at r1 b) (at r2 a)":',
-            '"(at r1 a) (at r2 b)": "a", "(at r1 b) (at r2 a)":',
-            "(at r1 a) (at r2 b)",
-        ),
-        (
-            '"(at r1 b) (at r2 a)":',
-            '"(at r1 \\u0061) (at r2 b)": "a", "(at r1 b) (at r2 a)":',
-            "(at r1 a) (at r2 b)",
-        ),
-        ('"default":', '"default": "b", "default":', "default"),
-        ('"states":', '"states": {"(at r1 a) (at r2 b)": "b"}, "states":', "states"),
-        ('"version":', '"producer": {"seed": 1, "\\u0073eed": 2}, "version":', "seed"),
-        ('"version":', '"tasks": {"kind": "all", "count": 30, "kind": "all"}, "version":', "kind"),
+        ('"(at r1 b) (at r2 a)"', '"(at r1 a) (at r2 b)": "a"', "(at r1 a) (at r2 b)"),
+        ('"(at r1 b) (at r2 a)"', '"(at r1 \\u0061) (at r2 b)": "a"', "(at r1 a) (at r2 b)"),
+        ('"default"', '"default": "b"', "default"),
+        ('"states"', '"states": {"(at r1 a) (at r2 b)": "b"}', "states"),
+        ('"version"', '"producer": {"seed": 1, "\\u0073eed": 2}', "seed"),
+        ('"version"', '"tasks": {"kind": "all", "count": 30, "kind": "all"}', "kind"),
     ],
 )
-def test_a_key_twice(old: str, new: str, key: str) -> None:
-    text = json.dumps(BY_HAND)
-    assert old in text
+def test_a_key_twice(at: str, added: str, key: str) -> None:
+    assert f"{at}:" in json.dumps(BY_HAND)
     for spaces in (None, 3):
         once = json.dumps(BY_HAND, indent=spaces)
         language_from_bytes(once.encode(), HERE)
         with pytest.raises(BadInput, match="occurs twice") as refused:
-            language_from_bytes(once.replace(old, new, 1).encode(), HERE)
+            language_from_bytes(once.replace(f"{at}:", f"{added}, {at}:", 1).encode(), HERE)
         assert repr(key) in refused.value.what

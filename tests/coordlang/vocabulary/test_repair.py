@@ -20,8 +20,6 @@ from planners.system.errors import OutOfTime
 from tests.support.candidates import failing, is_language, small_worlds
 from tests.support.domains import all_tasks
 
-Failing = list[list[tuple[int, ...]]]
-
 
 def with_others(word: dict[int, int], states: list[int], used: int) -> Iterator[dict[int, int]]:
     """The partition with any words for further states: those in use, by number, and new ones."""
@@ -33,7 +31,7 @@ def with_others(word: dict[int, int], states: list[int], used: int) -> Iterator[
 
 
 def nearest(
-    states: list[int], kept: dict[int, int], old_words: int, bad: Failing
+    states: list[int], kept: dict[int, int], old_words: int, bad: list[list[tuple[int, ...]]]
 ) -> tuple[int, int]:
     """The fewest changes of any language, and with them the fewest new words; all are tried."""
     for size in range(len(kept) + 1):

@@ -60,14 +60,6 @@ def least(states: list[int], wanted: set[Demand]) -> int:
     raise AssertionError("all states apart separate everything")
 
 
-def small_models(
-    robots: int, most: int, number: int, asynchronous: bool
-) -> Iterator[tuple[int, Candidates]]:
-    """Random models that require coordination, small enough to list plans and partitions."""
-    models = small_candidates(robots, states=7, plans=most, asynchronous=asynchronous)
-    return islice(((seed, found) for seed, found in models if requiring(found)), number)
-
-
 @pytest.mark.parametrize("asynchronous", [False, True])
 @pytest.mark.parametrize("written", [pytest.param(True, marks=pytest.mark.thorough), False])
 @pytest.mark.parametrize(
@@ -91,7 +83,9 @@ def test_against_the_theorem(
     if not written:
         monkeypatch.setattr(DifferenceWalk, "every", lambda *_: None)
     seen: Counter[tuple[int, ...]] = Counter()
-    for seed, candidates in small_models(robots, most, number, asynchronous):
+    models = small_candidates(robots, states=7, plans=most, asynchronous=asynchronous)
+    models = ((seed, found) for seed, found in models if requiring(found))
+    for seed, candidates in islice(models, number):
         both, alpha = (demands(candidates, most, beta=b) for b in (True, False))
         states = sorted({int(s) for space in candidates.spaces for s in space.state})
         full = build_language(candidates, "separating", seed=seed)

@@ -49,12 +49,9 @@ def left_on(found: Workers) -> tuple[int, list[str]]:
         ours = [name for name in dask_scheduler.worker_plugins if name.startswith("coordlang")]
         return len(dask_scheduler.tasks), ours
 
-    left: tuple[int, list[str]] = client_of(found).run_on_scheduler(look)
+    client: Any = found.cluster.client  # type: ignore[union-attr]
+    left: tuple[int, list[str]] = client.run_on_scheduler(look)
     return left
-
-
-def client_of(found: Workers) -> Any:
-    return found.cluster.client  # type: ignore[union-attr]
 
 
 def test_results_and_errors(connected: Workers) -> None:
