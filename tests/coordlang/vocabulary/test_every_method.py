@@ -16,7 +16,7 @@ from coordlang.vocabulary.job import Assignment
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import OutOfMemory, OutOfTime
 from tests.support import naive
-from tests.support.candidates import requiring, small_candidates
+from tests.support.candidates import small_candidates
 from tests.support.command import Command
 from tests.support.domains import all_tasks, files_of, own_task, read
 
@@ -25,8 +25,8 @@ from tests.support.domains import all_tasks, files_of, own_task, read
 @pytest.mark.parametrize(("robots", "most"), [(2, 40), (3, 14)])
 def test_a_language_by_definition_with_a_true_bound(robots: int, most: int) -> None:
     """On random models that require coordination; the bound is at most the least number of words."""
-    models = small_candidates(robots, states=6, plans=most, tasks=60)
-    for candidates in islice((found for _, found in models if requiring(found)), 10):
+    models = small_candidates(robots, states=6, plans=most, tasks=60, requires=True)
+    for _, candidates in islice(models, 10):
         least = build_language(candidates, "exhaustive").language.guarantee.size
         for method in METHODS:
             language = build_language(candidates, method, seed=3).language

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, nullcontext
 from dataclasses import replace
 from functools import partial
-from itertools import combinations, islice, product
+from itertools import combinations, islice, product, takewhile
 from math import inf
 
 import networkx as nx
@@ -31,6 +31,7 @@ from planners.search.plan_space import PlanSpace
 from tests.support import naive
 from tests.support.candidates import (
     MOST,
+    REQUIRING,
     failing,
     is_language,
     listed,
@@ -46,7 +47,7 @@ from tests.support.texts import parsed
     [(2, 10), (3, 5), *(pytest.param(n, 80, marks=pytest.mark.thorough) for n in (2, 3))],
 )
 def test_pairs_of_plans_that_fail_are_the_paths_of_a_graph(robots: int, number: int) -> None:
-    models = (c for _, c in small_candidates(robots, states=9, plans=MOST) if requiring(c))
+    models = (c for _, c in small_candidates(robots, states=9, plans=MOST, requires=True))
     told, own = 0, [own_task("grid", "corners-3x3"), own_task("corridor")] if robots == 2 else []
     for candidates in (bells(EQUAL[:1], EQUAL[:1]), *own, *islice(models, number)):
         fail = defaultdict[int, set[tuple[Pair | None, ...]]](set)
@@ -72,6 +73,16 @@ def test_pairs_of_plans_that_fail_are_the_paths_of_a_graph(robots: int, number: 
             with pytest.raises(Undecided) if paths else nullcontext():
                 failing_pairs(pairs, inf, 0)
     assert told >= 2 * number, told
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("robots", "asynchronous"), REQUIRING)
+def test_no_model_is_passed_over(robots: int, asynchronous: bool) -> None:
+    """The seeds of models that require coordination are those that all models show."""
+    seeds = [*map(int, REQUIRING[robots, asynchronous].split())]
+    models = small_candidates(robots, states=9, asynchronous=asynchronous, separable=False)
+    every = takewhile(lambda one: one[0] <= seeds[-1], models)
+    assert [seed for seed, found in every if requiring(found)] == seeds
 
 
 def paths_of(steps: Ints, place: int = START) -> Iterator[tuple[Pair | None, ...]]:
@@ -112,8 +123,8 @@ def test_all_warping_paths_of_pairs_of_plans_are_the_paths_of_a_graph(
 ) -> None:
     models = (
         c
-        for _, c in small_candidates(robots, states=9, plans=MOST)
-        if requiring(c) and len(c.spaces) == 1 and int(c.spaces[0].layer.max()) <= 4
+        for _, c in small_candidates(robots, states=9, plans=MOST, requires=True)
+        if len(c.spaces) == 1 and int(c.spaces[0].layer.max()) <= 4
     )
     random, seen, paths = np.random.default_rng(0), Counter[bool](), 0
     for candidates in islice(models, number):
@@ -266,11 +277,8 @@ def test_as_few_words_suffice_as_of_all_partitions(
 def test_as_few_words_of_random_models_suffice_as_of_all_partitions(
     robots: int, number: int, asynchronous: bool
 ) -> None:
-    models = (
-        c
-        for _, c in small_candidates(robots, states=7, plans=MOST, asynchronous=asynchronous)
-        if requiring(c) and len(c.spaces) == 1
-    )
+    found = small_candidates(robots, states=7, plans=MOST, asynchronous=asynchronous, requires=True)
+    models = (candidates for _, candidates in found if len(candidates.spaces) == 1)
     told = Counter[int]()
     for candidates in islice(models, number):
         size = least(candidates)

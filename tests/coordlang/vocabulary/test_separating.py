@@ -14,7 +14,7 @@ from coordlang.language.candidates import Candidates
 from coordlang.required.composition_walk import DifferenceWalk
 from coordlang.vocabulary.exhaustive import partitions
 from tests.support import naive
-from tests.support.candidates import listed, requiring, small_candidates
+from tests.support.candidates import listed, small_candidates
 from tests.support.domains import all_tasks
 
 #: Pairs of states, all of which must be separated; and of several such groups one.
@@ -83,8 +83,9 @@ def test_against_the_theorem(
     if not written:
         monkeypatch.setattr(DifferenceWalk, "every", lambda *_: None)
     seen: Counter[tuple[int, ...]] = Counter()
-    models = small_candidates(robots, states=7, plans=most, asynchronous=asynchronous)
-    models = ((seed, found) for seed, found in models if requiring(found))
+    models = small_candidates(
+        robots, states=7, plans=most, asynchronous=asynchronous, requires=True
+    )
     for seed, candidates in islice(models, number):
         both, alpha = (demands(candidates, most, beta=b) for b in (True, False))
         states = sorted({int(s) for space in candidates.spaces for s in space.state})
