@@ -27,11 +27,11 @@ CODE = """
 import sys, time
 import rich.console, rich.progress, rich.status, rich.text  # now, so that the pauses are enough
 from coordlang.commands import terminal
-terminal._DELAY = 0.0
+terminal._DELAY, terminal._INTERVAL = 0.0, 0.05
 with terminal.working("first thing") as say:
-    time.sleep(1)
+    time.sleep(0.5)
     say("[second] thing")
-    time.sleep(1)
+    time.sleep(0.5)
 print("answer")
 """
 
@@ -54,7 +54,6 @@ def test_how_far_the_work_got() -> None:
     """That of the innermost block; what cannot be read just now is left out."""
     code = CODE.split("with terminal.working")[0] + (
         "from planners.system.limits import reaching\n"
-        "terminal._INTERVAL = 0.05\n"
         "done, layers = 0, []\n"
         "with terminal.working('searching'), reaching(lambda: 'the whole', 'less'):\n"
         "    time.sleep(0.5)\n"

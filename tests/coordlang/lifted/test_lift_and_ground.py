@@ -168,13 +168,13 @@ def test_an_empty_claim_helps_nobody(rings: Lifted) -> None:
     data = json.loads(to_bytes(rings.language))
     data["values"], data["verified"] = {}, []
     lifted = lifted_of(data)
-    language = api.ground(lifted, GRID, LARGER, jobs=1)
+    language = api.ground(lifted, GRID, RINGS[0], jobs=1)
     assert set(language.words) == {"v0.0", "v0.1", "v1.0", "v1.1"}
-    unverified = api.ground(lifted, GRID, LARGER, verified=False, jobs=1)
+    unverified = api.ground(lifted, GRID, RINGS[0], verified=False, jobs=1)
     assert unverified.guarantee.method == "lifted; not verified here"
     data["features"] = []
     with pytest.raises(Refuted):
-        api.ground(lifted_of({**data, "words": ["w0"]}), GRID, LARGER, jobs=1)
+        api.ground(lifted_of({**data, "words": ["w0"]}), GRID, RINGS[0], jobs=1)
 
 
 def lifted_of(data: dict[str, object]) -> LiftedLanguage:
@@ -264,8 +264,9 @@ def test_files_on_stdout(
     out = coordlang("lift", GRID, *RINGS, "--tasks", "all", "-o", "-", "--jobs", "1")
     assert (out.code, out.out) == (0, lifted.read_text())
     assert "4 words, functions of 2 features" in out.err
-    assert coordlang("ground", lifted, GRID, LARGER, "-o", "l.json", "--jobs", "1").code == 0
-    out = coordlang("ground", lifted, GRID, LARGER, "-o", "-", "--jobs", "1")
+    ground = ("ground", lifted, GRID, RINGS[0], "--jobs", "1", "-o")
+    assert coordlang(*ground, "l.json").code == 0
+    out = coordlang(*ground, "-")
     assert (out.code, out.out) == (0, Path("l.json").read_text())
     assert sorted(path.name for path in tmp_path.iterdir()) == ["l.json"]
 
