@@ -233,12 +233,6 @@ def test_language_of_another_domain_or_world(shell: Shell, language: Path) -> No
     shell(f"verify language.json {domain} other.pddl", 31, said)
 
 
-PLANS, UNDERSTAND, CHOICES, BUILD = (
-    "plans d p",
-    "understand l d p w0",
-    "choices l d p w0",
-    "build d p",
-)
 SAMPLE = "--sample and --max exclude each other"
 
 
@@ -249,18 +243,18 @@ SAMPLE = "--sample and --max exclude each other"
         ("plans", "expected DOMAIN PROBLEM"),
         ("verify l.json d", "DOMAIN PROBLEMS..., or --factored DIR without"),
         ("coordination d p --factored x", "DOMAIN PROBLEMS..., or --factored DIR without"),
-        (BUILD, "Missing option '-o'"),
+        ("build d p", "Missing option '-o'"),
         ("build d.pddl p.pddl --seed -1 -o l.json", "--seed -1: expected 0 or more"),
-        (f"{PLANS} --max 1 --sample 2", SAMPLE),
-        (f"{UNDERSTAND} --max 1 --sample 2", SAMPLE),
-        (f"{PLANS} --seed 0", "--seed belongs to --sample"),
-        (f"{UNDERSTAND} --seed 1", "--seed belongs to --sample"),
-        (f"{PLANS} --format ipc --json", "leave out --format ipc"),
-        (f"{CHOICES} --format text --json", "leave out --format text"),
-        (f"{PLANS} --robots r1 --robot-type robot", "give one of them"),
-        (f"{BUILD} -o l --effort 2 --method minimal", "--effort belongs to --method best"),
-        (f"{BUILD} -o l --effort -1", "--effort"),
-        (f"{BUILD} -o l --words 2 --certificate c", "--certificate"),
+        ("plans d p --max 1 --sample 2", SAMPLE),
+        ("understand l d p w0 --max 1 --sample 2", SAMPLE),
+        ("plans d p --seed 0", "--seed belongs to --sample"),
+        ("understand l d p w0 --seed 1", "--seed belongs to --sample"),
+        ("plans d p --format ipc --json", "leave out --format ipc"),
+        ("choices l d p w0 --format text --json", "leave out --format text"),
+        ("plans d p --robots r1 --robot-type robot", "give one of them"),
+        ("build d p -o l --effort 2 --method minimal", "--effort belongs to --method best"),
+        ("build d p -o l --effort -1", "--effort"),
+        ("build d p -o l --words 2 --certificate c", "--certificate"),
     ],
 )
 def test_usage(line: str, message: str, shell: Shell) -> None:

@@ -12,12 +12,7 @@ import pytest
 from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.commands.building import build_language
 from coordlang.execution.guided_search import ExpandedStates, plan_under_sentence
-from coordlang.execution.plan_sentence import (
-    NotAPlan,
-    NotOptimal,
-    PlanDag,
-    sentence_of_plan,
-)
+from coordlang.execution.plan_sentence import NotAPlan, NotOptimal, PlanDag, sentence_of_plan
 from coordlang.execution.task_language import NoPlanFits, TaskLanguage
 from coordlang.language.candidates import Candidates, all_pairs
 from coordlang.language.listed import ground_task

@@ -13,11 +13,7 @@ import jsonschema
 import pytest
 
 from coordlang.commands.building import build_language
-from coordlang.language.file import (
-    LANGUAGE,
-    language_from_bytes,
-    to_bytes,
-)
+from coordlang.language.file import LANGUAGE, language_from_bytes, to_bytes
 from coordlang.language.provenance import Tolerance
 from planners.system.errors import BadInput, Position
 from tests.support.command import Command

@@ -321,10 +321,7 @@ def test_a_record_that_cannot_be_played_is_refused(tmp_path: Path) -> None:
 
 
 #: What a robot's logic is made of, besides the standard library.
-OWN = {
-    "coordlang.execution.monitor",
-    "coordlang.simulation.robot",
-}
+OWN = {"coordlang.execution.monitor", "coordlang.simulation.robot"}
 
 
 def imported(path: Path) -> Iterator[str]:
