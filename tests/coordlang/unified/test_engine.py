@@ -474,7 +474,7 @@ def test_a_sentence_leaves_exactly_its_plans() -> None:
 def test_a_language_for_plans_within_slack_is_refused(coordlang: Command, tmp_path: Path) -> None:
     """The engine's plans are optimal ones."""
     file = tmp_path / "language.json"
-    options = ("--slack", "1", "--words-see-slack", "-o", file)
+    options = ("--slack", "1", "--words", "1", "-o", file)
     assert coordlang("build", *files_of("three-cells"), *options).code == 0
     with pytest.raises(UPUsageError, match="plans within slack"):
         solve(crossing(), language=str(file))
