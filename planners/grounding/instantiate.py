@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 from functools import cache
-from itertools import product
 from math import prod
 
 from planners.grounding.actions import GroundAction
@@ -62,7 +61,7 @@ _MANY = 1000
 class Bindings:
     """The objects of a problem, its static facts and its possible subactions.
 
-    ``instances``: action -> the arguments with which it may ever be done.
+    ``instances``: action -> the arguments with which it may ever be done; empty if unknown.
     """
 
     def __init__(
@@ -74,6 +73,7 @@ class Bindings:
     ) -> None:
         self._domain = domain
         self._problem = problem
+        self._instances = instances
         self._members: dict[tuple[str, ...], dict[str, int]] = {}
         #: The arguments with which a guard is true, by what it is about and their number.
         self._true: dict[tuple[type[Guard], str, int], list[Arguments]] = {}
@@ -101,7 +101,7 @@ class Bindings:
         named = {arg for guard in statics for arg in guard.args}
         others = [self.objects(v.types) for v in variables if v.name not in named]
         guards: tuple[Guard, ...] = statics
-        if prod(map(len, others)) > _MANY:
+        if self._instances and prod(map(len, others)) > _MANY:
             guards += steps
         own = {v.name for v in variables}
         outer = {name: value for name, value in binding.items() if name not in own}
@@ -192,8 +192,8 @@ def idling_schemas(domain: Domain) -> frozenset[str]:
 def idling_costs(domain: Domain, problem: Problem, team: Team, *, costs: bool) -> tuple[int, ...]:
     """What idling costs each robot: what its cheapest action that is idling costs, else 0.
 
-    Of all arguments of the right types, whatever the precondition: idling is always possible.
-    Without ``costs`` nothing.
+    Of all arguments with which equality, static atoms and types do not make the precondition false;
+    where it holds does not matter: idling is always possible.  Without ``costs`` nothing.
     """
     idling = idling_schemas(domain) if costs else frozenset()
     grounder = _Grounder(domain, problem, team, {})
@@ -210,6 +210,10 @@ def idling_costs(domain: Domain, problem: Problem, team: Team, *, costs: bool) -
 def ground_goal(domain: Domain, problem: Problem, goal: Formula) -> Formula:
     """A goal formula over fluent atoms, in negation normal form."""
     return _Grounder(domain, problem, Team((), ""), {}).formula(goal, {}, True)
+
+
+def _terms(leaves: Iterable[Atom | StepAtom | Equal]) -> set[str]:
+    return {t for a in leaves for t in ((a.left, a.right) if isinstance(a, Equal) else a.args)}
 
 
 class _Grounder:
@@ -311,8 +315,7 @@ class _Grounder:
         negation under ``forall``: where one of them is false, the instance is no matter.
         """
         leaves = [leaf for leaf, _ in literals(f)]
-        terms = {t for a in leaves for t in ((a.left, a.right) if isinstance(a, Equal) else a.args)}
-        names = tuple(sorted(term for term in terms if term.startswith("?")))
+        names = tuple(sorted(term for term in _terms(leaves) if term.startswith("?")))
         part = f.part if isinstance(f, Exists) else negated(f.part)
         steps = tuple(p for p in conjuncts(part) if isinstance(p, StepAtom))
         found = self._shapes[id(f)] = (f, names, self._static_atoms(part), steps)
@@ -373,18 +376,24 @@ class _Grounder:
     def costs_alone(self, schema: Schema) -> Iterator[tuple[int, int]]:
         """The robot and the cost of each instance with one owner, as far as its cost is given.
 
-        Of arguments that matter neither for the owner nor for the cost only the first is taken.
+        Instances with a precondition that is false in every state are none.  Of arguments that
+        matter neither for that nor for the owner and the cost only the first is taken.
         """
-        term = schema.cost.args if isinstance(schema.cost, Atom) else ()
-        every = [(p.name, self._bindings.objects(p.types)) for p in schema.parameters]
-        objects = [
-            own if name in term or not {*own}.isdisjoint(self._team.robots) else [*own][:1]
-            for name, own in every
-        ]
-        for args in product(*objects):
-            binding = {p.name: a for p, a in zip(schema.parameters, args, strict=True)}
-            owners = self._team.owners(schema, args)
-            if len(owners) != 1:
+        precondition = schema.precondition
+        leaves = [leaf for leaf, _ in literals(precondition)]
+        named = _terms(a for a in leaves if getattr(a, "predicate", "") not in self._fluents)
+        named |= {*schema.cost.args} if isinstance(schema.cost, Atom) else set()
+        every = [(p, self._bindings.objects(p.types)) for p in schema.parameters]
+        if not all(own for _, own in every):
+            return
+        robots = self._team.robots
+        varied = [p for p, own in every if p.name in named or not {*own}.isdisjoint(robots)]
+        first = {p.name: next(iter(own)) for p, own in every}
+        guards = self._static_atoms(precondition)
+        for binding in self._bindings.values(tuple(varied), first, guards):
+            owners = self._team.owners(schema, tuple(binding[p.name] for p in schema.parameters))
+            possible = self.formula(precondition, binding, True, owners) != FALSE
+            if len(owners) != 1 or not possible:
                 continue
             cost = schema.cost
             if not isinstance(cost, Atom) or self._atom(cost, binding) in self._problem.values:

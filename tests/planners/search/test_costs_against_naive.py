@@ -27,28 +27,44 @@ from tests.support.texts import model_of, parsed
 Price = Callable[[str], int]
 
 
+#: Resting is idling, with some arguments only; of which no action changes anything.
+_REST = {
+    "agent": "(:action rest :agent ?q - robot :parameters (?x) :precondition {} :effect ())",
+    "plain": "(:action rest :parameters (?q - robot ?x) :precondition {} :effect ())",
+}
+_FITTING = (
+    "()",
+    "(not (= ?q ?x))",
+    "(or (fee ?x) (= ?q ?x))",
+    "(exists (?y) (and (fee ?y) (= ?x ?y)))",
+)
+
+
 def priced(seed: int, kind: Kind) -> tuple[PlanningInstance, Price]:
-    """A random model; an action costs a constant, what its first argument costs, or nothing."""
+    """A random model; an action costs a constant, what its last argument costs, or nothing."""
     text = random_model(seed, kind)
     random = Random(seed)
-    names = re.findall(r"\(:action (\S+)", text.domain)
-    pieces = re.split(r"(?=\(:action )", text.domain)
+    rest = _REST[kind].format(random.choice(_FITTING))
+    resting = text.domain.replace("(:action ", f"{rest} (:action ", 1)
+    names = re.findall(r"\(:action (\S+)", resting)
+    pieces = re.split(r"(?=\(:action )", resting)
     fixed: dict[str, int | None] = {}
     for number, name in enumerate(names, 1):
         variables = re.findall(r"\?\w+", pieces[number].split(":precondition")[0])
         fixed[name] = random.choice((0, 1, 2, 5, None if variables else 3))
-        term = f"(price {variables[0]})" if fixed[name] is None else str(fixed[name])
+        term = f"(price {variables[-1]})" if fixed[name] is None else str(fixed[name])
         cost = (
             "" if fixed[name] == 0 and random.random() < 0.5 else f"(increase (total-cost) {term}) "
         )
         pieces[number] = re.sub(
             r":effect \((?:and ?)?", f":effect (and {cost}", pieces[number], count=1
         )
-    functions = "(:functions (price ?x)) (:predicates"
+    functions = "(:functions (price ?x)) (:predicates (fee ?x)"
     priced_domain = "".join(pieces).replace("(:predicates", functions, 1)
     _, plain = parsed(priced_domain, text.problem)
     prices = {name: random.randrange(4) for name in sorted(plain.objects)}
     known = " ".join(f"(= (price {name}) {value})" for name, value in prices.items())
+    known += "".join(f" (fee {name})" for name in prices if random.random() < 0.5)
     priced_problem = text.problem.replace("(:init", f"(:init {known}", 1)
     options = ModelOptions(unowned=text.unowned, cost="makespan+cost")
     loaded = model_of(priced_domain, priced_problem, options)
@@ -56,19 +72,24 @@ def priced(seed: int, kind: Kind) -> tuple[PlanningInstance, Price]:
     def price(label: str) -> int:
         name, *args = label.strip("()").split()
         own = fixed[name]
-        return prices[args[0]] if own is None else own
+        return prices[args[-1]] if own is None else own
 
     return loaded, price
 
 
 def step_price(twin: Twin, price: Price) -> Callable[[Labels], int]:
-    """Each subaction once; idling costs as the robot's cheapest action that is idling, or 0."""
+    """Each subaction once; idling costs as the robot's cheapest action that is idling, or 0.
+
+    Where its precondition is false by equality and by what never changes, there is no such action.
+    """
     rules = twin.rules
     found: list[list[int]] = [[] for _ in rules.team.robots]
     for schema in filter(twin.is_idling, rules.domain.schemas):
         for args in product(*(rules.meaning.objects(v.types) for v in schema.parameters)):
-            owners = rules.bind(schema, args).owners
-            if len(owners) == 1:
+            bound = rules.bind(schema, args)
+            owners = bound.owners
+            needs = rules.meaning.required(schema.precondition, bound.binding, True, owners)
+            if len(owners) == 1 and needs is not False:
                 found[owners[0]].append(price(f"({' '.join((schema.name, *args))})"))
     idling = [min(own, default=0) for own in found]
 
@@ -126,7 +147,7 @@ _WAYS = """(define (domain ways) (:types robot place) (:constants hell - place)
   (:action rest :agent ?r - robot :parameters () :precondition (at ?r hell)
     :effect (increase (total-cost) (price ?r)))
   (:action wait :agent ?r - robot :parameters (?p ?p2 ?p3 ?p4 ?p5 ?p6 ?p7 ?p8 ?p9 - place)
-    :effect (increase (total-cost) 7)))"""
+    :precondition (exists (?r - robot ?a ?b - place) (drive ?r ?a ?b)) :effect (increase (total-cost) 7)))"""
 _OVER = """(define (problem over) (:domain ways) (:objects r1 r2 - robot a b c {more} - place)
   (:init (at r1 a) (at r2 a) (next a b) (next b c) (jumps r1) {price} (= (price r2) 5))
   (:goal (and (at r1 c) (at r2 c))))"""
