@@ -211,21 +211,34 @@ def _read_heads(names: Names, root: Group, sections: Sections) -> list[_Head]:
 
 def _read_head(names: Names, item: Group) -> _Head:
     name, fields = _fields(item, _FIELDS, _FORM)
-    items, agent_name = _parameter_items(fields)
+    items, agent_name, clause = _parameter_items(fields)
     parameters = names.variables_of(items)
     agent = next((i for i, v in enumerate(parameters) if v.name == agent_name), None)
     if agent_name is not None and agent is None:
         found = f", found {echoed(agent_name)}" if agent_name else ""
         raise item.fail(f"expected a variable after ':agent'{found}", _AGENT_FORM)
+    if clause:
+        (own,) = names.variables_of(clause)
+        parameters = tuple(_one(clause[0], own, p) if p.name == own.name else p for p in parameters)
     return _Head(item, name, fields, parameters, agent)
+
+
+def _one(place: Expression, own: Variable, listed: Variable) -> Variable:
+    """The agent of an ``:agent`` clause that is listed among the parameters, too."""
+    given = [v.types for v in (own, listed) if v.types != ("object",)]
+    if len({frozenset(types) for types in given}) > 1:
+        here, there = (" or ".join(types) for types in given)
+        what = f"{own.name} is of type {here} behind :agent, but {there} among the :parameters"
+        raise place.fail(what, f"Write ({own.name} - {here} ..) there.")
+    return replace(own, types=given[0]) if given else own
 
 
 def _parameter_items(
     fields: dict[str, tuple[Expression, ...]],
-) -> tuple[tuple[Expression, ...], str | None]:
-    """The full typed list of parameters, and the agent's name ("" if it has none).
+) -> tuple[tuple[Expression, ...], str | None, tuple[Expression, ...]]:
+    """The full typed list of parameters, the agent's name ("" if it has none), and its clause.
 
-    The agent comes first unless it stands among the parameters.
+    The agent comes first unless it stands among the parameters: only then there is a clause.
     """
     listed: tuple[Expression, ...] = ()
     if fields.get(":parameters"):
@@ -233,22 +246,29 @@ def _parameter_items(
     inside = next((n for n, item in enumerate(listed) if is_token(item, ":agent")), None)
     if inside is not None:
         before, behind = listed[:inside], listed[inside + 1 :]
-        return before + behind, first_text(behind)
+        if before and not any(is_token(item, "-") for item in before[-2:]):
+            before = _untyped(before)
+        return before + behind, first_text(behind), ()
     if ":agent" not in fields:
-        return listed, None
+        return listed, None, ()
     clause = fields[":agent"]
     if len(clause) == 1 and isinstance(clause[0], Group):  # ":agent (?a - robot)"
         clause = clause[0].items
     name = first_text(clause)
-    if any(is_token(item, name) for item in listed):
-        return listed, name
-    if len(clause) == 1:  # an untyped agent must not take the type of the parameters behind it
-        at, source = clause[0].offset, clause[0].source
-        clause = (*clause, Token("-", at, source), Token("object", at, source))
+    if len(clause) == 1:
+        clause = _untyped(clause)
     if clause and not is_token(clause[1], "-"):
         what = "expected '- TYPE' or nothing after the agent's variable"
         raise clause[1].fail(what, _AGENT_FORM)
-    return clause + listed, name
+    if len(clause) == 3 and any(is_token(item, name) for item in listed):
+        return listed, name, clause
+    return clause + listed, name, ()
+
+
+def _untyped(items: tuple[Expression, ...]) -> tuple[Expression, ...]:
+    """A typed list whose last names must not take the type of what stands behind them."""
+    at, source = items[-1].offset, items[-1].source
+    return (*items, Token("-", at, source), Token("object", at, source))
 
 
 def _read_schema(names: Names, head: _Head) -> Schema:

@@ -110,6 +110,7 @@ SAME_DOMAIN: dict[str, tuple[str, ...]] = {
     "agent inside the parameters": (AGENT, ":parameters (:agent ?r - robot ?x ?y - room)"),
     "agent again in them": (AGENT, ":agent ?r :parameters (?r - robot ?x ?y - room)"),
     "agent behind them": (AGENT, ":parameters (?x ?y - room) :agent ?r - robot"),
+    "untyped names before the agent": (AGENT, ":parameters (?x ?y :agent ?r - robot)"),
     "untyped agent before typed parameters": (":agent ?r - robot", ":agent ?r"),
     # types and objects
     "supertypes forward and undeclared": (
@@ -193,6 +194,13 @@ CASES: dict[str, Case] = {
     ),
     "two variables behind :agent": case(
         (31, "d.pddl:5"), d(":agent ?r - robot", ":agent ?r ?q - robot")
+    ),
+    "an agent whose type is behind :agent only": case(
+        2, with_action("hop :agent ?r - robot :parameters (?y - room ?r) :effect (at ?r ?y)")
+    ),
+    "an agent of two types": case(
+        (31, "d.pddl:5:22: ?r is of type robot behind :agent, but room among the :parameters"),
+        d(AGENT, ":agent ?r - robot :parameters (?r ?x ?y - room)"),
     ),
     "several types of agents": case(3, MOBILE, p(OBJECTS, "r1 - robot r2 - drone a b c - room")),
     "--robots in upper case": case(2, PLAIN, PROBLEM, "--robots R1,R2"),
