@@ -223,13 +223,13 @@ def read_objects(
     A section is a typed list, with ``(:private ..)`` groups.
     """
     objects = {**known}
-    for section in sections:
-        items = section.items[1:]
-        private = [item for item in items if isinstance(item, Group) and item.head == ":private"]
-        entries = typed_list([item for item in items if item not in private], "an object")
-        declared = {token.text for token, _ in entries}
+    parts = [_without_private(section) for section in sections]
+    declared = {*known, *(token.text for entries, _ in parts for token, _ in entries)}
+    for entries, private in parts:
         for group in private:
-            entries += typed_list(_without_owner(group, declared), "an object")
+            own = typed_list(_without_owner(group, declared), "an object")
+            declared |= {token.text for token, _ in own}
+            entries += own
         for token, types in entries:
             names.check_types(token, types)
             if token.text.startswith("?"):
@@ -239,14 +239,25 @@ def read_objects(
     return objects
 
 
+def _without_private(section: Group) -> tuple[list[Typed], list[Group]]:
+    """The objects of a section that are in no ``(:private ..)`` group, and these groups."""
+    items = section.items[1:]
+    private = [item for item in items if isinstance(item, Group) and item.head == ":private"]
+    return typed_list([item for item in items if item not in private], "an object"), private
+
+
 def _without_owner(section: Group, declared: Set[str]) -> Sequence[Expression]:
     """The objects of a ``(:private ..)`` group, without an owner in front of them.
 
     Unfactored MA-PDDL writes ``(:private depot0 hoist0 - hoist)``: the owner is declared elsewhere,
-    or again in the group.
+    or again in the group.  What a type stands behind is no owner.
     """
     inner = section.items[1:]
-    if not inner or not isinstance(inner[0], Token):
+    if (
+        not inner
+        or not isinstance(inner[0], Token)
+        or any(is_token(item, "-") for item in inner[1:2])
+    ):
         return inner
     owner = inner[0].text
     repeated = any(is_token(item, owner) for item in inner[1:])

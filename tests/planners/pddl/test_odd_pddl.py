@@ -101,6 +101,12 @@ MEET = with_action(
 THREE = p(
     "r1 r2 -", "r1 r2 r3 -", "(at r2 b)", "(at r2 b) (at r3 b)", "(at r2 a)", "(at r2 a) (at r3 a)"
 )
+#: Behind the effect of an action: one more action.  With it r1 has 3 ways to be elsewhere, r2 six.
+HOP = ") (:action hop :agent ?r - robot :parameters (?y - room) :effect (at ?r ?y)"
+ELSEWHERE = (
+    "(and (at r1 c) (at r2 a))",
+    "(exists (?x - room) (and (not (= ?x a)) (at r1 ?x)))",
+)
 LONG = "9" * 400
 HUGE = f"{9 * 10**18}"
 
@@ -222,6 +228,27 @@ CASES: dict[str, Case] = {
         p("a b c - room", "a b c - room x - agent"),
     ),
     # types, objects and sections
+    **{
+        f"an owner of private objects, declared in {place}": case(
+            18,
+            d("(:pred", f"{constants}(:pred", EFFECT, EFFECT + HOP),
+            p(OBJECTS, objects, *ELSEWHERE),
+        )
+        for place, constants, objects in (
+            (
+                "constants",
+                "(:constants r1 - robot) ",
+                "r2 - robot a - room (:private r1 b c - room)",
+            ),
+            ("a section", "", "(:private r1 a b c - room)) (:objects r1 r2 - robot"),
+            ("a group", "", "(:private r1 - robot r2 - robot) (:private r1 a b c - room)"),
+        )
+    },
+    "a private constant": case(
+        18,
+        d("(:pred", "(:constants r1 - robot) (:pred", EFFECT, EFFECT + HOP),
+        p(OBJECTS, "(:private r1 - robot) r2 - robot a b c - room", *ELSEWHERE),
+    ),
     "a cycle": case(
         (31, "d.pddl:3:11: the types form a cycle"), d("robot room)", "robot - room room - robot)")
     ),
