@@ -344,13 +344,15 @@ def _read_network(
     """The ``:concurrency-constraint`` and ``:positive-dependence`` sections of a domain.
 
     Raises `BadInput` for unknown actions, positions outside the arguments, impossible bounds,
-    unknown constraints.
+    unknown constraints, and two of one name.
     """
     by_action = {schema.name: schema for schema in schemas}
-    constraints = [
-        _constraint(names, by_action, s) for s in sections.get(":concurrency-constraint", ())
-    ]
-    by_name = {c.name: c for c in constraints}
+    by_name: dict[str, Constraint] = {}
+    for section in sections.get(":concurrency-constraint", ()):
+        constraint = _constraint(names, by_action, section)
+        if by_name.setdefault(constraint.name, constraint) is not constraint:
+            what = f"constraint {echoed(constraint.name)} is declared twice"
+            raise section.fail(what, "Rename or remove one of them, or list all :actions in one.")
     dependences = []
     for section in sections.get(":positive-dependence", ()):
         pair = [item.token("the name of a constraint") for item in section.items[1:]]
@@ -366,7 +368,7 @@ def _read_network(
             remedy = "They are bound to the same objects: give both as many :parameters."
             raise section.fail("the two constraints have different numbers of parameters", remedy)
         dependences.append((first.name, second.name))
-    return tuple(constraints), tuple(dependences)
+    return tuple(by_name.values()), tuple(dependences)
 
 
 def _constraint(names: Names, schemas: Mapping[str, Schema], section: Group) -> Constraint:

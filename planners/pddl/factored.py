@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 
 from planners.pddl.domain import read_domain
 from planners.pddl.formula_tree import label
-from planners.pddl.lifted import And, Atom, Domain, Problem, Schema
+from planners.pddl.lifted import And, Atom, Constraint, Domain, Problem, Schema
 from planners.pddl.problem import read_problem
 from planners.pddl.robots import objects_of
 from planners.pddl.sexpr import Source
@@ -34,7 +34,7 @@ def read_factored(directory: str | Path) -> tuple[Domain, Problem]:
     ``ROBOT_domain.pddl`` and ``ROBOT_problem.pddl``, as unified-planning writes them.
 
     Raises `BadInput` where a file has no partner, an action differs between files in more than its
-    agent's name and type, or has no parameter for its robot.
+    agent's name and type, or has no parameter for its robot, or a constraint in more than actions.
     """
     folder = Path(directory)
     if not folder.is_dir():
@@ -129,12 +129,29 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
         predicates=_merged((domain.predicates for domain in domains), or_),
         functions=_merged((domain.functions for domain in domains), or_),
         schemas=tuple(schemas.values()),
-        constraints=tuple(dict.fromkeys(c for domain in domains for c in domain.constraints)),
+        constraints=_join_constraints(domains),
         dependences=tuple(dict.fromkeys(d for domain in domains for d in domain.dependences)),
         signatures=_merged(
             (domain.signatures for domain in domains), lambda a, b: tuple(map(or_, a, b))
         ),
     )
+
+
+def _join_constraints(domains: Sequence[Domain]) -> tuple[Constraint, ...]:
+    """A file's constraint lists the actions of its robot: those of one name are one constraint."""
+    joined: dict[str, Constraint] = {}
+    for domain in domains:
+        for own in domain.constraints:
+            known = joined.setdefault(own.name, own)
+            if replace(known, actions=own.actions) != own:
+                raise BadInput(
+                    f"the constraint {echoed(own.name)} differs between the robots' files in more "
+                    "than its actions",
+                    position=domain.source.section(":concurrency-constraint"),
+                    remedy="Write the same :parameters and :bounds, or give it another name.",
+                )
+            joined[own.name] = replace(own, actions=_both(known.actions, own.actions))
+    return tuple(joined.values())
 
 
 def _union(name: str, files: Sequence[Domain | Problem]) -> Source:
@@ -195,7 +212,7 @@ def _merged(tables: Iterable[Mapping[K, V]], join: Callable[[V, V], V]) -> dict[
     return merged
 
 
-def _both(one: tuple[str, ...], other: tuple[str, ...]) -> tuple[str, ...]:
+def _both(one: tuple[V, ...], other: tuple[V, ...]) -> tuple[V, ...]:
     return tuple(dict.fromkeys((*one, *other)))
 
 

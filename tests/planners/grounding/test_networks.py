@@ -3,18 +3,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from random import Random
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.loading import PlanningInstance
+from planners.loading import PlanningInstance, build
 from planners.pddl import parse_domain
+from planners.pddl.factored import read_factored
 from planners.pddl.lifted import Domain
 from planners.pddl.sexpr import Source
 from planners.system.errors import BadInput
 from tests.support.joint_twin import check_model
+from tests.support.naive_joint_steps import Twin
 from tests.support.random_pddl import RandomModel, random_model
 from tests.support.texts import model_of
 
@@ -125,12 +128,46 @@ def test_dependence_is_needed_by_the_second_only() -> None:
         ),
         ("(:concurrency-constraint v :bounds (1 1))", "missing: :actions, :parameters"),
         ("(:positive-dependence v w)", "unknown constraint 'v'"),
+        (
+            constraint("v", "(1 1)", "row") + constraint("v", "(1 1)", "light"),
+            "constraint 'v' is declared twice",
+        ),
     ],
 )
 def test_a_wrong_network(network: str, message: str) -> None:
     with pytest.raises(BadInput, match=r"domain.pddl:6:\d+") as error:
         rowing(network)
     assert message in str(error.value)
+
+
+def write_rowers(folder: Path, *bounds: str) -> Path:
+    """Factored files of r1, r2, ..: each robot has an action and a view of the constraint."""
+    for number, own in enumerate(bounds, 1):
+        action = f"(:action row{number} :parameters (?r - t{number} ?b - boat) :effect (moved ?b))"
+        domain = (
+            f"(define (domain d) (:types t{number} boat) (:predicates (moved ?b - boat)) {action}"
+        )
+        (folder / f"domain-r{number}.pddl").write_text(
+            f"{domain}\n{constraint('crew', own, f'row{number}')})"
+        )
+        (folder / f"problem-r{number}.pddl").write_text(
+            f"(define (problem p) (:domain d) (:objects r{number} - t{number} b - boat)"
+            "(:init) (:goal (moved b)))"
+        )
+    return folder
+
+
+def test_a_constraint_of_several_factored_files(tmp_path: Path) -> None:
+    domain, problem = read_factored(write_rowers(tmp_path, "(2 2)", "(2 2)", "(2 2)"))
+    loaded = build(domain, [problem])
+    steps = loaded.model.successors(loaded.tasks[0].init[None, :])
+    found = {loaded.model.texts(row) for row in steps.labels}
+    assert len(found) == 4  # nobody, or two of three
+    twin = Twin(domain, problem, loaded.team)
+    assert found == {labels for labels, _ in twin.successors(twin.init)}
+    write_rowers(tmp_path, "(2 2)", "(2 inf)")
+    with pytest.raises(BadInput, match=r"domain-r2\.pddl:2:2: the constraint 'crew' differs"):
+        read_factored(tmp_path)
 
 
 def random_network(random: Random, domain: Domain) -> str:
