@@ -171,8 +171,8 @@ def _with_types(schema: Schema, types: tuple[str, ...]) -> Schema:
 def _without_agent(schema: Schema) -> Schema:
     """The action with neither the name nor the type of its agent."""
     assert schema.acting is not None
-    # No variable of a file has this name.
-    found: Schema = _renamed(_with_types(schema, ()), schema.acting.name, "?")
+    # The new name is one that no token is: a variable may be called "?".
+    found: Schema = _renamed(_with_types(schema, ()), schema.acting.name, "")
     return found
 
 

@@ -168,6 +168,19 @@ def test_an_action_that_differs_in_more(shell: Shell, tmp_path: Path) -> None:
     )
 
 
+def test_variables_of_one_character_are_told_from_the_agent(shell: Shell) -> None:
+    """Both go; in one file from where the agent is, in the other from where any robot is."""
+    for path in factored(Path("hall")).glob("domain-*"):
+        text = path.read_text().replace(f"go-{path.stem[-2:]}", "go")
+        text = text.replace("?x ?y - room)\n", "? - robot ?x ?y - room)\n")
+        path.write_text(
+            text.replace("(at ?r ?x) (", f"(at {'?r' if 'r1' in path.stem else '?'} ?x) (")
+        )
+    shell(
+        "inspect --factored hall", 31, "action 'go' differs between the robots' files in more than"
+    )
+
+
 def test_no_robot_gets_an_action_that_its_own_file_lacks(shell: Shell, tmp_path: Path) -> None:
     """Robots of one type, of which only the first may load."""
     for path in written("ma-loader", tmp_path / "files").iterdir():
