@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from decimal import Decimal
+from math import isinf
 
 from planners.pddl.formula_tree import declaration, formula_text, label
 from planners.pddl.lifted import TRUE, And, Constraint, Domain, Effect, Formula, Problem, Schema
@@ -44,7 +46,7 @@ def problem_text(problem: Problem, domain: Domain) -> str:
     known = domain.constants
     objects = {name: own for name, own in problem.objects.items() if known.get(name) != own}
     init = sorted(map(formula_text, problem.init))
-    init += sorted(f"(= {formula_text(atom)} {value:g})" for atom, value in problem.values.items())
+    init += sorted(f"(= {formula_text(a)} {_number(value)})" for a, value in problem.values.items())
     lines = [
         f"(define (problem {problem.name})",
         f"  (:domain {domain.name})",
@@ -55,6 +57,13 @@ def problem_text(problem: Problem, domain: Domain) -> str:
     if "total-cost" in domain.functions:
         lines.append("  (:metric minimize (total-cost))")
     return "\n".join((*lines, ")", ""))
+
+
+def _number(value: float) -> str:
+    """A number that reads back as the same one; PDDL has none with an exponent."""
+    if value.is_integer() or isinf(value):  # what has more digits than any float is infinite
+        return f"{value:.0f}".replace("inf", "9" * 309)
+    return f"{Decimal(repr(value)):f}"
 
 
 def _requirements(domain: Domain) -> Iterator[str]:

@@ -105,6 +105,19 @@ def test_own_domains(path: Path) -> None:
     check(path)
 
 
+@pytest.mark.parametrize(
+    "number",
+    ["0", "3.0", "1234567", "2147483647", "-0.0000123", "12345.678901", "9" * 22, "9" * 400],
+)
+def test_values_of_functions(number: str) -> None:
+    text = "(define (domain d) (:functions (f)) (:action a :parameters ()))"
+    domain = parse_domain(Source("d", text))
+    text = f"(define (problem p) (:domain d) (:init (= (f) {number})) (:goal ()))"
+    problem = parse_problem(Source("p", text), domain)
+    again = parse_problem(Source("again", problem_text(problem, domain)), domain)
+    assert again.values == problem.values == {Atom("f", ()): float(number)}
+
+
 @pytest.mark.foreign
 @pytest.mark.skipif(not SHARED.is_dir(), reason=f"no inputs of others here: {SHARED}")
 @pytest.mark.parametrize("path", FOREIGN, ids=lambda path: f"{path.parent.name}-{path.stem}")
