@@ -39,8 +39,8 @@ def natural(name: str) -> tuple[tuple[int, int, str], ...]:
 class Team:
     """Who acts in a joint step, in natural order of the names.
 
-    ``by`` says how they were found, for `coordlang inspect`.  With ``--unowned environment`` the
-    last one is the environment.
+    ``by`` says how they were found, for `coordlang inspect`.  Where ``unowned`` is ``environment``
+    the last one is the environment.
     """
 
     robots: tuple[str, ...]
@@ -89,9 +89,10 @@ def find_team(domain: Domain, problem: Problem, choice: ModelOptions) -> Team:
             position=problem.source.section(":objects"),
             remedy=f"Robots are found by {by}; declare at least one such object.",
         )
-    if choice.unowned == "environment" and any(
-        s.agent is None and not s.parts for s in domain.schemas
-    ):
+    unowned = choice.unowned
+    if all(s.agent is not None or s.parts for s in domain.schemas):
+        unowned = "error"  # there is no such action
+    if unowned == "environment":
         if ENVIRONMENT in problem.objects:
             raise UsageError(
                 "--unowned environment: an object of this problem is called "
@@ -99,7 +100,7 @@ def find_team(domain: Domain, problem: Problem, choice: ModelOptions) -> Team:
                 remedy="Rename the object.",
             )
         robots = (*robots, ENVIRONMENT)
-    return Team(robots, by, choice.unowned)
+    return Team(robots, by, unowned)
 
 
 def _found(domain: Domain, problem: Problem, choice: ModelOptions) -> tuple[tuple[str, ...], str]:
@@ -146,7 +147,7 @@ def _require_agreement(
 
 def without_idle_environment(team: Team, owners: Iterable[int]) -> Team:
     """The team without the environment if it owns no ground action: then nobody owns any."""
-    if team.robots[-1] != ENVIRONMENT or len(team.robots) - 1 in set(owners):
+    if team.unowned != "environment" or len(team.robots) - 1 in set(owners):
         return team
     return replace(team, robots=team.robots[:-1], unowned="error")
 

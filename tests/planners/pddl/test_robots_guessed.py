@@ -13,11 +13,12 @@ import pytest
 
 from planners.loading import PlanningInstance
 from planners.pddl import parse_domain, parse_problem
-from planners.pddl.model_options import ModelOptions
+from planners.pddl.model_options import ModelOptions, Unowned
 from planners.pddl.robots import find_team
 from planners.pddl.sexpr import Source
 from planners.system.errors import BadInput, Note
 from tests.support.command import Command
+from tests.support.hall import DOMAIN, PROBLEM
 from tests.support.texts import model_of, parsed
 
 HIKERS = """(define (domain hike) (:types hiker place - object)
@@ -210,6 +211,25 @@ def test_random_types_against_the_definition() -> None:
                 refused += 1
     assert refused > 100
     assert read > 100
+
+
+@pytest.mark.parametrize(
+    ("agent", "unowned"),
+    [
+        *(
+            (":agent ?r - robot :parameters (", unowned)
+            for unowned in ("error", "environment", "shared")
+        ),
+        (":parameters (?r - robot ", "error"),
+        (":parameters (?r - robot ", "shared"),
+    ],
+)
+def test_a_robot_called_environment_that_can_do_nothing(agent: str, unowned: Unowned) -> None:
+    """It is a robot as others; only an extra one that owns nothing is left out."""
+    domain = DOMAIN.replace(":agent ?r - robot :parameters (", agent)
+    problem = PROBLEM.replace("r1", "car").replace("r2", "environment").replace("(door b a)", "")
+    loaded = model_of(domain, problem, ModelOptions(unowned=unowned))
+    assert loaded.model.robots == ("car", "environment")
 
 
 def test_an_undeclared_type_and_several_declarations_restrict_nothing_more() -> None:
