@@ -33,7 +33,16 @@ from planners.pddl.names import (
     typed_list,
     unknown,
 )
-from planners.pddl.sexpr import Expression, Group, Source, Token, first_text, parse, read_source
+from planners.pddl.sexpr import (
+    Expression,
+    Group,
+    Source,
+    Token,
+    first_text,
+    parse,
+    read_source,
+    subaction_comments,
+)
 from planners.system.files import require_seen
 from planners.system.limits import reaching
 from planners.system.messages import echoed
@@ -310,9 +319,19 @@ def _read_part(names: Names, comment: Token) -> Part:
 
 
 def _check_parts(schemas: Sequence[Schema], heads: Sequence[_Head]) -> None:
-    """Raise `BadInput` for a domain that says what robots do in comments and in other ways."""
+    """Raise `BadInput` for a domain that says what robots do in comments and in other ways.
+
+    Such as comments outside of actions: they would be silently ignored.
+    """
     if not any(schema.parts for schema in schemas):
         return
+    read = {comment.offset for head in heads for comment in head.item.comments}
+    for comment in subaction_comments(heads[0].item.source):
+        if comment.offset not in read:
+            remedy = (
+                "Write '; subaction ROBOT ..' inside of the action, or begin with another word."
+            )
+            raise comment.fail("this subaction comment is not read", remedy)
     for schema, head in zip(schemas, heads, strict=True):
         what = f"action {echoed(schema.name)}"
         if not schema.parts:

@@ -25,6 +25,8 @@ MAX_DEPTH = 200
 #: What begins the comments that are read: they say a robot's part of a joint action.
 SUBACTION = "subaction"
 
+_ABOUT_SUBACTION = re.compile(rf";+\s*{SUBACTION}(?![\w-])", re.IGNORECASE)
+
 #: A variable may follow a name without a space, as in ``(aircraft?a)``.
 _TOKEN = re.compile(r";[^\n\r]*|[()]|\?*[^\s();?]+|\?+")
 
@@ -250,6 +252,13 @@ def parse(source: Source) -> Group:
         what = "expected '(define ...', found an empty file"
         raise BadInput(what, position=Position(source.name), remedy=_NO_PDDL)
     return top
+
+
+def subaction_comments(source: Source) -> Iterator[Token]:
+    """All comments that begin with the word `SUBACTION`, also those that `parse` leaves out."""
+    for match in _TOKEN.finditer(source.text):
+        if _ABOUT_SUBACTION.match(match[0]):
+            yield Token(match[0], match.start(), source)
 
 
 def _require_plain_names(source: Source) -> None:

@@ -75,6 +75,10 @@ RUNG = goal("(rung)")
 UNTYPED = """(define (domain hall) (:predicates (robot ?r) (at ?r ?x) (door ?x ?y))
   (:action go :agent ?r :parameters (?x ?y)
     :precondition (and (robot ?r) (at ?r ?x) (door ?x ?y)) :effect (and (at ?r ?y) (not (at ?r ?x)))))"""
+JOINT = """(define (domain lift) (:predicates (up)) (:action lift :parameters () :effect (up)
+  ; subaction r1 (lift)
+  MORE
+)"""
 COSTLY = d(
     *(
         f"{PREDICATE})",
@@ -323,6 +327,25 @@ CASES: dict[str, Case] = {
     "a comment about the subaction of one action": case(
         (31, "action 'go' has no '; subaction' comment"),
         with_action("wait :agent ?r - robot ; subaction r1 (wait)\n", where("(not (wait ?r))")),
+    ),
+    **{
+        f"comments in a joint action: {more}": case(
+            (31, "this subaction comment is not read") if is_refused else 1,
+            JOINT.replace("MORE", more),
+            "(define (problem p) (:domain lift) (:init) (:goal (up)))",
+        )
+        for more, is_refused in (
+            (") ;subaction r2 (lift)", True),
+            (") ; end\n; Subaction", True),
+            (";; Subaction: r2 (lift)\n)", True),
+            (";subaction(r2 lift)\n)", True),
+            ("; subaction r2 (lift)\n)", False),
+            ("; subactions: subaction r2\n)", False),
+            ("; sub-action\n; subaction-like\n)", False),
+        )
+    },
+    "comments of plain PDDL that begin so": case(
+        2, "; subaction r1 (x)\n" + d(":precondition", "; subaction: x\n :precondition")
     ),
     "no spaces that are not needed": case(2, d(" (", "("), p(" (", "(")),
     # costs
