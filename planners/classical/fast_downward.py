@@ -32,8 +32,8 @@ from planners.system.signals import postponed_signals
 SEARCH = "astar(blind())"
 #: Fast Downward adds up costs in 32-bit integers.
 _GREATEST = 2**31 - 1
-#: What Fast Downward writes below the actions of a whole plan.
-_COST = re.compile(r"; cost = (\d+) \((?:general|unit) cost\)")
+#: What Fast Downward writes below the actions of a whole plan: less than 0 if the sum is too large.
+_COST = re.compile(r"; cost = (-?\d+) \((?:general|unit) cost\)")
 #: The exit codes with which its translator and its search say that there is no plan, and that they
 #: had too little memory; the last one: the system has killed them.
 _UNSOLVABLE = (10, 11)
@@ -82,6 +82,7 @@ def optimal_cost(
 
 def total_cost(classical: ClassicalTask) -> int | None:
     """The total cost of an optimal plan by Fast Downward, None without one; see `optimal_cost`."""
+    _require_small(classical, max((action.cost for action in classical.actions), default=0))
     with postponed_signals() as signals, ExitStack() as ended:
         directory = _written(classical, ended)
         process = _started(directory)
@@ -91,12 +92,18 @@ def total_cost(classical: ClassicalTask) -> int | None:
         finally:
             _end(process)
         total = answered(classical, directory, code)
-    if total is not None and total + classical.step_cost > _GREATEST:
+    if total is not None:
+        _require_small(classical, total)
+    return total
+
+
+def _require_small(classical: ClassicalTask, cost: int) -> None:
+    """Raise `FastDownwardFailed` for a cost beside which one more step is too much."""
+    if cost + classical.step_cost > _GREATEST:
         raise FastDownwardFailed(
-            f"a cost of {total} is too large for Fast Downward's 32-bit integers",
+            f"a cost of {cost} is too large for Fast Downward's 32-bit integers",
             remedy="Check with --cost makespan.",
         )
-    return total
 
 
 def _written(classical: ClassicalTask, ended: ExitStack) -> Path:
@@ -173,7 +180,7 @@ def answered(classical: ClassicalTask, directory: Path, code: int) -> int | None
         raise FastDownwardFailed("the plan of Fast Downward is not complete", remedy=_FULL)
     number = {f"({name} )": n for n, name in enumerate(action_names(classical))}
     total = classical.cost_of_plan([number.get(line, -1) for line in lines])
-    if total is None or total != int(cost[1]):
+    if total is None or (total != int(cost[1]) and total <= _GREATEST):
         raise FastDownwardFailed(
             f"Fast Downward wrote {len(lines)} actions that are no plan of its task", remedy=_FULL
         )

@@ -11,8 +11,9 @@ import tempfile
 import threading
 import time
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 
 import pytest
@@ -130,6 +131,23 @@ def test_a_step_cost_that_was_too_small_is_raised(monkeypatch: pytest.MonkeyPatc
     loaded = read(*MODELS["partners"], "makespan+actions")
     monkeypatch.setattr(fast_downward, "LONGEST", 1)
     assert optimal_cost(loaded.model, loaded.tasks[0])[0] == (6, 11)
+
+
+@pytest.mark.parametrize(
+    ("cost", "form"),
+    [
+        *product((2**31 - 1, 2**31, 2**40), FORMS),
+        (2**29, "explicit"),  # one action of six is not too much
+    ],
+)
+def test_costs_that_are_too_large_are_named(cost: int, form: str) -> None:
+    """Of an action, or of all actions of the plan together."""
+    loaded = read(*MODELS["partners"])
+    task = compile_classical(loaded.model, loaded.tasks[0], limit=FORMS[form])
+    actions = tuple(replace(action, cost=action.cost * cost) for action in task.actions)
+    dear = replace(task, actions=actions, step_cost=cost)
+    with time_limit(60), pytest.raises(FastDownwardFailed, match=r"a cost of \d+ is too large"):
+        fast_downward.total_cost(dear)
 
 
 def test_nothing_is_written_or_printed(
