@@ -198,9 +198,7 @@ def with_recorded(language: Language, candidates: Candidates, position: Position
     return replace(together, skipped=candidates.skipped)
 
 
-def _require_pairs(
-    recorded: list[ListedTask], candidates: Candidates, position: Position
-) -> None:
+def _require_pairs(recorded: list[ListedTask], candidates: Candidates, position: Position) -> None:
     """Raise `BadInput` for a recorded task whose goal several states satisfy."""
     loaded, model = candidates.loaded, candidates.model
     states, _ = unique_rows(model.forgetting_slack(model.codec.facts_part(candidates.rows)))
