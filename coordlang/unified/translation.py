@@ -9,6 +9,7 @@ It is then read like any other PDDL.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement, count
@@ -23,6 +24,7 @@ from planners.pddl.lifted import Domain
 from planners.pddl.lifted import Problem as PddlProblem
 from planners.pddl.sexpr import Source
 from planners.system.errors import BadInput, Unsupported, UsageError
+from planners.system.messages import echoed
 
 #: Action -> robot -> its part, as in joint-action PDDL: ``{"swap": {"r1": "(move ?a ?b)", "r2":
 #: "(move ?b ?a)"}}``.
@@ -189,13 +191,18 @@ class _Writer:
         self.declared: dict[str, str] = {}
         self.agents: tuple[Any, ...] = tuple(getattr(problem, "agents", ()))
         self.names.of("variable", None, AGENT[1:])
+        shared = problem.ma_environment if self.agents else problem
+        #: The fluents that are nobody's own.
+        self.shared: tuple[Any, ...] = tuple(shared.fluents)
         roots = {[*t.ancestors][-1].name for t in problem.user_types}
         #: The type that PDDL calls object, as unified-planning's PDDL reader makes it.
         self.root = min(roots) if [root.lower() for root in roots] == ["object"] else None
+        #: The type of all agents, by which formulas of the user name it.
+        self.agent_type = self.names.of("type", None, "agent") if self.agents else ""
         for t in problem.user_types:
             self.type_name(t)
-        #: The type of all agents.
-        self.agent_type = self.names.of("type", None, "agent") if self.agents else ""
+        for action in {a.name for agent in self.agents for a in agent.actions if concurrency}:
+            self.names.of("predicate", ("action", action), action)  # formulas name the action
         for o in problem.all_objects:
             self.object_name(o)
         for agent in self.agents:
@@ -244,8 +251,7 @@ class _Writer:
 
     def write(self, subactions: Subactions) -> tuple[str, str, Schemas]:
         """Domain, problem, and what the schemas stand for."""
-        shared = self.problem.ma_environment if self.agents else self.problem
-        for fluent in filter(_is_read, shared.fluents):
+        for fluent in filter(_is_read, self.shared):
             self.predicate(fluent, None)
         actions, schemas = self.actions(subactions)
         facts, goals = self.facts(), self.goals()  # they may declare further predicates
@@ -288,6 +294,16 @@ class _Writer:
                 key = (action.name, *comments, *self.body(action, agent))
                 groups.setdefault(key, {})[agent and self.agent_name(agent)] = action
         self.apart = any(len(members) < len(self.agents) for members in groups.values())
+        forms = Counter(key[0] for key in groups)
+        for formula in self.concurrency.values():
+            for name in re.findall(r"\(\s*([^\s()]+)", formula):
+                if forms[name] > 1:
+                    raise UsageError(
+                        f"concurrency names action {echoed(name)}, which agents have in different "
+                        "forms",
+                        remedy="Give these actions names of their own, or equal conditions and "
+                        "effects.",
+                    )
         own_types = {self.agent_name(agent): self.own_type(agent) for agent in self.agents}
         actions: list[str] = []
         schemas: Schemas = {}
@@ -362,12 +378,10 @@ class _Writer:
         """
         if node.is_bool_constant():
             return "(and)" if node.is_true() else "(or)"
-        if node.is_fluent_exp():
+        if node.is_fluent_exp() or node.is_dot():
             bound: list[_Bound] = []
             parts = self.parts(node, agent, bound, inside)
             return _with(_listed(*parts), bound)
-        if node.is_dot():
-            return self.text(node.arg(0), self.problem.agent(node.agent()))
         if node.is_equals():
             bound = []
             sides = [self.term(arg, agent, bound, inside) for arg in node.args]
@@ -385,13 +399,19 @@ class _Writer:
     def parts(self, node: Any, agent: Any, bound: list[_Bound], inside: bool) -> list[str]:
         """The predicate of a fluent and its arguments, without the value of an object fluent.
 
-        What arguments are values of object fluents is added to ``bound``.
+        What arguments are values of object fluents is added to ``bound``.  Of ``Dot(other, ..)``
+        the fluent is the other agent's, and its arguments are read as they are without.
         """
+        owner = self.problem.agent(node.agent()) if node.is_dot() else agent
+        variable = inside and not node.is_dot()
+        node = node.arg(0) if node.is_dot() else node
         fluent = node.fluent()
-        own = agent if agent is not None and fluent in agent.fluents else None
+        own = owner if owner is not None and fluent in owner.fluents else None
+        if own is None and fluent not in self.shared:
+            raise refused(f"fluent {fluent.name!r}, another agent's own, without Dot")
         args = [self.term(arg, agent, bound, inside) for arg in node.args]
         if own is not None:
-            args.insert(0, AGENT if inside else self.agent_name(own))
+            args.insert(0, AGENT if variable else self.agent_name(own))
         return [self.predicate(fluent, own), *args]
 
     def value(self, fluent: Any, parts: Sequence[str]) -> _Bound:
@@ -406,11 +426,10 @@ class _Writer:
             return self.object_name(node.object())
         if node.is_parameter_exp() or node.is_variable_exp():
             return self.variable(node.parameter() if node.is_parameter_exp() else node.variable())
-        if node.is_dot():
-            return self.term(node.arg(0), self.problem.agent(node.agent()), bound, False)
-        if node.is_fluent_exp() and node.fluent().type.is_user_type():
+        inner = node.arg(0) if node.is_dot() else node
+        if inner.is_fluent_exp() and inner.fluent().type.is_user_type():
             parts = self.parts(node, agent, bound, inside)
-            bound.append(self.value(node.fluent(), parts))
+            bound.append(self.value(inner.fluent(), parts))
             return bound[-1].variable
         raise refused(f"the term {node}")
 

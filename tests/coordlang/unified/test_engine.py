@@ -49,6 +49,7 @@ from coordlang.unified.translation import PddlNames, translate
 from planners.pddl.model_options import ModelOptions
 from planners.search.optimal_plans import search
 from planners.search.plans import Plans
+from planners.system.errors import Unsupported, UsageError
 from tests.support.command import Command
 from tests.support.domains import ROOT, files_of, loaded_from
 
@@ -413,6 +414,34 @@ def test_concurrency_constraints() -> None:
     (together,) = all_plans(problem, concurrency=PARTNER)
     assert verdict(problem, together, concurrency=PARTNER).status == Validity.VALID
     assert verdict(problem, together, concurrency=ALONE).status == Validity.INVALID
+
+
+def test_formulas_name_agents_and_actions_whatever_else_is_called_so() -> None:
+    problem = lifting()
+    other = Agent("eve", problem)
+    problem.add_object("o", up.UserType("agent"))
+    other.add_public_fluent("lift", up.BoolType(), default_initial_value=True)
+    problem.add_agent(other)
+    ann, bob = problem.agent("ann"), problem.agent("bob")
+    for agent in (ann, bob):
+        problem.add_goal(up.Dot(agent, agent.fluent("up")()))
+    assert solve(problem, concurrency=ALONE).metrics["makespan"] == "2"
+    bob.action("lift").add_precondition(up.Dot(other, other.fluent("lift")()))
+    with pytest.raises(UsageError, match="'lift', which agents have in different forms"):
+        translate(problem, None, PARTNER)
+    problem.add_goal(ann.fluent("up")())
+    with pytest.raises(Unsupported, match="fluent 'up', another agent's own, without Dot"):
+        translate(problem)
+
+
+def test_arguments_of_a_fluent_of_another_agent_are_own() -> None:
+    problem = agents()
+    plans, one, other = len(all_plans(problem)), problem.agents[0], Agent("eve", problem)
+    seen = up.Fluent("seen", up.BoolType(), place=up.UserType("cell"))
+    other.add_public_fluent(seen, default_initial_value=True)
+    problem.add_agent(other)
+    one.action("Move").add_precondition(up.Dot(other, seen(one.fluent("Where")())))
+    assert len(all_plans(problem)) == plans
 
 
 # Joint actions.
