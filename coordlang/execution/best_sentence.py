@@ -248,8 +248,13 @@ def leading_sentences(task_language: TaskLanguage, number: int) -> list[tuple[Se
 def grants(
     task_language: TaskLanguage, words: Sequence[int], preferences: Sequence[Preference]
 ) -> bool:
-    """Whether every plan with a sentence has the best grade, for each preference over plans."""
+    """Whether every plan with a sentence has the best grade, for each preference over plans.
+
+    Preferences over whole sentences are granted by none alone: they compare several.
+    """
     automata = [one for one in preferences if isinstance(one, PlanPreference)]
+    if len(automata) < len(preferences):
+        return False
     fits = replace(task_language, space=task_language.plans_with(words), task=0)
     return all(
         one.grade(memory) == 0

@@ -151,6 +151,7 @@ def test_robots_agree_on_what_they_wish(language: Path, loaded: PlanningInstance
     for wishes in (
         {},
         {"r1": "avoid:(at r1 c1-1)", "r2": "shortest"},
+        {"r1": "shortest", "r2": "most-plans"},
         {"r2": "avoid:(at r1 c1-1)"},
     ):
         executives = [one.executive for one in team_of(language, loaded, **wishes).values()]
