@@ -202,7 +202,7 @@ def _require_pairs(recorded: list[ListedTask], candidates: Candidates, position:
     """Raise `BadInput` for a recorded task whose goal several states satisfy."""
     loaded, model = candidates.loaded, candidates.model
     states, _ = unique_rows(model.forgetting_slack(model.codec.facts_part(candidates.rows)))
-    for task in recorded:
+    for task in {task.goal: task for task in recorded}.values():
         _, goal = ground_task(loaded.domain, loaded.problems[0], task, position)
         if model.holds(goal, states).sum() > 1:
             raise BadInput(

@@ -170,12 +170,16 @@ class PddlNames:
         """The PDDL name of a thing; ``text`` is what it is called."""
         if (kind, thing) not in self._names:
             taken = self._taken.setdefault(kind, {*_RESERVED, "increase", "total-cost"})
-            base = re.sub(r"[^a-z0-9_-]", "_", text.lower()).strip("-") or "x"
+            base = self.plain(text)
             others = (f"{base}__{number}" for number in count(2))
             name = next(n for n in others if n not in taken) if base in taken else base
             self._names[kind, thing] = name
             taken.add(name)
         return self._names[kind, thing]
+
+    def plain(self, text: str) -> str:
+        """What a thing is called in PDDL as long as nothing else is."""
+        return re.sub(r"[^a-z0-9_-]", "_", text.lower()).strip("-") or "x"
 
 
 class _Writer:
@@ -201,8 +205,9 @@ class _Writer:
         self.agent_type = self.names.of("type", None, "agent") if self.agents else ""
         for t in problem.user_types:
             self.type_name(t)
-        for action in {a.name for agent in self.agents for a in agent.actions if concurrency}:
-            self.names.of("predicate", ("action", action), action)  # formulas name the action
+        if concurrency:  # its formulas name actions, not fluents that are called so
+            for action in (a.name for agent in self.agents for a in agent.actions):
+                self.names.of("predicate", ("action", action), action)
         for o in problem.all_objects:
             self.object_name(o)
         for agent in self.agents:
@@ -294,16 +299,7 @@ class _Writer:
                 key = (action.name, *comments, *self.body(action, agent))
                 groups.setdefault(key, {})[agent and self.agent_name(agent)] = action
         self.apart = any(len(members) < len(self.agents) for members in groups.values())
-        forms = Counter(key[0] for key in groups)
-        for formula in self.concurrency.values():
-            for name in re.findall(r"\(\s*([^\s()]+)", formula):
-                if forms[name] > 1:
-                    raise UsageError(
-                        f"concurrency names action {echoed(name)}, which agents have in different "
-                        "forms",
-                        remedy="Give these actions names of their own, or equal conditions and "
-                        "effects.",
-                    )
+        self.require_one_form(key[0] for key in groups)
         own_types = {self.agent_name(agent): self.own_type(agent) for agent in self.agents}
         actions: list[str] = []
         schemas: Schemas = {}
@@ -315,6 +311,22 @@ class _Writer:
             actions.append("\n".join([f"(:action {name}", *agents, *key[1:]]))
             schemas[name] = members
         return actions, schemas
+
+    def require_one_form(self, actions: Iterable[str]) -> None:
+        """Raise `UsageError` for a formula about an action that became several schemas.
+
+        ``actions`` has the name of each schema's action: a formula would speak of the first alone.
+        """
+        forms = Counter(map(self.names.plain, actions))
+        formulas = " ".join(self.concurrency.values()).lower()
+        for name in re.findall(r"\(\s*([^\s()]+)", formulas):
+            if forms[name] > 1:
+                raise UsageError(
+                    f"concurrency names action {echoed(name)}, which agents have in different "
+                    "forms",
+                    remedy="Give these actions names of their own, or equal conditions and "
+                    "effects.",
+                )
 
     def body(self, action: Any, agent: Any) -> list[str]:
         if type(action) is not InstantaneousAction or action.simulated_effect is not None:

@@ -110,7 +110,7 @@ class OneTask:
         rounds, left = budget.rounds, self._left()
         if size == 2:
             own = Budget(rounds, min(_FOR_TWO * rounds, left))
-            return self._two_words.find(holds, own, min(_PAIRS_OF_ROUND * rounds, _PAIRS * left))
+            return self._two_words.find(holds, own, self._room(_PAIRS_OF_ROUND * rounds, _PAIRS))
         if (apart := self._apart) is None:
             raise Undecided
         own = Budget(rounds, min(_FOR_MORE * rounds, left))
@@ -155,7 +155,7 @@ class OneTask:
         apart = min(_APART, steps_apart(self._pairs.space, self._room(_MOST_STEPS, _STEPS)))
         if apart < 1:
             return None
-        self._pairs.grow(min(_FEW_PAIRS, _PAIRS * self._left()))
+        self._pairs.grow(self._room(_FEW_PAIRS, _PAIRS))
         steps = WarpedPairs(self._pairs, apart).steps()
         return PairsApart(self._states, self._clauses, steps, np.random.default_rng(self._seed))
 

@@ -245,5 +245,5 @@ def _pairs(space: Space, goals: Sequence[Goal]) -> int:
 
 
 def _of_model(model: JointModel) -> tuple[object, ...]:
-    """A hash of what a model's plans are, and of what they are like without a common step."""
+    """All of a model on which the plans of a portion depend, for a hash."""
     return model_digest(model), model.slack, model.is_asynchronous

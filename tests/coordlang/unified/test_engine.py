@@ -427,8 +427,9 @@ def test_formulas_name_agents_and_actions_whatever_else_is_called_so() -> None:
         problem.add_goal(up.Dot(agent, agent.fluent("up")()))
     assert solve(problem, concurrency=ALONE).metrics["makespan"] == "2"
     bob.action("lift").add_precondition(up.Dot(other, other.fluent("lift")()))
-    with pytest.raises(UsageError, match="'lift', which agents have in different forms"):
-        translate(problem, None, PARTNER)
+    for formula in (PARTNER["lift"], PARTNER["lift"].upper()):
+        with pytest.raises(UsageError, match="'lift', which agents have in different forms"):
+            translate(problem, None, {"lift": formula})
     problem.add_goal(ann.fluent("up")())
     with pytest.raises(Unsupported, match="fluent 'up', another agent's own, without Dot"):
         translate(problem)
