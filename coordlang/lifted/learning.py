@@ -431,8 +431,8 @@ def _too_weak(own: Instance, pairs: Ints, complexity: int) -> ProvedImpossible:
         remedy = _REMEMBER
     one, other = (model.state_text(rows[state]) for state in pairs[0])
     return ProvedImpossible(
-        f"no feature up to complexity {complexity} tells states apart of which every language "
-        f"separates some, such as {one} and {other} of {own.name}",
+        f"no feature looked at, up to complexity {complexity}, tells states apart of which every "
+        f"language separates some, such as {one} and {other} of {own.name}",
         remedy=remedy,
     )
 

@@ -84,6 +84,12 @@ class World:
             found[atom.predicate] = min(arity, found.get(atom.predicate, arity))
         return found
 
+    def arity(self, predicate: str) -> int | None:
+        """How many arguments the atoms of a predicate have, static or not; None if it has none."""
+        if predicate in self.statics:
+            return len(self.statics[predicate][0])
+        return self.predicates.get(predicate)
+
     @cached_property
     def relations(self) -> Mapping[str, Sequence[Pair]]:
         """The static relations between objects: their pairs, sorted."""
@@ -117,7 +123,7 @@ class States:
         return TrueFacts(self.world.model.codec.facts_part(self.rows))
 
     def atoms(self, predicate: str) -> tuple[Ints, ...]:
-        """The true atoms of a fluent predicate: their states, then the numbers of their arguments.
+        """The true atoms of a predicate: their states, then the numbers of their arguments.
 
         All arrays are as long as there are such atoms in all states together.
         """
@@ -125,16 +131,22 @@ class States:
             found: tuple[Ints, ...] = self.known[predicate]
             return found
         world = self.world
-        arity = world.predicates.get(predicate, 0)
-        args = np.full((len(world.model.codec.facts), arity), NONE)
-        mine = np.zeros(len(args), bool)
-        for fact, atom in enumerate(world.model.codec.facts.atoms):
-            if atom.predicate == predicate and len(atom.args) == arity:
-                mine[fact] = True
-                args[fact] = [world.number[name] for name in atom.args]
-        chosen: Bools = mine[self.true.fact]
-        own = args[self.true.fact[chosen]]
-        self.known[predicate] = self.true.row[chosen], *(own[:, place] for place in range(arity))
+        arity = world.arity(predicate) or 0
+        static = [args for args in world.statics.get(predicate, ()) if len(args) == arity]
+        if static:
+            state = np.repeat(np.arange(len(self)), len(static))
+            own = np.array([[world.number[name] for name in args] for args in static])
+            own = np.tile(own, (len(self), 1))
+        else:
+            args = np.full((len(world.model.codec.facts), arity), NONE)
+            mine = np.zeros(len(args), bool)
+            for fact, atom in enumerate(world.model.codec.facts.atoms):
+                if atom.predicate == predicate and len(atom.args) == arity:
+                    mine[fact] = True
+                    args[fact] = [world.number[name] for name in atom.args]
+            chosen: Bools = mine[self.true.fact]
+            state, own = self.true.row[chosen], args[self.true.fact[chosen]]
+        self.known[predicate] = state, *(own[:, place] for place in range(arity))
         return self.atoms(predicate)
 
     def image(self, predicate: str, named: str, inverse: bool) -> Ints:
@@ -144,7 +156,7 @@ class States:
         """
         count = len(self.world.objects)
         found = np.full(len(self), count)
-        if self.world.predicates.get(predicate) == 2 and named in self.world.number:
+        if self.world.arity(predicate) == 2 and named in self.world.number:
             state, *ends = self.atoms(predicate)
             mine, other = reversed(ends) if inverse else ends
             hit = mine == self.world.number[named]
@@ -153,7 +165,7 @@ class States:
 
     def count(self, predicate: str, args: Sequence[str]) -> Ints:
         """Per state the number of true atoms of a predicate with these arguments, or `ANY`."""
-        if self.world.predicates.get(predicate) != len(args):
+        if self.world.arity(predicate) != len(args):
             return np.zeros(len(self), np.int64)
         state, *own = self.atoms(predicate)
         hit = np.ones(len(state), bool)
@@ -192,7 +204,7 @@ def _points(
         links = [(args[0], args[1]) for args in tuples if len(args) == 2]
         names = sorted({name for link in links for name in link})
         if not known.keys() >= set(names):
-            points |= from_names(names, links) or {}
+            points = (from_names(names, links) or {}) | points
     return points
 
 

@@ -122,7 +122,7 @@ def read_building(path: Path) -> Building:
 
 @dataclass(slots=True)
 class _Vertex:
-    """A vertex of a level, or all at one point: their first name, and their parameters.
+    """A vertex of a level, or all at one point: their first name, and the parameters of each.
 
     ``point`` is in units of the file until the scale of its level is known; then it has a ``name``.
     """
@@ -132,13 +132,21 @@ class _Vertex:
     point: Point
     value: Value
     said: str = ""
-    params: _Params = field(default_factory=dict)
+    params: list[_Params] = field(default_factory=list)
     name: str = ""
 
     def place(self) -> Place:
-        is_charger, is_parking = (_flag(self.params, n) for n in ("is_charger", "is_parking_spot"))
-        groups = _groups(self.params)
+        is_charger, is_parking = (
+            any(_flag(params, name) for params in self.params)
+            for name in ("is_charger", "is_parking_spot")
+        )
+        groups = frozenset[str]().union(*map(_groups, self.params))
         return Place(self.name, self.said, self.level, self.point, is_charger, is_parking, groups)
+
+    def robots(self) -> list[str]:
+        """The robots that start here, as the file calls them."""
+        named = [_text(params, "spawn_robot_name") for params in self.params]
+        return [robot for robot in named if robot]
 
 
 class _Level:
@@ -164,7 +172,7 @@ class _Level:
         point = x.number(), y.number()
         vertex = at.setdefault(point, _Vertex(self.name, number, point, value))
         vertex.said = vertex.said or said.text()
-        vertex.params = {**(params[0].mapping() if params else {}), **vertex.params}
+        vertex.params.append(params[0].mapping() if params else {})
         return vertex
 
     def _edge(self, value: Value) -> tuple[_Vertex, _Vertex, _Params]:
@@ -210,9 +218,9 @@ class _Level:
         """What is in the file and not read, by what it is called there."""
         lists = {k: v for k, v in self.content.items() if v.is_list and k not in _READ}
         found = Counter({key: len(value.list()) for key, value in lists.items()})
-        for params in [p for _, _, p in self.lanes] + [v.params for v in self.used]:
+        for params in [p for _, _, p in self.lanes] + [p for v in self.used for p in v.params]:
             found.update(n for n in _IGNORED if _text(params, n) not in ("", "0"))
-        spawning = {v.number for v in self.vertices if "spawn_robot_name" in v.params}
+        spawning = {v.number for v in self.vertices if v.robots()}
         found["robots off lanes"] = len(spawning.difference(v.number for v in self.used))
         return +found
 
@@ -269,7 +277,7 @@ def _set_image_scales(levels: Sequence[_Level], named: Value | None) -> tuple[st
         if known is not None and apart and all(map(all, apart)):
             scale = known / fmean(here / there for here, there in apart)
         if scale is None:
-            unscaled.append(level.name)
+            unscaled += [level.name] if level.used else []
             scale = 1.0
         level.set_scale(scale, scale)
     return tuple(unscaled)
@@ -288,7 +296,11 @@ def _spawning(vertices: Iterable[_Vertex]) -> dict[str, _Vertex]:
     """The robots that start in the building, by their names in PDDL, and where."""
     found: dict[str, _Vertex] = {}
     for vertex in vertices:
-        if robot := _text(vertex.params, "spawn_robot_name"):
+        robots = vertex.robots()
+        if len(robots) > 1:
+            what = f"two robots start at one point: {echoed(robots[0])} and {echoed(robots[1])}"
+            raise vertex.value.wrong(what, "Move one of them.")
+        for robot in robots:
             require_seen(robot, vertex.value.position, "robot")
             name = pddl_name(robot)
             if not name or name in found:

@@ -215,7 +215,9 @@ def _started(
     if asked is None:
         asked = list(building.spawning)
     elif isinstance(asked, int):
-        asked = [*building.spawning, *(f"r{number}" for number in range(1, asked + 1))][:asked]
+        taken = {*building.spawning, *building.places}
+        more = (f"r{number}" for number in range(1, 1 + asked + len(taken)))
+        asked = [*building.spawning, *(name for name in more if name not in taken)][:asked]
     starts: dict[str, str] = {}
     for said in asked:
         name = pddl_name(said)

@@ -17,8 +17,8 @@ from planners.system.messages import echoed
 
 Point = tuple[float, float]
 
-#: Coordinates in files are smaller than this.
-_LARGEST = 1e6
+#: Coordinates are smaller than this; those of maps in metres reach 10 million.
+_LARGEST = 1e8
 #: Names that hold two numbers, and the text before the first one that says it is the column.
 _PAIR = re.compile(
     r"(?P<stem>.*?)(?P<first>\d+)(?P<between>[^0-9]+)(?P<second>\d+)(?P<end>[^0-9]*)"
@@ -89,5 +89,7 @@ def from_names(names: Sequence[str], links: Sequence[tuple[str, str]]) -> dict[s
     points = dict(zip(names, pairs, strict=True))
     near = [math.dist(points[a], points[b]) < 1.5 for a, b in links]
     if len(set(pairs)) < len(names) or sum(near) < 0.8 * len(near):
+        return None
+    if max(map(max, pairs)) >= _LARGEST:
         return None
     return points

@@ -21,7 +21,7 @@ _DEEPEST = 32
 #: libyaml's parser where PyYAML has it: the same events, some ten times sooner.
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 #: Decimal numbers; `float` also reads other ones, which YAML reads in another way (``010``).
-_NUMBER = re.compile(r"[-+]?(0|[1-9]\d*|(?=\.))(\.\d*)?(e[-+]?\d+)?", re.ASCII | re.IGNORECASE)
+_NUMBER = re.compile(r"[-+]?(0|[1-9]\d*|(?=\.\d))(\.\d*)?(e[-+]?\d+)?", re.ASCII | re.IGNORECASE)
 _FLAGS = {"true": True, "false": False}
 _EMPTY = {"", "~", "null", "Null", "NULL"}
 

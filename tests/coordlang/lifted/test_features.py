@@ -175,6 +175,8 @@ def test_by_hand() -> None:
         "(min (count at _ c1-2) 1)": 1,
         "(same (at r1) (at r2))": 0,
         "(same (at r1) (at r1))": 1,
+        "(same (adjacent c0-0) (at r1))": 1,  # what never changes is true, too
+        "(min (count adjacent c0-1 _) 3)": 3,
         "(min (row (inverse at r1)) 1)": UNDEFINED,
         "(min (size (some (inverse at) robot)) 3)": 2,
         "(min (size (some adjacent (some (inverse at) (one r1)))) 3)": 3,
@@ -191,6 +193,8 @@ def test_by_hand() -> None:
     }
     for text, expected in texts.items():
         assert here.get(feature(text)).tolist() == [expected], text
+    loaded = loaded_from("grid", "gw2-2x3")
+    assert World.loaded(loaded, {"c0-1": (7, 7)}).points["c0-1"] == (7, 7)
 
 
 @pytest.mark.parametrize(

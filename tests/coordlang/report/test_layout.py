@@ -34,6 +34,7 @@ def test_what_names_tell(names: list[str], points: dict[str, tuple[float, float]
     assert from_names(names, [(names[0], names[1])]) == points
     far = ["s1-1", "s1-9", "s5-1", "s9-9"]
     assert from_names(far, [("s1-1", "s9-9"), ("s1-9", "s5-1")]) is None
+    assert from_names([names[0], "c0-99999999999999999999"], []) is None
 
 
 def test_a_path_is_laid_out_straight_and_a_ring_round() -> None:

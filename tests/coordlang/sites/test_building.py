@@ -109,13 +109,15 @@ def test_the_problem_is_understood(tmp_path: Path) -> None:
 
 def test_vertices_at_one_point_are_one_place(tmp_path: Path) -> None:
     text = level(
-        '[[0, 0, 0, ""], [1, 0, 0, ""], [1, 0, 0, b, {is_charger: [4, true], spawn_robot_name: [1, z]}], '
+        '[[0, 0, 0, ""], [1, 0, 0, "", {is_charger: [4, false], mutex: [1, m]}], '
+        "[1, 0, 0, b, {is_charger: [4, true], mutex: [1, n], spawn_robot_name: [1, z]}], "
         "[2, 0, 0, c]]",
         "[[0, 1], [2, 3, {bidirectional: [4, true]}]]",
     )
     found = read_building(written(tmp_path, text))
     assert driven(found) == {("l1-0", "b"), ("b", "c"), ("c", "b")}
     assert found.places["b"].is_charger
+    assert found.places["b"].groups == {"mutex m", "mutex n"}
     assert (found.spawning, found.unused) == ({"z": "b"}, {})
 
 
@@ -189,6 +191,10 @@ def test_lifts_join_levels_and_fiducials_scale_them(tmp_path: Path) -> None:
     assert "graph" not in own["domain.pddl"] + own["problem.pddl"]
     with pytest.raises(UsageError, match="no lanes lead there"):
         building_files(found, None, ["r:p-2-1"], 0)
+    roof = "  roof:\n    walls: []\n"
+    renamed = TWO_LEVELS.replace("[1, s]", "[1, r1]") + roof
+    found = read_building(written(tmp_path, renamed))
+    assert (found.unscaled, building_files(found, 3, [], 0)[1]) == ((), ("r", "r1", "r2"))
 
 
 def test_one_robot_is_in_a_lift(tmp_path: Path) -> None:
@@ -341,6 +347,12 @@ WRONG: list[tuple[str | tuple[str, str], str, str]] = [
     (("[0, 1, {bi", "[0, 6, {bi"), ":14:13:", "expected a whole number from 0 to 5, found '6'"),
     (("[0, 1, {bi", "[-1, 1, {bi"), ":14:10:", "expected a whole number from 0 to 5, found '-1'"),
     (("[0, 1, {bi", "[1, 1, {bi"), ":14:9:", "both ends are at one point"),
+    (
+        ("300, 300, 0, wall", "0, 0, 0, w, {spawn_robot_name: [1, c]}"),
+        ":7:9:",
+        "two robots start at",
+    ),
+    (("[300, 300", "[., 300"), ":12:10:", "expected a number"),
     (("graph_idx: [2, 0]", "graph_idx: [2, many]"), ":14:", "expected a whole number from 0"),
     (("graph_idx: [2, 0]", "graph_idx: 2"), ":14:", "expected a list of 2 or more, found '2'"),
     (("[4, false]}]\n      - [2", "[4, 0]}]\n      - [2"), ":15:", "expected true or false"),
