@@ -80,6 +80,8 @@ class Executive:
         self._counted = dict.fromkeys(self._logs, 0)
         #: The last message of each other robot: its process, what it has heard of and knows.
         self._last = {name: Message(run, name, 0) for name in self.others}
+        #: The processes that each other robot was before; what they said may still come.
+        self._former = {name: set[int]() for name in self.others}
         self._heard_at: dict[str, float] = {}
         self._silent: set[str] = set()
         self._refused: set[str] = set()
@@ -189,6 +191,8 @@ class Executive:
         """
         try:
             message = decoded(data, self._run, self.robot, self.others)
+            if message.life in self._former[message.by]:
+                return
             self._agreement.check(message)
             self._take_in(message, now)
             self._agreement.hears(message)
@@ -210,6 +214,8 @@ class Executive:
                 is_news = self._logs[of].version.is_done and not was_done
                 self._to_tell |= {*self.others} if is_news else {name}
         is_new = self._last[name].life != message.life
+        if is_new:
+            self._former[name].add(self._last[name].life)
         self._last[name], self._heard_at[name] = message, now
         if name in self._silent:
             self._silent.discard(name)

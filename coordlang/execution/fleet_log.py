@@ -72,9 +72,9 @@ class RobotLog:
         self.version = self.version._replace(events=len(self.events), **changed)
 
     def part(self, known: Version) -> LogPart:
-        """What somebody lacks who knows so much."""
-        first = min(known.events, len(self.events))
-        return LogPart(self.version, first, tuple(self.events[first : first + _EVENTS_SENT]))
+        """What somebody lacks who knows so much, and the event before, by which it is checked."""
+        first = max(0, min(known.events, len(self.events)) - 1)
+        return LogPart(self.version, first, tuple(self.events[first : first + 1 + _EVENTS_SENT]))
 
     def join(self, part: LogPart) -> bool:
         """Take in what is new; whether anything was.  `Contradiction`: and all is as before."""
@@ -82,8 +82,8 @@ class RobotLog:
         is_possible = told.ended <= told.told <= told.begun <= told.events <= told.ended + 1
         if not is_possible or part.first + len(part.events) > told.events:
             raise Contradiction(f"no robot can be so far: {told}")
-        if part.first > len(known):
-            return False  # something before it is missing: it comes again
+        if part.first >= max(1, len(known)):
+            return False  # the event before it is missing: it comes again
         shared = known[part.first : part.first + len(part.events)]
         if tuple(shared) != part.events[: len(shared)]:
             raise Contradiction("its events are others than those that were told before")

@@ -16,6 +16,7 @@ from itertools import count
 from random import Random
 from types import MappingProxyType
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -343,6 +344,31 @@ def test_a_robot_that_comes_back_asks_who_is_done_too() -> None:
     assert fleet.lines("r1", "event") == [1]
 
 
+def test_what_a_former_process_said_comes_too_late() -> None:
+    pair = Pair(choices_in(EITHER_WAY, EITHER_WAY_BOTH), "r1", "r2")
+
+    def chosen(now: float) -> bytes:
+        """What r1 says as soon as it has chosen an event."""
+        r1, r2 = pair.at["r1"], pair.at["r2"]
+        r1.tick(now)
+        while not r1._own.version.begun:
+            for by, to in ((r1, r2), (r2, r1)):
+                for _, data in by.messages():
+                    to.hears(data, now)
+        return next(data for _, data in r1.messages())
+
+    late = chosen(0)
+    assert b"(go r1 a)" in late
+    pair.join("r1", 2)
+    pair.at["r1"].random = Mock(randrange=lambda number: number - 1)
+    assert b"(go r1 b)" in chosen(1)
+    pair.at["r2"].hears(late, 2)
+    pair.tick(SILENT_AFTER)
+    pair.does("r1", SILENT_AFTER + 1)
+    assert [event.name for event in pair.at["r2"]._logs["r1"].events] == ["(go r1 b)"]
+    assert pair.lines("r1", "refused") == pair.lines("r2", "refused") == []
+
+
 def test_what_a_driver_may_not_say_is_refused_and_changes_nothing() -> None:
     pair = Pair(turning_round(), "r1", "r2")
     pair.tick(0)
@@ -399,6 +425,8 @@ WRONG = LogPart(Version(0, 1))
     [
         ([LogPart(Version(1, 1, 1, 1), 0, (GO,)), LogPart(Version(1, 1, 1, 0), 0, (GO,))], False),
         ([LogPart(Version(2, 1, 1, 1), 1, (GO,))], False),
+        # What comes after an event does not count without it: it may be another one.
+        ([LogPart(Version(1), 0, (GO,)), LogPart(Version(1, 1, 1, 1), 1)], False),
         (
             [LogPart(Version(1, 1, 1, 1), 0, (GO,)), LogPart(Version(1), 0, (Event("x", "x"),))],
             True,
