@@ -305,19 +305,32 @@ class _Grounder:
             kind = And if isinstance(f, Forall) == positive else Or
             instances = self._bindings.values(f.variables, binding, statics, steps)
             ground = (self.formula(f.part, inner, positive, acting) for inner in instances)
-            found = self._quantified[key] = joined(kind, ground)
+            found = joined(kind, ground)
+            if steps and isinstance(found, Truth):
+                # One subaction that nobody can ever do stays, so that what is beside it counts.
+                instances = self._bindings.values(f.variables, binding, statics)
+                ground = (self.formula(f.part, inner, positive, acting) for inner in instances)
+                found = next((one for one in ground if not isinstance(one, Truth)), found)
+            self._quantified[key] = found
         return found
 
     def _shape(self, f: Forall | Exists) -> _Shape:
         """The variables in a formula, and its guards.
 
         Guards are static atoms and actions that the part requires under ``exists``, and its
-        negation under ``forall``: where one of them is false, the instance is no matter.
+        negation under ``forall``: where one of them is false, the instance is no matter.  An action
+        is one only if all else is static: literals beside it count, whether or not it is done.
         """
         leaves = [leaf for leaf, _ in literals(f)]
         names = tuple(sorted(term for term in _terms(leaves) if term.startswith("?")))
         part = f.part if isinstance(f, Exists) else negated(f.part)
-        steps = tuple(p for p in conjuncts(part) if isinstance(p, StepAtom))
+        changing = {
+            leaf
+            for leaf in leaves
+            if isinstance(leaf, StepAtom)
+            or (isinstance(leaf, Atom) and leaf.predicate in self._fluents)
+        }
+        steps = tuple(p for p in conjuncts(part) if isinstance(p, StepAtom) and {p} == changing)
         found = self._shapes[id(f)] = (f, names, self._static_atoms(part), steps)
         return found
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from planners.grounding.actions import GroundAction
 from planners.joint.model import FullState, JointModel, PlanningTask
-from planners.pddl.formula_tree import formula_text
 from planners.search import optimal_plans
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import CoordlangError, note
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from planners.parallel.batch import Store
 
 #: The version of the tables: those of another one are never looked at, and go in time.
-_FORM = 6
+_FORM = 7
 #: Bytes that all tables together may take.
 _MOST_BYTES = 2**30
 #: The arrays of a plan space that are kept; goals are those of the task.
@@ -149,7 +148,7 @@ def key_of(model: str, task: PlanningTask) -> str:
     from planners.parallel.batch import code_hash, digest
 
     goal = task.goal
-    wanted = goal.facts if isinstance(goal, FullState) else formula_text(goal)
+    wanted = goal.facts if isinstance(goal, FullState) else repr(goal)
     return digest(code_hash("planners"), np.version.version, model, task.init, wanted)
 
 
