@@ -74,7 +74,8 @@ def _read_init(names: Names, item: Group, init: set[Atom], values: dict[Atom, fl
         if not isinstance(number, Token) or not NUMBER.match(number.text):
             what, remedy = "a function value that is no number is", "As in (= (distance a b) 3)."
             raise item.unsupported(what, remedy)
-        values[function] = float(number.text)
+        if values.setdefault(function, float(number.text)) != float(number.text):
+            raise item.fail("this function has another value already", "Leave one of the two.")
     else:
         _refuse_other_states(item)
         atom = read_formula(names, item)

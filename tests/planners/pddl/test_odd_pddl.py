@@ -366,6 +366,9 @@ CASES: dict[str, Case] = {
         (34, "d.pddl"), change(COSTLY, "(far ?x ?y)))", f"{LONG}))"), PROBLEM, COST
     ),
     "one that is ignored": case(2, change(COSTLY, "(far ?x ?y)))", f"{LONG}))")),
+    "two values of one function": case(
+        (31, "another value already"), COSTLY, change(PRICED, " 3)", " 3) (= (far A b) 4)")
+    ),
     "a value with the wrong number of arguments": case(
         (31, "p.pddl:3"), COSTLY, p("(:init", "(:init (= (far a) 3)")
     ),
