@@ -115,9 +115,4 @@ def random_bytes(text: str, random: Random) -> str:
 
 #: All of them, and how often each is used: those that get past the reader are worth more.  What
 #: `test_odd_pddl` and `test_bad_input` do by hand (line ends, letters, comments) is not among them.
-MUTATIONS: dict[Mutation, float] = {
-    edit_tokens: 20,
-    edit_groups: 30,
-    odd_name: 10,
-    random_bytes: 2,
-}
+MUTATIONS: dict[Mutation, float] = {edit_tokens: 20, edit_groups: 30, odd_name: 10, random_bytes: 2}

@@ -332,11 +332,7 @@ def texts(model: JointModel, parts: Parts) -> tuple[tuple[str, ...], ...]:
     """Parts as the product writes them."""
     return tuple(
         tuple(
-            event_text(
-                model,
-                robot,
-                joint.Event(e.label, e.waits, tuple(sorted(e.meets))),
-            )
+            event_text(model, robot, joint.Event(e.label, e.waits, tuple(sorted(e.meets))))
             for e in part
         )
         for robot, part in enumerate(parts)

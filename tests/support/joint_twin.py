@@ -63,9 +63,7 @@ def check_model(text: RandomModel, note: Callable[[str], None]) -> None:
         note("too large")
         return
     except BadInput:
-        note(
-            "ambiguous parts"
-        )  # exit 31: two joint actions with the same parts do different things
+        note("ambiguous parts")  # two joint actions with the same parts do different things
         with pytest.raises(BadInput, match="different results"):
             explore(loaded.model, loaded.tasks[0].init[None, :])
         return

@@ -150,28 +150,18 @@ def numbered_sentences(used: TaskLanguage, most: int = 1000) -> dict[tuple[int, 
     return by_sentence(used.space, used.task, word.__getitem__, most)
 
 
-def warping_clause(
-    u: Sequence[int], v: Sequence[int], word: Mapping[int, int] | Sequence[int]
-) -> Clause | None:
-    """The non-identical pairs on a warping path with the fewest non-identical cells.
-
-    The path is one of ``u`` and ``v`` under ``word``.
-
-    None if the two sentences differ.  O(len(u) * len(v)).
-    """
-    first, second = [word[a] for a in u], [word[b] for b in v]
-    path = warping_path(u, v, [[a == b for b in second] for a in first])
-    return None if path is None else frozenset(pair(u[i], v[j]) for i, j in path if u[i] != v[j])
-
-
 def separation_clause(
     sequences: Sequence[Sequence[int]], word: Mapping[int, int] | Sequence[int]
 ) -> Clause | None:
-    """The union of warping paths from a failing tuple's first plan; None if sentences differ."""
+    """The union of warping paths from a failing tuple's first plan; None if sentences differ.
+
+    Of each path the pairs that are not identical; it is one with the fewest of them.
+    """
+    first, *others = sequences
     clause: set[Pair] = set()
-    for other in sequences[1:]:
-        pairs = warping_clause(sequences[0], other, word)
-        if pairs is None:
+    for other in others:
+        path = warping_path(first, other, [[word[a] == word[b] for b in other] for a in first])
+        if path is None:
             return None
-        clause |= pairs
+        clause |= {pair(first[i], other[j]) for i, j in path if first[i] != other[j]}
     return frozenset(clause)

@@ -56,16 +56,15 @@ def of_any_kind(seed: int, random: Random) -> tuple[Domain, Problem, ModelOption
     return (*parsed(text.domain, text.problem), options)
 
 
-def random_instance(seed: int, cost: Cost | None = None) -> PlanningInstance | None:
-    """The model of a seed, under ``cost`` or a random one; None where it is refused."""
+def random_instance(seed: int) -> PlanningInstance | None:
+    """The model of a seed, under a random cost; None where it is refused."""
     random = Random(seed)
     try:
         if seed % 2:
             domain, problem, options = random_model(seed, random.choice((2, 3)))
         else:
             domain, problem, options = of_any_kind(seed, random)
-        chosen = random.choice(get_args(Cost)) if cost is None else cost
-        return build(domain, [problem], replace(options, cost=chosen))
+        return build(domain, [problem], replace(options, cost=random.choice(get_args(Cost))))
     except BadInput:
         return None
 
@@ -109,11 +108,9 @@ def random_spaces(
                 yield found, space
 
 
-def separable_spaces(
-    seeds: range, robots: int | None, most: int | None = None
-) -> Iterator[PlanSpace]:
+def separable_spaces(seeds: range, robots: int | None) -> Iterator[PlanSpace]:
     """The `random_spaces` without inseparable plans."""
-    return (space for _, space in random_spaces(seeds, robots, most) if inseparable(space) is None)
+    return (space for _, space in random_spaces(seeds, robots) if inseparable(space) is None)
 
 
 def runs(two: int, three: int, any_kind: int) -> list[Any]:

@@ -9,8 +9,8 @@ from coordlang.commands.building import build_language
 from coordlang.execution.best_sentence import best_sentence
 from coordlang.execution.task_language import TaskLanguage, language_in_task
 from coordlang.simulation.floor import Floor
-from coordlang.simulation.record import RunRecord, SimulationRecord, WishRecord
-from coordlang.simulation.run import record_of, runs_of
+from coordlang.simulation.record import RunRecord, WishRecord
+from coordlang.simulation.run import runs_of
 from coordlang.simulation.simulator import Settings
 from coordlang.simulation.team import Agreement, Mission
 from planners.pddl.model_options import ModelOptions
@@ -45,24 +45,9 @@ def floor_for(of: Mission) -> Floor:
     return Floor(of.world, {})
 
 
-def recorded(
-    folder: str, agreement: Agreement, settings: Settings, number: int
-) -> SimulationRecord:
-    """Runs in a shipped problem's own task, as a record."""
-    of = mission_of(folder, agreement=agreement)
-    floor = floor_for(of)
-    return record_of(of, floor, settings, list(runs_of(of, floor, settings, number)))
-
-
 def runs(
-    folder: str,
-    agreement: Agreement,
-    settings: Settings,
-    number: int,
-    *wishes: WishRecord,
-    first: int = 0,
+    folder: str, agreement: Agreement, settings: Settings, number: int, *wishes: WishRecord
 ) -> list[RunRecord]:
     """Runs in a shipped problem's own task, of seeds one after the other."""
     of = mission_of(folder, agreement=agreement)
-    floor = floor_for(of)
-    return list(runs_of(of, floor, settings, number, first, wishes))
+    return list(runs_of(of, floor_for(of), settings, number, wishes=wishes))
