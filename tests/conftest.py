@@ -14,7 +14,7 @@ import pytest
 
 from coordlang.commands.main import run
 from tests.support.command import Command, Outcome
-from tests.support.domains import DOMAINS
+from tests.support.domains import T_MAP
 
 # Some 150 processes are started, each of which would compile the packages again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -60,20 +60,16 @@ def searches(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 @pytest.fixture
-def t_map() -> tuple[Path, Path]:
-    return DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
-
-
-@pytest.fixture
-def language(t_map: tuple[Path, Path], tmp_path: Path) -> Path:
+def language(tmp_path: Path) -> Path:
+    """A language of the T-map."""
     path = tmp_path / "language.json"
-    path.write_bytes(_greedy(*t_map))
+    path.write_bytes(_greedy())
     return path
 
 
 @cache
-def _greedy(domain: Path, problem: Path) -> bytes:
+def _greedy() -> bytes:
     from coordlang import build
     from coordlang.language.file import to_bytes
 
-    return to_bytes(build(domain, problem, tasks="all", method="greedy").language)
+    return to_bytes(build(*T_MAP, tasks="all", method="greedy").language)

@@ -22,7 +22,7 @@ from coordlang.language.recorded import options_of
 from coordlang.language.sentences import sentence
 from planners.search.plans import Plans, counts
 from tests.support.command import Command
-from tests.support.domains import ROOT, files_of, read
+from tests.support.domains import ROOT, T_MAP, files_of, read
 from tests.support.pages import DOCS, PAGES, blocks, commands, matches, run_command, run_python
 
 #: Pages of many commands, which take a while.
@@ -118,11 +118,11 @@ def refutation(formula: Path, **environment: object) -> subprocess.CompletedProc
 
 
 @pytest.fixture
-def formula(coordlang: Command, t_map: tuple[Path, Path], tmp_path: Path) -> Path:
+def formula(coordlang: Command, tmp_path: Path) -> Path:
     language, proof, formula = tmp_path / "l.json", tmp_path / "c.json", tmp_path / "f.cnf"
     options = ("--tasks", "all", "--method", "minimal", "-o", language, "--certificate", proof)
-    assert coordlang("build", *t_map, *options).code == 0
-    made = coordlang("verify", language, *t_map, "--certificate", proof, "--dimacs", formula)
+    assert coordlang("build", *T_MAP, *options).code == 0
+    made = coordlang("verify", language, *T_MAP, "--certificate", proof, "--dimacs", formula)
     assert made.code == 0
     return formula
 
@@ -186,7 +186,7 @@ def test_reader_says_the_same(
     flags: list[str], ending: str, reader: dict[str, Any], tmp_path: Path
 ) -> None:
     path = tmp_path / f"language{ending}"
-    build = "build", *map(str, files_of("t-map")), "--method", "greedy"
+    build = "build", *map(str, T_MAP), "--method", "greedy"
     assert run([*build, "--tasks", "all", "-o", str(path), *flags]) == 0
     plain = reader["read_language"](path)
     language = read_language(path)

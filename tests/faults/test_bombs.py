@@ -13,7 +13,6 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from coordlang.commands.building import build_language
 from coordlang.verification.certificate_file import Cnf, read_certificate
 from coordlang.verification.check_certificate import check
 from planners.pddl import parse_domain
@@ -21,8 +20,8 @@ from planners.pddl.sexpr import Source
 from planners.system.errors import BadInput, OutOfMemory, Refuted
 from planners.system.files import read_bytes
 from planners.system.limits import time_limit
-from tests.support.domains import all_tasks
 from tests.support.forks import fork_command
+from tests.support.task_languages import built_for
 
 MIB = 2**20
 
@@ -119,7 +118,7 @@ def test_a_certificate_has_no_key_twice(key: str, value: str, tmp_path: Path) ->
 
 def test_a_false_claim_is_refuted_before_it_takes_memory() -> None:
     """There are 12 states."""
-    built = build_language(all_tasks("grid", "gw1-2x2"), "minimal")
+    built = built_for("grid", "gw1-2x2")
     for refuted in (11, 12, 1_000_000, 10**30):
         claim = msgspec.structs.replace(built.certificate(), refuted=refuted)
         with at_most(16), pytest.raises(Refuted, match=f"leave languages with {refuted} words"):

@@ -38,6 +38,9 @@ def files_of(folder: str, stem: str = "problem") -> tuple[Path, Path]:
     return DOMAINS / folder / "domain.pddl", DOMAINS / folder / f"{stem}.pddl"
 
 
+T_MAP = files_of("t-map")
+
+
 def loaded_from(
     folder: str, stem: str = "problem", options: ModelOptions | None = None
 ) -> PlanningInstance:

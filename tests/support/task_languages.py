@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from benchmarks.paper.task_choices import languages_in_tasks
-from coordlang.commands.building import build_language
+from coordlang.commands.building import Built, build_language
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import Candidates, all_pairs, from_listed, from_problems
 from coordlang.language.listed import ListedTask
@@ -78,6 +78,12 @@ def random_language(random: Random, candidates: Candidates) -> Language:
 
 
 @cache
+def built_for(folder: str, stem: str = "problem", method: str = "minimal") -> Built:
+    """A language for all pairs of states of a shipped problem, built once in a process."""
+    return build_language(all_tasks(folder, stem), method)
+
+
+@cache
 def shipped(name: str) -> tuple[Candidates, TaskLanguage]:
     """A shipped task and its greedy language; remembers actions if plans are inseparable."""
     folder, _, stem = name.partition("/")
@@ -89,31 +95,6 @@ def shipped(name: str) -> tuple[Candidates, TaskLanguage]:
             continue
         return candidates, next(languages_in_tasks(language, candidates))
     raise AssertionError(name)
-
-
-def where_r2_is(candidates: Candidates) -> Language:
-    """The paper's language of the running example: a word for each place of robot 2."""
-    words, states = ("in-a", "in-b", "in-c"), {}
-    for row in candidates.rows:
-        key = candidates.model.codec.key(row)
-        states[key] = f"in-{key.partition('(at r2 ')[2][0]}"
-    return Language(words, states, "in-a")
-
-
-@cache
-def three_cells() -> TaskLanguage:
-    """r1 and r2 trade a and b of three cells; three states a joint step: four optimal plans."""
-    candidates = own_task("three-cells")
-    return next(languages_in_tasks(where_r2_is(candidates), candidates))
-
-
-@cache
-def task_languages(
-    folder: str, stem: str, method: str = "minimal", everything: bool = True
-) -> tuple[TaskLanguage, ...]:
-    """Every candidate task with a language that a method makes."""
-    candidates = (all_tasks if everything else own_task)(folder, stem)
-    return tuple(languages_in_tasks(build_language(candidates, method).language, candidates))
 
 
 @cache

@@ -22,15 +22,13 @@ from planners.system.errors import BadInput, OutOfMemory
 from planners.system.limits import address_space, default_memory_limit, limited_memory, more_memory
 from tests.support.cluster import needs_distributed
 from tests.support.command import Command, on_a_terminal, own_process
-from tests.support.domains import DOMAINS, all_tasks
+from tests.support.domains import DOMAINS, T_MAP, all_tasks
 
 FREE = resource.RLIM_INFINITY
 
 
 @pytest.fixture
-def limit_of(
-    coordlang: Command, t_map: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
-) -> Callable[..., int]:
+def limit_of(coordlang: Command, monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
     """The soft limit of the memory while a command reads its files."""
     found: list[int] = []
 
@@ -39,7 +37,7 @@ def limit_of(
         raise BadInput("enough")
 
     def call(*arguments: str) -> int:
-        assert coordlang("plans", *t_map, *arguments).code == 31
+        assert coordlang("plans", *T_MAP, *arguments).code == 31
         return found.pop()
 
     monkeypatch.setattr("coordlang.commands.inputs.read_domain", reads)
@@ -75,7 +73,7 @@ def test_a_control_group_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert module._group_memory_left() > 1 << 50
 
 
-def test_no_remedy_that_is_in_use(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_remedy_that_is_in_use() -> None:
     model = all_tasks("grid", "gw1-2x2").model
     assert model.smaller("fewer robots", "b") == "fewer robots, b or --cost makespan+actions"
     with limited_memory(900 << 30):
@@ -108,22 +106,20 @@ def test_the_size_is_said_before_the_work(monkeypatch: pytest.MonkeyPatch) -> No
     ],
 )
 def test_what_cannot_be_done_is_said_at_once(
-    arguments: tuple[str, ...], message: str, coordlang: Command, t_map: tuple[Path, Path]
+    arguments: tuple[str, ...], message: str, coordlang: Command
 ) -> None:
-    outcome = coordlang("coordination", *t_map, *arguments)
+    outcome = coordlang("coordination", *T_MAP, *arguments)
     assert outcome.code == 2
     assert message in outcome.err
 
 
-def test_who_does_the_pieces_changes_nothing(
-    coordlang: Command, t_map: tuple[Path, Path], tmp_path: Path
-) -> None:
+def test_who_does_the_pieces_changes_nothing(coordlang: Command, tmp_path: Path) -> None:
     language = tmp_path / "l.json"
-    assert coordlang("build", *t_map, "--method", "greedy", "-o", language).code == 0
+    assert coordlang("build", *T_MAP, "--method", "greedy", "-o", language).code == 0
     for command in (
-        ("coordination", *t_map, "--json"),
-        ("build", *t_map, "--method", "greedy", "-o", "-"),
-        ("verify", language, *t_map, "--json"),
+        ("coordination", *T_MAP, "--json"),
+        ("build", *T_MAP, "--method", "greedy", "-o", "-"),
+        ("verify", language, *T_MAP, "--json"),
     ):
         kept = tmp_path / "kept" / command[0]
         given = ((), ("--jobs", 1), ("--jobs", 2), ("--resume", kept))
@@ -186,21 +182,6 @@ def no_search(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kept_plans, "optimal_plans", other)
 
 
-def commands(language: Path, plan: Path, sentence: str) -> dict[str, tuple[object, ...]]:
-    return {
-        "plans": ("plans", *GRID, "--count"),
-        "coordination": ("coordination", *GRID, "--jobs", 1),
-        "verify": ("verify", language, *GRID, "--jobs", 1),
-        "say": ("say", language, *GRID, plan),
-        "understand": ("understand", language, *GRID, sentence, "--count"),
-        "plan": ("plan", language, *GRID, sentence),
-        "choices": ("choices", language, *GRID, sentence, "--robot", "r1"),
-        "explain": ("explain", language, *GRID),
-        "export": ("export", language, *GRID, sentence, "--to", "ltlf"),
-        "report": ("report", language, *GRID, "-o", "-"),
-    }
-
-
 def test_no_command_searches_again(
     coordlang: Command, folder: Path, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
@@ -211,12 +192,23 @@ def test_no_command_searches_again(
     outcome = coordlang("plans", *GRID, "--max", 1, "--format", "ipc")
     plan.write_text(outcome.out)
     sentence = coordlang("say", language, *GRID, plan).out.strip()
-    every = commands(language, plan, sentence)
-    before = {name: coordlang(*arguments, "--no-cache") for name, arguments in every.items()}
+    every = (
+        ("plans", *GRID, "--count"),
+        ("coordination", *GRID, "--jobs", 1),
+        ("verify", language, *GRID, "--jobs", 1),
+        ("say", language, *GRID, plan),
+        ("understand", language, *GRID, sentence, "--count"),
+        ("plan", language, *GRID, sentence),
+        ("choices", language, *GRID, sentence, "--robot", "r1"),
+        ("explain", language, *GRID),
+        ("export", language, *GRID, sentence, "--to", "ltlf"),
+        ("report", language, *GRID, "-o", "-"),
+    )
+    before = [coordlang(*arguments, "--no-cache") for arguments in every]
     request.getfixturevalue("no_search")
-    for name, arguments in every.items():
-        assert coordlang(*arguments) == before[name], name
-        assert before[name].code == 0, name
+    for arguments, outcome in zip(every, before, strict=True):
+        assert coordlang(*arguments) == outcome, arguments
+        assert outcome.code == 0, arguments
     assert coordlang(*build).code == 0
     assert list(folder.glob("plans-*/*")) == [entry]
 

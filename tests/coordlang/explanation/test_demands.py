@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from benchmarks.paper.task_choices import languages_in_tasks
-from coordlang.commands.building import build_language
 from coordlang.execution.best_sentence import leading_sentences
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import RobotPart, SentenceDemands, meaning, sentence_demands
@@ -23,8 +22,8 @@ from planners.search.plans import Plan, Plans
 from tests.support import naive
 from tests.support.candidates import random_candidates
 from tests.support.command import Command
-from tests.support.domains import all_tasks
-from tests.support.task_languages import random_language
+from tests.support.domains import T_MAP, all_tasks
+from tests.support.task_languages import built_for, random_language
 
 
 def check(
@@ -38,9 +37,8 @@ def check(
     assert found.sentence == tuple(task_language.partition.words[w] for w in words)
     assert (found.plans, found.steps) == (len(plans), len(plans[0]))
     for robot, part in enumerate(found.parts):
-        texts = {
-            tuple(model.texts(step)[robot] for step in plan) for plan in plans
-        }  # the texts here still have the robot's name and the parentheses
+        # The texts here still have the robot's name and the parentheses.
+        texts = {tuple(model.texts(step)[robot] for step in plan) for plan in plans}
         assert part.subplans == len(texts)
         assert len(part.listed) == (len(texts) if len(texts) <= few else 0)
         short = {tuple(t and own_text(t, model.robots[robot]) for t in text) for text in texts}
@@ -100,8 +98,7 @@ def test_against_listed_plans(robots: int, monkeypatch: pytest.MonkeyPatch) -> N
 )
 def test_who_decides_a_change(folder: str, stem: str, every: int) -> None:
     """Before the change these robots' subactions always settle it; no smaller set of robots does."""
-    candidates = all_tasks(folder, stem)
-    language = build_language(candidates, "greedy").language
+    candidates, language = all_tasks(folder, stem), built_for(folder, stem, "greedy").language
     formulas = all_covers(mapped_states(language.partition(candidates.model), candidates.model))
     sizes: Counter[int] = Counter()
     for task_language in list(languages_in_tasks(language, candidates))[::every]:
@@ -160,13 +157,13 @@ def test_many_ways_in_plain_sentences(number: int, said: str) -> None:
     assert said in demands_text(SentenceDemands(("w0",), 5, 3, [part], []))
 
 
-def test_json(coordlang: Command, language: object, t_map: tuple[object, object]) -> None:
-    data = json.loads(coordlang("explain", language, *t_map, "--task", "--json").out)
+def test_json(coordlang: Command, language: object) -> None:
+    data = json.loads(coordlang("explain", language, *T_MAP, "--task", "--json").out)
     assert data["told"]["rules"][-1]["text"] is None
     assert {word: formula["states"] for word, formula in data["formulas"].items()} == data["words"]
     assert data["formulas"]["w0"]["pddl"] == "(and (not (at r1 c1-1)) (not (at r2 c1-1)))"
     assert sum(s["plans"] for s in data["sentences"]) == 2
-    refused = coordlang("explain", language, *t_map, "--task", "--sentence", "w3 w0")
+    refused = coordlang("explain", language, *T_MAP, "--task", "--sentence", "w3 w0")
     assert (refused.code, "no optimal plan has the sentence" in refused.err) == (1, True)
     for said in data["sentences"]:
         words = [said["changes"][0]["from"], *(change["to"] for change in said["changes"])]

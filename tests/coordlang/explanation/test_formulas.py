@@ -13,7 +13,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from coordlang.commands.building import Built, build_language
+from coordlang.commands.building import build_language
 from coordlang.explanation.minimise import Points, expand, minimise
 from coordlang.explanation.simple import _Search, simple
 from coordlang.explanation.text import literal_text, pddl_condition, shown
@@ -36,7 +36,7 @@ from tests.support.candidates import (
     small_worlds,
 )
 from tests.support.domains import all_tasks, own_task
-from tests.support.task_languages import language_of, random_language
+from tests.support.task_languages import built_for, language_of, random_language
 
 
 def holds(formula: Cover, atoms: set[str]) -> bool:
@@ -96,8 +96,7 @@ def test_exactly_one_formula_is_true_in_every_mapped_state(robots: int) -> None:
 
 def test_where_a_robot_is() -> None:
     """The three words of the running example say where one of the robots is."""
-    candidates = all_tasks("three-cells")
-    language = build_language(candidates, "minimal").language
+    candidates, language = all_tasks("three-cells"), built_for("three-cells").language
     formulas = all_covers(mapped_states(language.partition(candidates.model), candidates.model))
     for robot in ("r1", "r2"):
         if {shown(f) for f in formulas.values()} == {f"at({robot}) = {cell}" for cell in "abc"}:
@@ -343,8 +342,8 @@ def length(word: Assignment, states: list[int], shortest: dict[int, Lengths]) ->
 def by_trying_all(number: int) -> tuple[Lengths, list[int], dict[int, Lengths]]:
     """The shortest formulas of any smallest language of a small world."""
     candidates = small_worlds(6, number + 1)[number]
-    built = build_language(candidates, "minimal")
-    size, states = built.language.guarantee.size, list(built.job.states)
+    least = build_language(candidates, "minimal")
+    size, states = least.language.guarantee.size, list(least.job.states)
     variables, value = valuation(candidates.model, candidates.rows[states])
     sizes = [len(variable.values) for variable in variables]
     shortest = shortest_formulas([tuple(row) for row in value.tolist()], sizes)
@@ -359,27 +358,22 @@ def by_trying_all(number: int) -> tuple[Lengths, list[int], dict[int, Lengths]]:
 def test_shortest_by_trying_all(number: int) -> None:
     candidates = small_worlds(6, number + 1)[number]
     best, states, shortest = by_trying_all(number)
-    built = build_language(candidates, "minimal", prefer="simple")
-    figures = built.figures
+    found = build_language(candidates, "minimal", prefer="simple")
+    figures = found.figures
     assert (figures["terms"], figures["limits"]) == best
     assert (figures["terms_lower_bound"], figures["limits_lower_bound"]) == best
     assert (figures["terms_before"], figures["limits_before"]) >= best
-    word = built.language.partition(candidates.model).word_of(candidates.rows).tolist()
+    word = found.language.partition(candidates.model).word_of(candidates.rows).tolist()
     assert length({s: word[s] for s in states}, states, shortest) == best
-    assert built.verdict.holds
-    assert built.language.guarantee.proved_minimal
-
-
-@cache
-def two_rows() -> Built:
-    return build_language(all_tasks("grid", "gw2-2x3"), "minimal")
+    assert found.verdict.holds
+    assert found.language.guarantee.proved_minimal
 
 
 @pytest.mark.parametrize("phase", ["terms", "limits"])
 def test_stopped_searches_return_languages(phase: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    candidates, built = all_tasks("grid", "gw2-2x3"), two_rows()
-    word = built.language.partition(candidates.model).word_of(candidates.rows).tolist()
-    found = Outcome({s: word[s] for s in built.job.states}, 5)
+    candidates, made = all_tasks("grid", "gw2-2x3"), built_for("grid", "gw2-2x3")
+    word = made.language.partition(candidates.model).word_of(candidates.rows).tolist()
+    found = Outcome({s: word[s] for s in made.job.states}, 5)
     checked: list[Assignment] = []
 
     finds = _Search._finds
@@ -390,7 +384,7 @@ def test_stopped_searches_return_languages(phase: str, monkeypatch: pytest.Monke
         return finds(self, terms, limits, budget)
 
     monkeypatch.setattr(_Search, "_finds", late)
-    outcome = simple(replace(built.job, check=checked.append), found)
+    outcome = simple(replace(made.job, check=checked.append), found)
     assert isinstance(outcome.stopped, OutOfTime)
     assert outcome.partition is (checked[-1] if checked else found.partition)
     assert outcome.figures["terms_lower_bound"] <= 4 <= outcome.figures["terms"]
@@ -399,11 +393,11 @@ def test_stopped_searches_return_languages(phase: str, monkeypatch: pytest.Monke
 
 def test_a_search_gives_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """With no conflicts to spend: the formulas that there were, and a bound that is true."""
-    candidates, built = all_tasks("grid", "gw2-2x3"), two_rows()
-    mapped = mapped_states(built.language.partition(candidates.model), candidates.model)
-    found = Outcome(dict(zip(built.job.states, mapped.word.tolist(), strict=True)), 5)
+    candidates, made = all_tasks("grid", "gw2-2x3"), built_for("grid", "gw2-2x3")
+    mapped = mapped_states(made.language.partition(candidates.model), candidates.model)
+    found = Outcome(dict(zip(made.job.states, mapped.word.tolist(), strict=True)), 5)
     monkeypatch.setattr("coordlang.explanation.simple._CONFLICTS", 0)
-    outcome = simple(built.job, found)
+    outcome = simple(made.job, found)
     assert outcome.stopped is None
     assert outcome.partition is found.partition
     assert outcome.figures["terms"] == outcome.figures["terms_before"]

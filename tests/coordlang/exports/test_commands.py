@@ -23,7 +23,7 @@ from planners.pddl import parse_domain, parse_problem
 from planners.pddl.sexpr import Source
 from planners.system.errors import UsageError
 from tests.support.command import Command, Outcome
-from tests.support.domains import files_of
+from tests.support.domains import T_MAP, files_of
 from tests.support.naive_classical import optimal_plans
 from tests.support.task_languages import SHIPPED
 
@@ -31,9 +31,7 @@ from tests.support.task_languages import SHIPPED
 SENTENCE, OF_CELLS = "w0 w2 w1 w0", "w1 w0"
 #: Arguments -> what ``coordlang export`` ends with.
 Ask = Callable[..., Outcome]
-
-
-T_MAP, CELLS = files_of("t-map"), files_of("three-cells")
+CELLS = files_of("three-cells")
 
 
 @pytest.fixture(scope="module")

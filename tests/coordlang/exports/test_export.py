@@ -16,6 +16,7 @@ import pytest
 
 from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.commands.build import build
+from coordlang.commands.building import build_language
 from coordlang.commands.explain import explain
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.words import Conjunction
@@ -30,7 +31,7 @@ from planners.system.errors import BadInput, UsageError
 from tests.support.domains import DOMAINS, own_task
 from tests.support.naive import numbered_sentences
 from tests.support.naive_classical import optimal_plans
-from tests.support.task_languages import random_language, random_task_languages, task_languages
+from tests.support.task_languages import random_language, random_task_languages
 
 FORMS = {"explicit": 100_000, "select-then-apply": 0}
 #: How many random models of each number of robots; a second lot, much longer, runs on demand.
@@ -41,7 +42,8 @@ BOTH = pytest.mark.parametrize("lot", ["few", pytest.param("many", marks=pytest.
 @cache
 def tasks(lot: str) -> tuple[TaskLanguage, ...]:
     """Random models of all kinds, words at random; one says both "w0" and "w0 w2 w1 w0"."""
-    found = [*task_languages("t-map", "problem", everything=False)]
+    t_map = own_task("t-map")
+    found = [*languages_in_tasks(build_language(t_map, "minimal").language, t_map)]
     found += [u for robots in (2, 3) for _, _, u in random_task_languages(robots, NUMBER[lot])]
     for name, remember in product(("grid-joint/three-cells", "handover/one-door"), (True, False)):
         candidates = own_task(*name.split("/"), ModelOptions(remember_actions=remember))

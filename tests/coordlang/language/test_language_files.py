@@ -10,21 +10,19 @@ import pytest
 
 import coordlang as library
 from tests.support.command import Command
-from tests.support.domains import DOMAINS
+from tests.support.domains import T_MAP, files_of
 
 
 def edit(path: Path, **changes: object) -> None:
     path.write_text(json.dumps(json.loads(path.read_text()) | changes))
 
 
-def test_a_key_in_another_order_is_refused(
-    coordlang: Command, language: Path, t_map: tuple[Path, Path]
-) -> None:
+def test_a_key_in_another_order_is_refused(coordlang: Command, language: Path) -> None:
     """A robot looks states up by their key: what it would not find must not be verified."""
     states = json.loads(language.read_text())["states"]
     atoms = {key: key.replace(") (", ")|(").split("|") for key in states}
     edit(language, states={" ".join(atoms[key][::-1]): word for key, word in states.items()})
-    outcome = coordlang("verify", language, *t_map)
+    outcome = coordlang("verify", language, *T_MAP)
     assert outcome.code == 31
     assert "is no key of a state; it would be" in outcome.err
 
@@ -37,23 +35,17 @@ def test_a_key_in_another_order_is_refused(
     ],
 )
 def test_contradictions(
-    changes: dict[str, object],
-    message: str,
-    coordlang: Command,
-    language: Path,
-    t_map: tuple[Path, Path],
+    changes: dict[str, object], message: str, coordlang: Command, language: Path
 ) -> None:
     edit(language, **changes)
-    outcome = coordlang("verify", language, *t_map)
+    outcome = coordlang("verify", language, *T_MAP)
     assert outcome.code == 31
     assert message in outcome.err
 
 
-T_MAP = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
-GRID_JOINT = DOMAINS / "grid-joint" / "domain.pddl", DOMAINS / "grid-joint" / "three-cells.pddl"
-
-
-@pytest.mark.parametrize("files", [T_MAP, GRID_JOINT], ids=["t-map", "grid-joint"])
+@pytest.mark.parametrize(
+    "files", [T_MAP, files_of("grid-joint", "three-cells")], ids=["t-map", "grid-joint"]
+)
 def test_a_language_belongs_to_what_the_domain_says(
     files: tuple[Path, Path], coordlang: Command, tmp_path: Path
 ) -> None:

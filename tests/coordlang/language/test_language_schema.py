@@ -12,12 +12,12 @@ from typing import Any
 import jsonschema
 import pytest
 
-from coordlang.commands.building import build_language
 from coordlang.language.file import LANGUAGE, language_from_bytes, to_bytes
 from coordlang.language.provenance import Tolerance
 from planners.system.errors import BadInput, Position
 from tests.support.command import Command
-from tests.support.domains import DOMAINS, all_tasks
+from tests.support.domains import DOMAINS
+from tests.support.task_languages import built_for
 
 HERE = Position("here")
 RUNNING = [DOMAINS / "three-cells" / name for name in ("domain.pddl", "problem.pddl")]
@@ -25,9 +25,7 @@ RUNNING = [DOMAINS / "three-cells" / name for name in ("domain.pddl", "problem.p
 
 @pytest.fixture(scope="module")
 def written() -> dict[str, Any]:
-    data: dict[str, Any] = json.loads(
-        to_bytes(build_language(all_tasks("three-cells"), "minimal").language)
-    )
+    data: dict[str, Any] = json.loads(to_bytes(built_for("three-cells").language))
     return data
 
 

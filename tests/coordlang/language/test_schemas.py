@@ -15,7 +15,6 @@ import pytest
 
 import coordlang as api
 from benchmarks.paper.task_choices import languages_in_tasks
-from coordlang.commands.building import build_language
 from coordlang.commands.schema import SCHEMAS
 from coordlang.execution.choices import choices, to_bytes
 from coordlang.execution.monitor import Monitor, MonitorError
@@ -33,9 +32,8 @@ from planners.search.plan_file import read_plans, to_json
 from planners.search.plans import Plans
 from planners.system.errors import BadInput
 from tests.support.command import Command
-from tests.support.domains import DOMAINS, ROOT, all_tasks
-
-T_MAP = DOMAINS / "t-map" / "domain.pddl", DOMAINS / "t-map" / "problem.pddl"
+from tests.support.domains import ROOT, T_MAP, all_tasks, files_of
+from tests.support.task_languages import built_for
 
 
 @cache
@@ -59,31 +57,24 @@ def test_shipped_as_printed(name: str, coordlang: Command) -> None:
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
     """A file of each format, as it is written."""
-    candidates = all_tasks("three-cells")
-    built = build_language(candidates, "minimal")
+    candidates, built = all_tasks("three-cells"), built_for("three-cells")
     certificate = tmp_path_factory.mktemp("schemas") / "certificate.json"
     write_certificate(built.certificate(), certificate)
     plans = Plans.of(candidates.spaces[0])
     task = next(languages_in_tasks(built.language, candidates))
     sentences = task_sentences(task.space, 0, task.partition, task.plans_with)
     words = task.words_of(sentences[0].words)
+    language = api.build(*T_MAP, method="greedy").language
+    simulated = api.simulate(language, *T_MAP, without=True, seed=1)
     texts = {
         "language": language_bytes(built.language).decode(),
         "tasks": tasks_text([ListedTask(("(at r1 a)", "(at r2 b)"), ("(at r1 b)",))]),
         "certificate": certificate.read_text(),
         "lifted": lifted_bytes(
-            api.lift(
-                *(DOMAINS / "grid" / f"{stem}.pddl" for stem in ("domain", "gw1-2x2")),
-                complexity=5,
-                jobs=1,
-            ).language
+            api.lift(*files_of("grid", "gw1-2x2"), complexity=5, jobs=1).language
         ).decode(),
         "choices": to_bytes(choices(task, words)).decode(),
-        "simulation": simulated_bytes(
-            api.simulate(
-                api.build(*T_MAP, method="greedy").language, *T_MAP, without=True, seed=1
-            ).record
-        ).decode(),
+        "simulation": simulated_bytes(simulated.record).decode(),
         "plans": json.dumps(to_json(plans, [plans.unrank(0)])),
         "coordinates": json.dumps({"coordinates": {"a": [0, 0], "b": [1, 0.5]}}),
     }

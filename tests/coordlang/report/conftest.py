@@ -19,7 +19,8 @@ from coordlang.language.listed import read_task_file
 from coordlang.language.words import Language
 from coordlang.report.page import Report, make_report
 from planners.pddl.lifted import Domain, Problem
-from tests.support.domains import DOMAINS, all_tasks, own_task, read
+from tests.support.domains import DOMAINS, own_task, read
+from tests.support.task_languages import built_for
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -71,28 +72,23 @@ def listed_plans(task: dict[str, Any]) -> list[tuple[list[int], list[int]]]:
 
 @cache
 def make_language(
-    domain: str,
-    problem: str,
-    tasks: str | None = "all",
-    method: str = "greedy",
+    domain: str, problem: str, tasks: str | None = "all"
 ) -> tuple[Language, Domain, Problem]:
     lifted, read_problem = read(domain, problem)
-    if tasks in (None, "all"):
-        candidates = (all_tasks if tasks else own_task)(domain, problem)
-    else:
-        listed = read_task_file(DOMAINS / domain / tasks)
-        candidates = from_listed(lifted, [read_problem], listed)
-    built = build_language(candidates, method)
-    return built.language, lifted, read_problem
+    if tasks == "all":
+        return built_for(domain, problem, "greedy").language, lifted, read_problem
+    candidates = (
+        from_listed(lifted, [read_problem], read_task_file(DOMAINS / domain / tasks))
+        if tasks
+        else own_task(domain, problem)
+    )
+    return build_language(candidates, "greedy").language, lifted, read_problem
 
 
 @cache
-def make_world(
-    domain: str, problem: str, tasks: str | None = "all", method: str = "greedy", shown: int = 6
-) -> World:
-    language, lifted, asked = make_language(domain, problem, tasks, method)
-    report = make_report(language, lifted, [asked], tasks_shown=shown)
-    return World(language, lifted, asked, report)
+def make_world(domain: str, problem: str, tasks: str | None = "all") -> World:
+    language, lifted, asked = make_language(domain, problem, tasks)
+    return World(language, lifted, asked, make_report(language, lifted, [asked], tasks_shown=6))
 
 
 def refuted(language: Language) -> Language:
@@ -142,12 +138,11 @@ class Opener:
         self.folder = folder
         self.pages: list[Opened] = []
 
-    def __call__(self, html: bytes, width: int = 1200, height: int = 900, **context: Any) -> Opened:
+    def __call__(self, html: bytes, **context: Any) -> Opened:
         path = self.folder / f"{len(self.pages)}.html"
         path.write_bytes(html)
-        page = self.browser.new_context(
-            viewport={"width": width, "height": height}, **context
-        ).new_page()
+        size = {"width": 1200, "height": 900}
+        page = self.browser.new_context(viewport=size, **context).new_page()  # type: ignore[arg-type]
         opened = Opened(page, [], [])
         page.on("console", lambda message: opened.messages.append(message.text))
         page.on("pageerror", lambda error: opened.messages.append(str(error)))

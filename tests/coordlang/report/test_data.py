@@ -32,7 +32,7 @@ from tests.coordlang.report.conftest import (
     refuted,
 )
 from tests.support.command import Command
-from tests.support.domains import files_of
+from tests.support.domains import T_MAP, files_of
 from tests.support.random_models import random_model
 
 WORLDS: list[tuple[str, str, str | None]] = [
@@ -211,17 +211,15 @@ def test_plans_within_slack_are_called_so() -> None:
 
 # ---- ``coordlang report``
 
-FILES = files_of("t-map")
-
 
 def test_a_page_is_written(coordlang: Command, language: Path, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
-    outcome = coordlang("report", language, *FILES, "-o", page)
+    outcome = coordlang("report", language, *T_MAP, "-o", page)
     assert outcome.code == 0
     assert outcome.out == f"30 tasks of 132, {page.stat().st_size:,} bytes, written to {page}\n"
     assert page.read_text().startswith("<!DOCTYPE html>")
     assert len(data_of(page.read_bytes())["tasks"]) == 30
-    to_stdout = coordlang("report", language, *FILES, "-o", "-")
+    to_stdout = coordlang("report", language, *T_MAP, "-o", "-")
     assert to_stdout.out == page.read_text()
     assert "written to stdout" in to_stdout.err
 
@@ -233,16 +231,16 @@ def test_coordinates(coordlang: Command, language: Path, tmp_path: Path) -> None
     )
     page = tmp_path / "report.html"
     one = ("-o", page)
-    assert coordlang("report", language, *FILES, *one, "--coordinates", sidecar).code == 0
+    assert coordlang("report", language, *T_MAP, *one, "--coordinates", sidecar).code == 0
     assert data_of(page.read_bytes())["places"][0] == {"name": "c0-1", "x": 9, "y": 0}
     # Beside the problem it needs no option.
     copy = tmp_path / "problem.pddl"
-    copy.write_text(FILES[1].read_text())
+    copy.write_text(T_MAP[1].read_text())
     sidecar.rename(tmp_path / "coordinates.json")
-    assert coordlang("report", language, FILES[0], copy, *one).code == 0
+    assert coordlang("report", language, T_MAP[0], copy, *one).code == 0
     assert data_of(page.read_bytes())["places"][0]["x"] == 9
     (tmp_path / "coordinates.json").write_text("[]")
-    assert coordlang("report", language, FILES[0], copy, *one).code == 31
+    assert coordlang("report", language, T_MAP[0], copy, *one).code == 31
 
 
 @pytest.mark.parametrize(
@@ -259,7 +257,7 @@ def test_what_is_refused(
 ) -> None:
     before = language.read_bytes()
     given = [a.format(language=language, folder=tmp_path) for a in arguments]
-    outcome = coordlang("report", language, *FILES, *given)
+    outcome = coordlang("report", language, *T_MAP, *given)
     assert outcome.code == code
     assert outcome.err
     assert language.read_bytes() == before

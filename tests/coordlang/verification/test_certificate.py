@@ -33,12 +33,13 @@ from planners.system.errors import OutOfTime, Refuted
 from planners.system.limits import time_left
 from tests.support.candidates import small_candidates
 from tests.support.command import Command
-from tests.support.domains import DOMAINS, all_tasks
+from tests.support.domains import DOMAINS
+from tests.support.task_languages import built_for
 
 
 @pytest.fixture(scope="module")
 def built() -> Built:
-    return build_language(all_tasks("grid", "gw1-2x2"), "minimal")
+    return built_for("grid", "gw1-2x2")
 
 
 @pytest.fixture(scope="module")
@@ -183,17 +184,13 @@ def test_what_proves_nothing(built: Built, certificate: Certificate) -> None:
 @pytest.mark.parametrize("method", ["greedy", "separating", "exhaustive"])
 def test_other_methods(method: str) -> None:
     """A certificate for what the method proves, also where it met no counterexamples itself."""
-    built = build_language(all_tasks("three-cells"), method)
+    built, least = built_for("three-cells", method=method), 3 if method == "exhaustive" else 2
     checked = check(built.certificate(), built.job.candidates)
-    assert (
-        checked.lower_bound
-        == built.language.guarantee.lower_bound
-        == (3 if method == "exhaustive" else 2)
-    )
+    assert checked.lower_bound == built.language.guarantee.lower_bound == least
 
 
 def test_nothing_to_refute() -> None:
-    built = build_language(all_tasks("grid", "gw1-2x2"), "greedy")
+    built = built_for("grid", "gw1-2x2", "greedy")
     with pytest.raises(ValueError, match="there is a language with 3 words"):
         refuting_clauses(built.job, 3)
     with pytest.raises(ValueError, match="leave a partition into 1 words"):

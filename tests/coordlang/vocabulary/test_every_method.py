@@ -19,6 +19,7 @@ from tests.support import naive
 from tests.support.candidates import small_candidates
 from tests.support.command import Command
 from tests.support.domains import all_tasks, files_of, own_task, read
+from tests.support.task_languages import built_for
 
 
 @pytest.mark.thorough
@@ -83,7 +84,7 @@ def test_effort_buys_words_and_bounds(stem: str, least: int) -> None:
     known = [
         build_language(candidates, effort=effort).language.guarantee for effort in (0, 1, 5, 1_000)
     ]
-    greedy = build_language(candidates, "greedy").language.guarantee
+    greedy = built_for("grid", stem, "greedy").language.guarantee
     assert (known[0].size, known[0].lower_bound) == (greedy.size, 2)
     assert known[-1].size == known[-1].lower_bound == least
     for less, more in pairwise(known):

@@ -27,6 +27,7 @@ from tests.support.candidates import on_graph
 from tests.support.command import Command
 from tests.support.domains import DOMAINS, all_tasks, own_task
 from tests.support.random_spaces import random_spaces
+from tests.support.task_languages import built_for
 
 SQUARE = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "gw1-2x2.pddl"
 
@@ -120,7 +121,7 @@ def test_annealing_finds_the_best_two_words(monkeypatch: pytest.MonkeyPatch) -> 
     assert found.figures["partitions_measured"] > 400
 
 
-def test_words_that_are_enough_are_a_language(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_words_that_are_enough_are_a_language() -> None:
     """The loop is asked first: a task with 252 plans, of which none has to be measured."""
     candidates = own_task("grid", "corners-4x4")
     found, failures = few_words(job_for_few_words(Making(candidates)), 4)
@@ -184,7 +185,7 @@ def test_a_function_gives_words_too() -> None:
     assert built.failures.mean == Fraction(5, 132)
     assert built.data()["failure_mean"] == 5 / 132
     assert not built.guarantee.coordination_language
-    assert build_language(all_tasks("grid", "gw1-2x2"), "minimal").failures.mean == 0
+    assert built_for("grid", "gw1-2x2").failures.mean == 0
 
 
 def test_a_limit_before_a_language_is_found_and_none_after() -> None:
