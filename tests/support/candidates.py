@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
@@ -78,8 +78,9 @@ def requiring(candidates: Candidates) -> bool:
     )
 
 
-def states_of(spaces: Sequence[PlanSpace]) -> int:
-    return len({int(s) for space in spaces for s in space.state})
+def states_of(candidates: Candidates) -> list[int]:
+    """The states that plans pass through."""
+    return sorted({s for space in candidates.spaces for s in space.state.tolist()})
 
 
 def small_candidates(
@@ -104,13 +105,13 @@ def small_candidates(
         if found is None:
             continue
         with suppress(ProvedImpossible, BadInput, naive.TooLarge):
-            if not 0 < found.count <= tasks or states_of(found.spaces) > states:
+            if not 0 < found.count <= tasks or len(states_of(found)) > states:
                 continue
             if separable and any(inseparable(space) is not None for space in found.spaces):
                 continue
             if plans:
                 list(listed(found, plans))
-            if requires and not requiring(found):
+            if requires and seed not in known and not requiring(found):
                 continue
             yield seed, found
 

@@ -10,23 +10,25 @@ from itertools import permutations, product
 
 from coordlang.language.candidates import Candidates
 from planners.joint.model import FullState, Goal, JointModel, show
-from planners.pddl import read_domain
-from planners.pddl.lifted import And, Atom, Not, Or, Truth
+from planners.pddl import parse_problem, read_domain
+from planners.pddl.lifted import And, Atom, Not, Or, Problem, Truth
 from planners.pddl.robots import fluent_predicates
+from planners.pddl.sexpr import Source
 from tests.support.domains import DOMAINS
 
 GRID = read_domain(DOMAINS / "grid" / "domain.pddl")
 
 
-def world(cells: int, edges: list[tuple[int, int]], robots: int) -> str:
+def world(cells: int, edges: list[tuple[int, int]], robots: int) -> Problem:
     """Robots in the first cells of a graph, each wants to be in the cell of the next one."""
     names = [f"r{n + 1}" for n in range(robots)]
     adjacent = " ".join(f"(adjacent c{a} c{b}) (adjacent c{b} c{a})" for a, b in edges)
     at = " ".join(f"(at {name} c{n})" for n, name in enumerate(names))
     goal = " ".join(f"(at {name} c{(n + 1) % robots})" for n, name in enumerate(names))
-    return f"""(define (problem p) (:domain grid)
+    text = f"""(define (problem p) (:domain grid)
       (:objects {" ".join(names)} - robot {" ".join(f"c{n}" for n in range(cells))} - cell)
       (:init {at} {adjacent}) (:goal (and {goal})))"""
+    return parse_problem(Source("p", text), GRID)
 
 
 def state_symmetries(candidates: Candidates) -> set[tuple[int, ...]]:

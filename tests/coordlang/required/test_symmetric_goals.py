@@ -24,9 +24,7 @@ from coordlang.vocabulary.first_differences import FirstDifferences, differences
 from planners.loading import load
 from planners.parallel.batch import Store
 from planners.parallel.workers import Workers
-from planners.pddl import parse_problem
 from planners.pddl.model_options import ModelOptions
-from planners.pddl.sexpr import Source
 from planners.search.portions import PORTION
 from planners.system.errors import BadInput, ProvedImpossible
 from tests.support.domains import all_tasks, files_of, own_task, read
@@ -77,7 +75,7 @@ def test_random_worlds(seeds: range) -> None:
         robots = random.choice([2, 2, 3])
         cells = random.randint(robots + 1, 5 if robots == 2 else 4)
         edges = [edge for edge in combinations(range(cells), 2) if random.random() < 0.7]
-        problem = parse_problem(Source("p", world(cells, edges, robots)), GRID)
+        problem = world(cells, edges, robots)
         options = random.choice([ModelOptions(), ModelOptions(cost="makespan+actions")])
         candidates = all_pairs(GRID, [problem], options)
         found += bool(candidates.count) and agree(candidates, random.choice([PORTION, 40.0, 300.0]))

@@ -25,7 +25,7 @@ def random_world(random: Random) -> Candidates | None:
     cells = random.randint(3, 5)
     edges = [edge for edge in combinations(range(cells), 2) if random.random() < 0.85]
     robots = random.choice([2, 2, 3]) if cells < 5 else 2
-    problem = parse_problem(Source("p", world(cells, edges, robots)), GRID)
+    problem = world(cells, edges, robots)
     every = all_pairs(GRID, [problem])
     if not every.count:
         return None
@@ -83,20 +83,14 @@ def test_the_group_of_unstructured_models(robots: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("folder", "stem"),
+    "name",
     [
-        ("three-cells", "problem"),
-        ("t-map", "problem"),
-        ("grid", "gw2-2x3"),
-        ("grid-joint", "gw1-2x2"),
-        ("handover", "two-doors"),
-        ("push-box", "next-door"),
-        ("lock", "three-robots"),
-        ("tray", "serve"),
+        *("three-cells/problem", "t-map/problem", "grid/gw2-2x3", "grid-joint/gw1-2x2"),
+        *("handover/two-doors", "push-box/next-door", "lock/three-robots", "tray/serve"),
     ],
 )
-def test_the_group_of_shipped_domains(folder: str, stem: str) -> None:
-    candidates = all_tasks(folder, stem)
+def test_the_group_of_shipped_domains(name: str) -> None:
+    candidates = all_tasks(*name.split("/"))
     group = symmetry_group(candidates)
     assert elements(group) == state_symmetries(candidates)
     assert is_group(elements(group))
@@ -105,8 +99,7 @@ def test_the_group_of_shipped_domains(folder: str, stem: str) -> None:
 
 def test_of_a_large_group_a_subgroup() -> None:
     """Three robots in four cells, all neighbours of each other: 4! times 3! symmetries."""
-    edges = list(combinations(range(4), 2))
-    candidates = all_pairs(GRID, [parse_problem(Source("p", world(4, edges, 3)), GRID)])
+    candidates = all_pairs(GRID, [world(4, list(combinations(range(4), 2)), 3)])
     whole = elements(symmetry_group(candidates, largest=144))
     assert len(whole) == 143
     for largest in (1, 2, 7, 64, 143):

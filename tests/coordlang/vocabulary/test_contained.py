@@ -19,17 +19,10 @@ from coordlang.symmetry.group import Symmetry, symmetries_of_part, symmetry_grou
 from coordlang.verification.certificate_file import Certificate, Reason
 from coordlang.verification.check_certificate import Checked, check
 from coordlang.verification.make_certificate import _reason
-from coordlang.vocabulary.contained import (
-    ContainedInstance,
-    part_of,
-    parts,
-    tasks_of_one_orbit,
-)
+from coordlang.vocabulary.contained import ContainedInstance, part_of, parts, tasks_of_one_orbit
 from coordlang.vocabulary.loop import Budget
 from coordlang.vocabulary.refuter import ends
 from planners.joint.tables import Bools
-from planners.pddl import parse_problem
-from planners.pddl.sexpr import Source
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan
 from planners.system.errors import Refuted
@@ -42,9 +35,9 @@ from tests.support.texts import parsed
 MOST = 25
 
 
-def on_graph(cells: int, edges: list[tuple[int, int]], robots: int = 2) -> Candidates:
-    """All tasks of robots on a graph of cells."""
-    return all_pairs(GRID, [parse_problem(Source("p", world(cells, edges, robots)), GRID)])
+def on_graph(cells: int, edges: list[tuple[int, int]]) -> Candidates:
+    """All tasks of two robots on a graph of cells."""
+    return all_pairs(GRID, [world(cells, edges, 2)])
 
 
 def without(candidates: Candidates, *names: str) -> Bools:

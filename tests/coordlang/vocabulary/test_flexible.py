@@ -30,6 +30,7 @@ from tests.support.candidates import (
     requiring,
     small_candidates,
     some_tasks,
+    states_of,
 )
 from tests.support.domains import all_tasks, own_task
 
@@ -94,7 +95,7 @@ def test_many_plans_lose_nothing() -> None:
 
 def all_languages(candidates: Candidates, size: int) -> list[tuple[Fraction, dict[int, int]]]:
     """All languages with so many words, with their flexibility."""
-    states = sorted({int(s) for space in candidates.spaces for s in space.state})
+    states = states_of(candidates)
     bad, every = failing(candidates), [sequences for *_, sequences in listed(candidates)]
     found = []
     for word in partitions(states, size):
@@ -118,9 +119,7 @@ def test_flexible_is_best_by_trying_all() -> None:
             *random.choice([("grid", "gw1-2x2"), ("grid", "gwb2-3x3"), ("t-map", "problem")])
         )
         candidates = some_tasks(candidates, random, random.randint(1, 4))
-        if len({int(s) for space in candidates.spaces for s in space.state}) > 9 or not requiring(
-            candidates
-        ):
+        if len(states_of(candidates)) > 9 or not requiring(candidates):
             continue
         built = build_language(candidates, "minimal")
         languages = all_languages(candidates, built.language.guarantee.size)

@@ -28,9 +28,10 @@ from coordlang.vocabulary.sat import PartitionProblem
 from planners.joint.tables import Ints
 from planners.parallel.batch import Store
 from planners.parallel.workers import Workers
-from tests.support.candidates import small_candidates
+from tests.support.candidates import small_candidates, states_of
 from tests.support.domains import all_tasks, own_task
 from tests.support.random_spaces import random_spaces
+from tests.support.task_languages import built_for
 
 
 @pytest.mark.parametrize(
@@ -45,7 +46,7 @@ from tests.support.random_spaces import random_spaces
     ],
 )
 def test_known_minima(folder: str, stem: str, words: int) -> None:
-    built = build_language(all_tasks(folder, stem), "minimal")
+    built = built_for(folder, stem)
     guarantee = built.language.guarantee
     assert (guarantee.size, guarantee.lower_bound, guarantee.proved_minimal) == (words, words, True)
     assert built.verdict.holds
@@ -126,10 +127,6 @@ def merges(word: Assignment) -> Iterator[dict[int, int]]:
     """All partitions with two words made one."""
     for one, other in combinations(sorted(set(word.values())), 2):
         yield {state: one if own == other else own for state, own in word.items()}
-
-
-def states_of(candidates: Candidates) -> list[int]:
-    return sorted({s for space in candidates.spaces for s in space.state.tolist()})
 
 
 def languages(candidates: Candidates, group: SymmetryGroup) -> list[dict[int, int]]:

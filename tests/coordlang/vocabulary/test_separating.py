@@ -14,7 +14,7 @@ from coordlang.language.candidates import Candidates
 from coordlang.required.composition_walk import DifferenceWalk
 from coordlang.vocabulary.exhaustive import partitions
 from tests.support import naive
-from tests.support.candidates import listed, small_candidates
+from tests.support.candidates import listed, small_candidates, states_of
 from tests.support.domains import all_tasks
 
 #: Pairs of states, all of which must be separated; and of several such groups one.
@@ -88,7 +88,7 @@ def test_against_the_theorem(
     )
     for seed, candidates in islice(models, number):
         both, alpha = (demands(candidates, most, beta=b) for b in (True, False))
-        states = sorted({int(s) for space in candidates.spaces for s in space.state})
+        states = states_of(candidates)
         full = build_language(candidates, "separating", seed=seed)
         first = build_language(candidates, "separating", alpha_only=True)
         for built, wanted in ((full, both), (first, alpha)):

@@ -19,10 +19,7 @@ from planners.joint.model import Goal
 from planners.joint.tables import Rows
 from planners.joint.traces import Traces
 from planners.loading import build, load
-from planners.pddl import parse_problem
-from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
-from planners.pddl.sexpr import Source
 from planners.search.asynchronous import asynchronous
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
@@ -92,8 +89,7 @@ def test_paths_are_the_plans_up_to_timing(robots: int, seeds: range) -> None:
             for plan in listed:
                 assert listed.steps(plan) in plans.listed
                 assert listed.of_steps(listed.steps(plan)) == plan
-    print(f"{robots} robots: {dict(seen)}")
-    assert seen["plans"] >= 30
+    assert seen["plans"] >= 30, seen
 
 
 @pytest.mark.parametrize(("robots", "seeds"), SEEDS)
@@ -114,8 +110,7 @@ def test_under_a_language_every_interleaving_ends_in_the_goal(robots: int, seeds
             seen["language" if holds else "none"] += 1
             seen["mixtures"] += len(mixtures)
             seen["do not arrive"] += any(end != "arrived" for end in ends)
-    print(f"{robots} robots: {dict(seen)}")
-    assert min(seen["language"], seen["none"]) >= 5
+    assert min(seen["language"], seen["none"]) >= 5, seen
 
 
 @pytest.mark.parametrize(
@@ -174,11 +169,15 @@ MAPS = [
 @pytest.mark.parametrize(("links", "robots", "in_step", "asynchronously"), MAPS)
 def test_least_words(links: str, robots: int, in_step: int, asynchronously: int) -> None:
     """As the brute force finds them; every mixture arrives in every interleaving."""
-    domain, problem = small_map(links, robots)
-    for options, words in ((None, in_step), (ModelOptions(asynchronous=True), asynchronously)):
-        built = build_language(all_pairs(domain, [problem], options), "minimal")
+    cells = sorted({*links} - {" "})
+    edges = [(cells.index(link[0]), cells.index(link[1])) for link in links.split()]
+    problem = on_cells(len(cells), edges, robots)
+    in_step_tasks = all_pairs(GRID, [problem])
+    others = all_pairs(GRID, [problem], ModelOptions(asynchronous=True))
+    for candidates, words in ((in_step_tasks, in_step), (others, asynchronously)):
+        built = build_language(candidates, "minimal")
         assert len(built.language.words) == built.language.guarantee.lower_bound == words
-    (space,) = all_pairs(domain, [problem]).spaces
+    (space,) = in_step_tasks.spaces
     world = World(space.model)
     plans = [Plans(world, space, task, 200) for task in range(len(space.starts))]
     least, word = least_words(plans, range(len(space.rows)))
@@ -189,13 +188,6 @@ def test_least_words(links: str, robots: int, in_step: int, asynchronously: int)
             assert world.ends(row, mixed, goal) == {"arrived"}
     if in_step < asynchronously:
         assert sum(len(own.states) for own in plans) < sum(len(own.listed) for own in plans)
-
-
-def small_map(links: str, robots: int) -> tuple[Domain, Problem]:
-    """Robots of the grid on cells that are linked like this."""
-    cells = sorted({*links} - {" "})
-    edges = [(cells.index(link[0]), cells.index(link[1])) for link in links.split()]
-    return GRID, parse_problem(Source("map.pddl", on_cells(len(cells), edges, robots)), GRID)
 
 
 def test_single_steps_are_those_of_tables() -> None:
