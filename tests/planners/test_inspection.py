@@ -18,17 +18,8 @@ from planners.loading import PlanningInstance
 from planners.pddl.model_options import ModelOptions
 from planners.search.optimal_plans import search
 from planners.search.reachable import PieceSizes, count, explore
+from planners.system import limits
 from planners.system.errors import OutOfMemory, OutOfTime
-from planners.system.limits import (
-    address_space,
-    limited_memory,
-    little_time_after,
-    memory_left,
-    reaching,
-    run_until_stopped,
-    time_left,
-    time_limit,
-)
 from tests.support.domains import loaded_from
 from tests.support.random_pddl import random_model
 from tests.support.texts import model_of
@@ -113,7 +104,7 @@ def test_the_example_can_happen_in_random_models() -> None:
 def late() -> OutOfTime:
     """What the alarm raises."""
     try:
-        with time_limit(0.01):
+        with limits.time_limit(0.01):
             while True:
                 pass
     except OutOfTime as error:
@@ -126,8 +117,8 @@ def late() -> OutOfTime:
 def test_the_innermost_block_speaks() -> None:
     with (
         pytest.raises(OutOfTime) as caught,
-        reaching(lambda: "the whole", "less of everything"),
-        reaching(lambda: f"{2 + 1} of 9 parts", "fewer parts"),
+        limits.reaching(lambda: "the whole", "less of everything"),
+        limits.reaching(lambda: f"{2 + 1} of 9 parts", "fewer parts"),
     ):
         raise late()
     assert str(caught.value).splitlines()[1:] == [
@@ -138,9 +129,9 @@ def test_the_innermost_block_speaks() -> None:
 
 def test_memory_that_is_used_up_is_an_error_with_a_code() -> None:
     with (
-        limited_memory(900 << 30),
+        limits.limited_memory(900 << 30),
         pytest.raises(OutOfMemory) as caught,
-        reaching(lambda: "half of it", "fewer parts"),
+        limits.reaching(lambda: "half of it", "fewer parts"),
     ):
         raise MemoryError
     assert caught.value.exit_code == 22
@@ -149,10 +140,10 @@ def test_memory_that_is_used_up_is_an_error_with_a_code() -> None:
 
 
 def test_an_estimate_keeps_its_own_remedy_and_other_errors_pass() -> None:
-    with pytest.raises(OutOfMemory) as caught, reaching(lambda: "half of it", "fewer parts"):
+    with pytest.raises(OutOfMemory) as caught, limits.reaching(lambda: "half of it", "fewer parts"):
         raise OutOfMemory("this would need 9 GiB", remedy="Use fewer robots.")
     assert str(caught.value) == "this would need 9 GiB\n  Reached: half of it.\n  Use fewer robots."
-    with pytest.raises(KeyError), reaching(lambda: "half of it", "fewer parts"):
+    with pytest.raises(KeyError), limits.reaching(lambda: "half of it", "fewer parts"):
         raise KeyError
 
 
@@ -181,30 +172,34 @@ def test_an_alarm_lost_in_a_finalizer_rings_again() -> None:
             time.sleep(0.01)
 
     hook = sys.unraisablehook
-    with pytest.raises(OutOfTime), time_limit(0.05):
+    with pytest.raises(OutOfTime), limits.time_limit(0.05):
         work()
     assert sys.unraisablehook is hook
 
 
 def test_limits_within_limits() -> None:
     """The one that is over first rings; leaving the inner block gives the outer its time back."""
-    with time_limit(100):
-        with time_limit(50):
-            assert 25 < time_left() <= 50
-        assert 75 < time_left() <= 100
-        with time_limit(200):
-            assert 75 < time_left() <= 100
-        assert 75 < time_left() <= 100
-    assert time_left() == math.inf
-    with pytest.raises(OutOfTime, match=r"limit of 0\.05 s"), time_limit(0.05), time_limit(10):
+    with limits.time_limit(100):
+        with limits.time_limit(50):
+            assert 25 < limits.time_left() <= 50
+        assert 75 < limits.time_left() <= 100
+        with limits.time_limit(200):
+            assert 75 < limits.time_left() <= 100
+        assert 75 < limits.time_left() <= 100
+    assert limits.time_left() == math.inf
+    with (
+        pytest.raises(OutOfTime, match=r"limit of 0\.05 s"),
+        limits.time_limit(0.05),
+        limits.time_limit(10),
+    ):
         time.sleep(2)
 
     def inner_then_outer() -> None:
-        with pytest.raises(OutOfTime, match=r"limit of 0\.05 s"), time_limit(0.05):
+        with pytest.raises(OutOfTime, match=r"limit of 0\.05 s"), limits.time_limit(0.05):
             time.sleep(2)
         time.sleep(2)
 
-    with pytest.raises(OutOfTime, match=r"limit of 0\.3 s"), time_limit(0.3):
+    with pytest.raises(OutOfTime, match=r"limit of 0\.3 s"), limits.time_limit(0.3):
         inner_then_outer()
 
 
@@ -216,13 +211,13 @@ def test_what_follows_on_stopped_work_is_stopped_soon() -> None:
         while True:
             pass
 
-    with time_limit(60):
-        stopped = run_until_stopped(work)
+    with limits.time_limit(60):
+        stopped = limits.run_until_stopped(work)
         assert isinstance(stopped, OutOfTime)
-        with pytest.raises(OutOfTime, match="limit of the test"), little_time_after(stopped):
+        with pytest.raises(OutOfTime, match="limit of the test"), limits.little_time_after(stopped):
             busy()
-        with little_time_after(None):
-            assert time_left() == math.inf  # the clock is stopped
+        with limits.little_time_after(None):
+            assert limits.time_left() == math.inf  # the clock is stopped
 
 
 # How far work got
@@ -285,5 +280,5 @@ def test_combinations_that_do_not_fit_are_not_made() -> None:
 def test_what_linux_says_of_memory_is_what_psutil_says() -> None:
     import psutil
 
-    assert address_space() == pytest.approx(psutil.Process().memory_info().vms, rel=0.02)
-    assert memory_left() <= psutil.virtual_memory().available * 1.1
+    assert limits.address_space() == pytest.approx(psutil.Process().memory_info().vms, rel=0.02)
+    assert limits.memory_left() <= psutil.virtual_memory().available * 1.1

@@ -20,15 +20,7 @@ from planners.loading import PlanningInstance
 from planners.parallel.batch import Store
 from planners.pddl.lifted import FALSE
 from planners.pddl.model_options import Cost, ModelOptions
-from planners.search.kept_plans import (
-    default_folder,
-    keeping_plans,
-    key_of,
-    model_digest,
-    plan_store,
-    search,
-    store_in_use,
-)
+from planners.search import kept_plans
 from planners.search.portions import Explored
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, Note, ProvedImpossible
@@ -66,7 +58,7 @@ def loaded(
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Store:
-    return plan_store(tmp_path / "cache")
+    return kept_plans.plan_store(tmp_path / "cache")
 
 
 def entries(folder: Store) -> list[Path]:
@@ -75,12 +67,12 @@ def entries(folder: Store) -> list[Path]:
 
 def test_nothing_is_kept_unasked(folder: Store, searches: list[str]) -> None:
     world = loaded()
-    search(world.model, world.tasks[0])
-    assert store_in_use() is None
-    with keeping_plans(folder):
-        assert store_in_use() is folder
-        with keeping_plans(None):
-            search(world.model, world.tasks[0])
+    kept_plans.search(world.model, world.tasks[0])
+    assert kept_plans.store_in_use() is None
+    with kept_plans.keeping_plans(folder):
+        assert kept_plans.store_in_use() is folder
+        with kept_plans.keeping_plans(None):
+            kept_plans.search(world.model, world.tasks[0])
     assert (len(searches), entries(folder)) == (2, [])
 
 
@@ -91,13 +83,13 @@ def test_random_models_come_back_as_they_were(folder: Store, searches: list[str]
         for cost in get_args(Cost):
             options = ModelOptions(unowned=text.unowned, cost=cost)
             world = loaded(text.domain, text.problem, options)
-            with keeping_plans(folder):
+            with kept_plans.keeping_plans(folder):
                 try:
-                    found = search(world.model, world.tasks[0])
+                    found = kept_plans.search(world.model, world.tasks[0])
                 except (ProvedImpossible, BadInput):
                     continue
                 before = len(searches)
-                read = search(world.model, world.tasks[0])
+                read = kept_plans.search(world.model, world.tasks[0])
                 assert read.model is world.model
                 equal(found, read)
             assert len(searches) == before
@@ -116,21 +108,23 @@ def test_what_changes_plans_changes_the_key() -> None:
         loaded(GRID.replace("(not (move ?o ?to ?from))", "(not (move ?r ?to ?from))")),
         loaded(GRID.replace("(at ?r ?to)))", "(at ?r ?to) (when (at ?r ?to) (at ?r ?from))))")),
     ]
-    keys = [key_of(model_digest(world.model), world.tasks[0]) for world in worlds]
+    keys = [
+        kept_plans.key_of(kept_plans.model_digest(world.model), world.tasks[0]) for world in worlds
+    ]
     assert len(set(keys)) == len(worlds)
     again = loaded(GRID + "; a comment", PROBLEM.replace("gw4-3x3", "other"))
-    assert key_of(model_digest(again.model), again.tasks[0]) == keys[0]
+    assert kept_plans.key_of(kept_plans.model_digest(again.model), again.tasks[0]) == keys[0]
     state = PlanningTask("t", again.tasks[0].init, again.model.full_state(again.tasks[0].init))
-    assert key_of(model_digest(again.model), state) not in keys
+    assert kept_plans.key_of(kept_plans.model_digest(again.model), state) not in keys
 
 
 def test_an_action_and_a_predicate_of_one_name_are_two() -> None:
     named = PUSH.replace("(no)", "(no) (lift ?r - robot)")[:-1] + NEVER
     task = "(define (problem p) (:domain d) (:objects r1 r2 - robot) (:goal (and (done) (up r1))))"
-    assert len({model_digest(loaded(text, task).model) for text in (PUSH, named)}) == 2
+    assert len({kept_plans.model_digest(loaded(text, task).model) for text in (PUSH, named)}) == 2
     world = loaded(*OR)
     never = replace(world.tasks[0], goal=FALSE)
-    assert len({key_of("model", task) for task in (world.tasks[0], never)}) == 2
+    assert len({kept_plans.key_of("model", task) for task in (world.tasks[0], never)}) == 2
 
 
 def test_jobs_without_a_common_step_are_those_of_one_model() -> None:
@@ -170,10 +164,10 @@ def test_a_full_disk_is_said(
 ) -> None:
     full = Mock(side_effect=OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
     world = loaded()
-    with monkeypatch.context() as patched, keeping_plans(folder):
+    with monkeypatch.context() as patched, kept_plans.keeping_plans(folder):
         patched.setattr(f"planners.system.writing.os.{call}", full)
         with pytest.warns(Note, match="not kept: .*No space left"):
-            search(world.model, world.tasks[0])
+            kept_plans.search(world.model, world.tasks[0])
     assert (len(searches), entries(folder)) == (1, [])
 
 
@@ -183,8 +177,8 @@ def test_a_folder_that_is_only_read(
     """What is there is read, and what is new is not kept (an administrator may write anywhere)."""
     world = loaded()
     refused = Mock(side_effect=OSError(errno.EROFS, os.strerror(errno.EROFS)))
-    with keeping_plans(folder):
-        search(world.model, world.tasks[0])
+    with kept_plans.keeping_plans(folder):
+        kept_plans.search(world.model, world.tasks[0])
         opened = os.open
         for name in ("utime", "unlink", "replace"):
             monkeypatch.setattr(os, name, refused)
@@ -193,11 +187,11 @@ def test_a_folder_that_is_only_read(
         )
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            search(world.model, world.tasks[0])
+            kept_plans.search(world.model, world.tasks[0])
         assert len(searches) == 1
         other = loaded(options=ModelOptions(cost="makespan+actions"))
         with pytest.warns(Note, match="not kept: .*Read-only"):
-            search(other.model, other.tasks[0])
+            kept_plans.search(other.model, other.tasks[0])
     assert len(searches) == 2
 
 
@@ -225,11 +219,20 @@ def test_many_at_once(tmp_path: Path) -> None:
 
 def test_where_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
-    assert default_folder({}) == tmp_path / ".cache" / "coordlang"
-    assert default_folder({"XDG_CACHE_HOME": "relative"}) == tmp_path / ".cache" / "coordlang"
-    assert default_folder({"XDG_CACHE_HOME": f"{tmp_path}/xdg"}) == tmp_path / "xdg" / "coordlang"
-    assert default_folder({"XDG_CACHE_HOME": f"{tmp_path}/no/xdg"}) is None
-    assert default_folder({"COORDLANG_CACHE": "here"}) == Path("here")
-    assert default_folder({"COORDLANG_CACHE": "OFF", "XDG_CACHE_HOME": str(tmp_path)}) is None
+    assert kept_plans.default_folder({}) == tmp_path / ".cache" / "coordlang"
+    assert (
+        kept_plans.default_folder({"XDG_CACHE_HOME": "relative"})
+        == tmp_path / ".cache" / "coordlang"
+    )
+    assert (
+        kept_plans.default_folder({"XDG_CACHE_HOME": f"{tmp_path}/xdg"})
+        == tmp_path / "xdg" / "coordlang"
+    )
+    assert kept_plans.default_folder({"XDG_CACHE_HOME": f"{tmp_path}/no/xdg"}) is None
+    assert kept_plans.default_folder({"COORDLANG_CACHE": "here"}) == Path("here")
+    assert (
+        kept_plans.default_folder({"COORDLANG_CACHE": "OFF", "XDG_CACHE_HOME": str(tmp_path)})
+        is None
+    )
     monkeypatch.setenv("HOME", str(tmp_path / "missing"))
-    assert default_folder({}) is None
+    assert kept_plans.default_folder({}) is None

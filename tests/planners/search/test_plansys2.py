@@ -32,18 +32,15 @@ def items(text: str) -> list[tuple[float, str, float]]:
     return found
 
 
-@pytest.mark.parametrize(
-    ("folder", "problem"),
-    [
-        ("three-cells", "problem"),
-        ("grid", "corners-3x3"),
-        ("grid-joint", "three-cells"),
-        ("handover", "exchange"),
-        ("flags", "parade"),
-    ],
+WORLDS = (
+    "three-cells/problem grid/corners-3x3 grid-joint/three-cells handover/exchange flags/parade"
 )
-def test_plansys2_reads_each_plan_and_so_do_we(folder: str, problem: str, tmp_path: Path) -> None:
-    loaded = loaded_from(folder, problem)
+
+
+@pytest.mark.parametrize("name", WORLDS.split())
+def test_plansys2_reads_each_plan_and_so_do_we(name: str, tmp_path: Path) -> None:
+    folder, stem = name.split("/")
+    loaded = loaded_from(folder, stem)
     plans = Plans.of(search(loaded.model, loaded.tasks[0]))
     path = tmp_path / "plan"
     for plan in plans.sample(10, seed=1):
