@@ -148,32 +148,26 @@ def clean(text: str) -> bool:
 
 # ---- what is written
 
-#: Every command that shows something of a world.
-SHOWING = """
+#: Every command that shows something of a world, those of the first lines as JSON, too.
+IN_BOTH_FORMS = """
 inspect PDDL
-inspect PDDL --json
 plans PDDL
-plans PDDL --json
 coordination PDDL
-coordination PDDL --json
 verify SPOKEN
-verify SPOKEN --json
+say SPOKEN PLAN
+plan SPOKEN SENTENCE
+export SPOKEN SENTENCE
+explain SPOKEN
+"""
+SHOWING = """
 verify SPOKEN --tasks TASKS
 verify SPOKEN --certificate CERTIFICATE
-say SPOKEN PLAN
-say SPOKEN PLAN --json
 understand SPOKEN SENTENCE --format ipc
 understand SPOKEN SENTENCE --format json
-plan SPOKEN SENTENCE
-plan SPOKEN SENTENCE --json
 choices SPOKEN SENTENCE --format text
 choices SPOKEN SENTENCE --format json
 choices SPOKEN SENTENCE --robot R1
-export SPOKEN SENTENCE
-export SPOKEN SENTENCE --json
 export SPOKEN SENTENCE --to ltlf
-explain SPOKEN
-explain SPOKEN --json
 explain SPOKEN --task
 plans PDDL --robots BAD --json
 report SPOKEN -o - --coordinates COORDINATES
@@ -187,7 +181,8 @@ report LIFTED PDDL -o -
 def test_names_are_quoted_wherever_they_are_written(bare: Make, kind: str, tmp_path: Path) -> None:
     world = bare(NAMES[kind]).written()
     world.words["R1"] = [world.names["r1"]]
-    for line in SHOWING.strip().splitlines():
+    both = IN_BOTH_FORMS.strip().splitlines()
+    for line in (*both, *(f"{line} --json" for line in both), *SHOWING.strip().splitlines()):
         done = world.run(line, f"{world.names['r1']},x")
         assert done.code in ((2,) if "BAD" in line else (0, 1)), (line, done.err)
         assert "internal error" not in done.err

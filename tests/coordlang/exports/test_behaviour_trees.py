@@ -51,9 +51,12 @@ class Node(py_trees.behaviour.Behaviour):
         return self.ask()
 
 
-def read_tree(xml: str, robot: str, leaves: Mapping[str, Leaf]) -> py_trees.trees.BehaviourTree:
-    """The tree of this name, with ``leaves`` in place of the robot's own nodes, by their ID."""
-    root = ET.fromstring(xml)
+def read_tree(
+    xml: str, model: JointModel, number: int, acts: Leaf, **leaves: Leaf
+) -> py_trees.trees.BehaviourTree:
+    """A robot's tree, with these in place of its actions and of its own other nodes, by their ID."""
+    robot, root = model.robots[number], ET.fromstring(xml)
+    leaves |= {text.strip("()").split()[0]: acts for text in model.labels[number][1:]}
     assert root.tag == "root"
     assert root.get("BTCPP_format") == "4"
     names = [tree.get("ID") for tree in root.iter("BehaviorTree")]
@@ -136,10 +139,9 @@ class Team:
             self.done[robot] = ports["subaction"]
             return Status.SUCCESS
 
-        actions = {text.strip("()").split()[0] for text in self.model.labels[robot][1:]}
-        own: dict[str, Leaf] = dict.fromkeys(actions, acts)
-        leaves = own | {"AwaitStep": awaits, "Chooses": chooses, "Holds": holds}
-        return read_tree(self.xml, self.model.robots[robot], leaves)
+        return read_tree(
+            self.xml, self.model, robot, acts, AwaitStep=awaits, Chooses=chooses, Holds=holds
+        )
 
     def run(self, plan: Plan, states: list[frozenset[str]]) -> None:
         """Each robot wants its part of the plan, and does it."""
@@ -255,10 +257,9 @@ class FreeTeam:
             self.done[robot].append(ports["subaction"])
             return Status.SUCCESS
 
-        actions = {text.strip("()").split()[0] for text in self.model.labels[robot][1:]}
-        leaves: dict[str, Leaf] = dict.fromkeys(actions, acts)
-        leaves |= {"AwaitEnded": ended, "AwaitPartner": partner, "Chooses": chooses}
-        return read_tree(self.xml, names[robot], {**leaves, "Holds": lambda ports: Status.SUCCESS})
+        leaves: dict[str, Leaf] = {"AwaitEnded": ended, "AwaitPartner": partner}
+        leaves |= {"Chooses": chooses, "Holds": lambda _: Status.SUCCESS}
+        return read_tree(self.xml, self.model, robot, acts, **leaves)
 
     def run(self, random: Random) -> None:
         trees = [self.tree(robot) for robot in self.world.robots]
