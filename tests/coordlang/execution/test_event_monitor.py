@@ -148,8 +148,7 @@ def test_robots_arrive_whatever_they_choose_and_whenever_they_start(
             seen += team.seen
             seen["runs"] += 1
             seen["several parts"] += max(map(len, parts)) > 1
-    print(f"{robots} robots: {dict(seen)}")
-    assert min(seen["runs"], seen["no language"], seen["waits"], seen["several parts"]) >= 5
+    assert min(seen[k] for k in ("runs", "no language", "waits", "several parts")) >= 5, seen
 
 
 def test_what_cannot_have_happened_is_refused() -> None:

@@ -226,8 +226,7 @@ def test_all_arrive_whatever_the_network_does_and_whoever_is_killed(
         assert fleet.run() in optimal
         seen += fleet.seen
         seen["runs"] += 1
-    print(f"{robots} robots: {dict(seen)}")
-    assert min(seen["runs"], seen["killed"], seen["lost"], seen["silent"], seen["heard"]) >= 5
+    assert min(seen[k] for k in ("runs", "killed", "lost", "silent", "heard")) >= 5, seen
 
 
 def test_robots_that_meet_start_together_and_more_than_once() -> None:
