@@ -164,10 +164,7 @@ MEANINGS: list[tuple[str, str, str, str, tuple[Word, ...]]] = [
         *("charger", "three-robots", OWN, "--cost makespan+actions"),
         (only("r1"), only("r2"), has("(charged r3)", without=("(charged r1)", "(charged r2)"))),
     ),
-    (
-        *("elevator", "two-calls", OWN, ""),
-        (has("(stops second)", "(outside r1)", "(outside r2)"),),
-    ),
+    ("elevator", "two-calls", OWN, "", (has("(stops second)", "(outside r1)", "(outside r2)"),)),
     (
         *("handover", "two-doors", OWN, ""),
         (has("(at r1 west-south)", "(at r2 east-south)", "(holds r2 box)"),),
@@ -191,10 +188,7 @@ MEANINGS: list[tuple[str, str, str, str, tuple[Word, ...]]] = [
         *("push-box", "around", "all", ""),
         tuple(has(f"(at r1 {p})", f"(at r2 {p})", f"(stands box {p})") for p in ("store", "yard")),
     ),
-    (
-        *("push-box", "around", OWN, ""),
-        (has("(at r1 yard)", "(at r2 yard)", "(stands box yard)"),),
-    ),
+    ("push-box", "around", OWN, "", (has("(at r1 yard)", "(at r2 yard)", "(stands box yard)"),)),
     ("tray", "serve", OWN, "", (BESIDE,)),
     ("tray", "three-robots", OWN, "", (BESIDE,)),
     (

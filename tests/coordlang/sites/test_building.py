@@ -520,11 +520,8 @@ def test_buildings_of_others(name: str, tmp_path: Path) -> None:
 @foreign
 def test_robots_ride_the_lifts_of_the_hotel(tmp_path: Path) -> None:
     found = read_building(BUILDINGS / "hotel.building.yaml")
-    asked, tasks = (
-        ["tinyBot_1", "deliveryBot_1"],
-        ["tinyBot_1:L3_master_suite", "deliveryBot_1:L2_room1"],
-    )
-    files = saved(tmp_path, building_files(found, asked, tasks, 0)[0])
+    tasks = ["tinyBot_1:L3_master_suite", "deliveryBot_1:L2_room1"]
+    files = saved(tmp_path, building_files(found, ["tinyBot_1", "deliveryBot_1"], tasks, 0)[0])
     plans = library.plans(*files, cost="makespan+actions")
     assert (plans.makespan, plans.count) == (17, 70)
     assert [step for step in plans[0] if "(move tinybot_1 l1-95 l3-122)" in step]

@@ -24,20 +24,12 @@ WORLDS: dict[str, tuple[str, int, dict[str, str]]] = {
     "handover/three-rooms": (
         "r1 r2 r3 box",
         7,
-        {
-            "(lies box west)": "at box west",
-            "(holds r1 box)": "with r1 box",
-            "(free r1)": "other",
-        },
+        {"(lies box west)": "at box west", "(holds r1 box)": "with r1 box", "(free r1)": "other"},
     ),
     "elevator/two-calls": (
         "lift r1 r2",
         3,
-        {
-            "(stops first)": "at lift first",
-            "(on r1 first)": "at r1 first",
-            "(inside r1)": "other",
-        },
+        {"(stops first)": "at lift first", "(on r1 first)": "at r1 first", "(inside r1)": "other"},
     ),
     "vans/two-each": ("d1 d2 v1 v2", 4, {"(aboard d1 v2)": "with d1 v2"}),
     "tray/serve": (

@@ -114,10 +114,7 @@ _WATCH = "(:action watch :agent ?r - robot :parameters (?o - robot)"
         # Nor does who owns it.
         ("(:action wait :parameters (?r ?q - robot))", True),
         # What it asks of others makes it no other action; what others ask of it does.
-        (
-            f"{_WAIT} :precondition (forall (?o - robot) (not (move ?o nowhere nowhere))))",
-            True,
-        ),
+        (f"{_WAIT} :precondition (forall (?o - robot) (not (move ?o nowhere nowhere))))", True),
         (f"{_WAIT}) {_WATCH} :precondition (wait ?o) :effect (ok ?r))", False),
         (f"{_WAIT}) {_WATCH} :effect (when (not (wait ?o)) (ok ?r)))", False),
         (

@@ -170,10 +170,7 @@ def test_the_command_says_it_within_its_limit(silence: str) -> None:
 
 @pytest.mark.slow
 def test_a_worker_is_waited_for_and_said(tmp_path: Path) -> None:
-    with (
-        running_cluster(tmp_path, 0) as cluster,
-        opened(scheduler=str(cluster.file)) as found,
-    ):
+    with running_cluster(tmp_path, 0) as cluster, opened(scheduler=str(cluster.file)) as found:
         threading.Timer(0.5, cluster.add_worker).start()
         with pytest.warns(Note, match="no worker has connected"):
             assert len(list(found.tables(batch(jobs.squares, 1, [range(2)])))) == 1
@@ -198,10 +195,7 @@ def test_a_scheduler_that_goes_is_an_error(begun: bool, tmp_path: Path) -> None:
         until(lambda: workers(tmp_path) or not begun)
         cluster.scheduler.kill(signal.SIGKILL)
 
-    with (
-        running_cluster(tmp_path, 1) as cluster,
-        opened(scheduler=str(cluster.file)) as found,
-    ):
+    with running_cluster(tmp_path, 1) as cluster, opened(scheduler=str(cluster.file)) as found:
         if begun:
             threading.Thread(target=kill).start()
         else:

@@ -107,10 +107,7 @@ THREE = p(
 )
 #: Behind the effect of an action: one more action.  With it r1 has 3 ways to be elsewhere, r2 six.
 HOP = ") (:action hop :agent ?r - robot :parameters (?y - room) :effect (at ?r ?y)"
-ELSEWHERE = (
-    "(and (at r1 c) (at r2 a))",
-    "(exists (?x - room) (and (not (= ?x a)) (at r1 ?x)))",
-)
+ELSEWHERE = ("(and (at r1 c) (at r2 a))", "(exists (?x - room) (and (not (= ?x a)) (at r1 ?x)))")
 LONG = "9" * 400
 HUGE = f"{9 * 10**18}"
 
