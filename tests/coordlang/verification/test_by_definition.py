@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -50,12 +51,7 @@ SIZES = [
 def models(robots: int, most: int, number: int, asynchronous: bool = False) -> list[Candidates]:
     """Random candidate tasks whose plans can be listed, inseparable ones among them."""
     found = small_candidates(
-        robots,
-        states=10**6,
-        plans=most,
-        tasks=300,
-        separable=False,
-        asynchronous=asynchronous,
+        robots, states=10**6, plans=most, tasks=300, separable=False, asynchronous=asynchronous
     )
     return [candidates for _, candidates in islice(found, number)]
 
@@ -189,21 +185,20 @@ def may_part(
     own: Mapping[tuple[int, ...], int], said: Mapping[int, int], ends: Sequence[Sequence[object]]
 ) -> bool:
     """Whether some steps that enter one word, or none, differ from their mixture in it or an end."""
-    for steps in product(own, repeat=len(ends[0])):
-        mixed = own.get(tuple(step[k] for k, step in enumerate(steps)))
-        to = [own[step] for step in steps]
-        if len({said[node] for node in to} - {0}) < 2 and (
-            mixed is None
-            or any(said[node] != said[mixed] for node in to)
-            or any(ends[node][k] != ends[mixed][k] for k, node in enumerate(to))
-        ):
-            return True
+    for chosen in product(own.items(), repeat=len(ends[0])):
+        if len({said[node] for _, node in chosen} - {0}) < 2:
+            mixed = own.get(tuple(step[k] for k, (step, _) in enumerate(chosen)))
+            if mixed is None or any(
+                said[node] != said[mixed] or ends[node][k] != ends[mixed][k]
+                for k, (_, node) in enumerate(chosen)
+            ):
+                return True
     return False
 
 
 def test_sets_of_steps_of_long_plans() -> None:
-    """Nothing recurses: three robots go 1,050 steps, and each has two ways to begin."""
-    last = 1_050
+    """Nothing recurses: three robots go 300 steps, and each has two ways to begin."""
+    last, deepest = 300, sys.getrecursionlimit()
     robots = "".join(f"(at r{k} c0)" for k in range(3))
     steps = "".join(f"(next c{n} c{n + 1})" for n in range(last))
     domain, problem = parsed(
@@ -217,6 +212,10 @@ def test_sets_of_steps_of_long_plans() -> None:
              (:init {robots} {steps} (next c0 aside) (next aside c2))
              (:goal (and (at r0 c{last}) (at r1 c{last}) (at r2 c{last}))))""",
     )
-    found = from_problems(domain, [problem], ModelOptions(robots=("r0", "r1", "r2")))
-    (space,) = found.spaces
-    assert SetWalk(space, np.zeros(len(space), np.int64)).run()[0] is None
+    sys.setrecursionlimit(last)
+    try:
+        found = from_problems(domain, [problem], ModelOptions(robots=("r0", "r1", "r2")))
+        (space,) = found.spaces
+        assert SetWalk(space, np.zeros(len(space), np.int64)).run()[0] is None
+    finally:
+        sys.setrecursionlimit(deepest)
