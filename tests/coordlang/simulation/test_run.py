@@ -291,15 +291,13 @@ def test_films_have_the_frames_that_are_drawn() -> None:
     run = msgspec.structs.replace(run, poses=poses)
     drawn = list(frames(found, run))
     assert len({image.shape for image in drawn}) == 1
-    gif, film, sheet = (
-        imageio.v3.imread(RECORDINGS[kind](found, run), extension=kind)
-        for kind in (".gif", ".mp4", ".png")
-    )
+    pictures = {kind: RECORDINGS[kind](found, run) for kind in (".gif", ".mp4", ".png")}
+    gif, film, sheet = (imageio.v3.imread(data, extension=kind) for kind, data in pictures.items())
     assert gif[0].shape == drawn[0].shape
     assert film.shape == (len(drawn), *drawn[0].shape)
     assert np.abs(film[0].astype(int) - drawn[0]).mean() < 6
     assert sheet.shape[1] > drawn[0].shape[1]
-    assert RECORDINGS[".png"](found, run) == RECORDINGS[".png"](found, run)
+    assert RECORDINGS[".png"](found, run) == pictures[".png"]
 
 
 def test_a_record_that_cannot_be_played_is_refused(tmp_path: Path) -> None:

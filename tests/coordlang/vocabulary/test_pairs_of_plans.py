@@ -20,6 +20,7 @@ from coordlang.commands.records import MethodOptions
 from coordlang.language.candidates import Candidates, from_problems
 from coordlang.language.warping import Pair, pair
 from coordlang.required.choices import Choices
+from coordlang.vocabulary.job import Job
 from coordlang.vocabulary.loop import Budget, Languages, find
 from coordlang.vocabulary.minimal import MinimalSearch
 from coordlang.vocabulary.plan_pairs import PlanPairs
@@ -212,10 +213,9 @@ def least(candidates: Candidates) -> int:
     return build_language(candidates, "exhaustive").language.guarantee.size
 
 
-def suffice(candidates: Candidates) -> bool:
+def suffice(job: Job) -> bool:
     """Whether the search for two words finds a language, which is verified."""
-    (space,) = candidates.spaces
-    job = Making(candidates).job(MethodOptions())
+    (space,) = job.candidates.spaces
     languages = Languages.of(job)
     search = TwoWords(PlanPairs(Choices(space)), job.states, languages.clauses)
     with closing(search):
@@ -225,10 +225,9 @@ def suffice(candidates: Candidates) -> bool:
     return found is not None
 
 
-def fewest(candidates: Candidates) -> int:
+def fewest(job: Job) -> int:
     """The fewest words of which some tell all pairs of plans apart, and are a language."""
-    job = Making(candidates).job(MethodOptions())
-    languages, pairs = Languages.of(job), WarpedPairs(grown(candidates.spaces[0]), 99)
+    languages, pairs = Languages.of(job), WarpedPairs(grown(job.candidates.spaces[0]), 99)
     draws, size = np.random.default_rng(0), 2
     with closing(PairsApart(job.states, languages.clauses, pairs.steps(), draws)) as search:
         while (
@@ -257,9 +256,9 @@ def test_as_few_words_suffice_as_of_all_partitions(
     for first, second in fits:
         candidates = bells(first, second, goal)
         if requiring(candidates):
-            size = least(candidates)
-            assert suffice(candidates) == (size == 2)
-            assert fewest(candidates) == size
+            size, job = least(candidates), Making(candidates).job(MethodOptions())
+            assert suffice(job) == (size == 2)
+            assert fewest(job) == size
             told[size] += 1
     assert min(told[2], told[3]) >= 1, told
 
@@ -281,9 +280,9 @@ def test_as_few_words_of_random_models_suffice_as_of_all_partitions(
     models = (candidates for _, candidates in found if len(candidates.spaces) == 1)
     told = Counter[int]()
     for candidates in islice(models, number):
-        size = least(candidates)
-        assert suffice(candidates) == (size == 2)
-        assert fewest(candidates) == size
+        size, job = least(candidates), Making(candidates).job(MethodOptions())
+        assert suffice(job) == (size == 2)
+        assert fewest(job) == size
         told[size] += 1
     assert min(told[2], told[3]) >= 3, told
 
