@@ -223,7 +223,9 @@ def test_what_is_solved_is_what_others_say(
     assert int(result.metrics["makespan"]) == len(plan.actions) == shortest(other)
 
 
-@pytest.mark.parametrize("name", ["ma-loader", "ma_buttons"])
+@pytest.mark.parametrize(
+    "name", ["ma-loader", pytest.param("ma_buttons", marks=pytest.mark.thorough)]
+)
 def test_agents_that_act_together(name: str) -> None:
     """Every order of the actions of a step is a plan, by unified-planning's own validator."""
     problem = EXAMPLES[name].problem
