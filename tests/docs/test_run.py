@@ -26,7 +26,7 @@ from tests.support.domains import ROOT, T_MAP, files_of, read
 from tests.support.pages import DOCS, PAGES, blocks, commands, matches, run_command, run_python
 
 #: Pages of many commands, which take a while.
-LONG = ("asynchronous", "cli", "gallery", "library", "lifted", "simulation")
+LONG = ("asynchronous", "cli", "gallery", "library", "lifted", "simulation", "sites")
 
 
 @pytest.mark.parametrize(
