@@ -202,10 +202,10 @@ def first_break(steps: Steps, robots: int, starts: list[int], *, together: bool)
         after = set()
         for plans, mixture in layer:
             for chosen in product(*(steps[node].items() for node in plans)):
-                ends = tuple(target for _, target in chosen)
+                labels, ends = zip(*chosen, strict=True)
                 if together and len({*ends}) > 1:
                     continue
-                mixed = tuple(labels[robot] for robot, (labels, _) in enumerate(chosen))
+                mixed = tuple(own[robot] for robot, own in enumerate(labels))
                 if mixed not in steps[mixture]:
                     return step
                 after.add((ends, steps[mixture][mixed]))

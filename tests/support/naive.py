@@ -66,11 +66,14 @@ def mixture(plans: tuple[Plan, ...]) -> Plan:
     )
 
 
-def failing(plans: list[Plan], robots: int) -> Iterator[tuple[Plan, ...]]:
-    """The tuples of plans, one for each robot, whose mixture is not among the plans."""
-    good = set(plans)
-    for chosen in product(plans, repeat=robots):
-        if mixture(chosen) not in good:
+def failing(
+    plans: list[Plan], robots: int, good: set[Plan] | None = None
+) -> Iterator[tuple[Plan, ...]]:
+    """The tuples of plans, one for each robot, whose mixture is not among the plans, or the good."""
+    good = set(plans) if good is None else good
+    own = [[tuple(step[robot] for step in plan) for plan in plans] for robot in range(robots)]
+    for chosen, parts in zip(product(plans, repeat=robots), product(*own), strict=True):
+        if tuple(zip(*parts, strict=True)) not in good:
             yield chosen
 
 
@@ -119,18 +122,20 @@ def is_language(space: PlanSpace, word_of_state: dict[int, int], most: int) -> b
         groups = by_sentence(space, task, word_of_state.__getitem__, most)
         good = {plan for group in groups.values() for plan in group}
         for group in groups.values():
-            if any(mixture(chosen) not in good for chosen in product(group, repeat=space.robots)):
+            if any(failing(group, space.robots, good)):
                 return False
     return True
 
 
-def failure(space: PlanSpace, task: int, word: Sequence[int] | None, most: int) -> Fraction:
+def failure(
+    space: PlanSpace, task: int, word: Mapping[int, int] | Sequence[int] | None, most: int
+) -> Fraction:
     """The failure probability; ``word`` gives each *state* its word; None: silence."""
     plans = listed(space, task, most)
     said = by_sentence(space, task, lambda s: word[s] if word is not None else 0, most)
     good, found = set(plans), Fraction(0)
     for group in said.values():
-        failed = sum(mixture(chosen) not in good for chosen in product(group, repeat=space.robots))
+        failed = sum(1 for _ in failing(group, space.robots, good))
         found += Fraction(len(group), len(plans)) * Fraction(failed, len(group) ** space.robots)
     return found
 

@@ -37,13 +37,15 @@ def state_symmetries(candidates: Candidates) -> set[tuple[int, ...]]:
     keys = [frozenset(model.codec.decode(row)) for row in candidates.rows]
     number = {key: n for n, key in enumerate(keys)}
     tasks = [(int(s.state[n]), s.goals[s.goal[n]]) for s in spaces for n in s.starts]
+    goals = {id(goal): goal for _, goal in tasks}
     given = {(state, image_of_goal(model, goal, {})) for state, goal in tasks}
     found = set()
     for renaming in renamings(candidates):
         images = [frozenset(rename(atom, renaming) for atom in key) for key in keys]
         if keeps_actions(model, renaming) and set(images) == set(keys):
             states = tuple(number[image] for image in images)
-            if given == {(states[s], image_of_goal(model, goal, renaming)) for s, goal in tasks}:
+            to = {key: image_of_goal(model, goal, renaming) for key, goal in goals.items()}
+            if given == {(states[s], to[id(goal)]) for s, goal in tasks}:
                 found.add(states)
     return found - {tuple(range(len(keys)))}
 

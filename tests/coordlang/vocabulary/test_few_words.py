@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from fractions import Fraction
+from functools import cache
 from itertools import product
 from pathlib import Path
 
@@ -58,6 +59,16 @@ def by_hand(candidates: Candidates, words: int) -> tuple[dict[str, Fraction], in
     """By the definition, over all partitions: the least mean, and the least worst task; how many."""
     every = [(space, task) for space in candidates.spaces for task in range(len(space.starts))]
     tasks = [own for own in every if naive.failure(*own, None, 100)]
+    passed = [
+        sorted({s for plan in naive.listed(*own, 100) for s in naive.states(*own, plan)})
+        for own in tasks
+    ]
+
+    @cache
+    def failure(task: int, said: tuple[int, ...]) -> Fraction:
+        """Of a task, by the words of the states that its plans pass."""
+        return naive.failure(*tasks[task], dict(zip(passed[task], said, strict=True)), 100)
+
     states = first_differences(candidates.spaces, most=0).states.tolist()
     least, tried = {"mean": Fraction(1), "worst": Fraction(1)}, 0
     for chosen in product(range(words), repeat=len(states)):
@@ -66,7 +77,7 @@ def by_hand(candidates: Candidates, words: int) -> tuple[dict[str, Fraction], in
             tried += 1
             word = np.zeros(len(candidates.rows), np.int64)
             word[states] = chosen
-            found = [naive.failure(*own, word.tolist(), 100) for own in tasks]
+            found = [failure(n, tuple(word[own].tolist())) for n, own in enumerate(passed)]
             least["mean"] = min(least["mean"], sum(found, start=Fraction(0)) / len(every))
             least["worst"] = min(least["worst"], max(found))
     return least, tried
