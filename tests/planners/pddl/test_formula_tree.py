@@ -11,66 +11,54 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planners.pddl import lifted as f
 from planners.pddl.domain import parse_domain, read_domain
 from planners.pddl.formula_tree import conjuncts, joined, negated, signed, substituted
-from planners.pddl.lifted import (
-    FALSE,
-    TRUE,
-    And,
-    Atom,
-    Domain,
-    Formula,
-    Not,
-    Or,
-    Problem,
-    StepAtom,
-    Truth,
-)
 from planners.pddl.pddl_text import domain_text, problem_text
 from planners.pddl.problem import parse_problem, read_problem
 from planners.pddl.sexpr import Source
 from tests.support.domains import DOMAINS, SHARED
 
-LEAVES: tuple[Formula, ...] = (Atom("a", ()), Atom("b", ()), StepAtom("move", ("r1", "x")))
+LEAVES: tuple[f.Formula, ...] = (f.Atom("a", ()), f.Atom("b", ()), f.StepAtom("move", ("r1", "x")))
 #: Ground formulas, not in negation normal form.
 FORMULAS = st.recursive(
-    st.sampled_from((*LEAVES, TRUE, FALSE)),
+    st.sampled_from((*LEAVES, f.TRUE, f.FALSE)),
     lambda parts: st.one_of(
-        st.builds(Not, parts),
-        st.builds(And, st.lists(parts, max_size=3).map(tuple)),
-        st.builds(Or, st.lists(parts, max_size=3).map(tuple)),
+        st.builds(f.Not, parts),
+        st.builds(f.And, st.lists(parts, max_size=3).map(tuple)),
+        st.builds(f.Or, st.lists(parts, max_size=3).map(tuple)),
     ),
     max_leaves=8,
 )
 
 
-def true(formula: Formula, values: dict[Formula, bool]) -> bool:
+def true(formula: f.Formula, values: dict[f.Formula, bool]) -> bool:
     """The definition."""
     match formula:
-        case Truth(value):
+        case f.Truth(value):
             return value
-        case Not(part):
+        case f.Not(part):
             return not true(part, values)
-        case And(parts):
+        case f.And(parts):
             return all(true(part, values) for part in parts)
-        case Or(parts):
+        case f.Or(parts):
             return any(true(part, values) for part in parts)
     return values[formula]
 
 
 @given(FORMULAS)
-def test_the_meaning_is_kept(formula: Formula) -> None:
-    assert joined(And, [formula, FALSE]) == FALSE
+def test_the_meaning_is_kept(formula: f.Formula) -> None:
+    assert joined(f.And, [formula, f.FALSE]) == f.FALSE
     part, positive = signed(formula)
-    assert (part if positive else Not(part)) == formula
+    assert (part if positive else f.Not(part)) == formula
     for chosen in product((False, True), repeat=len(LEAVES)):
         values = dict(zip(LEAVES, chosen, strict=True))
         meant = true(formula, values)
-        assert true(And(conjuncts(formula)), values) == meant
+        assert true(f.And(conjuncts(formula)), values) == meant
         assert true(negated(formula), values) != meant
         assert true(substituted(formula, lambda leaf: leaf), values) == meant
-        decided = substituted(formula, lambda leaf: Truth(values[leaf]))  # noqa: B023 - now
-        assert decided == Truth(meant)
+        decided = substituted(formula, lambda leaf: f.Truth(values[leaf]))  # noqa: B023 - now
+        assert decided == f.Truth(meant)
 
 
 NOWHERE = Source("nowhere", "")
@@ -80,7 +68,7 @@ FOREIGN = sorted(
 )
 
 
-def bare(domain: Domain) -> Domain:
+def bare(domain: f.Domain) -> f.Domain:
     """A domain without its text."""
     return replace(domain, source=NOWHERE)
 
@@ -96,7 +84,7 @@ def check(path: Path) -> None:
         assert _bare(found) == _bare(problem)
 
 
-def _bare(problem: Problem) -> Problem:
+def _bare(problem: f.Problem) -> f.Problem:
     return replace(problem, source=NOWHERE)
 
 
@@ -115,7 +103,7 @@ def test_values_of_functions(number: str) -> None:
     text = f"(define (problem p) (:domain d) (:init (= (f) {number})) (:goal ()))"
     problem = parse_problem(Source("p", text), domain)
     again = parse_problem(Source("again", problem_text(problem, domain)), domain)
-    assert again.values == problem.values == {Atom("f", ()): float(number)}
+    assert again.values == problem.values == {f.Atom("f", ()): float(number)}
 
 
 @pytest.mark.foreign
