@@ -184,8 +184,9 @@ def language_in_task(
     options = options or options_of(language)
     loaded, recorded = model_of_listed(domain, [problem], listed, options, position)
     atoms = set(" ".join(filter(None, language.states)).replace(") (", ")\0(").split("\0"))
-    atoms -= {"", *loaded.model.codec.facts.texts}
-    unknown = {atom for atom in atoms if not atom.startswith("(last ")}
+    codec = loaded.model.codec
+    atoms -= {"", *codec.facts.texts}
+    unknown = {a for a in atoms if codec.memory is None or not a.startswith("(last ")}
     if unknown:
         # What can be true depends on where tasks start: the states in the language file must
         # be possible here.

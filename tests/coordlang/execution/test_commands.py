@@ -356,3 +356,14 @@ def test_choices_of_another_task(
     data = json.loads(coordlang(*asked).out)
     assert (data["guaranteed"], data["covered"]) == (False, False)
     assert {entry["atoms"] for entry in data["choices"]} == {"own"}
+
+
+def test_a_predicate_called_last_is_no_memory(coordlang: Command, tmp_path: Path) -> None:
+    """Its atoms may be in a language's states and never be true in another task."""
+    domain, problem = pddl("cells")
+    own = changed(tmp_path / "d.pddl", domain, "(:predicates", "(:predicates (last ?r - robot)")
+    changed(own, own, ":effect (and", ":effect (and (not (last ?r))")
+    other = changed(tmp_path / "other.pddl", problem, "(:init", "(:init (last r1)")
+    language = tmp_path / "last.json"
+    assert coordlang("build", own, other, "--tasks", "all", "-o", language).code == 0
+    assert coordlang("explain", language, own, problem).code == 0
