@@ -34,12 +34,14 @@ class Verification(Presented, Verdict):
 
     ``witness`` has plans of one sentence that miscoordinate, or is None.  ``certificate`` is the
     checked one, where one was given, and ``claimed`` the lower bound that the language file claims.
-    ``options`` are those of the model, which the file chooses, ``language`` what messages call it.
+    ``robots`` and ``options`` are the model's, which the file chooses; ``language`` is what
+    messages call it.
     """
 
     words: int
     claimed: int
     certificate: Checked | None
+    robots: tuple[str, ...]
     options: ModelOptions
     failures: Failures
     tolerance: Tolerance | None
@@ -87,6 +89,7 @@ class Verification(Presented, Verdict):
             "tasks": self.tasks,
             "words": self.words,
             "nodes": self.nodes,
+            "robots": list(self.robots),
             "model": self.options.data(),
             "unchecked": self.unchecked,
             "miscoordination": witness_data(self.witness),
@@ -100,7 +103,8 @@ class Verification(Presented, Verdict):
     def text(self) -> str:
         """The answer for people, in lines of any length."""
         words = counted(self.words, "word")
-        tasks = f"{counted(self.tasks, 'task')}, {self.options}"
+        model = f"robots {', '.join(self.robots)}, {self.options}"
+        tasks = f"{counted(self.tasks, 'task')}, {model}"
         fail = f"robots that choose by themselves {self.failures.text()}"
         if self.is_tolerated:
             return (
@@ -113,7 +117,7 @@ class Verification(Presented, Verdict):
             if self.tolerance is not None and self.tolerance.may_fail:
                 fail += f".\nThe file claims less: {self.tolerance.warning}"
             text = witness_text(self.witness)
-            return f"{head}\n{text}\n\nOn the whole ({self.options})\n{fail}."
+            return f"{head}\n{text}\n\nOn the whole ({model})\n{fail}."
         slack = self.tolerance.slack if self.tolerance else None
         plans = f"plans within slack {slack}" if slack else "optimal plans"
         mixing = f"all {plans} of one sentence mix freely"
@@ -184,7 +188,8 @@ def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
                 f"{checked.lower_bound} are needed: one of the two is wrong"
             )
     words, claimed = len(read.words), read.guarantee.lower_bound
-    more = (words, claimed, checked, model, found, read.tolerance, str(position))
+    robots = candidates.model.robots
+    more = (words, claimed, checked, robots, model, found, read.tolerance, str(position))
     return extended(Verification, verdict, *more)
 
 

@@ -59,7 +59,7 @@ def test_plans_json_and_samples(shell: Shell) -> None:
 
 
 def test_build_verify_explain(shell: Shell, language: Path) -> None:
-    shell("verify language.json T-MAP", 0, "132 tasks")
+    shell("verify language.json T-MAP", 0, "132 tasks, robots r1, r2, cost makespan")
     said = "w0 (6 states): at(r1) != c1-1 and at(r2) != c1-1"
     shell("explain language.json T-MAP", 0, "in 2 sentences", said)
     data = json.loads(language.read_text())
@@ -72,6 +72,7 @@ def test_build_verify_explain(shell: Shell, language: Path) -> None:
     shell("verify language.json T-MAP", 1, 'refuted: plans with the sentence "w0', "breaks")
     data = json.loads(shell("verify language.json T-MAP --json", 1).out)
     assert (data["holds"], data["miscoordination"]["sentence"]) == (False, ["w0"])
+    assert data["robots"] == ["r1", "r2"]
 
 
 def test_build_from_a_task_file_and_for_problems(shell: Shell) -> None:
