@@ -10,7 +10,13 @@ from typing import Literal
 
 import numpy as np
 
-from coordlang.language.listed import ListedTask, goal_text, listed_task, model_of_listed
+from coordlang.language.listed import (
+    ListedTask,
+    first_of_equal,
+    goal_text,
+    listed_task,
+    model_of_listed,
+)
 from planners.joint.model import NO_FACT, Goal, JointModel, PlanningTask
 from planners.joint.tables import Bools, Rows, find_rows, unique_rows
 from planners.loading import PlanningInstance, build
@@ -80,7 +86,7 @@ def from_problems(
     *,
     skip_unsolvable: bool = False,
 ) -> Candidates:
-    """The tasks of the given problems.
+    """The tasks of the given problems, each one once.
 
     Raises `ProvedImpossible` for an unsolvable one, naming it; with ``skip_unsolvable`` only if
     there is no other.
@@ -88,10 +94,12 @@ def from_problems(
     loaded = build(domain, problems, options)
     pairs = zip(problems, loaded.tasks, strict=True)
     listed = [listed_task(domain, problem, task) for problem, task in pairs]
-    names = [problem.source.name for problem in problems]
+    numbers = first_of_equal(listed)
+    listed = [listed[number] for number in numbers]
+    names = [problems[number].source.name for number in numbers]
 
     def found(number: int) -> PlanSpace:
-        return search(loaded.model, loaded.tasks[number])
+        return search(loaded.model, loaded.tasks[numbers[number]])
 
     return _one_by_one("problems", loaded, listed, names, found, skip_unsolvable)
 

@@ -14,7 +14,7 @@ import msgspec
 from msgspec import UNSET, Meta, UnsetType
 
 from coordlang.language.candidates import Kind
-from coordlang.language.listed import ListedTask
+from coordlang.language.listed import ListedTask, each_once
 from coordlang.language.provenance import Guarantee, Provenance, Tolerance
 from coordlang.language.words import Language
 from planners.pddl.model_options import Cost, Execution, Unowned
@@ -247,10 +247,11 @@ def language_from_bytes(data: bytes, position: Position) -> Language:
     refuse_first(_faults_of_words(record), position)
     _check_seen(record, position)
     refuse_first(_faults(record), position)
+    tasks = TasksRecord("problems", 0) if record.tasks is UNSET else record.tasks
     provenance = Provenance(
         robots=() if record.robots is UNSET else tuple(record.robots),
         model=present(record.model),
-        tasks=present(TasksRecord("problems", 0) if record.tasks is UNSET else record.tasks),
+        tasks=present(_each_once(tasks)),
         producer=record.producer,
         guarantee=None if record.guarantee is UNSET else record.guarantee,
         domain={} if record.domain is UNSET else present(record.domain),
@@ -258,6 +259,14 @@ def language_from_bytes(data: bytes, position: Position) -> Language:
         tolerance=None if record.tolerance is UNSET else record.tolerance,
     )
     return Language(tuple(record.words), record.states, record.default, provenance)
+
+
+def _each_once(record: TasksRecord) -> TasksRecord:
+    """The record with each listed task once: older versions listed equal problems' tasks."""
+    if record.kind == "all" or not record.tasks:
+        return record
+    tasks = each_once(record.tasks)
+    return TasksRecord(record.kind, len(tasks), tasks=[*tasks])
 
 
 def _plain(record: msgspec.Struct) -> dict[str, Any]:
@@ -296,6 +305,12 @@ def _faults(record: LanguageRecord) -> Iterator[Fault]:
     yield from faults_of_robots(record.model, record.robots, _BUILD_AGAIN)
     if record.guarantee is not UNSET:
         yield from _faults_of_guarantee(record.guarantee, len(record.words))
+    tasks = record.tasks
+    if tasks is not UNSET and tasks.kind != "all" and tasks.count != len(tasks.tasks or ()):
+        yield (
+            f"the language records {tasks.count} tasks but lists {len(tasks.tasks or ())}",
+            "Correct 'tasks', or build the language again.",
+        )
     claimed = Tolerance() if record.tolerance is UNSET else record.tolerance
     for what in _faults_of_tolerance(record, claimed):
         remedy = "Correct 'tolerance' and 'guarantee', or build the language again."

@@ -148,12 +148,12 @@ TASKS = FileFormat("tasks", "task file", TaskFile, "coordlang/tasks")
 def read_task_file(path: str | Path) -> tuple[ListedTask, ...]:
     """Read a task file (docs/formats.md).  Raises `BadInput` for anything else."""
     position = Position(str(path))
-    return _plain(TASKS.decode(read_bytes(path), position), position)
+    return _once(TASKS.decode(read_bytes(path), position), position)
 
 
 def tasks_from_data(data: Any, position: Position) -> tuple[ListedTask, ...]:
     """Read the data of a task file.  Raises `BadInput` for anything else."""
-    return _plain(TASKS.decode(msgspec.json.encode(data, enc_hook=str), position), position)
+    return _once(TASKS.decode(msgspec.json.encode(data, enc_hook=str), position), position)
 
 
 def task_data(tasks: Sequence[ListedTask]) -> list[dict[str, list[str]]]:
@@ -167,22 +167,32 @@ def tasks_text(tasks: Sequence[ListedTask]) -> str:
     return f'{{"format": "{TASKS.format}", "version": {TASKS.version},\n "tasks": [\n{lines}]}}\n'
 
 
-def _plain(file: TaskFile, position: Position) -> tuple[ListedTask, ...]:
+def each_once(tasks: Sequence[ListedTask]) -> tuple[ListedTask, ...]:
     """The tasks with their texts in lower case, with single spaces; each one once."""
 
     def plain(texts: Sequence[str]) -> tuple[str, ...]:
         return tuple(" ".join(text.lower().split()) for text in texts)
 
-    once: dict[tuple[frozenset[str], frozenset[str]], ListedTask] = {}
-    for task in file.tasks:
-        init, goal = plain(task.init), plain(task.goal)
-        once.setdefault((frozenset(init), frozenset(goal)), ListedTask(init, goal))
+    plain_tasks = [ListedTask(plain(task.init), plain(task.goal)) for task in tasks]
+    return tuple(plain_tasks[number] for number in first_of_equal(plain_tasks))
+
+
+def first_of_equal(tasks: Sequence[ListedTask]) -> list[int]:
+    """The numbers of the tasks that no task before them equals, in whatever order their texts."""
+    first: dict[tuple[frozenset[str], frozenset[str]], int] = {}
+    for number, task in enumerate(tasks):
+        first.setdefault((frozenset(task.init), frozenset(task.goal)), number)
+    return list(first.values())
+
+
+def _once(file: TaskFile, position: Position) -> tuple[ListedTask, ...]:
+    once = each_once(file.tasks)
     if again := len(file.tasks) - len(once):
         note(
             f"{again:,} of {len(file.tasks):,} tasks repeat another one: every task counts once",
             position=position,
         )
-    return tuple(once.values())
+    return once
 
 
 #: Entries of the table (goals, states) filled at a time.

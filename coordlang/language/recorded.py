@@ -16,9 +16,10 @@ from coordlang.language.candidates import (
     from_problems,
     from_recorded,
 )
-from coordlang.language.listed import ListedTask, goal_text, ground_task
+from coordlang.language.listed import ListedTask, first_of_equal, goal_text, ground_task
 from coordlang.language.provenance import domain_sha256, states_sha256, world_sha256
 from coordlang.language.words import Language
+from planners.joint.model import show
 from planners.joint.tables import unique_rows
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
@@ -125,20 +126,14 @@ def recorded_candidates(
     position: Position,
 ) -> Candidates:
     """The candidate tasks that a language file records, else the problems' own ones."""
-    kind, count = language.provenance.tasks["kind"], language.provenance.tasks["count"]
-    if kind == "problems" and not count:
+    kind, listed = language.provenance.tasks["kind"], recorded_list(language)
+    if kind == "problems" and not listed:
         return from_problems(domain, problems, options)
     try:
         if kind == "all":
             candidates = all_pairs(domain, problems, options)
             _require_same_pairs(language, candidates)
             return candidates
-        listed = recorded_list(language)
-        if not listed or len(listed) != count:
-            raise BadInput(
-                f"the language records {count} tasks but lists {len(listed)}",
-                remedy="Say --tasks all or --tasks FILE.",
-            )
         make = from_listed if kind == "file" else from_recorded
         return make(domain, problems, listed, options, position)
     except BadInput as error:
@@ -177,7 +172,7 @@ def with_recorded(language: Language, candidates: Candidates, position: Position
     count.  All pairs of states are with the recorded tasks, if these have one goal state each.
 
     Raises `BadInput` for a language for all pairs of states, where the candidate tasks are not, or
-    are fewer, and for tasks that are no pairs where the candidate tasks are all pairs.
+    lack some, and for tasks that are no such pairs where the candidate tasks are all pairs.
     """
     domain, problems = candidates.loaded.domain, list(candidates.loaded.problems)
     if not all(_is_of_world(language, domain, problem) for problem in problems):
@@ -189,22 +184,38 @@ def with_recorded(language: Language, candidates: Candidates, position: Position
     if candidates.kind == "all":
         _require_pairs(recorded, candidates, position)
         return candidates
-    if all(task in candidates.listed for task in recorded):
+    both = [*recorded, *candidates.listed]
+    listed = [both[number] for number in first_of_equal(both)]
+    if len(listed) == len(candidates.listed):
         return candidates
-    listed = [*recorded, *(task for task in candidates.listed if task not in recorded)]
     kinds = {candidates.kind, language.provenance.tasks["kind"]}
     make = from_recorded if kinds == {"problems"} else from_listed
     together = make(domain, problems, listed, candidates.loaded.options, position)
     return replace(together, skipped=candidates.skipped)
 
 
+#: What to do about tasks that a language records, and that problems do not have.
+_ALSO = "Also give the problem that it was built for."
+
+
 def _require_pairs(recorded: list[ListedTask], candidates: Candidates, position: Position) -> None:
-    """Raise `BadInput` for a recorded task whose goal several states satisfy."""
+    """Raise `BadInput` for a recorded task that is no pair of reachable states."""
     loaded, model = candidates.loaded, candidates.model
-    states, _ = unique_rows(model.forgetting_slack(model.codec.facts_part(candidates.rows)))
-    for task in {task.goal: task for task in recorded}.values():
-        _, goal = ground_task(loaded.domain, loaded.problems[0], task, position)
-        if model.holds(goal, states).sum() > 1:
+    states, _ = unique_rows(model.codec.facts_part(candidates.rows))
+    facts = model.codec.facts.texts
+    reached = {frozenset(facts[n] for n in model.codec.true_facts(row)) for row in states}
+    for task in recorded:
+        init, goal = ground_task(loaded.domain, loaded.problems[0], task, position)
+        start = frozenset(map(show, init))
+        ends = model.holds(goal, states).sum()
+        if start not in reached or not ends:
+            raise BadInput(
+                f"these problems do not reach both states of the recorded task "
+                f"{' '.join(sorted(start))} -> {goal_text(model, goal)}",
+                position=position,
+                remedy=_ALSO,
+            )
+        if ends > 1:
             raise BadInput(
                 f"the recorded goal {goal_text(model, goal)} is one of several states, and would "
                 "not be served with all pairs of states",
@@ -214,18 +225,20 @@ def _require_pairs(recorded: list[ListedTask], candidates: Candidates, position:
 
 
 def _require_all_pairs(language: Language, candidates: Candidates, position: Position) -> None:
-    """Raise `BadInput` unless the candidate tasks are all pairs, and no fewer than recorded."""
+    """Raise `BadInput` unless the candidate tasks are all pairs, with all that are recorded."""
     if candidates.kind != "all":
         raise BadInput(
             "this language serves all pairs of states, and others cannot be added to them",
             position=position,
             remedy="Say --tasks all, with the problems whose states count.",
         )
-    recorded = language.provenance.tasks["count"]
-    if candidates.count < recorded:
-        raise BadInput(
-            f"this language serves {recorded:,} pairs of states, but these problems have "
-            f"{candidates.count:,}",
-            position=position,
-            remedy="Also give the problem that it was built for.",
-        )
+    recorded, have = language.provenance.tasks["count"], f"have {candidates.count:,}"
+    if candidates.count >= recorded:
+        if language.states.keys() <= set(map(candidates.model.codec.key, candidates.rows)):
+            return
+        have = "do not reach all their states"
+    raise BadInput(
+        f"this language serves {recorded:,} pairs of states, but these problems {have}",
+        position=position,
+        remedy=_ALSO,
+    )

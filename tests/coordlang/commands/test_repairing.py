@@ -80,6 +80,10 @@ def test_tasks_are_added_to_those_recorded(shell: Shell) -> None:
     goals = [["(at r1 c1-2)", "(at r2 c0-0)"], ["(at r1 c0-1)"]]
     assert [task["goal"] for task in tasks["tasks"]] == goals
     shell("verify new.json SMALL")
+    for task in tasks["tasks"]:
+        task["init"] = [atom.upper() for atom in reversed(task["init"])]
+    data = json.loads(Path("new.json").read_text()) | {"tasks": tasks}
+    Path("new.json").write_text(json.dumps(data))
     line = f"{GRID} other.pddl {SMALL} --start new.json -o both.json"
     assert build(shell, line)["tasks"] == 2
     # A task file joins them.
@@ -149,6 +153,17 @@ def test_fewer_pairs_than_it_serves(shell: Shell) -> None:
     again = "--tasks all --start old.json -o new.json"
     shell(f"build domain.pddl ajar.pddl {again}", 31, said)
     shell(f"build domain.pddl shut.pddl {again}")
+    # From where r1 is in there are more pairs than from where r2 is, but not those.
+    first, second = Path("first.pddl"), Path("second.pddl")
+    first.write_text(text.format("(in r1)"))
+    second.write_text(text.format("(open) (in r2)"))
+    for tasks, said in (
+        ("", "do not reach both states of the recorded task (in r2) (open)"),
+        ("--tasks all", "of states, but these problems do not reach all"),
+    ):
+        shell(f"build domain.pddl second.pddl {tasks} -o old.json")
+        shell(f"build domain.pddl first.pddl {again}", 31, said)
+        shell(f"build domain.pddl first.pddl second.pddl {again}")
 
 
 def test_stopped_repairs_are_written(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,18 +27,31 @@ def test_a_key_in_another_order_is_refused(coordlang: Command, language: Path) -
     assert "is no key of a state; it would be" in outcome.err
 
 
+SWAP = {"init": ["(at r1 c0-1)", "(at r2 c1-0)"], "goal": ["(at r1 c1-0)", "(at r2 c0-1)"]}
+STAY = {"init": ["(at r1 c0-1)", "(at r2 c1-0)"], "goal": ["(at r1 c0-1)"]}
+
+
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("command", "tasks", "message"),
     [
-        ({"tasks": {"kind": "problems", "count": 2, "tasks": []}}, "records 2 tasks but lists 0"),
-        ({"tasks": {"kind": "all", "count": 5}}, "the language records 5 tasks"),
+        (
+            "verify",
+            {"kind": "problems", "count": 0, "tasks": [SWAP]},
+            "records 0 tasks but lists 1",
+        ),
+        ("explain", {"kind": "file", "count": 2, "tasks": [SWAP]}, "records 2 tasks but lists 1"),
+        ("verify", {"kind": "all", "count": 5}, "the language records 5 tasks"),
     ],
 )
 def test_contradictions(
-    changes: dict[str, object], message: str, coordlang: Command, language: Path
+    command: str,
+    tasks: dict[str, object],
+    message: str,
+    coordlang: Command,
+    language: Path,
 ) -> None:
-    edit(language, **changes)
-    outcome = coordlang("verify", language, *T_MAP)
+    edit(language, tasks=tasks)
+    outcome = coordlang(command, language, *T_MAP)
     assert outcome.code == 31
     assert message in outcome.err
 
@@ -83,10 +96,6 @@ def test_the_file_says_which_predicates_keys_hold(
     assert set(data["domain"]["fluents"]) == held
 
 
-SWAP = {"init": ["(at r1 c0-1)", "(at r2 c1-0)"], "goal": ["(at r1 c1-0)", "(at r2 c0-1)"]}
-STAY = {"init": ["(at r1 c0-1)", "(at r2 c1-0)"], "goal": ["(at r1 c0-1)"]}
-
-
 def test_a_task_that_is_there_twice_counts_once(coordlang: Command, tmp_path: Path) -> None:
     swapped = {"init": ["(AT r2  c1-0)", *SWAP["init"]], "goal": SWAP["goal"][::-1]}
     means = []
@@ -98,6 +107,7 @@ def test_a_task_that_is_there_twice_counts_once(coordlang: Command, tmp_path: Pa
         repeated = "2 of 4 tasks repeat another one: every task counts once"
         assert (repeated in outcome.err) == (number == 1)
         means.append(library.load_language(output).tolerance)
+        edit(output, tasks={"kind": "file", "count": len(tasks), "tasks": tasks})
         verified = coordlang("verify", output, *T_MAP, "--json")
         assert json.loads(verified.out)["tasks"] == 2
     found, other = means
@@ -105,6 +115,7 @@ def test_a_task_that_is_there_twice_counts_once(coordlang: Command, tmp_path: Pa
     assert found.failure_mean is not None
     assert found.failure_worst == 2 * found.failure_mean > 0
     assert found == other
+    assert len(library.build(*T_MAP, T_MAP[1]).language.provenance.tasks["tasks"]) == 1
 
 
 DOMAIN = """(define (domain lane) ; the first two cells of a lane, and a bay
