@@ -103,13 +103,13 @@ class Verification(Presented, Verdict):
     def text(self) -> str:
         """The answer for people, in lines of any length."""
         words = counted(self.words, "word")
-        model = f"robots {', '.join(self.robots)}, {self.options}"
-        tasks = f"{counted(self.tasks, 'task')}, {model}"
+        tasks = f"{counted(self.tasks, 'task')}, {self.options}"
+        robots = f"robots {', '.join(self.robots)}"
         fail = f"robots that choose by themselves {self.failures.text()}"
         if self.is_tolerated:
             return (
                 f"as claimed: {words}, {tasks}: this is no coordination language, and {fail} "
-                f"({self.nodes:,} walk nodes)"
+                f"({self.nodes:,} walk nodes; {robots})"
             )
         if self.witness:
             sentence = " ".join(self.witness.sentence or ())
@@ -117,11 +117,11 @@ class Verification(Presented, Verdict):
             if self.tolerance is not None and self.tolerance.may_fail:
                 fail += f".\nThe file claims less: {self.tolerance.warning}"
             text = witness_text(self.witness)
-            return f"{head}\n{text}\n\nOn the whole ({model})\n{fail}."
+            return f"{head}\n{text}\n\nOn the whole ({self.options}; {robots})\n{fail}."
         slack = self.tolerance.slack if self.tolerance else None
         plans = f"plans within slack {slack}" if slack else "optimal plans"
         mixing = f"all {plans} of one sentence mix freely"
-        head = f"verified: {words}, {tasks}: {mixing} ({self.nodes:,} walk nodes)"
+        head = f"verified: {words}, {tasks}: {mixing} ({self.nodes:,} walk nodes; {robots})"
         return "\n".join([head, *self._what_is_proved()])
 
     def _what_is_proved(self) -> Iterator[str]:

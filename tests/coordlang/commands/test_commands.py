@@ -59,7 +59,7 @@ def test_plans_json_and_samples(shell: Shell) -> None:
 
 
 def test_build_verify_explain(shell: Shell, language: Path) -> None:
-    shell("verify language.json T-MAP", 0, "132 tasks, robots r1, r2, cost makespan")
+    shell("verify language.json T-MAP", 0, "132 tasks", "robots r1, r2)")
     said = "w0 (6 states): at(r1) != c1-1 and at(r2) != c1-1"
     shell("explain language.json T-MAP", 0, "in 2 sentences", said)
     data = json.loads(language.read_text())
