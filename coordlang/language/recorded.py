@@ -204,18 +204,20 @@ def _require_pairs(recorded: list[ListedTask], candidates: Candidates, position:
     states, _ = unique_rows(model.codec.facts_part(candidates.rows))
     facts = model.codec.facts.texts
     reached = {frozenset(facts[n] for n in model.codec.true_facts(row)) for row in states}
+    ends: dict[tuple[str, ...], int] = {}
     for task in recorded:
         init, goal = ground_task(loaded.domain, loaded.problems[0], task, position)
         start = frozenset(map(show, init))
-        ends = model.holds(goal, states).sum()
-        if start not in reached or not ends:
+        if task.goal not in ends:
+            ends[task.goal] = int(model.holds(goal, states).sum())
+        if start not in reached or not ends[task.goal]:
             raise BadInput(
                 f"these problems do not reach both states of the recorded task "
                 f"{' '.join(sorted(start))} -> {goal_text(model, goal)}",
                 position=position,
                 remedy=_ALSO,
             )
-        if ends > 1:
+        if ends[task.goal] > 1:
             raise BadInput(
                 f"the recorded goal {goal_text(model, goal)} is one of several states, and would "
                 "not be served with all pairs of states",
