@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import combinations, cycle, pairwise
 from typing import Any, Literal
 
 import msgspec
@@ -15,13 +15,14 @@ import numpy as np
 from coordlang.explanation.words import Cover
 from coordlang.language.words import Partition
 from coordlang.required.choices import Choices
+from planners.joint.conditions import Labels
 from planners.joint.model import JointModel, own_text
 from planners.joint.tables import Bools, Ints, find_rows
 from planners.pddl.robots import natural
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
 
-#: States at which it is computed which robots decide the next word.
+#: States at once at which it is computed which robots decide the next word.
 _STATES = 500
 
 #: Subplans of a robot that are listed one by one.
@@ -61,8 +62,8 @@ class WordChange(
 
     ``earliest`` and ``latest`` are the first and the last step (from 1) at whose end plans make it.
     ``robots`` are the fewest robots whose subactions decide it: wherever plans make the change,
-    these robots' subactions settle whether a joint step to a mapped state makes it, whatever the
-    others do; no robots: every such step makes it.  ``ways`` are how they do it.
+    these robots' subactions settle whether a joint step to a mapped state, or one on plans, makes
+    it, whatever the others do; no robots: every such step makes it.  ``ways`` are how they do it.
     """
 
     before: str
@@ -256,15 +257,24 @@ def _deciding(
     """
     if space.model.slack_facts:
         return tuple(sorted(order))
-    rows = space.rows[states[:_STATES]]
-    steps = space.model.successors(rows)
-    mapped = find_rows(partition.rows, steps.result) >= 0
-    source, labels = steps.source[mapped], steps.labels[mapped]
-    changes = partition.word_of(steps.result[mapped]) == after
-    for size in range(len(order)):
-        for some in combinations(order, size):
-            seen = np.column_stack((source, labels[:, list(some)]))
-            _, first, inverse = np.unique(seen, axis=0, return_index=True, return_inverse=True)
-            if (changes == changes[first][inverse.reshape(-1)]).all():
-                return tuple(sorted(some))
-    return tuple(sorted(order))
+    groups = (some for size in range(len(order)) for some in combinations(order, size))
+    robots, agreeing = next(groups, tuple(order)), 0
+    for start in cycle(range(0, len(states), _STATES)):
+        steps = space.model.successors(space.rows[states[start : start + _STATES]])
+        kept = find_rows(partition.rows, steps.result) >= 0
+        kept |= find_rows(space.rows, steps.result) >= 0
+        source, labels = steps.source[kept], steps.labels[kept]
+        changes = partition.word_of(steps.result[kept]) == after
+        while len(robots) < len(order) and not _settle(changes, source, labels[:, robots]):
+            robots, agreeing = next(groups, tuple(order)), 0
+        agreeing += 1
+        if len(robots) == len(order) or agreeing * _STATES >= len(states):
+            break
+    return tuple(sorted(robots))
+
+
+def _settle(changes: Bools, source: Ints, labels: Labels) -> bool:
+    """Whether of all joint steps from one state in which robots do the same each one changes."""
+    seen = np.column_stack((source, labels))
+    _, first, inverse = np.unique(seen, axis=0, return_index=True, return_inverse=True)
+    return bool((changes == changes[first][inverse.reshape(-1)]).all())
