@@ -29,8 +29,9 @@ _AT_ONCE = 200
 class Variable:
     """A multi-valued variable.
 
-    ``name`` is what is shown: ``at(r2)``.  ``values`` are ground atoms, each standing for "this one
-    of the variable's atoms is true", or None: none of them is.  ``texts`` are for each value what
+    ``name`` is what is shown: ``at(r2)``, or ``in(?, p)`` for ``(in r2 p)`` and the like.
+    ``values`` are ground atoms, each standing for "this one of the variable's atoms is true", or
+    None: none of them is.  ``texts`` are for each value what
     is shown as subject and value: ``at(r2)`` and ``c3``; a subject alone is a fact, as ``free(r1)``
     with an empty value.
     """
@@ -110,19 +111,29 @@ def _surroundings(model: JointModel, rows: Rows) -> Rows:
 
 
 def _variable(group: _Group, used: Sequence[int], atoms: Sequence[Atom], none: bool) -> Variable:
-    key = f"({', '.join(group.key)})" if group.key else ""
     positions = dict(group.family)
+    subjects = {p: p + _key_text(own, group.key) for p, own in group.family}
     values: list[Atom | None] = [atoms[number] for number in used]
     texts = []
     for atom in (atoms[number] for number in used):
         own = positions[atom.predicate]
         others = [arg for position, arg in enumerate(atom.args) if position not in own]
-        texts.append((atom.predicate + key, _value(group.key, others)))
-    name = "/".join(sorted({atoms[number].predicate for number in group.atoms})) + key
+        texts.append((subjects[atom.predicate], _value(group.key, others)))
+    predicates = sorted({atoms[number].predicate for number in group.atoms})
+    name = "/".join(subjects[predicate] for predicate in predicates)
+    if len({positions[predicate] for predicate in predicates}) == 1:
+        name = "/".join(predicates) + _key_text(positions[predicates[0]], group.key)
     if none:
         values.append(None)
         texts.append((name, "none"))
     return Variable(name, tuple(values), tuple(texts))
+
+
+def _key_text(positions: Sequence[int], key: Sequence[str]) -> str:
+    """``(r2)``; ``(?, r2)`` where the key is not the first argument."""
+    place = dict(zip(positions, key, strict=True))
+    shown = (place.get(position, "?") for position in range(max(positions, default=-1) + 1))
+    return f"({', '.join(shown)})" if key else ""
 
 
 def _value(key: Sequence[str], others: Sequence[str]) -> str:
