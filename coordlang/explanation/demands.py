@@ -148,48 +148,57 @@ def meaning(spaces: Sequence[PlanSpace]) -> tuple[str, list[tuple[str, ...]]] | 
 
     ``spaces``: the plans with each sentence.  A robot *uses* the objects that its subactions name;
     of several in one step all are first, and nobody where no subaction names it.  Sentences mean
-    who uses an object first if all plans of each agree about it, and no two sentences do.  None if
-    there is no such object (and where there is no common step, or more plans than are looked at);
-    of several the first by name, if possible of those where it always is one robot.
+    who uses an object first if all mixtures of each one's plans agree about it, and no two
+    sentences do.  None if there is no such object (and where there is no common step, or more plans
+    than are looked at); of several the first by name, if possible of those where it always is one
+    robot.
     """
     if spaces[0].model.is_asynchronous or any(len(s.target) > _MEANT for s in spaces):
         return None
     first = [_first_users(space) for space in spaces]
     meant = []
     for name in sorted({name for users in first for name in users}, key=natural):
-        answers = [users.get(name, {()}) for users in first]
-        said = {answer for own in answers for answer in own}
-        if all(len(own) == 1 for own in answers) and len(said) == len(spaces):
-            meant.append((name, [min(own) for own in answers]))
+        answers = [users.get(name, ()) for users in first]
+        sure = [answer for answer in answers if answer is not None]
+        if len({*sure}) == len(spaces):
+            meant.append((name, sure))
     return min(meant, key=lambda one: sum(len(who) != 1 for who in one[1]), default=None)
 
 
-def _first_users(space: PlanSpace) -> dict[str, set[tuple[str, ...]]]:
-    """For each object that one task's plans use, who is the first to use it in some of them.
+def _first_users(space: PlanSpace) -> dict[str, tuple[str, ...] | None]:
+    """For each object that one task's plans use, who is first, None where mixtures do not agree.
 
-    One pass from the start: the objects that some way to a node has not used.
+    One pass from the start: the earliest and the latest step in which a robot uses an object first,
+    and with each node what robots have not used on some way to it.
     """
     robots = space.model.robots
     named = [
-        [frozenset(text.strip("()").split()[1:]) - {*robots} for text in labels]
-        for labels in space.model.labels
+        [frozenset((robot, name) for name in text.strip("()").split()[1:]) for text in labels]
+        for robot, labels in zip(robots, space.model.labels, strict=True)
     ]
-    users: dict[str, set[tuple[str, ...]]] = defaultdict(set)
-    nothing: frozenset[str] = frozenset()
+    steps, nothing = space.cost_of(0)[0], frozenset[tuple[str, str]]()
+    earliest: dict[tuple[str, str], int] = {}
+    latest: dict[tuple[str, str], int] = {}
     unused = {int(space.starts[0]): nothing.union(*(own for part in named for own in part))}
-    for layer in range(space.cost_of(0)[0], 0, -1):
-        for edge, source, target in np.column_stack(space.layer_edges(layer)).tolist():
-            does = [named[robot][label] for robot, label in enumerate(space.labels_of(edge))]
-            used = nothing.union(*does)
-            for name in used & unused[source]:
-                users[name].add(
-                    tuple(r for r, own in zip(robots, does, strict=True) if name in own)
-                )
+    for step in range(1, steps + 1):
+        layer = space.layer_edges(steps + 1 - step)
+        for edge, source, target in np.column_stack(layer).tolist():
+            labels = enumerate(space.labels_of(edge))
+            used = nothing.union(*(named[robot][label] for robot, label in labels))
+            for use in used:
+                earliest.setdefault(use, step)
+            latest |= dict.fromkeys(used & unused[source], step)
             unused[target] = unused.get(target, nothing) | (unused[source] - used)
-    for goal, left in unused.items():
-        if not space.layer[goal]:
-            for name in left & users.keys():
-                users[name].add(())
+    never = nothing.union(*(left for node, left in unused.items() if not space.layer[node]))
+    latest |= dict.fromkeys(never & earliest.keys(), steps + 1)
+    users: dict[str, tuple[str, ...] | None] = {}
+    for name in {name for _, name in earliest} - {*robots}:
+        own = [robot for robot in robots if (robot, name) in earliest]
+        until = min(latest[robot, name] for robot in own)
+        first = tuple(robot for robot in own if earliest[robot, name] <= until)
+        at_once = all(earliest[robot, name] == latest[robot, name] for robot in first)
+        sure = until <= steps and (len(first) == 1 or at_once)
+        users[name] = first if sure else None
     return users
 
 

@@ -31,9 +31,8 @@ class Variable:
 
     ``name`` is what is shown: ``at(r2)``, or ``in(?, p)`` for ``(in r2 p)`` and the like.
     ``values`` are ground atoms, each standing for "this one of the variable's atoms is true", or
-    None: none of them is.  ``texts`` are for each value what
-    is shown as subject and value: ``at(r2)`` and ``c3``; a subject alone is a fact, as ``free(r1)``
-    with an empty value.
+    None: none of them is.  ``texts`` are for each value what is shown as subject and value:
+    ``at(r2)`` and ``c3``; a subject alone is a fact, as ``free(r1)`` with an empty value.
     """
 
     name: str

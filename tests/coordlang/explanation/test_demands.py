@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from itertools import product
 from random import Random
 
 import numpy as np
@@ -16,6 +17,7 @@ from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import RobotPart, SentenceDemands, meaning, sentence_demands
 from coordlang.explanation.text import demands_text
 from coordlang.explanation.words import all_covers, mapped_states
+from coordlang.language.candidates import from_problems
 from coordlang.language.sentences import task_sentences
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
@@ -24,6 +26,7 @@ from tests.support.candidates import random_candidates
 from tests.support.command import Command
 from tests.support.domains import T_MAP, all_tasks
 from tests.support.task_languages import built_for, random_language
+from tests.support.texts import parsed
 
 
 def check(
@@ -174,12 +177,14 @@ def test_json(coordlang: Command, language: object) -> None:
 
 
 def first_users(space: PlanSpace, name: str) -> set[tuple[str, ...]]:
-    """Who uses an object first, plan by plan."""
+    """Who uses an object first, mixture by mixture."""
     found = set()
-    for plan in Plans.of(space, 0):
+    plans = [[*map(space.model.texts, plan)] for plan in Plans.of(space, 0)]
+    parts = [{*part} for part in zip(*(zip(*plan, strict=True) for plan in plans), strict=True)]
+    for mixture in product(*parts):
         users: tuple[str, ...] = ()
-        for step in plan:
-            texts = zip(space.model.robots, space.model.texts(step), strict=True)
+        for step in zip(*mixture, strict=True):
+            texts = zip(space.model.robots, step, strict=True)
             users = tuple(r for r, text in texts if name in (text or "").strip("()").split()[1:])
             if users:
                 break
@@ -211,3 +216,20 @@ def test_which_sentences_lead_and_what_they_mean_against_listed_plans() -> None:
             seen[found is not None] += 1
     assert seen[True] > 2
     assert seen[False] > 1
+
+
+def test_mixtures_agree_about_what_sentences_mean() -> None:
+    """In each plan of w1 both use x at once; in mixtures of these plans one of them is first."""
+    domain, problem = parsed(
+        """(define (domain use) (:types robot thing) (:predicates (used ?r - robot ?x - thing))
+        (:action use :parameters (?r - robot ?x - thing)
+         :precondition (not (used ?r ?x)) :effect (used ?r ?x)))""",
+        """(define (problem both) (:domain use) (:objects r1 r2 - robot x y - thing) (:init)
+        (:goal (and (used r1 x) (used r1 y) (used r2 x) (used r2 y))))""",
+    )
+    middle = {"(used r1 x) (used r2 x)": "w1", "(used r1 y) (used r2 y)": "w1"}
+    language = language_of({**middle, "(used r1 x) (used r2 y)": "w2"}, ("w0", "w1", "w2"))
+    used = next(iter(languages_in_tasks(language, from_problems(domain, [problem]))))
+    together, r1_first, r2_first = map(used.plans_with, ((0, 1, 0), (0, 2, 0), (0,)))
+    assert meaning([r1_first, r2_first]) == ("x", [("r1",), ("r2",)])
+    assert meaning([together, r1_first, r2_first]) is None
