@@ -183,9 +183,9 @@ def best_sentence(task_language: TaskLanguage, preferences: Sequence[Preference]
 
     - ``shortest``: fewest words;
     - ``most-plans``: most optimal plans have it;
-    - a `PlanPreference`: the worst plan that the sentence leaves open has the best grade, then the
-      best plan has.  The robots may end up with any of these plans, so the worst one is what the
-      sentence promises.
+    - a `PlanPreference`: the worst plan that has the sentence has the best grade, then the best
+      plan has.  Robots that choose for themselves may do otherwise, where mixtures of these plans
+      have another sentence.
 
     Of equal sentences the one with fewest words is taken, then the first by word numbers.
     Best-first search over prefixes of sentences, with a bound on what any continuation can give;
