@@ -288,7 +288,15 @@ function ownText(sentence, task) {
   const product = sentence.own.reduce((p, n) => p * BigInt(n), 1n);
   const parts = sentence.own.map((n, r) => `${DATA.robots[r]} ${shortNumber(n)}`).join(' × ');
   return sentence.own.every(n => n === '1') ? 'nothing left to choose'
-    : product === BigInt(sentence.plans) ? `ways to go: ${parts}` : `ways to go: ${parts}; ${task.violation ? 'not all of them mix' : 'some mixtures have another sentence'}`;
+    : product === BigInt(sentence.plans) ? `ways to go: ${parts}` : `ways to go: ${parts}${mixing(sentence, task)}`;
+}
+
+// What is known of mixtures that do not have the sentence.
+function mixing(sentence, task) {
+  if (task.verified) return '; some mixtures have another sentence';
+  const words = (task.violation ? task.violation.states[0] : []).map(state => DATA.state_words[state]);
+  const said = words.filter((word, k) => word !== words[k - 1]);
+  return said.join() === sentence.words.join() ? '; not all of them mix' : '';
 }
 
 // Facts that change within a task and are not seen on the map.

@@ -151,6 +151,13 @@ def test_choosing_for_a_robot(open_page: Opener) -> None:
     page = open_page(make_report(refuted(language), domain, [problem], tasks_shown=1).html).page
     assert "no coordination language" in page.inner_text("#task-warning")
     assert "do not mix" in page.inner_text("#without-note")
+    assert "; not all of them mix" in page.inner_text("#sentence-list")
+    known = """DATA.tasks.map(task => [{...task, violation: null, verified: true}, {...task,
+      violation: null, verified: null}].map(other => ownText(task.sentences[0], other)))[0]"""
+    mixed, unknown = page.evaluate(known)
+    assert mixed == unknown + "; some mixtures have another sentence"
+    other = "ownText({...DATA.tasks[0].sentences[0], words: [1]}, DATA.tasks[0])"
+    assert page.evaluate(other) == unknown
     page.click("[data-mode='0']")
     said = endings(page, 12)
     assert any("not part of any optimal plan" in text for text in said)
