@@ -81,6 +81,7 @@ def page_data(
         "kept": {
             "plan": model.kept_plan,
             "plans": model.kept_plans,
+            "unit": model.unit,
             "slack": model.slack,
             "one": f"{'a' if model.slack else 'an'} {model.kept_plan}",
         },

@@ -163,7 +163,8 @@ class TaskView {
   show(step) {
     const { task } = this, state = this.states[step], word = DATA.state_words[state];
     const did = step ? this.steps[step - 1] : null;
-    const doing = did ? DATA.robots.map((r, k) => `${r}: ${DATA.labels[k][did[k]].short}`).join('; ') : 'start';
+    const begin = DATA.kept.unit === 'event' ? `events ${step}: ` : '';
+    const doing = did ? begin + DATA.robots.map((r, k) => `${r}: ${DATA.labels[k][did[k]].short}`).join('; ') : 'start';
     byId('now-word').replaceChildren('now ', chip(word));
     if (this.scene) {
       const faded = new Set(this.mode < 0 ? [] : DATA.things.map((_, t) => t).filter(t => t < DATA.robots.length && t !== this.mode));
@@ -258,6 +259,8 @@ class TaskView {
       make('button', { type: 'button', 'data-step': k, 'aria-label': `Go to step ${k}`, onclick: () => { this.transport.pause(); this.transport.go(k); } }, k === 0 ? 'start' : k)));
     const rows = DATA.robots.map((robot, r) => make('tr', {}, make('th', { scope: 'row', class: robotClass(r) }, robot),
       ...states.map((state, k) => this.cell(r, k, step)), ...blanks()));
+    // Without a common step the k-th events of the robots need not be at the k-th state.
+    if (DATA.kept.unit === 'event') rows.unshift(make('tr', {}, make('th', { scope: 'row' }, 'event'), ...states.map((_, k) => make('td', {}, k || '')), ...blanks()));
     byId('timeline').replaceChildren(make('table', { class: 'timeline' }, make('thead', {}, make('tr', {}, make('th', {}, 'step'), ...head, ...blanks())),
       make('tbody', {}, make('tr', { class: 'said' }, make('th', { scope: 'row' }, 'word'),
         ...words.map(({ word, span }) => make('td', { colspan: span, class: wordClass(word) }, DATA.words[word].name))), ...rows)));

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+import coordlang as door
 from coordlang.execution.task_language import language_in_task
 from coordlang.language.sentences import sentence
 from coordlang.report.page import LARGEST, make_report
@@ -21,6 +22,7 @@ from tests.coordlang.report.conftest import (
     make_world,
     refuted,
 )
+from tests.support.domains import files_of, read
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -134,6 +136,17 @@ def test_a_robots_options_are_its_own_subplans(open_page: Opener) -> None:
         for robot, found in enumerate(robots):
             expected = {tuple(step[robot] or "idle" for step in plan) for plan in plans}
             assert sorted(map(tuple, found)) == sorted(expected)
+
+
+def test_events_are_no_steps(open_page: Opener) -> None:
+    """Without a common step the timetable numbers steps with words, and events with robots."""
+    language = door.build(*files_of("t-map"), asynchronous=True, method="greedy").language
+    domain, problem = read("t-map")
+    opened = open_page(make_report(language, domain, [problem], tasks_shown=1).html)
+    opened.forward()
+    rows = opened.page.eval_on_selector_all("#timeline th", "all => all.map(e => e.textContent)")
+    assert rows == ["step", "word", "event", "r1", "r2"]
+    assert opened.page.inner_text("#now").startswith("events 1: r1: ")
 
 
 @pytest.mark.thorough
