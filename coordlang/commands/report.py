@@ -33,6 +33,8 @@ def show_report(page: Report, options: ReportOptions) -> None:
     """Write the page."""
     output = options.output
     shown = f"{counted(page.tasks, 'task')} of {page.candidates:,}"
+    if page.others:
+        shown += f" and {counted(page.others, 'other')}"
     place = "stdout" if output == "-" else visible(output)
     write(page.html, output, f"{shown}, {len(page.html):,} bytes, written to {place}")
     warn_of_failures(page.tolerance)

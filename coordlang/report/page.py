@@ -101,6 +101,7 @@ def page_data(
         "tasks": tasks,
         "candidates": {
             "count": str(language.provenance.tasks.get("count", 0)),
+            "others": selection.others,
             "looked": selection.looked,
             "requiring": selection.requiring,
             "complete": selection.complete,
@@ -247,10 +248,14 @@ _FEW_WORDS = 8
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A page, how many tasks are shown in it of how many, and what the language tolerates."""
+    """A page, how many candidate tasks it shows of how many, and what the language tolerates.
+
+    ``others``: so many tasks that are no candidates are shown besides.
+    """
 
     html: bytes
     tasks: int
+    others: int
     candidates: int
     tolerance: Tolerance | None
 
@@ -300,7 +305,9 @@ def make_report(
         html = _render({**shown, **drawn_plan(data, heat)}, data)
         if len(html) <= LARGEST:
             candidates = int(language.provenance.tasks.get("count", 0))
-            return Report(html, len(selection.tasks), candidates, language.tolerance)
+            others = selection.others
+            tasks = len(selection.tasks) - others
+            return Report(html, tasks, others, candidates, language.tolerance)
         if len(selection.tasks) == 1:
             raise OutOfMemory(
                 f"the page of one task would have {len(html):,} bytes, more than {LARGEST:,}",

@@ -59,6 +59,12 @@ class Selection:
     requiring: int
     complete: bool
 
+    @property
+    def others(self) -> int:
+        """How many tasks of problems are no candidate tasks of the language."""
+        used = [shown.language for shown in self.tasks]
+        return sum(not own.covered and own.verdict is None for own in used)
+
 
 def select_tasks(
     language: Language,
@@ -101,7 +107,11 @@ def select_tasks(
             (others if task.witness is None else requiring).append(task)
     kept = [*requiring[: max(round(room * _REQUIRING), room - len(others))], *others][:room]
     examined = len(requiring) + len(others)
-    return Selection((*given, *kept), examined, len(requiring), complete and examined <= room)
+    found = Selection((*given, *kept), examined, len(requiring), complete and examined <= room)
+    if found.complete and language.provenance.tasks.get("kind") == "all":  # of listed states
+        count = int(language.provenance.tasks.get("count", 0))
+        return replace(found, complete=len(found.tasks) - found.others >= count)
+    return found
 
 
 def _examined(name: str | None, language: TaskLanguage) -> ShownTask:
@@ -137,7 +147,7 @@ def _candidates(
             continue  # of two states one need not be reachable from the other
         word = first.partition.word_of(space.rows)[space.state]
         yield replace(
-            first, space=space, task=0, word=word, covered=True, guaranteed=True, verdict=None
+            first, space=space, task=0, word=word, covered=True, guaranteed=False, verdict=None
         )
 
 

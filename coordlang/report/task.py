@@ -78,7 +78,7 @@ def task_data(shown: ShownTask, tables: Tables, seed: int) -> dict[str, Any]:
     requires = None if not shown.decided else shown.witness is not None
     return {
         "name": shown.name,
-        "covered": language.covered,
+        "covered": language.covered and (violation is None or language.language.may_fail),
         "requires": requires,
         "silence": _failure(language, None) if requires else None,
         "failure": _failure(language, language.word) if violation else None,

@@ -11,9 +11,9 @@ function fillTasks(select) {
 }
 
 function tasksNote() {
-  const { count, looked, requiring, complete } = DATA.candidates, drawn = DATA.tasks.filter(t => t.name === null).length;
+  const { count, others, looked, requiring, complete } = DATA.candidates, drawn = DATA.tasks.filter(t => t.name === null).length;
   if (complete) return drawn ? `All ${counted(count, 'candidate task')} of the language can be chosen.` : '';
-  return `${grouped(DATA.tasks.length)} tasks of ${grouped(count)}: those given, and ${drawn} drawn at random `
+  return `${grouped(DATA.tasks.length - others)} tasks of ${grouped(count)}${others ? ` and ${counted(others, 'other')}` : ''}: those given, and ${drawn} drawn at random `
     + `(of ${grouped(looked)} drawn, ${grouped(requiring)} require coordination; such tasks were preferred).`;
 }
 

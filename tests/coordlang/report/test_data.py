@@ -152,6 +152,8 @@ def test_selection() -> None:
     assert every.complete
     assert len(every.tasks) == 30
     assert sum(task.witness is not None for task in every.tasks) == 6
+    fewer = replace(language, states=dict([*language.states.items()][1:]))
+    assert not select_tasks(fewer, domain, [problem], 200, 0).complete
     language, domain, problem = make_language("t-map", "problem")
 
     def some(seed: int) -> tuple[list[int], ...]:
@@ -186,9 +188,10 @@ def test_a_page_is_the_same_each_time_opens_offline_and_shows_fewer_tasks_if_too
 def test_a_language_that_is_none_is_said_to_be_none() -> None:
     language, domain, problem = make_language("t-map", "problem")
     for shown, holds in ((language, True), (refuted(language), False)):
-        task = data_of(make_report(shown, domain, [problem], tasks_shown=1).html)["tasks"][0]
-        assert task["verified"] is holds
-        assert (task["violation"] is None) == holds
+        data = data_of(make_report(shown, domain, [problem], tasks_shown=2).html)
+        for task in data["tasks"]:
+            assert task["covered"] is task["verified"] is holds
+            assert (task["violation"] is None) == holds
 
 
 def test_a_file_need_not_name_the_robots() -> None:
@@ -222,6 +225,10 @@ def test_a_page_is_written(coordlang: Command, language: Path, tmp_path: Path) -
     to_stdout = coordlang("report", language, *T_MAP, "-o", "-")
     assert to_stdout.out == page.read_text()
     assert "written to stdout" in to_stdout.err
+    other = tmp_path / "other.pddl"  # no candidate: plans to part of a state
+    other.write_text(FILES[1].read_text().replace("(:goal (and", "(:goal (or (at r1 c1-2)"))
+    outcome = coordlang("report", language, FILES[0], other, "-o", page)
+    assert outcome.out.startswith("29 tasks of 132 and 1 other, ")
 
 
 def test_coordinates(coordlang: Command, language: Path, tmp_path: Path) -> None:
