@@ -193,7 +193,9 @@ def task_summary(language: TaskLanguage, world: World) -> dict[str, Any]:
     init = model.codec.decode(space.rows[space.state[language.start]])
     literals = split_atoms(goal_text(model, space.goals[space.goal[language.start]]))
     goals = world.located(literals)
-    others = [a for a in literals if world.role(a)[0] != "at" and a not in init]
+    false = {a for a in literals if a.startswith("(not ") and a.count("(") == 2}
+    done = {*init, *(a for a in false if a[5:-1] not in init)}
+    others = [a for a in literals if world.role(a)[0] != "at" and a not in done]
     return {
         "title": _title(world.located(init), goals, others),
         "goals": [
