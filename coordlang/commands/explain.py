@@ -100,11 +100,10 @@ class WordsExplained:
         lines.append(descriptions_text(told, self.mapped))
         if not self.mapped.word.size:
             return "\n".join([*lines, f"No state is mapped: the word is always {default}."])
-        lines.append(
-            f"Exact in all {counted(len(self.mapped.word), 'mapped state')}. No "
-            f"{self.used.model.kept_plan} of these tasks leaves them; elsewhere the word is "
-            f"{default}."
-        )
+        exact = f"Exact in all {counted(len(self.mapped.word), 'mapped state')}"
+        if self.used.is_mapped:
+            exact += f". No {self.used.model.kept_plan} of these tasks leaves them"
+        lines.append(f"{exact}; elsewhere the word is {default}.")
         if long := [word for word, cover in told.rules if cover and not cover.fewest]:
             rest = "for the others it is proved that they do not."
             lines.append(f"Fewer terms may suffice for {', '.join(long)}; {rest}")

@@ -15,7 +15,7 @@ from coordlang.language.recorded import check_source, options_of, recorded_list
 from coordlang.language.words import Language, Partition
 from coordlang.verification.by_definition import Verdict, verify
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask
-from planners.joint.tables import Ints
+from planners.joint.tables import Ints, find_rows
 from planners.pddl.formula_tree import conjuncts
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
@@ -89,6 +89,12 @@ class TaskLanguage:
     def model(self) -> JointModel:
         """The joint model of the task."""
         return self.space.model
+
+    @property
+    def is_mapped(self) -> bool:
+        """Whether the language lists every state on the plans of the space."""
+        rows = self.space.rows[np.unique(self.space.state)]
+        return bool((find_rows(self.partition.rows, rows) >= 0).all())
 
     def words_of(self, text: str | Iterable[str]) -> tuple[int, ...]:
         """Word numbers of a sentence, ``"w2 w0"`` or ``("w2", "w0")``.

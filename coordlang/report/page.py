@@ -282,7 +282,8 @@ def make_report(
     position = position or Position("the language file")
     points = coordinates or {}
     selection = select_tasks(language, domain, problems, tasks_shown, seed, options, position)
-    model = selection.tasks[0].language.model
+    tasks = [shown.language for shown in selection.tasks]
+    model = tasks[0].model
     lifted = lifted_words(language, domain, problems[0], model, points, position)
     rows, in_order = word_rows(language, model, lifted)
     shown: dict[str, Any] = {
@@ -295,6 +296,7 @@ def make_report(
         "in_order": in_order,
         "features": lifted.data()["features"] if lifted else (),
         "seed": seed,
+        "is_mapped": all(own.is_mapped for own in tasks),
     }
     heat = None
     while True:
@@ -306,8 +308,8 @@ def make_report(
         if len(html) <= LARGEST:
             candidates = int(language.provenance.tasks.get("count", 0))
             others = selection.others
-            tasks = len(selection.tasks) - others
-            return Report(html, tasks, others, candidates, language.tolerance)
+            own = len(selection.tasks) - others
+            return Report(html, own, others, candidates, language.tolerance)
         if len(selection.tasks) == 1:
             raise OutOfMemory(
                 f"the page of one task would have {len(html):,} bytes, more than {LARGEST:,}",

@@ -154,6 +154,8 @@ def test_selection() -> None:
     assert sum(task.witness is not None for task in every.tasks) == 6
     fewer = replace(language, states=dict([*language.states.items()][1:]))
     assert not select_tasks(fewer, domain, [problem], 200, 0).complete
+    html = make_report(fewer, domain, [problem], tasks_shown=1).html
+    assert b"on optimal plans of these tasks" not in html
     language, domain, problem = make_language("t-map", "problem")
 
     def some(seed: int) -> tuple[list[int], ...]:
