@@ -32,7 +32,7 @@ def report(arguments: Arguments, options: ReportOptions) -> Report:
 def show_report(page: Report, options: ReportOptions) -> None:
     """Write the page."""
     output = options.output
-    shown = f"{counted(page.tasks, 'task')} of {page.candidates:,}"
+    shown = f"{counted(page.tasks - page.others, 'task')} of {page.candidates:,}"
     if page.others:
         shown += f" and {counted(page.others, 'other')}"
     place = "stdout" if output == "-" else visible(output)

@@ -185,8 +185,7 @@ def _first_users(space: PlanSpace) -> dict[str, tuple[str, ...] | None]:
         for edge, source, target in np.column_stack(layer).tolist():
             labels = enumerate(space.labels_of(edge))
             used = nothing.union(*(named[robot][label] for robot, label in labels))
-            for use in used:
-                earliest.setdefault(use, step)
+            earliest |= dict.fromkeys(used - earliest.keys(), step)
             latest |= dict.fromkeys(used & unused[source], step)
             unused[target] = unused.get(target, nothing) | (unused[source] - used)
     never = nothing.union(*(left for node, left in unused.items() if not space.layer[node]))
@@ -196,9 +195,8 @@ def _first_users(space: PlanSpace) -> dict[str, tuple[str, ...] | None]:
         own = [robot for robot in robots if (robot, name) in earliest]
         until = min(latest[robot, name] for robot in own)
         first = tuple(robot for robot in own if earliest[robot, name] <= until)
-        at_once = all(earliest[robot, name] == latest[robot, name] for robot in first)
-        sure = until <= steps and (len(first) == 1 or at_once)
-        users[name] = first if sure else None
+        steady = all(earliest[robot, name] == latest[robot, name] for robot in first)
+        users[name] = first if until <= steps and (steady or len(first) == 1) else None
     return users
 
 
@@ -266,8 +264,8 @@ def _deciding(
     """
     if space.model.slack_facts:
         return tuple(sorted(order))
-    groups = (some for size in range(len(order)) for some in combinations(order, size))
-    robots, agreeing = next(groups, tuple(order)), 0
+    groups = (some for size in range(len(order) + 1) for some in combinations(order, size))
+    robots, agreeing = next(groups), 0
     for start in cycle(range(0, len(states), _STATES)):
         steps = space.model.successors(space.rows[states[start : start + _STATES]])
         kept = find_rows(partition.rows, steps.result) >= 0
@@ -275,9 +273,9 @@ def _deciding(
         source, labels = steps.source[kept], steps.labels[kept]
         changes = partition.word_of(steps.result[kept]) == after
         while len(robots) < len(order) and not _settle(changes, source, labels[:, robots]):
-            robots, agreeing = next(groups, tuple(order)), 0
+            robots, agreeing = next(groups), 0
         agreeing += 1
-        if len(robots) == len(order) or agreeing * _STATES >= len(states):
+        if agreeing * _STATES >= len(states):
             break
     return tuple(sorted(robots))
 

@@ -248,9 +248,9 @@ _FEW_WORDS = 8
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A page, how many candidate tasks it shows of how many, and what the language tolerates.
+    """A page, how many tasks are shown in it of how many, and what the language tolerates.
 
-    ``others``: so many tasks that are no candidates are shown besides.
+    ``others``: so many of those shown are no ``candidates``.
     """
 
     html: bytes
@@ -282,8 +282,7 @@ def make_report(
     position = position or Position("the language file")
     points = coordinates or {}
     selection = select_tasks(language, domain, problems, tasks_shown, seed, options, position)
-    tasks = [shown.language for shown in selection.tasks]
-    model = tasks[0].model
+    model = selection.tasks[0].language.model
     lifted = lifted_words(language, domain, problems[0], model, points, position)
     rows, in_order = word_rows(language, model, lifted)
     shown: dict[str, Any] = {
@@ -296,7 +295,7 @@ def make_report(
         "in_order": in_order,
         "features": lifted.data()["features"] if lifted else (),
         "seed": seed,
-        "is_mapped": all(own.is_mapped for own in tasks),
+        "is_mapped": all(task.language.is_mapped for task in selection.tasks),
     }
     heat = None
     while True:
@@ -307,9 +306,8 @@ def make_report(
         html = _render({**shown, **drawn_plan(data, heat)}, data)
         if len(html) <= LARGEST:
             candidates = int(language.provenance.tasks.get("count", 0))
-            others = selection.others
-            own = len(selection.tasks) - others
-            return Report(html, own, others, candidates, language.tolerance)
+            number, others = len(selection.tasks), selection.others
+            return Report(html, number, others, candidates, language.tolerance)
         if len(selection.tasks) == 1:
             raise OutOfMemory(
                 f"the page of one task would have {len(html):,} bytes, more than {LARGEST:,}",

@@ -140,12 +140,11 @@ def test_a_robots_options_are_its_own_subplans(open_page: Opener) -> None:
 
 def test_events_are_no_steps(open_page: Opener) -> None:
     """Without a common step the timetable numbers steps with words, and events with robots."""
-    language = door.build(*files_of("t-map"), asynchronous=True, method="greedy").language
+    built = door.build(*files_of("t-map"), asynchronous=True, method="greedy")
     domain, problem = read("t-map")
-    opened = open_page(make_report(language, domain, [problem], tasks_shown=1).html)
+    opened = open_page(make_report(built.language, domain, [problem]).html)
     opened.forward()
-    rows = opened.page.eval_on_selector_all("#timeline th", "all => all.map(e => e.textContent)")
-    assert rows == ["step", "word", "event", "r1", "r2"]
+    assert opened.page.inner_text("#timeline tr:nth-child(2) th") == "event"
     assert opened.page.inner_text("#now").startswith("events 1: r1: ")
 
 
@@ -165,12 +164,8 @@ def test_choosing_for_a_robot(open_page: Opener) -> None:
     assert "no coordination language" in page.inner_text("#task-warning")
     assert "do not mix" in page.inner_text("#without-note")
     assert "; not all of them mix" in page.inner_text("#sentence-list")
-    known = """DATA.tasks.map(task => [{...task, violation: null, verified: true}, {...task,
-      violation: null, verified: null}].map(other => ownText(task.sentences[0], other)))[0]"""
-    mixed, unknown = page.evaluate(known)
-    assert mixed == unknown + "; some mixtures have another sentence"
     other = "ownText({...DATA.tasks[0].sentences[0], words: [1]}, DATA.tasks[0])"
-    assert page.evaluate(other) == unknown
+    assert ";" not in page.evaluate(other)  # of this one nothing is known
     page.click("[data-mode='0']")
     said = endings(page, 12)
     assert any("not part of any optimal plan" in text for text in said)
