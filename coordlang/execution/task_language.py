@@ -15,7 +15,7 @@ from coordlang.language.recorded import check_source, options_of, recorded_list
 from coordlang.language.words import Language, Partition
 from coordlang.verification.by_definition import Verdict, verify
 from planners.joint.model import FullState, Goal, JointModel, PlanningTask
-from planners.joint.tables import Ints, find_rows
+from planners.joint.tables import Ints, find_rows, unique_rows
 from planners.pddl.formula_tree import conjuncts
 from planners.pddl.lifted import Domain, Problem
 from planners.pddl.model_options import ModelOptions
@@ -232,9 +232,9 @@ def _covers(language: Language, space: PlanSpace, recorded: Sequence[PlanningTas
     model = space.model
     row = space.rows[space.state[space.starts[0]]]
     if language.provenance.tasks["kind"] == "all":
-        ends = np.unique(space.state[space.layer == 0])
-        return len(ends) == 1 and all(
-            model.codec.key(state) in language.states for state in (row, space.rows[ends[0]])
+        ends = space.rows[space.state[space.layer == 0]]  # remembered actions are no part of goals
+        return len(unique_rows(model.codec.facts_part(ends))[0]) == 1 and all(
+            model.codec.key(state) in language.states for state in (row, ends[0])
         )
     init = model.forgetting_slack(row)
     return any(
