@@ -192,8 +192,7 @@ def test_a_page_is_the_same_each_time_opens_offline_and_shows_fewer_tasks_if_too
 def test_a_language_that_is_none_is_said_to_be_none() -> None:
     language, domain, problem = make_language("t-map", "problem")
     for shown, holds in ((language, True), (refuted(language), False)):
-        data = data_of(make_report(shown, domain, [problem], tasks_shown=2).html)
-        for task in data["tasks"]:
+        for task in data_of(make_report(shown, domain, [problem], tasks_shown=2).html)["tasks"]:
             assert task["covered"] is task["verified"] is holds
             assert (task["violation"] is None) == holds
 
