@@ -230,8 +230,8 @@ def test_a_page_is_written(coordlang: Command, language: Path, tmp_path: Path) -
     assert "written to stdout" in to_stdout.err
     other = tmp_path / "other.pddl"  # no candidate: plans to part of a state
     goal = "(:goal (and (not (at r2 c1-2)) (at r1 c1-2)))\n)"
-    other.write_text(FILES[1].read_text().partition("(:goal")[0] + goal)
-    outcome = coordlang("report", language, FILES[0], other, "-o", page)
+    other.write_text(T_MAP[1].read_text().partition("(:goal")[0] + goal)
+    outcome = coordlang("report", language, T_MAP[0], other, "-o", page)
     assert outcome.out.startswith("29 tasks of 132 and 1 other, ")
     assert data_of(page.read_bytes())["tasks"][0]["title"] == "r1 c0-1 → c1-2"
 
