@@ -8,7 +8,8 @@ needs none of them; it selects among these without observing the other robots.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import prod
 from random import Random
@@ -23,7 +24,7 @@ from coordlang.language.candidates import Candidates
 from coordlang.language.sentences import Sentence, sentence_counts
 from coordlang.language.words import Language
 from planners.joint.model import JointModel
-from planners.joint.tables import Ints
+from planners.joint.tables import Bools, Ints
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import OutOfMemory
 
@@ -47,31 +48,32 @@ def success_rates(
 ) -> list[list[SuccessRates]]:
     """Return the success rates of every task (rows) under every disruption (columns).
 
-    The plans of a sentence are RC-free, so some plan with the sentence succeeds exactly if every
-    robot has a successful choice: the successful sentences are those of the successful plans.
+    A sentence succeeds if for every robot there is a plan with it in which this robot is spared.
+    There may be none in which all are: what they choose may have another sentence.
 
     ``word``: (nodes) The word number of each plan-space node.  ``most``: the most steps of counting
     sentences, see `sentence_counts`.  Raises `OutOfMemory` if there are more sentences than
     ``most`` allows.
     """
-    every = sentence_counts(space, word, most_steps=most)
     word_of = np.zeros(len(space.rows), np.int64)
     word_of[space.state] = word
-    found: list[list[SuccessRates]] = [[] for _ in space.starts]
+
+    def counted(edges: Bools) -> list[Counter[Sentence]]:
+        """The sentences of the plans of each task along some edges."""
+        part = space.along(edges)
+        counts = sentence_counts(part, word_of[part.state], most_steps=most)
+        return [counts[start] for start in part.starts.tolist()]
+
+    every = counted(np.ones(len(space.target), np.bool_))
+    found: list[list[SuccessRates]] = [[] for _ in every]
     for disruption in disruptions:
-        spared = space.along(disruption.spared(space))
-        left = sentence_counts(spared, word_of[spared.state])
-        starts = zip(space.starts.tolist(), spared.starts.tolist(), strict=True)
-        for row, (node, own) in zip(found, starts, strict=True):
-            row.append(_rates(every[node], left[own]))
+        spared = disruption.spared(space)
+        left, own = counted(np.all(spared, axis=0)), list(map(counted, spared))
+        for task, (row, said) in enumerate(zip(found, every, strict=True)):
+            good = sum(n for words, n in said.items() if all(words in of[task] for of in own))
+            total, plans = said.total(), left[task].total()
+            row.append(SuccessRates(plans / total, good / total, plans > 0))
     return found
-
-
-def _rates(every: Mapping[Sentence, int], left: Mapping[Sentence, int]) -> SuccessRates:
-    """The rates of a task from the plans of each sentence, all of them and the successful ones."""
-    total, plans = sum(every.values()), sum(left.values())
-    in_sentences = sum(every[words] for words in left)
-    return SuccessRates(plans / total, in_sentences / total, plans > 0)
 
 
 #: Steps of counting sentences up to which success rates are computed exactly.
@@ -162,7 +164,7 @@ def subaction_trials(candidates: Candidates, language: Language) -> Trials:
     choices = _choices(candidates, language)
     disruptions = _single_subactions(candidates.model, choices.space)
     space = choices.space
-    hit = [space.sources[~disruption.spared(space)] for disruption in disruptions]
+    hit = [space.sources[~np.all(disruption.spared(space), axis=0)] for disruption in disruptions]
     concerned = [space.ancestors(nodes)[space.starts] for nodes in hit]
     trials = [
         Trial((task,), number)

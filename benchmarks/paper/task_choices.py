@@ -42,12 +42,10 @@ class Disruption:
             label in own for step in plan for label, own in zip(step, self.forbidden, strict=True)
         )
 
-    def spared(self, space: PlanSpace) -> Bools:
-        """Return a mask of the edges of a plan space that need no forbidden subaction."""
-        hit = np.zeros(len(space.target), np.bool_)
-        for robot, own in enumerate(self.forbidden):
-            hit |= np.isin(space.robot_labels(robot), sorted(own))
-        return ~hit
+    def spared(self, space: PlanSpace) -> list[Bools]:
+        """Return for each robot a mask of the edges in which it needs no forbidden subaction."""
+        forbidden = enumerate(map(sorted, self.forbidden))
+        return [~np.isin(space.robot_labels(robot), own) for robot, own in forbidden]
 
 
 class TaskChoices:

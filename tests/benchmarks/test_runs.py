@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections import defaultdict
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,12 +16,15 @@ import pytest
 from benchmarks.frame import KeptRows, asked_for, run_python
 from benchmarks.paper import communication, game, table1
 from benchmarks.paper.__main__ import RECIPES, main
+from benchmarks.paper.disruptions import Trial, warehouse_trials
 from benchmarks.paper.floors import FLOORS, tasks_of
 from benchmarks.paper.page import page_of
 from benchmarks.paper.recipe import Settings
 from benchmarks.paper.reported import TABLE_1
 from benchmarks.paper.runner import attempt, is_known, kept, run
-from benchmarks.paper.suite import OTHERS, ROWS
+from benchmarks.paper.suite import OTHERS, ROWS, language_for
+from benchmarks.paper.task_choices import sentence_of
+from benchmarks.paper.warehouse import WAREHOUSES, deliveries, listed_tasks
 from planners.search.plans import Plans
 from tests.support import naive
 from tests.support.domains import ROOT
@@ -154,6 +158,20 @@ def test_table_1_has_the_papers_tasks_and_states() -> None:
 
 
 # ---- the recipes
+
+
+def test_a_sentence_may_succeed_of_which_no_plan_does() -> None:
+    """What the robots choose is an optimal plan, but may have another sentence."""
+    world, rows, columns = WAREHOUSES["open 3x3"]
+    every = deliveries(rows, columns, "across")
+    trials = warehouse_trials(*language_for(world, "minimal", 0, listed_tasks(every)), every)
+    used, said = replace(trials.choices.language, task=15), defaultdict(list)
+    for plan in Plans.of(used.space, 15):
+        parts = zip(zip(*plan, strict=True), trials.disruptions[3].forbidden, strict=True)
+        said[sentence_of(used, plan)].append([own.isdisjoint(part) for part, own in parts])
+    good = [len(spared) for spared in said.values() if all(map(any, zip(*spared, strict=True)))]
+    exact = replace(trials, trials=(Trial((15,), 3),)).exact()
+    assert (exact or {})["sentence"] == round(sum(good) / sum(map(len, said.values())), 6)
 
 
 def test_units_have_names_of_their_own() -> None:
