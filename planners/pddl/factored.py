@@ -55,9 +55,10 @@ def read_factored(directory: str | Path) -> tuple[Domain, Problem]:
     for robot, path in domains.items():
         domain = read_domain(path)
         views.append(_of_robot(robot, domain, read_problem(problems[robot], domain)))
-    _require_owners(views, list(domains))
     domain = _join_domains([domain for domain, _ in views], str(directory))
-    return domain, _join_problems([problem for _, problem in views], str(directory))
+    problem = _join_problems([problem for _, problem in views], str(directory))
+    _require_owners(domain, problem, dict(zip(domains, (own for own, _ in views), strict=True)))
+    return domain, problem
 
 
 def _files(folder: Path, kind: str) -> dict[str, Path]:
@@ -186,15 +187,15 @@ def _renamed(part: Any, old: str, new: str) -> Any:
     return new if part == old else part
 
 
-def _require_owners(views: list[tuple[Domain, Problem]], robots: list[str]) -> None:
-    """Raise `BadInput` where the union would give a robot an action that its own file lacks.
+def _require_owners(domain: Domain, problem: Problem, views: Mapping[str, Domain]) -> None:
+    """Raise `BadInput` where the union gives a robot an action that its own file lacks.
 
     A robot does what its agent's type allows: two robots of one type have the same actions.
     """
-    for schema in [schema for domain, _ in views for schema in domain.schemas]:
-        for robot, (other, problem) in zip(robots, views, strict=True):
-            fits = robot in objects_of(other, problem, _agent_of(schema))
-            if fits and all(s.name != schema.name for s in other.schemas):
+    for schema in [schema for view in views.values() for schema in view.schemas]:
+        agents = objects_of(domain, problem, _agent_of(schema))
+        for robot, other in views.items():
+            if robot in agents and all(s.name != schema.name for s in other.schemas):
                 raise BadInput(
                     f"action {echoed(schema.name)} is for agents such as {echoed(robot)}, "
                     f"whose own domain {other.source.name} does not have it",

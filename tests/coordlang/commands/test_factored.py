@@ -193,6 +193,12 @@ def test_no_robot_gets_an_action_that_its_own_file_lacks(shell: Shell, tmp_path:
         path.write_text(text)
     said = "action 'load' is for agents such as 'robot2', whose own domain"
     shell("inspect --factored files", 31, said)
+    for own, types in (("a", "b - a a"), ("b", "b")):  # only the first file says: b is an a
+        head, action = f"(define (domain d) (:types {types})", f"(:action {own} :parameters"
+        Path(f"domain-{own}.pddl").write_text(f"{head} {action} (?r - {own})))")
+        head = f"(define (problem p) (:domain d) (:objects {own} - {own})"
+        Path(f"problem-{own}.pddl").write_text(f"{head} (:goal (and)))")
+    shell("inspect --factored .", 31, "action 'a' is for agents such as 'b', whose own domain")
 
 
 def test_write_beside_inputs(shell: Shell) -> None:
