@@ -136,6 +136,7 @@ def simulate(files: Arguments, options: SimulateOptions) -> Simulated:
         step=_step(task.used, options.step),
         radius=min(settings.radius, MOST_RADIUS * floor.shortest),
     )
+    settings = replace(settings, radius=prepared.radius_on(floor, settings.radius))
     wishes = [_wish(prepared, text) for text in on_the_way]
     done: list[RunRecord] = []
 

@@ -19,9 +19,9 @@ from planners.system.errors import BadInput, UsageError
 #: A wall: (x, y) of one end, (x, y) of the other, in metres.
 Wall = tuple[float, float, float, float]
 
-#: The greatest radius of a robot, as a share of the shortest link.  Robots that move at once come
-#: as near as 0.707 of a link to each other: one leaves a place at a right angle to the one that
-#: comes, which has the other one's flank before it meanwhile, and must neither touch it nor stop.
+#: The greatest radius of a robot, as a share of the shortest link.  On grids robots that move at
+#: once come as near as 0.707 of a link to each other: one leaves a place at a right angle to the
+#: one that comes, which has its flank before it meanwhile, and must neither touch it nor stop.
 MOST_RADIUS = 0.25
 
 

@@ -30,7 +30,7 @@ WALL = "the wall"
 #: Beams of a lidar, and the angle that they cover, in radians.
 _BEAMS, _ANGLE = 61, 2 * math.pi
 #: What a lidar sees beside its robot's way within this many metres counts as in its way.
-_BESIDE = 0.02
+BESIDE = 0.02
 #: Noise of the position that a robot believes in, in metres for each unit of ``Settings.noise``.
 POSITION_NOISE = 0.1
 
@@ -115,7 +115,7 @@ class Simulator:
         hits = np.asarray(scan["valid"], np.bool_)
         length, angle = scan["ranges"][hits], own.lidar.angle_list[hits]
         ahead, beside = length * np.cos(angle), np.abs(length * np.sin(angle))
-        in_way = (beside < self._settings.radius + _BESIDE) & (ahead > 0)
+        in_way = (beside < self._settings.radius + BESIDE) & (ahead > 0)
         return float(ahead[in_way].min(initial=math.inf))
 
     def touching(self) -> set[tuple[str, str]]:

@@ -6,8 +6,9 @@ For comparison all robots follow one whole plan, or each an optimal plan of its 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
+from itertools import combinations
 from random import Random
 from typing import Literal
 
@@ -18,7 +19,10 @@ from coordlang.execution.choices import choices, knowing_own, monitor
 from coordlang.execution.monitor import IDLE, Monitor
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import words_passed
-from coordlang.simulation.robot import OwnWords
+from coordlang.simulation.floor import Floor
+from coordlang.simulation.robot import SPEED, TICK, OwnWords
+from coordlang.simulation.simulator import BESIDE
+from coordlang.sites.clearance import distance
 from coordlang.sites.world import World, find_world
 from planners.search.plan_space import PlanSpace, UnfoldingStep
 from planners.search.plans import Plan, Plans
@@ -62,7 +66,11 @@ class Mission:
                 "the start",
                 remedy="Simulate a domain whose robots move from place to place.",
             )
-        _note_what_is_left_out(self.world, model.robots, space)
+        self._at = {
+            number: _robots_in(self.world, model.robots, model.codec.decode(space.rows[number]))
+            for number in sorted(set(space.state.tolist()))
+        }
+        _note_what_is_left_out(self.world, model.robots, self._at.values())
         numbered = enumerate(model.robots)
         self.leads = {name: _leads(self.world, space, robot) for robot, name in numbered}
         self.steps = space.cost_of(task_language.task)[0]
@@ -100,6 +108,34 @@ class Mission:
             remedy=f"Robots are {', '.join(self.robots)}; places are called as "
             f"{self.starts[self.robots[0]]} is.",
         )
+
+    def radius_on(self, floor: Floor, most: float) -> float:
+        """Return the radius, ``most`` at most, with which robots pass each other in every step.
+
+        Where no robot is small enough a note says so, and the radius is ``most``.
+        """
+        space, at, points = self.task_language.space, self._at, floor.points
+        ends = space.state[space.sources].tolist(), space.state[space.target].tolist()
+        ways = {
+            (one, at[k][one], at[m][one], other, at[k][other], at[m][other])
+            for k, m in set(zip(*ends, strict=True))
+            for one, other in combinations([name for name in at[k] if name in at[m]], 2)
+        }
+        radius = most
+        for one, a, b, other, c, d in sorted(ways):
+            if a == c or b == d:
+                continue  # what is noted already
+            near = distance((points[a], points[b]), (points[c], points[d]))
+            radius = min(radius, (near - BESIDE) / 2)
+            if radius < SPEED * TICK:
+                note(
+                    f"plans may bring {one} from {a} to {b} and {other} from {c} to {d} at once, "
+                    "where robots on a floor collide",
+                    remedy="Collisions are then none of the language: simulate a domain in which "
+                    "robots keep apart, or write coordinates further apart.",
+                )
+                return most
+        return radius
 
     def mixes(self, subplans: Mapping[str, Sequence[str | None]]) -> bool:
         """Say whether subplans of all robots are an optimal plan of the task.
@@ -139,8 +175,13 @@ def own_words(fits: PlanSpace, task_language: TaskLanguage, robot: int) -> OwnWo
     return OwnWords(moves, [known.possible.bit_length() for known in found.known])
 
 
-def _note_what_is_left_out(world: World, robots: Sequence[str], space: PlanSpace) -> None:
-    """Give notes on what the simulator does not do as the domain says."""
+def _note_what_is_left_out(
+    world: World, robots: Sequence[str], states: Iterable[Mapping[str, str]]
+) -> None:
+    """Give notes on what the simulator does not do as the domain says.
+
+    ``states`` are those of the plans: robot -> its place.
+    """
     located = {role[1] for role in world.roles.values() if role[0] == "at"}
     others = [name for name in world.things if name in located and name not in robots]
     if others:
@@ -149,8 +190,7 @@ def _note_what_is_left_out(world: World, robots: Sequence[str], space: PlanSpace
             f"{some(others, 3)}",
             remedy="Subactions that move no robot are waiting.",
         )
-    for number in sorted(set(space.state.tolist())):
-        places = _robots_in(world, robots, space.model.codec.decode(space.rows[number]))
+    for places in states:
         taken: dict[str, str] = {}
         for name, place in places.items():
             other = taken.setdefault(place, name)

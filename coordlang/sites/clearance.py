@@ -15,7 +15,7 @@ from coordlang.sites.coordinates import Point
 #: Metres that rounding may be wrong by.
 _ROUNDING = 1e-9
 #: Where a robot is in the course of a step, on one level: from one point to another.
-_Segment = tuple[Point, Point]
+Segment = tuple[Point, Point]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class Motion:
 
     start: str
     end: str
-    on: Mapping[str, _Segment]
+    on: Mapping[str, Segment]
     groups: frozenset[str]
 
 
@@ -58,7 +58,7 @@ def clash(one: Motion, other: Motion, clearance: float) -> bool:
     if one.groups & other.groups:
         return True
     levels = one.on.keys() & other.on.keys()
-    return any(_distance(one.on[k], other.on[k]) < clearance - _ROUNDING for k in levels)
+    return any(distance(one.on[k], other.on[k]) < clearance - _ROUNDING for k in levels)
 
 
 def excluded(
@@ -123,8 +123,8 @@ class _Near:
             yield from product((level,), *spans)
 
 
-def _distance(one: _Segment, other: _Segment) -> float:
-    """How near two robots come in a step.
+def distance(one: Segment, other: Segment) -> float:
+    """How near two robots come in a step, from and to these points.
 
     Lanes are as far apart as their nearest points, whatever the speeds of robots. Where one robot
     follows another into the place that this one leaves, both drive evenly through the step.
@@ -137,7 +137,7 @@ def _distance(one: _Segment, other: _Segment) -> float:
     return min(_from(a, other), _from(b, other), _from(c, one), _from(d, one))
 
 
-def _from(point: Point, segment: _Segment) -> float:
+def _from(point: Point, segment: Segment) -> float:
     (x, y), ((ax, ay), (bx, by)) = point, segment
     squared = (bx - ax) ** 2 + (by - ay) ** 2
     along = 0.0 if squared == 0 else ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / squared
@@ -145,7 +145,7 @@ def _from(point: Point, segment: _Segment) -> float:
     return math.hypot(ax + along * (bx - ax) - x, ay + along * (by - ay) - y)
 
 
-def _sides(line: _Segment, one: Point, other: Point) -> float:
+def _sides(line: Segment, one: Point, other: Point) -> float:
     """Below 0 where two points are on different sides of a line."""
     (ax, ay), (bx, by) = line
     first, second = ((bx - ax) * (y - ay) - (by - ay) * (x - ax) for x, y in (one, other))

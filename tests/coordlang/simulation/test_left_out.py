@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from itertools import pairwise
 from pathlib import Path
 from unittest.mock import Mock
@@ -16,7 +17,9 @@ from coordlang.sites.world import Link, World
 from planners.system.errors import BadInput, Note, UsageError
 from planners.system.signals import Interrupted
 from tests.support.domains import files_of
+from tests.support.hall import DOMAIN, PROBLEM
 from tests.support.simulation import floor_for, language_of_task, mission_of
+from tests.support.texts import parsed
 
 _PLANES = """
 (define (domain planes) (:requirements :strips :typing)
@@ -50,6 +53,29 @@ def test_a_plane_is_in_a_city_and_not_in_its_fuel(tmp_path: Path) -> None:
     assert any("nothing collides with it: anna" in str(one.message) for one in given)
     assert set(found.record.places) == {"c0-0", "c0-1", "c1-0"}
     assert found.runs[0].arrived
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "more", "radius"),
+    [
+        ("b", "a", "", None),
+        ("c", "d", ', "c": [0.5, 0.5], "d": [0.5, -0.5]', None),
+        ("c", "a", ', "c": [0.94, 0.34]', None),
+        ("c", "a", ', "c": [0.8, 0.6]', 0.148),
+    ],
+    ids=["swap", "cross", "too sharp", "sharp"],
+)
+def test_robots_can_pass_or_it_is_said(
+    start: str, end: str, more: str, radius: float | None, tmp_path: Path
+) -> None:
+    text = PROBLEM.replace("(at r2 a)", f"(at r2 {end})").replace("b - room", "b c d - room")
+    text = text.replace("(at r2 b)", f"(at r2 {start}) (door {start} {end})")
+    files, where = parsed(DOMAIN, text), tmp_path / "points.json"
+    where.write_text(f'{{"coordinates": {{"a": [0, 0], "b": [1, 0]{more}}}}}')
+    with nullcontext() if radius else pytest.warns(Note, match=f"r2 from {start} to {end} at once"):
+        found = coordlang.simulate(coordlang.build(*files).language, *files, coordinates=where)
+    assert found.runs[0].arrived == (radius is not None)
+    assert found.record.radius == pytest.approx(radius or 0.2, abs=1e-3)
 
 
 def test_a_robot_may_be_called_wall(tmp_path: Path) -> None:
