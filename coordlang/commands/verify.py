@@ -64,7 +64,7 @@ class Verification(Presented, Verdict):
     @property
     def unchecked(self) -> str | None:
         """What the language file claims and nothing proved, None if there is nothing."""
-        if self.claimed == 1 or self.certificate or not self.holds:
+        if self.claimed == 1 or self.certificate or not (self.holds or self.is_tolerated):
             return None
         return (
             f"not checked: the file claims that at least {self.claimed:,} words are needed, "
@@ -107,10 +107,11 @@ class Verification(Presented, Verdict):
         robots = f"robots {', '.join(self.robots)}"
         fail = f"robots that choose by themselves {self.failures.text()}"
         if self.is_tolerated:
-            return (
+            head = (
                 f"as claimed: {words}, {tasks}: this is no coordination language, and {fail} "
                 f"({self.nodes:,} walk nodes; {robots})"
             )
+            return "\n".join([head, *self._what_is_proved()])
         if self.witness:
             sentence = " ".join(self.witness.sentence or ())
             head = f'refuted: plans with the sentence "{sentence} .." miscoordinate'
@@ -139,7 +140,7 @@ class Verification(Presented, Verdict):
                 f"({counted(len(checked.cnf.clauses), 'clause')})"
             )
         yield f"lower bound {bound}: {why}"
-        if bound != self.words:
+        if bound != self.words and self.holds:
             least = f"at least {bound:,} and at most {self.words:,}"
             yield f"not proved minimal: the least number of words is {least}"
 
@@ -169,10 +170,9 @@ def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
     note_size(candidates)
     with options.work.opened() as workers:
         verdict = verify_candidates(partition, candidates, workers, say)
-        found = NONE
+        found, claims = NONE, read.tolerance is not None and read.tolerance.may_fail
         if not verdict.holds:
             say("counting how often robots fail")
-            claims = read.tolerance is not None and read.tolerance.may_fail
             found = failures_under(partition, candidates, is_claimed=claims)
             if claims and found.mean is None:
                 raise TooManyToCount(
@@ -180,9 +180,9 @@ def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
                     remedy="Say --tasks FILE with fewer tasks.",
                 )
     checked = None
-    if proof and verdict.holds:
+    if proof and (verdict.holds or claims):
         checked = check_certificate(proof, candidates, say)
-        if checked.lower_bound > len(read.words):
+        if verdict.holds and checked.lower_bound > len(read.words):
             raise AssertionError(
                 f"a language of {len(read.words)} words is verified, and a certificate that "
                 f"{checked.lower_bound} are needed: one of the two is wrong"
@@ -196,8 +196,8 @@ def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
 def show_verify(found: Verification, options: VerifyOptions) -> int:
     """Print the verdict; `Refuted` if a certificate proves less than the language claims."""
     show_answer(found, as_json=options.as_json)
-    if not found.holds:
-        return 0 if found.is_tolerated else REFUTED
+    if not (found.holds or found.is_tolerated):
+        return REFUTED
     if options.dimacs and found.certificate is not None:
         write(found.certificate.dimacs(), options.dimacs)
     if not found.proves_claim:

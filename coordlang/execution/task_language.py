@@ -227,15 +227,18 @@ def _covers(language: Language, space: PlanSpace, recorded: Sequence[PlanningTas
     """Whether the (one) task of a plan space is a candidate task of the language.
 
     The guarantee is about a task's optimal plans, so a task with the same optimal plans as a
-    candidate is one too: under ``--tasks all``, a task whose optimal plans all end in one state.
+    candidate is one too: under ``--tasks all``, a task whose optimal plans all end in one state,
+    whatever was done last, and how much slack is left.  Within slack it is not the state in which
+    they begin.
     """
     model = space.model
     row = space.rows[space.state[space.starts[0]]]
     if language.provenance.tasks["kind"] == "all":
-        ends = space.rows[space.state[space.layer == 0]]  # remembered actions are no part of goals
-        return len(unique_rows(model.codec.facts_part(ends))[0]) == 1 and all(
-            model.codec.key(state) in language.states for state in (row, ends[0])
-        )
+        ends = space.rows[np.unique(space.state[space.layer == 0])]
+        begin, *facts = model.codec.facts_part(model.forgetting_slack(np.stack((row, *ends))))
+        if len(unique_rows(np.stack(facts))[0]) > 1 or (model.slack and (facts == begin).all()):
+            return False
+        return all(model.codec.key(state) in language.states for state in (row, *ends))
     init = model.forgetting_slack(row)
     return any(
         _literals(task.goal) == _literals(space.goals[0]) and (task.init == init).all()

@@ -22,7 +22,7 @@ from planners.parallel.batch import Batch, Store, Table, digest
 from planners.parallel.workers import Workers
 from planners.pddl.model_options import Cost
 from planners.search.asynchronous import as_executed
-from planners.search.kept_plans import keeping_plans, search, store_in_use
+from planners.search.kept_plans import keeping_plans, key_of, model_digest, search, store_in_use
 from planners.search.plan_file import json_count
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import counts
@@ -83,8 +83,8 @@ def answers(loaded: PlanningInstance, workers: Workers) -> list[TaskAnswer]:
     model, tasks = loaded.model, loaded.tasks
     effort = float(len(model.codec.facts) * sum(map(len, model.labels)))  # a guess: no search yet
     numbers = range(len(tasks))
-    hashes = (loaded.domain.source.sha256, *(p.source.sha256 for p in loaded.problems))
-    identity = digest(*hashes, repr(loaded.options))
+    known = model_digest(model)
+    identity = digest(*(key_of(known, task) for task in tasks), repr(loaded.options))
     shared = (model, tasks, store_in_use())
     batch = Batch("coordination", _answer, shared, numbers, identity, [effort for _ in numbers])
     decoder = msgspec.json.Decoder(TaskAnswer, dec_hook=lambda _, text: Fraction(text))

@@ -45,7 +45,7 @@ from coordlang.language.file import read_language
 from coordlang.language.recorded import options_of
 from coordlang.language.words import Language
 from coordlang.unified import NAME
-from coordlang.unified.plans import NoSteps, of_up, to_up
+from coordlang.unified.plans import NoSteps, label, of_up, to_up
 from coordlang.unified.translation import FEATURES, Concurrency, Subactions, Translated, translate
 from planners.check.rules import validate
 from planners.grounding.instantiate import idling_schemas
@@ -351,7 +351,12 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
                 loaded = build(found.domain, [found.problem], options.model_options(found))
                 steps = of_up(found, loaded.model, loaded.team, plan)
                 texts = [step for step, _ in steps]
-                verdict = validate(found.domain, found.problem, loaded.team, texts)
+                names = None
+                if loaded.model.is_joint_action:
+                    names = [label(found, action) for _, (action, *_) in steps]
+                verdict = validate(
+                    found.domain, found.problem, loaded.team, texts, joint_actions=names
+                )
                 wrong_sentence = self._wrong_sentence(found, texts) if verdict.valid else None
         except NoSteps as error:
             reason = Reason.INAPPLICABLE_ACTION if error.action else Reason.MUTEX_CONFLICT

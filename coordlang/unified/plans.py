@@ -79,8 +79,7 @@ def of_up(
     for actions in _steps(plan):
         step: list[str | None] = [None] * len(model.robots)
         for action in actions:
-            text = label(found, action)
-            for robot, part in _parts(model, team, found, text):
+            for robot, part in _parts(model, team, found, action):
                 if step[robot] is not None:
                     raise NoSteps(
                         f"{model.robots[robot]} does {step[robot]} and {part} in one step"
@@ -130,15 +129,19 @@ def label(found: Translated, action: Any) -> str:
 
 
 def _parts(
-    model: JointModel, team: Team, found: Translated, text: str
+    model: JointModel, team: Team, found: Translated, action: Any
 ) -> list[tuple[int, str | None]]:
-    """The robots that take part in a ground action, with their parts."""
+    """The robots that take part in an action, with their parts.
+
+    Raises `NoSteps` for a joint action that is never possible.
+    """
+    text = label(found, action)
     if not model.is_joint_action:
         name, *args = text[1:-1].split()
         schema = next(s for s in found.domain.schemas if s.name == name)
         return [(robot, text) for robot in team.owners(schema, tuple(args))]
-    robots = range(len(model.robots))
-    action = next((action for action in model.actions if action.label == text), None)
-    if action is None:  # it can never be applied, so the plan is refused for that
-        return [(robot, text) for robot in robots]
-    return [(robot, part) for robot in robots if (part := action.part_of(robot)) is not None]
+    ground = next((ground for ground in model.actions if ground.label == text), None)
+    if ground is None:
+        raise NoSteps(f"{action} is never possible", action)
+    parts = ((robot, ground.part_of(robot)) for robot in range(len(model.robots)))
+    return [(robot, part) for robot, part in parts if part is not None]

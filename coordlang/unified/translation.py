@@ -199,8 +199,10 @@ class _Writer:
         #: The fluents that are nobody's own.
         self.shared: tuple[Any, ...] = tuple(shared.fluents)
         roots = {[*t.ancestors][-1].name for t in problem.user_types}
-        #: The type that PDDL calls object, as unified-planning's PDDL reader makes it.
-        self.root = min(roots) if [root.lower() for root in roots] == ["object"] else None
+        is_root = not self.agents and [root.lower() for root in roots] == ["object"]
+        #: The type that PDDL calls object, as unified-planning's PDDL reader makes it; no agents
+        #: are of it.
+        self.root = min(roots) if is_root else None
         #: The type of all agents, by which formulas of the user name it.
         self.agent_type = self.names.of("type", None, "agent") if self.agents else ""
         for t in problem.user_types:

@@ -73,9 +73,10 @@ class Rules:
         self.meaning = Meaning(domain, problem, team)
         self._touched: dict[tuple[StepAtom, StepAtom | None], Touched] = {}
 
-    def step(self, state: State, labels: Labels) -> State | str:
+    def step(self, state: State, labels: Labels, joint_action: str | None = None) -> State | str:
         """The state after a joint step, or the first rule that it breaks, in words.
 
+        ``joint_action``: the one that it is, by name; None: any with these subactions.
         Raises `BadInput` where two applicable joint actions with these subactions have different
         results.
         """
@@ -83,7 +84,7 @@ class Rules:
         if len(labels) != len(robots):
             return f"the step has {len(labels)} entries for {len(robots)} robots"
         if self.domain.is_joint_action:
-            return self._joint_action(state, labels)
+            return self._joint_action(state, labels, joint_action)
         chosen: list[Instance | None] = []
         for robot, label in zip(robots, labels, strict=True):
             found = self.instance(label) if label is not None else None
@@ -265,7 +266,7 @@ class Rules:
                         changes[effect.adds].add(ground_atom(effect.atom, binding))
         return (state - changes[False]) | changes[True]
 
-    def _joint_action(self, state: State, labels: Labels) -> State | str:
+    def _joint_action(self, state: State, labels: Labels, name: str | None) -> State | str:
         """The state after the joint action with these subactions, or what is wrong with them."""
         parts = ", ".join(
             f"{robot} {label or 'idle'}"
@@ -273,7 +274,8 @@ class Rules:
         )
         reason = f"no joint action of the domain has the parts {parts}"
         results: dict[State, str] = {}
-        for number, action in enumerate(self._whole_actions(labels)):
+        actions = [a for a in self._whole_actions(labels) if name in (None, a.text)]
+        for number, action in enumerate(actions):
             formula, moment = action.schema.precondition, Moment(state)
             if self.meaning.holds(formula, action.binding, True, moment):
                 results.setdefault(self._after(state, (action,)), action.text)
@@ -368,13 +370,14 @@ def validate(
     *,
     init: Iterable[Atom] | None = None,
     goal: Formula | None = None,
+    joint_actions: Sequence[str] | None = None,
 ) -> Verdict:
     """Check that every step is legal where it is taken and that the goal holds at the end.
 
     ``plan[k][i]`` is the subaction of robot ``i`` in step ``k``, such as ``"(move r1 a b)"`` (in
     joint-action PDDL the filled-in template of the subaction comment), or None if it idles.
     ``init`` (true fluents; statics come from the problem) and ``goal`` are of another task than the
-    problem's own.
+    problem's own.  ``joint_actions`` names the one of each step; None: any with its subactions.
 
     Raises `BadInput` where two applicable joint actions with the same subactions have different
     results.
@@ -382,7 +385,7 @@ def validate(
     rules = Rules(domain, problem, team)
     state = rules.meaning.fluents_of(problem.init if init is None else init)
     for number, labels in enumerate(plan):
-        after = rules.step(state, labels)
+        after = rules.step(state, labels, joint_actions[number] if joint_actions else None)
         if isinstance(after, str):
             return Verdict(False, len(plan), number, after)
         state = after

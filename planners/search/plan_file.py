@@ -188,9 +188,16 @@ def only_one_plan(text: str, position: Position) -> None:
 
 def _from_json(text: str, model: JointModel, position: Position) -> list[tuple[Texts, ...]]:
     file = PLANS.decode(text.encode(), position)
-    found = [tuple(map(tuple, plan.actions)) for plan in file.plans]
-    for plan in found:
-        for number, step in enumerate(plan):
+    robots = model.robots if file.robots is None else file.robots
+    if sorted(robots) != sorted(model.robots):
+        raise BadInput(
+            f"the robots of these plans are {echoed(', '.join(robots))}, not "
+            f"{', '.join(model.robots)}",
+            position=position,
+            remedy="Give plans of this task, with the order of its robots.",
+        )
+    for plan in file.plans:
+        for number, step in enumerate(plan.actions):
             if len(step) != len(model.robots):
                 raise BadInput(
                     f"step {number} must have one text or null for each "
@@ -198,7 +205,8 @@ def _from_json(text: str, model: JointModel, position: Position) -> list[tuple[T
                     position=position,
                     remedy='As in ["(move r1 a b)", null]: null is a robot that idles.',
                 )
-    return found
+    order = [robots.index(robot) for robot in model.robots]
+    return [tuple(tuple(step[k] for k in order) for step in plan.actions) for plan in file.plans]
 
 
 def _from_ipc(text: str, model: JointModel, name: str) -> tuple[Texts, ...]:
@@ -216,7 +224,7 @@ def _from_ipc(text: str, model: JointModel, name: str) -> tuple[Texts, ...]:
                 remedy="`coordlang plans DOMAIN PROBLEM` writes plans in this form.",
             )
         action = "(" + " ".join(match["action"][1:-1].split()) + ")"
-        step = int(match["step"][-8:]) if match["step"] else len(steps)
+        step = int(match["step"][-8:]) if match["step"] else max(steps, default=-1) + 1
         if match["step"] and (len(match["step"]) > 8 or step > _MOST_STEPS):
             raise BadInput(
                 f"step {match['step'][:20]} is too many steps",

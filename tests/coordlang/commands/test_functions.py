@@ -23,11 +23,13 @@ import coordlang as door
 from coordlang.commands.main import COMMANDS
 from coordlang.language.recorded import options_of
 from coordlang.verification.certificate_file import write_certificate
+from planners.pddl.formula_tree import conjuncts
 from planners.pddl.model_options import ModelOptions
 from tests.coordlang.commands.conftest import FILES
 from tests.support.command import Command
 from tests.support.domains import DOMAINS, ROOT
 from tests.support.hall import factored
+from tests.support.texts import parsed
 
 T_MAP, CELLS = FILES["T-MAP"], FILES["CELLS"]
 CORRIDOR = [DOMAINS / "corridor" / "domain.pddl", DOMAINS / "corridor" / "problem.pddl"]
@@ -112,6 +114,12 @@ def test_coordination(tmp_path: Path) -> None:
     assert found[0].witness is found.witness is not None
     assert (len(found), found.witness.step) == (1, 0)
     shows_itself(found[0])
+    # Kept answers are of the task as it is, not of the file that it was read from.
+    domain, problem = parsed(*(Path(path).read_text() for path in T_MAP))
+    kept = tmp_path / "kept"
+    assert door.coordination(domain, problem, resume=kept)[0].makespan == 4
+    fewer = replace(problem, goal=conjuncts(problem.goal)[0])
+    assert door.coordination(domain, fewer, resume=kept)[0].makespan == 3
     found = door.coordination(factored=factored(tmp_path / "hall"))
     assert not found
     assert (found[0].plans, found.witness) == (1, None)

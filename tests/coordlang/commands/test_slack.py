@@ -129,6 +129,13 @@ def test_coordination_and_few_words_within_slack(shell: Shell) -> None:
         assert claimed["slack"] == 1
         assert 0 < claimed["failure_mean"] < 1
         shell("verify l.json CELLS")
+    # Pairs are of different states: to stay is none, though plans go out and come back.
+    shell("build CELLS --tasks all --slack 2 --words 1 -o l.json")
+    domain, problem = CELLS
+    stays = Path(problem).read_text().partition("(:goal")[0] + "(:goal (and (at r1 a) (at r2 b))))"
+    Path("p").write_text(stays)
+    shell("choices l.json CELLS w0")
+    shell(f"choices l.json {domain} p w0", 1, "does not cover")
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ import coordlang as library
 from coordlang.language.file import to_bytes
 from coordlang.language.provenance import percent
 from coordlang.required.failure import failures_under
+from coordlang.verification.certificate_file import write_certificate
 from tests.support.command import Command
 from tests.support.domains import DOMAINS
 
@@ -65,6 +66,21 @@ def test_verify_counts_what_a_file_claims(
     assert {key: answer[key] for key in SILENCE} == SILENCE
     assert answer.get("tolerance") == claimed
     assert bool(library.verify(path, *SQUARE)) == (code == 0)
+
+
+def test_a_bound_claimed_for_words_that_may_fail_is_checked(
+    coordlang: Command, tmp_path: Path
+) -> None:
+    path, proof = silent(tmp_path / "l.json", SILENCE), tmp_path / "proof.json"
+    data = json.loads(path.read_text())
+    write_certificate(library.build(*SQUARE, tasks="all", method="minimal").certificate(), proof)
+    for claimed, code in ((3, 0), (4, 1)):
+        data["guarantee"]["lower_bound"] = claimed
+        path.write_text(json.dumps(data))
+        unchecked = coordlang("verify", path, *SQUARE)
+        assert (unchecked.code, f"at least {claimed} words" in unchecked.out) == (0, True)
+        found = coordlang("verify", path, *SQUARE, "--certificate", proof)
+        assert (found.code, "lower bound 3" in found.out) == (code, claimed == 3)
 
 
 def test_what_cannot_be_counted_cannot_be_claimed(

@@ -207,6 +207,20 @@ def test_a_multi_agent_problem() -> None:
     assert {str(a.agent.name) for a in plans[0].get_adjacency_list} == {"R1", "R2"}
     assert verdict(problem, plans[0]).status == Validity.VALID
     assert "R1.Move" in str(plans[0])
+    # Agents are of no type of the user, though PDDL calls all things objects.
+    thing = up.UserType("object")
+    every, lit = up.Variable("every", thing), up.Fluent("lit", up.BoolType(), thing=thing)
+    problem, agent = MultiAgentProblem("all"), Agent("r1", MultiAgentProblem("all"))
+    problem.ma_environment.add_fluent(lit, default_initial_value=True)
+    problem.add_object("lamp", thing)
+    done, mark = up.Fluent("done"), up.InstantaneousAction("mark")
+    agent.add_public_fluent(done, default_initial_value=False)
+    mark.add_precondition(up.Forall(lit(every), every))
+    mark.add_effect(done(), value=True)
+    agent.add_action(mark)
+    problem.add_agent(agent)
+    problem.add_goal(up.Dot(agent, done()))
+    assert len(all_plans(problem)) == 1
 
 
 def test_agents_of_different_kinds() -> None:
@@ -464,6 +478,26 @@ def test_joint_actions() -> None:
     with up.PlanValidator(name="sequential_plan_validator") as validator:
         assert all(validator.validate(problem, plan).status == Validity.VALID for plan in plans)
     assert all(verdict(problem, plan, subactions=parts).status == Validity.VALID for plan in plans)
+    # What is done counts, not only by what parts: two actions have the same ones.
+    problem = PDDLReader().parse_problem_string(
+        """(define (domain d) (:predicates (p) (q) (g))
+         (:action make :parameters () :effect (p))
+         (:action first :parameters () :precondition (p) :effect (g))
+         (:action second :parameters () :effect (g))
+         (:action never :parameters () :precondition (q) :effect (g)))""",
+        "(define (problem p) (:domain d) (:init ) (:goal (g)))",
+    )
+    texts = {"make": "(go)", "first": "(never)", "second": "(never)", "never": "(stop)"}
+    valid = {
+        action.name: verdict(
+            problem,
+            SequentialPlan([ActionInstance(action)]),
+            subactions={name: {"r1": text} for name, text in texts.items()},
+        ).status
+        == Validity.VALID
+        for action in problem.actions
+    }
+    assert valid == {"make": False, "first": False, "second": True, "never": False}
 
 
 # Under a sentence.

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
 from planners.search.optimal_plans import search
-from planners.search.plan_file import read_plans, to_ipc, to_plansys2
+from planners.search.plan_file import read_plans, to_ipc, to_json, to_plansys2
 from planners.search.plans import Plans, texts
 from tests.support.command import Command
 from tests.support.domains import DOMAINS, loaded_from
@@ -46,6 +47,12 @@ def test_plansys2_reads_each_plan_and_so_do_we(name: str, tmp_path: Path) -> Non
     for plan in plans.sample(10, seed=1):
         path.write_text(to_plansys2(plans, plan))
         assert read_plans(path, loaded.model) == [texts(loaded.model, plan)]
+        data = to_json(plans, [plan])
+        data["robots"].reverse()
+        for listed in data["plans"]:
+            listed["actions"] = [step[::-1] for step in listed["actions"]]
+        (tmp_path / "json").write_text(json.dumps(data))
+        assert read_plans(tmp_path / "json", loaded.model) == [texts(loaded.model, plan)]
         read = items(path.read_text())
         assert {duration for _, _, duration in read} == {1.0}
         joint = loaded.model.is_joint_action
