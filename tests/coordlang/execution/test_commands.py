@@ -142,6 +142,10 @@ def test_says_what_plans_wrote(
             *("; makespan", "5: (move r2 c0-1 c1-1)\n6: (move r2 c1-1 c0-1)\n; makespan", 1),
             "takes 7 steps, and 4 are enough: the goal holds before step 5",
         ),
+        (
+            *("3: (move r2 c1-1 c0-1)", "4: (move r2 c1-1 c0-1)\n(move r2 c0-1 c1-1)", 1),
+            "after 6 steps the goal is not reached",
+        ),
         ("0: (move r2 c1-0 c1-1)", "0:", 31, "plan.txt:2:1: expected '0: (action args)'"),
         ("3: (move r2 c1-1 c0-1)", "123456789: (move r2 c1-1 c0-1)", 31, "too many steps"),
         ("3: (move r2 c1-1 c0-1)", "4000000: (move r2 c1-1 c0-1)", 31, "too many steps"),
