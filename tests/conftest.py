@@ -15,7 +15,7 @@ import pytest
 
 from coordlang.commands.main import run
 from tests.support.command import Command, Outcome
-from tests.support.domains import T_MAP
+from tests.support.domains import SHARED, T_MAP
 
 # Some 150 processes are started, each of which would compile the packages again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -36,6 +36,12 @@ def pytest_collection_modifyitems() -> None:
 def pytest_collection_finish() -> None:
     """Modules stay: to look for garbage in what they hold, again and again, takes 3 % of all time."""
     gc.freeze()
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """What others wrote is read where it is."""
+    if item.get_closest_marker("foreign") and not SHARED.is_dir():
+        pytest.skip(f"the inputs that others wrote are not here: {SHARED}")
 
 
 @pytest.fixture

@@ -31,12 +31,7 @@ from planners.system.limits import time_limit
 from tests.support.domains import SHARED
 from tests.support.pages import DOCS, rows, sections
 
-pytestmark = [
-    pytest.mark.foreign,
-    pytest.mark.skipif(
-        not SHARED.is_dir(), reason=f"the inputs that others wrote are not here: {SHARED}"
-    ),
-]
+pytestmark = pytest.mark.foreign
 
 #: A task's name, folder, domain and problem (none: a file for each robot); the numbers of an
 #: independent search: reachable states, least makespan, plans, plans with the fewest actions; and

@@ -47,13 +47,7 @@ def written(name: str, folder: Path, *, unfactored: bool = False) -> Path:
         *UNIFIED[1:],
         pytest.param(UNIFIED[0], marks=pytest.mark.thorough),
         "hall",
-        pytest.param(
-            "driverlog",
-            marks=[
-                pytest.mark.foreign,
-                pytest.mark.skipif(not SHARED.is_dir(), reason=f"no inputs of others: {SHARED}"),
-            ],
-        ),
+        pytest.param("driverlog", marks=pytest.mark.foreign),
     ],
 )
 def test_the_union_is_the_same_model(name: str, shell: Shell, tmp_path: Path) -> None:

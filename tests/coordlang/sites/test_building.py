@@ -489,9 +489,6 @@ def test_no_robot_spawns(coordlang: Command, tmp_path: Path) -> None:
     assert coordlang("import", path, "-o", tmp_path / "new", "--robots", "x,y").code == 0
 
 
-foreign = pytest.mark.skipif(
-    not BUILDINGS.is_dir(), reason=f"the inputs of others are not here: {BUILDINGS}"
-)
 #: Places and directed lanes of each building of others, graphs, robots that spawn.
 OTHERS = {
     "office": (29, 60, 1, 2),
@@ -502,7 +499,6 @@ OTHERS = {
 
 
 @pytest.mark.foreign
-@foreign
 @pytest.mark.parametrize("name", OTHERS)
 def test_buildings_of_others(name: str, tmp_path: Path) -> None:
     found = read_building(BUILDINGS / f"{name}.building.yaml")
@@ -517,7 +513,6 @@ def test_buildings_of_others(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.foreign
-@foreign
 def test_robots_ride_the_lifts_of_the_hotel(tmp_path: Path) -> None:
     found = read_building(BUILDINGS / "hotel.building.yaml")
     tasks = ["tinyBot_1:L3_master_suite", "deliveryBot_1:L2_room1"]
@@ -533,7 +528,6 @@ REFERENCE = {"triple_H": (255_530, 20_986, 3_426), "office": (658_532, 50_676, 1
 
 
 @pytest.mark.foreign
-@foreign
 @pytest.mark.parametrize("name", ["triple_H", pytest.param("office", marks=[pytest.mark.slow])])
 def test_numbers_of_an_independent_reference(name: str, tmp_path: Path) -> None:
     found = read_building(BUILDINGS / f"{name}.building.yaml")

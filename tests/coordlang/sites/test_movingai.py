@@ -140,7 +140,6 @@ def test_command(coordlang: Command, tmp_path: Path) -> None:
 
 
 @pytest.mark.foreign
-@pytest.mark.skipif(not SHARED.is_dir(), reason=f"the inputs of others are not here: {SHARED}")
 def test_maps_of_others_are_read(tmp_path: Path) -> None:
     maps = sorted([*SHARED.glob("mapf/*.map"), *SHARED.glob("maps/*.map")])
     assert len(maps) >= 12

@@ -107,7 +107,6 @@ def test_values_of_functions(number: str) -> None:
 
 
 @pytest.mark.foreign
-@pytest.mark.skipif(not SHARED.is_dir(), reason=f"no inputs of others here: {SHARED}")
 @pytest.mark.parametrize("path", FOREIGN, ids=lambda path: f"{path.parent.name}-{path.stem}")
 def test_domains_of_others(path: Path) -> None:
     check(path)
