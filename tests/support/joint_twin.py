@@ -76,11 +76,11 @@ def check_model(text: RandomModel, note: Callable[[str], None]) -> None:
         return
     for one in (loaded, built(text, "makespan+actions")):
         _check_plans(one, twin, one.problems[0], note)
-        _check_plans(one, twin, _far(twin, states[-1]), note)
+        _check_plans(one, twin, far(twin, states[-1]), note)
 
 
-def _far(twin: Twin, state: State) -> Problem:
-    """The problem whose goal is how the twin's last state differs from the first one."""
+def far(twin: Twin, state: State) -> Problem:
+    """The problem whose goal is how a state of the twin differs from the first one."""
     goals: list[Formula] = [*sorted(state - twin.init, key=str)]
     goals += [Not(atom) for atom in sorted(twin.init - state, key=str)]
     return replace(twin.rules.problem, goal=And(tuple(goals)))

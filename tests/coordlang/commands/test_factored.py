@@ -15,7 +15,7 @@ import pytest
 import coordlang as door
 from coordlang.commands.main import COMMANDS
 from tests.coordlang.commands.conftest import Shell
-from tests.support.domains import SHARED, T_MAP
+from tests.support.domains import SHARED
 from tests.support.hall import factored
 
 UNIFIED = "ma-basic", "ma-loader", "ma_buttons"
@@ -193,11 +193,3 @@ def test_no_robot_gets_an_action_that_its_own_file_lacks(shell: Shell, tmp_path:
         head = f"(define (problem p) (:domain d) (:objects {own} - {own})"
         Path(f"problem-{own}.pddl").write_text(f"{head} (:goal (and)))")
     shell("inspect --factored .", 31, "action 'a' is for agents such as 'b', whose own domain")
-
-
-def test_write_beside_inputs(shell: Shell) -> None:
-    shell(f"inspect T-MAP --write {T_MAP[0].parent}", 2, "would overwrite an input file")
-    data = json.loads(shell("inspect T-MAP --write new --json").out)
-    assert data["robots"] == ["r1", "r2"]
-    again = shell("inspect new/domain.pddl new/problem.pddl").out
-    assert again == shell("inspect T-MAP").out

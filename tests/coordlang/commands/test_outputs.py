@@ -59,6 +59,7 @@ OVERWRITING = [
     f"{EXPORT} --translate-plan plan -o plan",
     "export l.json in/domain.pddl p.pddl w0 -o in",
     "export l.json d.pddl in/problem.pddl w0 -o in",
+    "inspect in/domain.pddl in/problem.pddl --write in",
     "tasks d.pddl p.pddl -o p.pddl",
     *(f"{VERIFY} {name}" for name in (*ALL.split(), "t.json", "proof.json")),
     *(f"report {ALL} -o {name}" for name in ("l.json", "coordinates.json")),

@@ -192,10 +192,13 @@ def test_every_mixture_of_random_models(robots: int) -> None:
     assert several >= 2
 
 
-def test_hyphens_of_a_word_end_no_comment() -> None:
+@pytest.mark.parametrize("words", [("-", "---", "w--"), ("w0", "a--b<&", "w2")])
+def test_names_of_words_that_xml_would_misread(words: tuple[str, str, str]) -> None:
+    """Two hyphens end a comment, and a word may have any name."""
     _, used = shipped("three-cells/problem")
-    used = replace(used, partition=replace(used.partition, words=("-", "---", "w--")))
-    assert ET.fromstring(behaviour_trees(choices(used, used.words_of("--- -")))).tag == "root"
+    used = replace(used, partition=replace(used.partition, words=words))
+    said = used.words_of(f"{words[1]} {words[0]}")
+    assert ET.fromstring(behaviour_trees(choices(used, said))).tag == "root"
 
 
 @pytest.mark.parametrize("fails", [False, True])

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree as ET
 
 import pytest
 
@@ -98,17 +97,6 @@ def test_the_command_as_json(ask: Ask, of_cells: Ask, tmp_path: Path) -> None:
         assert (shown.code, shown.out) == (0, text)
         assert asked(*to, "-o", tmp_path / "file").out == ""
         assert (tmp_path / "file").read_text() == text
-
-
-def test_names_that_xml_would_misread(
-    coordlang: Command, languages: tuple[Path, Path], tmp_path: Path
-) -> None:
-    """Two hyphens end an XML comment; a word may have any name."""
-    odd = tmp_path / "l.json"
-    odd.write_text(languages[1].read_text().replace('"w1"', '"a--b<&"'))
-    shown = coordlang("export", odd, *CELLS, "a--b<& w0", "--to", "bt")
-    assert shown.code == 0, shown.err
-    assert ET.fromstring(shown.out).get("BTCPP_format") == "4"
 
 
 @pytest.mark.parametrize(

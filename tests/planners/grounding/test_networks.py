@@ -212,23 +212,21 @@ def test_random_networks() -> None:
     assert seen.get("several states", 0) >= 30, seen
 
 
-def test_a_network_of_joint_actions_is_refused() -> None:
-    text = """(define (domain d) (:predicates (p))
-      (:action x :parameters ()
-        ; subaction r1 (do)
-        :effect (p))
-      (:concurrency-constraint v :parameters () :bounds (2 2) :actions ((x))))"""
-    with pytest.raises(BadInput, match="a concurrency network in a joint-action domain"):
-        parse_domain(Source("d", text))
-
-
-def test_an_action_in_a_formula_of_joint_actions_is_refused() -> None:
-    text = """(define (domain d) (:predicates (p))
-      (:action x :parameters ()
-        ; subaction r1 (do)
-        :effect (when (not (y)) (p)))
-      (:action y :parameters ()
-        ; subaction r1 (do-not)
-        :effect (p)))"""
-    with pytest.raises(BadInput, match="d:2:7: action 'y' is used as a formula in a joint-action"):
+@pytest.mark.parametrize(
+    ("effect", "more", "message"),
+    [
+        (
+            *("(p)", "(:concurrency-constraint v :parameters () :bounds (2 2) :actions ((x)))"),
+            "a concurrency network in a joint-action domain",
+        ),
+        ("(when (not (y)) (p))", "", "d:2:7: action 'y' is used as a formula in a joint-action"),
+    ],
+)
+def test_what_joint_actions_do_not_have(effect: str, more: str, message: str) -> None:
+    text = f"""(define (domain d) (:predicates (p))
+      (:action x :parameters () ; subaction r1 (do)
+        :effect {effect})
+      (:action y :parameters () ; subaction r1 (do-not)
+        :effect (p)) {more})"""
+    with pytest.raises(BadInput, match=message):
         parse_domain(Source("d", text))

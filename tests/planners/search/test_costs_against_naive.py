@@ -6,7 +6,6 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import product
 from random import Random
 
@@ -14,11 +13,11 @@ import pytest
 
 from planners.classical import compile_classical
 from planners.loading import PlanningInstance, task_of
-from planners.pddl.lifted import And, Formula, Not
 from planners.pddl.model_options import ModelOptions
 from planners.search.optimal_plans import plan_spaces, search
 from planners.search.plans import Plans
 from planners.search.reachable import explore
+from tests.support.joint_twin import far
 from tests.support.naive_classical import optimal_plans
 from tests.support.naive_joint_steps import Labels, TooLarge, Twin
 from tests.support.random_pddl import Kind, random_model
@@ -109,19 +108,14 @@ def test_the_same_cost_and_the_same_number_of_plans(kind: Kind) -> None:
         model = loaded.model
         twin = Twin(loaded.domain, loaded.problems[0], loaded.team, 3000)
         try:
-            last = twin.reachable(128)[-1]
-            parts: tuple[Formula, ...] = (
-                *sorted(last - twin.init, key=str),
-                *(Not(a) for a in sorted(twin.init - last, key=str)),
-            )
-            goal = And(parts)
-            found = twin.optimal(goal, step_price(twin, price))
+            problem = far(twin, twin.reachable(128)[-1])
+            found = twin.optimal(problem.goal, step_price(twin, price))
             assert found is not None
         except TooLarge:
             seen["too large"] += 1
             continue
         wanted = (found.makespan, found.second, found.count)
-        task = task_of(model, loaded.domain, replace(loaded.problems[0], goal=goal))
+        task = task_of(model, loaded.domain, problem)
         space = search(model, task)
         assert (*space.cost_of(0), Plans.of(space).count) == wanted, seed
         init = task.init[None, :]
