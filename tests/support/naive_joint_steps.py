@@ -125,8 +125,11 @@ class Twin:
         formulas = [f for s in schemas for f in (s.precondition, *(e.condition for e in s.effects))]
         return schema.name not in {name for f in formulas for name in _actions_named(f)} | bound
 
-    def optimal(self, goal: Formula, price: Price = lambda _: 0) -> Optimal | None:
-        """The plans of least length, of these those of least price; None if there is none."""
+    def optimal(self, goal: Formula, price: Price = lambda _: 0, slack: int = 0) -> Optimal | None:
+        """The plans of least length, or of ``slack`` steps more, of these those of least price.
+
+        None if there is none.
+        """
 
         @cache
         def is_goal(state: State) -> bool:
@@ -158,8 +161,8 @@ class Twin:
             makespan += 1
             if not layer:
                 return None
-        second, count = rest(self.init, makespan)
-        return Optimal(makespan, int(second), count, plans(self.init, makespan))
+        second, count = rest(self.init, makespan + slack)
+        return Optimal(makespan, int(second), count, plans(self.init, makespan + slack))
 
 
 @dataclass(frozen=True)

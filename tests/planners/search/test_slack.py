@@ -4,20 +4,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from itertools import product
 
 import numpy as np
 import pytest
 
-from planners.joint.model import JointModel, PlanningTask
 from planners.loading import PlanningInstance, build
 from planners.pddl.model_options import ModelOptions
 from planners.search.optimal_plans import plan_spaces, search
-from planners.search.plans import Plan, Plans
+from planners.search.plans import Plans, texts
 from planners.search.reachable import explore
 from planners.system.errors import BadInput, ProvedImpossible, UsageError
 from tests.support.domains import loaded_from
+from tests.support.naive_joint_steps import Labels, Price, Twin
 from tests.support.random_models import random_model
 from tests.support.texts import model_of
 
@@ -32,6 +31,18 @@ COUNTS = [
     ("corridor/problem", 10, (32, 1920, 70680)),
     ("handover/exchange", 10, (128, 3392, 55904)),
 ]
+
+
+def by_definition(
+    found: PlanningInstance, price: Price = lambda _: 0
+) -> set[tuple[Labels, ...]] | None:
+    """The plans within slack, with a rest at the end; None if there is none, or too many."""
+    (problem,) = found.problems
+    twin = Twin(found.domain, problem, found.team)
+    if found.model.cost == "makespan+actions":
+        price = twin.actions
+    listed = twin.optimal(problem.goal, price, found.model.slack)
+    return None if listed is None or listed.count > 4_000 else {*listed.plans}
 
 
 def loaded(folder: str, stem: str, slack: int, **options: object) -> PlanningInstance:
@@ -56,17 +67,18 @@ def test_random_tasks_have_the_plans_that_the_definition_lists(robots: int, seed
         options = replace(options, slack=slack, words_see_slack=sees, remember_actions=remembers)
         try:
             found = build(domain, [problem], options)
-            naive = Sequences(found.model, found.tasks[0]).within(slack)
+            naive = by_definition(found)
             if naive is None:
                 continue
             space = search(found.model, found.tasks[0])
-        except (BadInput, TooMany, ProvedImpossible, UsageError):
+        except (BadInput, ProvedImpossible, UsageError):
             continue
         plans = Plans.of(space)
-        assert {*plans} == naive
+        assert {texts(found.model, plan) for plan in plans} == naive
+        assert len(naive) == plans.count
         short = {plans.without_rest(plan) for plan in plans}
         assert len(short) == plans.count
-        assert {plans.padded(plan) for plan in short} == naive
+        assert {plans.padded(plan) for plan in short} == {*plans}
         shorter += len({*map(len, short)}) > 1
         nodes = np.column_stack((space.goal, space.state, space.layer))
         assert len(np.unique(nodes, axis=0)) == len(space)
@@ -141,12 +153,14 @@ DEAR = """(define (domain d) (:types robot) (:constants r1 r2 - robot)
  (:action nop :agent ?r - robot :parameters () :effect (a ?r)))"""
 
 
-@pytest.mark.parametrize(("domain", "lengths"), [(TICK, [2, 3, 3]), (DEAR, [2] * 4)])
-def test_a_rest_is_in_the_goal_and_may_be_dear(domain: str, lengths: list[int]) -> None:
+@pytest.mark.parametrize(("domain", "rest", "lengths"), [(TICK, 0, [2, 3, 3]), (DEAR, 2, [2] * 4)])
+def test_a_rest_is_in_the_goal_and_may_be_dear(domain: str, rest: int, lengths: list[int]) -> None:
     problem = "(define (problem p) (:domain d) (:goal (done)))"
     found = model_of(domain, problem, ModelOptions(slack=1, cost="makespan+cost"))
     plans = Plans.of(search(found.model, found.tasks[0]))
-    assert {*plans} == Sequences(found.model, found.tasks[0]).within(1)
+    price = {None: rest, "(do r1)": 1, "(do r2)": 1}
+    naive = by_definition(found, lambda step: sum(price.get(text, 0) for text in step))
+    assert {texts(found.model, plan) for plan in plans} == naive
     assert sorted(len(plans.without_rest(plan)) for plan in plans) == lengths
 
 
@@ -164,49 +178,3 @@ def test_what_is_no_slack_is_refused(options: dict[str, object], message: str) -
     robots_cannot_wait = loaded("grid-joint", "corners-3x3", 1)
     with pytest.raises(UsageError, match="must be able to wait"):
         search(robots_cannot_wait.model, robots_cannot_wait.tasks[0])
-
-
-#: A joint step: its labels, its cost, and the state that it leads to.
-Step = tuple[tuple[int, ...], int, bytes]
-
-
-class TooMany(Exception):
-    """More sequences than a twin should list."""
-
-
-class Sequences:
-    """The sequences of joint steps of a task that end in its goal, by their number of steps."""
-
-    def __init__(self, model: JointModel, task: PlanningTask, most: int = 4_000) -> None:
-        self.model, self.task, self.most = model.without_slack, task, most
-        self.steps = cache(self._steps)
-
-    def _steps(self, state: bytes) -> list[Step]:
-        found = self.model.successors(np.frombuffer(state, np.uint64)[None, :])
-        rows = zip(found.labels.tolist(), found.cost.tolist(), found.result, strict=True)
-        return [(tuple(labels), cost, row.tobytes()) for labels, cost, row in rows]
-
-    def of_length(self, length: int) -> dict[Plan, int]:
-        """All that end in the goal after so many steps, each with what it costs."""
-        reached: list[tuple[Plan, int, bytes]] = [((), 0, self.task.init.tobytes())]
-        for _ in range(length):
-            reached = [
-                ((*plan, labels), paid + cost, after)
-                for plan, paid, state in reached
-                for labels, cost, after in self.steps(state)
-            ]
-            if len(reached) > self.most:
-                raise TooMany
-        rows = np.frombuffer(b"".join(state for *_, state in reached), np.uint64)
-        rows = rows.reshape(len(reached), len(self.task.init))
-        holds = self.model.holds(self.task.goal, rows)
-        return {plan: paid for (plan, paid, _), ends in zip(reached, holds, strict=True) if ends}
-
-    def within(self, slack: int) -> set[Plan] | None:
-        """The plans within slack, with a rest at the end; None where the task is too hard."""
-        makespan = next((k for k in range(5) if self.of_length(k)), None)
-        if makespan is None:
-            return None
-        found = self.of_length(makespan + slack)
-        cheapest = min(found.values(), default=0)
-        return {plan for plan, paid in found.items() if paid == cheapest}
