@@ -14,7 +14,7 @@ from planners.pddl.sexpr import Source
 from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans
-from planners.system.errors import BadInput, Unsupported
+from planners.system.errors import Unsupported
 from tests.support import naive
 from tests.support.domains import ROOT
 from tests.support.pages import DOCS, blocks, code, links, prose, rows, sections
@@ -52,11 +52,6 @@ def test_what_is_not_supported(cells: list[str]) -> None:
     assert place is not None
     assert place.file == ("problem.pddl" if cells[1] == "init" else "domain.pddl")
     assert place.line > 0
-
-
-def test_an_unknown_section_is_bad_input() -> None:
-    with pytest.raises(BadInput, match="unknown section ':observe'"):
-        model_of(*texts("section", "(:observe (p))"))
 
 
 def test_every_answer_is_compared() -> None:

@@ -15,14 +15,13 @@ from typing import Any
 import pytest
 
 from coordlang.commands.main import run
-from coordlang.language.candidates import all_pairs
 from coordlang.language.file import read_language
 from coordlang.language.listed import read_task_file
 from coordlang.language.recorded import options_of
 from coordlang.language.sentences import sentence
 from planners.search.plans import Plans, counts
 from tests.support.command import Command
-from tests.support.domains import ROOT, T_MAP, files_of, read
+from tests.support.domains import ROOT, T_MAP, all_tasks, files_of
 from tests.support.pages import DOCS, PAGES, blocks, commands, matches, run_command, run_python
 
 #: Pages of many commands, which take a while.
@@ -190,8 +189,7 @@ def test_reader_says_the_same(
     assert run([*build, "--tasks", "all", "-o", str(path), *flags]) == 0
     plain = reader["read_language"](path)
     language = read_language(path)
-    domain, problem = read("t-map")
-    candidates = all_pairs(domain, [problem], options_of(language))
+    candidates = all_tasks("t-map", options=options_of(language))
     table = language.partition(candidates.model)
     codec = candidates.model.codec
     compared, words = 0, set()

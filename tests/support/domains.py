@@ -65,10 +65,12 @@ def read(folder: str, stem: str = "problem") -> tuple[Domain, Problem]:
 
 
 @cache
-def all_tasks(folder: str, stem: str = "problem") -> Candidates:
+def all_tasks(
+    folder: str, stem: str = "problem", options: ModelOptions | None = None
+) -> Candidates:
     """All pairs of states of a shipped problem."""
     domain, problem = read(folder, stem)
-    return all_pairs(domain, [problem])
+    return all_pairs(domain, [problem], options)
 
 
 @cache

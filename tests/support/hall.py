@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 DOMAIN = """(define (domain hall)
@@ -32,12 +33,6 @@ def factored(folder: Path) -> Path:
         )
         (folder / f"domain-{robot}.pddl").write_text(domain)
         problem = PROBLEM.replace("r1 r2 - robot", f"{robot} - {robot}kind")
-        facts = [
-            f"(at {other} {room})"
-            for other, room in (("r1", "a"), ("r2", "b"), ("r1", "b"), ("r2", "a"))
-            if other != robot
-        ]
-        for fact in facts:
-            problem = problem.replace(fact, "")
+        problem = re.sub(rf"\(at (?!{robot} )[^)]*\)", "", problem)
         (folder / f"problem-{robot}.pddl").write_text(problem)
     return folder

@@ -79,6 +79,7 @@ WRONG = [
     (d(PLACES, PLACES.replace("?y", "?x")), "variable ?x is declared twice\n  Give one of the two"),
     (d(":effect", ":effects"), "unknown keyword ':effects' in"),
     (("(define (domain hall))", PROBLEM), "this domain has no action"),
+    (d("(:types", "(:observe (p)) (:types"), "unknown section ':observe'"),
     ((f"{DOMAIN.rstrip()[:-1]}(:action go))", PROBLEM), "action 'go' is declared twice"),
     (
         d("(at ?r ?x) (door", "(at r1 ?x) (door"),
@@ -244,6 +245,7 @@ SAMPLE = "--sample and --max exclude each other"
         ("verify l.json d", "DOMAIN PROBLEMS..., or --factored DIR without"),
         ("coordination d p --factored x", "DOMAIN PROBLEMS..., or --factored DIR without"),
         ("build d p", "Missing option '-o'"),
+        ("report l d p", "Missing option '-o'"),
         ("build d.pddl p.pddl --seed -1 -o l.json", "--seed -1: expected 0 or more"),
         ("plans d p --max 1 --sample 2", SAMPLE),
         ("understand l d p w0 --max 1 --sample 2", SAMPLE),

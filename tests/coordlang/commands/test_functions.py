@@ -27,12 +27,12 @@ from planners.pddl.formula_tree import conjuncts
 from planners.pddl.model_options import ModelOptions
 from tests.coordlang.commands.conftest import FILES
 from tests.support.command import Command
-from tests.support.domains import DOMAINS, ROOT
+from tests.support.domains import ROOT, files_of
 from tests.support.hall import factored
 from tests.support.texts import parsed
 
 T_MAP, CELLS = FILES["T-MAP"], FILES["CELLS"]
-CORRIDOR = [DOMAINS / "corridor" / "domain.pddl", DOMAINS / "corridor" / "problem.pddl"]
+CORRIDOR = files_of("corridor")
 
 
 @pytest.fixture(scope="module")
@@ -301,9 +301,6 @@ def test_a_signature_names_what_python_takes() -> None:
 
 # ---- what import coordlang gives, what it costs, and what hides it
 
-#: Commands that have no function of the same name.
-ONLY_COMMANDS = {"domains", "import", "report", "robot", "schema", "tasks"}
-
 
 def python(*arguments: str, cwd: Path = ROOT) -> tuple[int, str, str]:
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
@@ -315,7 +312,8 @@ def python(*arguments: str, cwd: Path = ROOT) -> tuple[int, str, str]:
 
 def test_every_name_is_there() -> None:
     assert set(coordlang.__all__) <= set(dir(coordlang))
-    functions = {*COMMANDS, "load", "load_language"} - ONLY_COMMANDS
+    only_commands = {"domains", "import", "report", "robot", "schema", "tasks"}
+    functions = {*COMMANDS, "load", "load_language"} - only_commands
     assert set(coordlang.__all__) >= {*functions, "Language", "Monitor", "CoordlangError"}
     for name in coordlang.__all__:
         assert getattr(coordlang, name).__doc__, name

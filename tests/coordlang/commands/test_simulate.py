@@ -19,19 +19,12 @@ from tests.coordlang.commands.conftest import FILES, Shell
 from tests.support.command import Outcome
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("simulate") / "language.json"
-    coordlang.build(*FILES["T-MAP"], method="minimal").language.save(path)
-    return path
-
-
 @pytest.fixture
-def simulate(made: Path, shell: Shell) -> Shell:
+def simulate(language: Path, shell: Shell) -> Shell:
     """The command with a language of the T."""
 
     def call(line: str, code: int = 0, *said: str) -> Outcome:
-        return shell(f"simulate {made} T-MAP {line}", code, *said)
+        return shell(f"simulate {language} T-MAP {line}", code, *said)
 
     return call
 
@@ -138,9 +131,9 @@ def test_a_record_is_drawn_again(simulate: Shell, shell: Shell) -> None:
     assert Path("again.png").read_bytes() == sheet
 
 
-def test_wishes_choose_the_sentence(simulate: Shell, made: Path) -> None:
-    best = coordlang.plan(made, *FILES["T-MAP"], prefer="first:r2").sentence
-    data = json.loads(simulate("--prefer first:r2 --json").out)
+def test_wishes_choose_the_sentence(simulate: Shell, language: Path) -> None:
+    best = coordlang.plan(language, *FILES["T-MAP"], prefer="first:r1").sentence
+    data = json.loads(simulate("--prefer first:r1 --json").out)
     assert data["sentence"] == best != json.loads(simulate("--json").out)["sentence"]
 
 

@@ -184,13 +184,12 @@ def test_the_width_is_the_terminals(monkeypatch: pytest.MonkeyPatch) -> None:
     assert terminal.line_width() == 60
 
 
-def test_tables_of_choices_fit(coordlang: Command, tmp_path: object) -> None:
+def test_tables_of_choices_fit(coordlang: Command, tmp_path: Path) -> None:
     """Shipped problems with three robots: robots that only idle share a table."""
     files = files_of("charger", "three-robots")
-    language, plan = f"{tmp_path}/l.json", f"{tmp_path}/plan"
+    language, plan = tmp_path / "l.json", tmp_path / "plan"
     coordlang("build", *files, "--method", "greedy", "-o", language)
-    with open(plan, "w") as file:
-        file.write(coordlang("plans", *files, "--max", "1").out)
+    plan.write_text(coordlang("plans", *files, "--max", "1").out)
     said = coordlang("say", language, *files, plan).out.strip()
     out = coordlang("choices", language, *files, said).out
     assert max(map(len, out.split("\n"))) <= WIDTH

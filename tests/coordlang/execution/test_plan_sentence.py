@@ -14,7 +14,7 @@ from coordlang.commands.building import build_language
 from coordlang.execution.guided_search import ExpandedStates, plan_under_sentence
 from coordlang.execution.plan_sentence import NotAPlan, NotOptimal, PlanDag, sentence_of_plan
 from coordlang.execution.task_language import NoPlanFits, TaskLanguage
-from coordlang.language.candidates import Candidates, all_pairs
+from coordlang.language.candidates import Candidates
 from coordlang.language.listed import ground_task
 from planners.check.rules import validate
 from planners.joint.model import PlanningTask
@@ -25,7 +25,7 @@ from planners.search.optimal_plans import search
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, Texts, texts
 from planners.system.errors import ProvedImpossible
-from tests.support.domains import read
+from tests.support.domains import all_tasks
 from tests.support.naive import plans_by_sentence
 from tests.support.task_languages import EACH_FOLDER, RANDOM, random_task_languages, shipped
 
@@ -172,8 +172,7 @@ def test_random_models(robots: int, number: int) -> None:
 
 
 def test_without_a_common_step_it_is_the_plan_of_its_own_task() -> None:
-    domain, problem = read("grid", "gw1-2x2")
-    made = all_pairs(domain, [problem], ModelOptions(asynchronous=True))
+    made = all_tasks("grid", "gw1-2x2", ModelOptions(asynchronous=True))
     for used in languages_in_tasks(build_language(made, "best").language, made):
         found = plan_under_sentence(used, None)
         assert found.words[0] == used.word[used.start]

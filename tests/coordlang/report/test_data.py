@@ -253,23 +253,4 @@ def test_coordinates(coordlang: Command, language: Path, tmp_path: Path) -> None
     assert data_of(page.read_bytes())["places"][0]["x"] == 9
     (tmp_path / "coordinates.json").write_text("[]")
     assert coordlang("report", language, T_MAP[0], copy, *one).code == 31
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code"),
-    [
-        (("-o", "{folder}"), 2),
-        ((), 2),
-        (("--coordinates", "{folder}/none.json", "-o", "-"), 31),
-        (("--cost", "makespan+actions", "-o", "-"), 2),
-    ],
-)
-def test_what_is_refused(
-    arguments: tuple[str, ...], code: int, coordlang: Command, language: Path, tmp_path: Path
-) -> None:
-    before = language.read_bytes()
-    given = [a.format(language=language, folder=tmp_path) for a in arguments]
-    outcome = coordlang("report", language, *T_MAP, *given)
-    assert outcome.code == code
-    assert outcome.err
-    assert language.read_bytes() == before
+    assert coordlang("report", language, *T_MAP, *one, "--coordinates", sidecar).code == 31

@@ -27,7 +27,7 @@ from planners.parallel.workers import Workers
 from planners.pddl.model_options import ModelOptions
 from planners.search.portions import PORTION
 from planners.system.errors import BadInput, ProvedImpossible
-from tests.support.domains import all_tasks, files_of, own_task, read
+from tests.support.domains import all_tasks, files_of, own_task
 from tests.support.random_models import random_model
 from tests.support.symmetric_worlds import GRID, world
 
@@ -95,13 +95,12 @@ def test_random_models() -> None:
 
 
 def test_where_symmetries_are_not_looked_for() -> None:
-    grid, problem = read("grid", "gw2-2x3")
     small = all_tasks("grid", "gw2-2x3")
     assert symmetric_goals(small) is None  # less work than symmetries take
     assert symmetric_goals(small, 0, 0) is not None
     assert symmetric_goals(small, least=0, for_action=10**6) is None
     assert symmetric_goals(own_task("grid", "gw2-2x3"), 0, 0) is None
-    remembering = all_pairs(grid, [problem], ModelOptions(remember_actions=True))
+    remembering = all_tasks("grid", "gw2-2x3", ModelOptions(remember_actions=True))
     assert symmetric_goals(remembering, 0, 0) is None
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 from fractions import Fraction
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
@@ -18,21 +18,17 @@ from coordlang.language.provenance import percent
 from coordlang.required.failure import failures_under
 from coordlang.verification.certificate_file import write_certificate
 from tests.support.command import Command
-from tests.support.domains import DOMAINS
+from tests.support.domains import files_of
+from tests.support.task_languages import built_for
 
-SQUARE = DOMAINS / "grid" / "domain.pddl", DOMAINS / "grid" / "gw1-2x2.pddl"
+SQUARE = files_of("grid", "gw1-2x2")
 #: The open 2x2 grid in silence, all pairs of states.
 SILENCE = {"failure_mean": 5 / 66, "failure_worst": 0.5}
 
 
-@cache
-def built() -> bytes:
-    return to_bytes(library.build(*SQUARE, tasks="all", method="greedy").language)
-
-
 def silent(path: Path, tolerance: dict[str, float] | None) -> Path:
     """One word for all states."""
-    data: dict[str, Any] = json.loads(built())
+    data: dict[str, Any] = json.loads(to_bytes(built_for("grid", "gw1-2x2", "greedy").language))
     data |= {"words": ["w0"], "states": dict.fromkeys(data["states"], "w0"), "default": "w0"}
     own = {"method": "by hand", "size": 1, "lower_bound": 1, "proved_minimal": False}
     data["guarantee"] = {**own, "coordination_language": False}

@@ -134,15 +134,11 @@ def test_neighbours_without_a_link_have_a_wall_between_them() -> None:
     assert (-0.5, 0.5, 1.5, 0.5) in Floor(ring, {}).walls
 
 
-def test_places_that_are_no_cells_have_no_walls() -> None:
+def test_places_that_are_no_cells_have_no_walls_and_need_coordinates() -> None:
     towns = world(("depot", "town"), ("depot", "town"))
     floor = Floor(towns, {"depot": (0, 0), "town": (1.5, 2)})
     assert floor.points == {"depot": (0, 2), "town": (1.5, 0)}
     assert floor.walls == ()
-
-
-def test_places_without_coordinates_are_an_error() -> None:
-    towns = world(("depot", "town"), ("depot", "town"))
     with pytest.raises(BadInput, match=r"not known: depot, town(.|\n)*--coordinates"):
         Floor(towns, {})
 

@@ -29,7 +29,7 @@ from planners.system.errors import Refuted
 from tests.support import naive
 from tests.support.candidates import small_candidates
 from tests.support.domains import all_tasks
-from tests.support.symmetric_worlds import GRID, world
+from tests.support.symmetric_worlds import GRID, rename, world
 from tests.support.texts import parsed
 
 MOST = 25
@@ -92,19 +92,15 @@ def test_mixtures_of_plans_in_a_part_fail_in_the_part_iff_in_the_whole(number: i
     assert failing > 20
 
 
-def renamed(text: str, renaming: dict[str, str]) -> str:
-    return re.sub(r"[^ ()]+", lambda found: renaming.get(found[0], found[0]), text)
-
-
 def edges_of(space: PlanSpace, renaming: dict[str, str]) -> set[object]:
     """The edges as texts, under a renaming of objects."""
     codec, robots, end = space.model.codec, space.model.robots, ends(space)
     order = sorted(range(len(robots)), key=lambda n: renaming.get(robots[n], robots[n]))
-    keys = [frozenset(renamed(a, renaming) for a in codec.decode(row)) for row in space.rows]
+    keys = [frozenset(rename(a, renaming) for a in codec.decode(row)) for row in space.rows]
     found: set[object] = set()
     for edge, source in enumerate(space.sources.tolist()):
         texts = space.model.texts(space.labels_of(edge))
-        labels = tuple([texts[n] and renamed(str(texts[n]), renaming) for n in order])
+        labels = tuple([texts[n] and rename(str(texts[n]), renaming) for n in order])
         target = space.state[space.target[edge]]
         goal = end[space.goal[source]]
         found.add((keys[space.state[source]], labels, keys[target], keys[goal]))
@@ -115,7 +111,7 @@ def states_under(space: PlanSpace, renaming: dict[str, str]) -> list[int]:
     """Where a renaming takes the states of a table, by their texts; all of them must go somewhere."""
     codec = space.model.codec
     number = {frozenset(codec.decode(row)): n for n, row in enumerate(space.rows)}
-    return [number[frozenset(renamed(a, renaming) for a in atoms)] for atoms in number]
+    return [number[frozenset(rename(a, renaming) for a in atoms)] for atoms in number]
 
 
 @pytest.mark.parametrize("seeds", [5, pytest.param(16, marks=pytest.mark.thorough)])

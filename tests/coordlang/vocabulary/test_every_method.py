@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from coordlang.commands.building import Making, build_language
-from coordlang.language.candidates import all_pairs
 from coordlang.vocabulary import METHODS
 from coordlang.vocabulary.job import Assignment
 from planners.pddl.model_options import ModelOptions
@@ -18,7 +17,7 @@ from planners.system.errors import OutOfMemory, OutOfTime
 from tests.support import naive
 from tests.support.candidates import small_candidates
 from tests.support.command import Command
-from tests.support.domains import all_tasks, files_of, own_task, read
+from tests.support.domains import all_tasks, files_of, own_task
 from tests.support.task_languages import built_for
 
 
@@ -107,8 +106,7 @@ def test_what_more_effort_might_bring(coordlang: Command, tmp_path: Path) -> Non
 
 def test_single_states_are_merged_before_effort_is_spent_on_bounds() -> None:
     """Without a common step no words are greedy's: each state begins with its own."""
-    domain, problem = read("grid", "gw2-2x3")
-    candidates = all_pairs(domain, [problem], ModelOptions(asynchronous=True))
+    candidates = all_tasks("grid", "gw2-2x3", ModelOptions(asynchronous=True))
     built = build_language(candidates, effort=1)
     assert built.verdict.holds
     assert len(built.job.states) == 30 > 2 * built.language.guarantee.size

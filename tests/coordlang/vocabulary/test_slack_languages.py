@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from coordlang.commands.building import build_language
-from coordlang.language.candidates import Candidates, all_pairs, from_problems
+from coordlang.language.candidates import Candidates, from_problems
 from coordlang.language.words import Partition
 from coordlang.required.miscoordination import Inseparable
 from coordlang.verification.by_definition import verify
@@ -21,15 +21,12 @@ from coordlang.vocabulary.first_differences import first_differences
 from planners.pddl.model_options import ModelOptions
 from planners.search.plans import counts
 from planners.system.errors import BadInput, ProvedImpossible, Refuted, UsageError
-from tests.support.domains import read
+from tests.support.domains import all_tasks, own_task
 from tests.support.naive import is_language, sentence
 from tests.support.random_models import random_model
 
-
-def shipped(folder: str, stem: str, *, every: bool = False, **options: object) -> Candidates:
-    domain, problem = read(folder, stem)
-    make = all_pairs if every else from_problems
-    return make(domain, [problem], ModelOptions(**options))  # type: ignore[arg-type]
+#: Where states say what is left.
+SEEING = ModelOptions(slack=1, words_see_slack=True)
 
 
 def small_tasks(seeds: range, robots: int) -> Iterator[Candidates]:
@@ -84,16 +81,14 @@ def test_verdicts_and_least_numbers_are_those_of_the_definition(robots: int, see
 
 @pytest.mark.parametrize("method", ["greedy", "minimal"])
 def test_all_methods_where_states_say_what_is_left(method: str) -> None:
-    built = build_language(
-        shipped("three-cells", "problem", slack=1, words_see_slack=True, every=True), method
-    )
+    built = build_language(all_tasks("three-cells", options=SEEING), method)
     assert built.verdict.holds
     assert built.language.guarantee.size == 6
     assert built.language.guarantee.proved_minimal == (method == "minimal")
 
 
 def test_waiting_here_or_there_is_one_sentence_and_both_plans_are_named() -> None:
-    found = shipped("three-cells", "problem", slack=1, every=True)
+    found = all_tasks("three-cells", options=ModelOptions(slack=1))
     with pytest.raises(Inseparable, match="wait in different ones") as error:
         build_language(found, "minimal")
     witness = error.value.witness
@@ -105,7 +100,7 @@ def test_waiting_here_or_there_is_one_sentence_and_both_plans_are_named() -> Non
 
 def test_methods_that_part_plans_where_states_first_differ_are_refused() -> None:
     """Propositions 3 to 6 speak of nodes: a plan may part from another one by waiting."""
-    found = shipped("grid", "corners-3x3", slack=1)
+    found = own_task("grid", "corners-3x3", ModelOptions(slack=1))
     for method in ("greedy", "separating"):
         with pytest.raises(UsageError, match="with slack") as error:
             build_language(found, method)
@@ -117,19 +112,19 @@ def test_methods_that_part_plans_where_states_first_differ_are_refused() -> None
 
 @pytest.mark.thorough
 def test_there_are_languages_where_plans_part_by_waiting() -> None:
-    found = shipped("grid", "corners-3x3", slack=1)
+    found = own_task("grid", "corners-3x3", ModelOptions(slack=1))
     built = build_language(found, "minimal")
     assert built.language.guarantee.size == 4
     # Proposition 24: it is one for optimal plans as well, for what has ended rests.
-    optimal = shipped("grid", "corners-3x3")
+    optimal = own_task("grid", "corners-3x3")
     assert verify(built.language.partition(found.model), optimal.spaces).holds
 
 
 def test_lower_bounds_are_certified() -> None:
-    found = shipped("three-cells", "problem", slack=1, words_see_slack=True, every=True)
+    found = all_tasks("three-cells", options=SEEING)
     built = build_language(found, "minimal")
     checked = check(built.certificate(), found)
     assert checked.lower_bound == built.language.guarantee.size == 6
     # For optimal plans its reasons are none.
     with pytest.raises(Refuted):
-        check(built.certificate(), shipped("three-cells", "problem", every=True))
+        check(built.certificate(), all_tasks("three-cells"))

@@ -32,7 +32,6 @@ from tests.support.jobs import until
 
 #: Lamps along a corridor that put out their neighbours: more states than anybody searches in the
 #: time of a test.
-BIG_CELLS = 24
 BIG = """
 (define (domain big)
   (:types robot cell)
@@ -45,7 +44,7 @@ BIG = """
 
 
 def big() -> PlanningInstance:
-    cells = [f"c{n}" for n in range(BIG_CELLS)]
+    cells = [f"c{n}" for n in range(24)]
     steps = " ".join(f"(next {a} {b}) (next {b} {a})" for a, b in pairwise(cells))
     lit = " ".join(f"(lit {c})" for c in cells)
     task = (

@@ -219,20 +219,14 @@ def test_many_at_once(tmp_path: Path) -> None:
 
 def test_where_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
-    assert kept_plans.default_folder({}) == tmp_path / ".cache" / "coordlang"
-    assert (
-        kept_plans.default_folder({"XDG_CACHE_HOME": "relative"})
-        == tmp_path / ".cache" / "coordlang"
-    )
-    assert (
-        kept_plans.default_folder({"XDG_CACHE_HOME": f"{tmp_path}/xdg"})
-        == tmp_path / "xdg" / "coordlang"
-    )
-    assert kept_plans.default_folder({"XDG_CACHE_HOME": f"{tmp_path}/no/xdg"}) is None
-    assert kept_plans.default_folder({"COORDLANG_CACHE": "here"}) == Path("here")
-    assert (
-        kept_plans.default_folder({"COORDLANG_CACHE": "OFF", "XDG_CACHE_HOME": str(tmp_path)})
-        is None
-    )
+    for given, found in (
+        ({}, tmp_path / ".cache" / "coordlang"),
+        ({"XDG_CACHE_HOME": "relative"}, tmp_path / ".cache" / "coordlang"),
+        ({"XDG_CACHE_HOME": f"{tmp_path}/xdg"}, tmp_path / "xdg" / "coordlang"),
+        ({"XDG_CACHE_HOME": f"{tmp_path}/no/xdg"}, None),
+        ({"COORDLANG_CACHE": "here"}, Path("here")),
+        ({"COORDLANG_CACHE": "OFF", "XDG_CACHE_HOME": str(tmp_path)}, None),
+    ):
+        assert kept_plans.default_folder(given) == found
     monkeypatch.setenv("HOME", str(tmp_path / "missing"))
     assert kept_plans.default_folder({}) is None
