@@ -20,7 +20,7 @@ from coordlang.language.listed import read_task_file
 from coordlang.language.recorded import options_of
 from coordlang.language.sentences import sentence
 from planners.search.plans import Plans, counts
-from tests.support.command import Command
+from tests.support.command import Command, program
 from tests.support.domains import ROOT, T_MAP, all_tasks, files_of
 from tests.support.pages import DOCS, PAGES, blocks, commands, matches, run_command, run_python
 
@@ -132,12 +132,6 @@ def test_a_certificate_is_verified(formula: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert f"refuted by {SOLVER} in " in done.stdout
     assert f"proof verified by {CHECKER} in " in done.stdout
-
-
-def program(path: Path, text: str) -> Path:
-    path.write_text(f"#!/bin/sh\n{text}\n")
-    path.chmod(0o755)
-    return path
 
 
 def test_the_answers_of_both_programs_count(tmp_path: Path) -> None:

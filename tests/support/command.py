@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,13 @@ def on_a_terminal(
     os.close(terminal)
     out, _ = process.communicate(timeout=60)
     return Outcome(process.returncode, out, said.decode())
+
+
+def program(path: Path, text: str) -> Path:
+    """A script of the shell that can be run."""
+    path.write_text(f"#!/bin/sh\n{text}\n")
+    path.chmod(0o755)
+    return path
 
 
 def in_shell(script: str, *arguments: object, before: str = "") -> subprocess.CompletedProcess[str]:

@@ -19,7 +19,7 @@ from coordlang.commands import terminal
 from coordlang.commands.terminal import WIDTH, columns, fitted, wrapped
 from coordlang.commands.witness import witness_text
 from planners.joint.states import split_atoms
-from tests.support.command import Command, Outcome, on_a_terminal
+from tests.support.command import Command, Outcome, on_a_terminal, program
 from tests.support.domains import ROOT, files_of
 from tests.support.forks import fork_command
 
@@ -125,9 +125,7 @@ def test_completion(shell: str) -> None:
 def test_bash_itself(tmp_path: Path) -> None:
     if shutil.which("bash") is None:
         pytest.skip("there is no bash here")
-    program = tmp_path / "coordlang"
-    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m coordlang "$@"\n')
-    program.chmod(0o755)
+    program(tmp_path / "coordlang", f'exec "{sys.executable}" -m coordlang "$@"')
     script = """eval "$(_COORDLANG_COMPLETE=bash_source coordlang)"
 COMP_WORDS=(coordlang build --method m); COMP_CWORD=3
 _coordlang_completion coordlang; echo "${COMPREPLY[@]}"; complete -p coordlang >/dev/null"""

@@ -11,7 +11,7 @@ from random import Random
 
 import pytest
 
-from coordlang.execution.choices import SentenceChoices, choices, to_bytes
+from coordlang.execution.choices import SentenceChoices, to_bytes
 from coordlang.execution.monitor import EventMonitor, MonitorError, NotAllowed, NotPossible
 from tests.support.asynchronous import World, texts
 from tests.support.events import (
@@ -23,7 +23,6 @@ from tests.support.events import (
     random_choices,
     turning_round,
 )
-from tests.support.task_languages import shipped
 
 RUNS = [(2, range(24)), (3, range(7))]
 THOROUGH = [(2, range(24, 900)), (3, range(7, 500)), (4, range(60))]
@@ -181,13 +180,6 @@ def test_what_cannot_have_happened_is_refused() -> None:
     r1.did(further)
     assert r1.finished
     assert r1.late() == ()
-
-
-def test_each_file_has_its_kind_of_monitor() -> None:
-    _, in_step = shipped("three-cells/problem")
-    data = to_bytes(choices(in_step, in_step.words_of("w1 w0")))
-    with pytest.raises(MonitorError, match="are for a Monitor"):
-        EventMonitor(json.loads(data), "r1")
 
 
 def test_while_an_event_is_under_way_it_is_all_that_may_end() -> None:

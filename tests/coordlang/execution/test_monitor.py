@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from coordlang.execution.choices import SentenceChoices, choices, to_bytes
-from coordlang.execution.monitor import Monitor, MonitorError, NotAllowed, NotPossible
+from coordlang.execution.monitor import EventMonitor, Monitor, MonitorError, NotAllowed, NotPossible
 from coordlang.execution.task_language import TaskLanguage
 from tests.support.naive_choices import Detour, Known, Listed, Own
 from tests.support.task_languages import RUNS, in_built_languages, shipped, with_twins
@@ -181,6 +181,7 @@ def test_messages(three_cells: SentenceChoices) -> None:
             "no choices of r7; it has those of r1, r2",
         ),
         (lambda: Monitor(json.loads(to_bytes(three_cells))), "whose choices"),
+        (lambda: EventMonitor(json.loads(to_bytes(three_cells)), "r1"), "are for a Monitor"),
     ):
         with pytest.raises(MonitorError, match=said):
             ask()

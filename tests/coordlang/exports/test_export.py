@@ -276,10 +276,7 @@ def test_the_formula_within_slack() -> None:
 
 
 def test_slack_that_pddl_cannot_say_is_refused() -> None:
-    seen = within_slack("three-cells", 1, 1, words_see_slack=True)
-    for export in (PddlExport, export_ltlf):
-        with pytest.raises(UsageError, match="see how much is left of the slack"):
-            export(seen, [0])
+    """Words that see what is left: tests/coordlang/commands/test_slack.py."""
     dear = within_slack("three-cells", 1, 1, cost="makespan+actions")
     with pytest.raises(UsageError, match="counts the joint steps"):
         PddlExport(dear, [0])

@@ -187,14 +187,9 @@ def test_equal_features_are_kept_once() -> None:
     partitions = set()
     for feature_, row in zip(pool.features, pool.values, strict=True):
         assert row.tolist() == np.concatenate([own.get(feature_) for own in states]).tolist()
-        partitions.add(partition_of(row.tolist()))
+        partitions.add(tuple(map(row.tolist().index, row.tolist())))
     assert len(partitions) == len(pool.features)
-    assert partition_of([0] * len(pool.values[0])) not in partitions
-
-
-def partition_of(values: list[int]) -> tuple[int, ...]:
-    first = {v: k for k, v in reversed(list(enumerate(values)))}
-    return tuple(first[v] for v in values)
+    assert (0,) * len(pool.values[0]) not in partitions
 
 
 def test_coordinates_of_a_file() -> None:

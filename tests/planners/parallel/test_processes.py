@@ -27,6 +27,7 @@ from planners.parallel.workers import workers as given_workers
 from planners.system.errors import BadInput, Note, OutOfMemory, OutOfTime, UsageError
 from planners.system.limits import address_space, limited_memory, time_limit
 from tests.support import jobs
+from tests.support.command import program
 from tests.support.domains import ROOT
 from tests.support.jobs import batch, runs, until, workers
 
@@ -128,10 +129,8 @@ def test_workers_that_cannot_start(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     given = batch(jobs.squares, 3, [range(2), range(3)])
     resource_tracker.ensure_running()  # it is started by the same program
     # One that ended at once would close its pipes while the next one is given them.
-    program = tmp_path / "ends"
-    program.write_text("#!/bin/sh\nsleep 0.2\nexit 1\n")
-    program.chmod(0o755)
-    monkeypatch.setattr(spawn, "_python_exe", os.fsencode(program))
+    ends = program(tmp_path / "ends", "sleep 0.2\nexit 1")
+    monkeypatch.setattr(spawn, "_python_exe", os.fsencode(ends))
     with pytest.raises(OutOfMemory, match="lost its worker 2 times") as caught:
         list(TWO.tables(given))
     assert "--jobs 1" in str(caught.value)
@@ -155,10 +154,10 @@ def test_a_script_without_main_guard_is_not_run_again(tmp_path: Path) -> None:
         SCRIPT
         + "print(len(list(Workers(2).tables(jobs.batch(jobs.squares, 1, [range(2)] * 2)))))\n"
     )
-    program = [sys.executable, "-P", "script.py"]
+    command = [sys.executable, "-P", "script.py"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
-        program, cwd=tmp_path, env=environment, capture_output=True, check=True, timeout=60
+        command, cwd=tmp_path, env=environment, capture_output=True, check=True, timeout=60
     )
     assert done.stdout == b"2\n"
 

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from coordlang.commands.inspect import feasibility
-from planners.joint.model import JointModel
-from planners.joint.tables import Ints, Rows, find_rows, unique_rows
+from planners.joint.tables import Ints
 from planners.loading import PlanningInstance
 from planners.search.goals import FAR
 from planners.search.heuristics import HEURISTICS, Bound, heuristic
@@ -144,19 +143,6 @@ def walking(robots: int, places: int, goal: str) -> PlanningInstance:
     return model_of(WALK, problem)
 
 
-def naive_layers(model: JointModel, init: Rows) -> list[int]:
-    """The definition: states by their least number of joint steps from the start."""
-    seen = init[None, :]
-    sizes = [1]
-    while True:
-        after, _ = unique_rows(model.successors(seen).result)
-        new = after[find_rows(seen, after) < 0]
-        if not len(new):
-            return sizes
-        sizes.append(len(new))
-        seen, _ = unique_rows(np.concatenate((seen, new)))
-
-
 @pytest.mark.parametrize("style", ["agent", "plain", "joint"])
 def test_layers_bounds_and_choices_are_those_of_the_whole_search(style: str) -> None:
     solved = unsolved = 0
@@ -169,12 +155,13 @@ def test_layers_bounds_and_choices_are_those_of_the_whole_search(style: str) -> 
         except BadInput:  # two joint actions of the same parts that do different things
             continue
         assert found.next_steps is None
-        assert (
-            list(found.layers)
-            == naive_layers(model, task.init)
-            == [len(rows) for rows in layers if len(rows)]
-        )
         space = explore(model, task.init[None, :])
+        first = int((space.rows == task.init).all(axis=1).argmax())
+        steps = nx.DiGraph(zip(space.sources.tolist(), space.target.tolist(), strict=True))
+        steps.add_node(first)
+        far = Counter(nx.single_source_shortest_path_length(steps, first).values())
+        sizes = [far[number] for number in sorted(far)]
+        assert list(found.layers) == sizes == [len(rows) for rows in layers if len(rows)]
         assert found.states == len(space)
         assert model.stepper.most_steps(space.rows) >= len(space.labels)
         start = model.successors(task.init[None, :]).labels
