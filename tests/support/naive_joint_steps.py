@@ -162,6 +162,8 @@ class Twin:
             if not layer:
                 return None
         second, count = rest(self.init, makespan + slack)
+        if not count:  # nobody can wait
+            return None
         return Optimal(makespan, int(second), count, plans(self.init, makespan + slack))
 
 
