@@ -176,8 +176,6 @@ def test_what_is_wrong_with_a_map_and_where(
 
 # ---- what the maps contain: the rules of the grid, in both styles
 
-STYLES = ("grid", "grid-joint")
-
 
 def to_every_state(space: Space) -> PlanSpace:
     """The optimal plans between all pairs of different states."""
@@ -190,7 +188,7 @@ def to_every_state(space: Space) -> PlanSpace:
     "problem", ["gw1-2x2", "gw2-2x3", "gw4-3x3", "gwb1-2x4", "gwb5-3x3", "corners-4x4"]
 )
 def test_both_styles_are_the_same_model(problem: str) -> None:
-    one, other = (world_of(style, problem).space for style in STYLES)
+    one, other = (world_of(style, problem).space for style in ("grid", "grid-joint"))
     assert one.model.codec.facts == other.model.codec.facts
     assert (one.rows == other.rows).all()
     # Only MA-PDDL has the step in which nobody moves.

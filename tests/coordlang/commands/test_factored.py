@@ -19,7 +19,6 @@ from tests.support.domains import SHARED
 from tests.support.hall import factored
 
 UNIFIED = "ma-basic", "ma-loader", "ma_buttons"
-DRIVERLOG = SHARED / "foreign" / "driverlog-factored"
 NO_TASK = {"schema", "domains", "import"}
 
 
@@ -54,7 +53,7 @@ def test_the_union_is_the_same_model(name: str, shell: Shell, tmp_path: Path) ->
     """A language built from either belongs to both, and is the same; the older hash serves, too."""
     folder = tmp_path / "files"
     if name == "driverlog":
-        folder = DRIVERLOG
+        folder = SHARED / "foreign" / "driverlog-factored"
     elif name == "hall":
         factored(folder)
     else:

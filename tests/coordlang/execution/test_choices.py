@@ -234,9 +234,6 @@ def test_a_task_that_starts_at_its_goal() -> None:
         assert not at.can(do="(move *)")
 
 
-Word = tuple[int, ...]
-
-
 def random_edges(random: Random) -> tuple[list[int], list[list[tuple[int, int]]]]:
     """The sizes of layers, the goal's first, and the edges (label, target) of each node."""
     sizes = [*(random.randint(1, 4) for _ in range(random.randint(1, 4))), 1]
@@ -250,7 +247,9 @@ def random_edges(random: Random) -> tuple[list[int], list[list[tuple[int, int]]]
     return sizes, edges
 
 
-def futures(edges: list[list[tuple[int, int]]], nodes: frozenset[int]) -> frozenset[Word]:
+def futures(
+    edges: list[list[tuple[int, int]]], nodes: frozenset[int]
+) -> frozenset[tuple[int, ...]]:
     """What may follow from some nodes."""
     found = {
         (label, *rest)

@@ -22,14 +22,13 @@ from tests.support.joint_twin import built
 from tests.support.random_pddl import Kind, random_model
 from tests.support.texts import parsed
 
-_MOST = 400
 Plan = tuple[tuple[str | None, ...], ...]
 
 
 def listed(space: PlanSpace) -> set[Plan]:
     """All plans of the task, as texts; none if they are too many."""
     plans = Plans.of(space)
-    return {tuple(map(space.model.texts, p)) for p in plans} if plans.count <= _MOST else set()
+    return {tuple(map(space.model.texts, p)) for p in plans} if plans.count <= 400 else set()
 
 
 def plans(loaded: PlanningInstance) -> set[Plan]:

@@ -28,7 +28,6 @@ EXAMPLES: dict[str, Any] = {
     **multi_agent.get_example_problems(),
     **tamp.get_example_problems(),
 }
-CLASSES = frozenset(GROUPS["PROBLEM_CLASS"])
 
 
 @pytest.fixture(autouse=True)
@@ -40,7 +39,7 @@ def _registered() -> None:
 def answer(problem: Any) -> str:
     """What the engine should say of a problem: by its class, by a feature, or a plan."""
     others = problem.kind.features - FEATURES - {"MAKESPAN"}
-    return "class" if others & CLASSES else "feature" if others else "solved"
+    return "class" if others & {*GROUPS["PROBLEM_CLASS"]} else "feature" if others else "solved"
 
 
 def without_metrics(problem: Any) -> Any:
