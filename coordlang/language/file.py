@@ -255,7 +255,7 @@ def language_from_bytes(data: bytes, position: Position) -> Language:
         producer=record.producer,
         guarantee=None if record.guarantee is UNSET else record.guarantee,
         domain={} if record.domain is UNSET else present(record.domain),
-        lifted={} if record.lifted is UNSET else _plain(record.lifted),
+        lifted={} if record.lifted is UNSET else present(record.lifted),
         tolerance=None if record.tolerance is UNSET else record.tolerance,
     )
     return Language(tuple(record.words), record.states, record.default, provenance)
@@ -269,14 +269,10 @@ def _each_once(record: TasksRecord) -> TasksRecord:
     return TasksRecord(record.kind, len(tasks), tasks=[*tasks])
 
 
-def _plain(record: msgspec.Struct) -> dict[str, Any]:
-    entries: dict[str, Any] = msgspec.to_builtins(record)
-    return entries
-
-
 def present(record: msgspec.Struct) -> dict[str, Any]:
     """The entries of a record that its file has."""
-    return {k: value for k, value in _plain(record).items() if value is not None and k != "idle"}
+    entries: dict[str, Any] = msgspec.to_builtins(record)
+    return {k: value for k, value in entries.items() if value is not None and k != "idle"}
 
 
 def refuse_first(faults: Iterator[Fault], position: Position) -> None:
