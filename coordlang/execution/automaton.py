@@ -151,19 +151,16 @@ def _alike(
 
 
 def _numbered(merged: Sequence[Sequence[_State]]) -> Automaton:
-    """Number the states in the order in which a walk by layers and labels meets them."""
+    """Number the states layer by layer, where a walk by labels has met them in their order."""
     layers: list[range] = []
-    found, end = {0: 0}, 1
     numbered: list[Mapping[int, int]] = []
     known: list[Knowledge] = []
     for layer in merged:
+        end = len(numbered) + len(layer)
         layers.append(range(len(numbered), end))
-        here, found = found, {}
-        for state in here:
-            knowledge, moves = layer[state]
+        for knowledge, moves in layer:
             known.append(knowledge)
-            numbered.append({own: found.setdefault(to, end + len(found)) for own, to in moves})
-        end += len(found)
+            numbered.append({own: end + to for own, to in moves})
     left = [1] * len(known)
     for state in reversed(range(layers[-1].start)):
         left[state] = sum(left[to] for to in numbered[state].values())
