@@ -2,7 +2,8 @@
 """What carries messages between robots: sockets in a folder of this machine, or Zenoh.
 
 A bus delivers what it can and promises nothing: what was lost is told again (`fleet_log`).  It is
-used by one thread; ``fileno`` is ready to be read when a message has come.
+used by one thread; ``fileno`` is ready to be read when a message has come, and ``send`` says
+whether a message is on its way, as far as that can be known.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from queue import SimpleQueue
-from typing import Any, Protocol
+from typing import Any
 from urllib.parse import quote
 
 from planners.system.errors import BadInput, UsageError
@@ -25,22 +26,6 @@ from planners.system.errors import BadInput, UsageError
 _MOST = 1 << 17
 #: Where Zenoh listens without a configuration: the first robot here, the next one at the next port.
 _PORT = 7460
-
-
-class Bus(Protocol):
-    """Sends messages to robots by their names, and receives those to one robot."""
-
-    def fileno(self) -> int:
-        """The file number that is ready to be read when there are messages."""
-
-    def send(self, robot: str, data: bytes) -> bool:
-        """Send a message; whether it is on its way, as far as that can be known."""
-
-    def receive(self) -> Iterator[bytes]:
-        """The messages that have come."""
-
-    def close(self) -> None:
-        """Leave the bus."""
 
 
 def opened(text: str, run: str, robot: str, robots: Sequence[str]) -> Bus:
@@ -169,6 +154,9 @@ class _ZenohBus:
         self._session.close()
         self._bell.close()
         self._rung.close()
+
+
+Bus = _UnixBus | _ZenohBus
 
 
 def _local(zenoh: Any, number: int, robots: int) -> Any:
