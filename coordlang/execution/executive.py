@@ -19,6 +19,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from random import Random
 from typing import Any
 
+import msgspec
+
 from coordlang.execution.fleet_log import (
     Agreement,
     Contradiction,
@@ -27,7 +29,6 @@ from coordlang.execution.fleet_log import (
     RobotLog,
     Version,
     decoded,
-    encoded,
 )
 from coordlang.execution.monitor import EventMonitor, MonitorError, NotPossible, drawn
 from planners.system.errors import Refuted
@@ -261,7 +262,8 @@ class Executive:
             }
             who, said = (self._run, self.robot, self.life), self._agreement.said()
             self.sent += 1
-            yield name, encoded(Message(*who, lives, knows, logs, late=late, **said))
+            message = Message(*who, lives, knows, logs, late=late, **said)
+            yield name, msgspec.json.encode(message)
 
     def unsent(self, name: str) -> bool:
         """Tell that a message could not be sent; whether to send it again at once.

@@ -110,7 +110,7 @@ class Answer(Struct, frozen=True):
 
 
 class Message(Struct, frozen=True, omit_defaults=True):
-    """A message of one robot to another; all of them have this form.
+    """A message of one robot to another, sent as JSON; all of them have this form.
 
     ``run`` names what all must agree on (domain, task, words), ``life`` the process that speaks;
     ``lives`` says of which process of each robot it has heard, ``knows`` how far it knows each
@@ -133,11 +133,6 @@ class Message(Struct, frozen=True, omit_defaults=True):
 
 
 _DECODER = msgspec.json.Decoder(Message)
-
-
-def encoded(message: Message) -> bytes:
-    """A message as it is sent: JSON."""
-    return msgspec.json.encode(message)
 
 
 def decoded(data: bytes, run: str, robot: str, others: Sequence[str]) -> Message:

@@ -19,6 +19,7 @@ from typing import Any
 from unittest.mock import Mock
 
 import pytest
+from msgspec.json import encode
 
 from coordlang.execution.choices import SentenceChoices, to_bytes
 from coordlang.execution.executive import Executive
@@ -30,7 +31,6 @@ from coordlang.execution.fleet_log import (
     Message,
     RobotLog,
     Version,
-    encoded,
 )
 from coordlang.execution.monitor import EventMonitor
 from planners.system.errors import Refuted
@@ -464,16 +464,16 @@ def test_messages_that_are_none_are_refused_once() -> None:
     pair = Pair(turning_round(), "r1", "r2")
     pair.tick(0)
     own = pair.at["r1"]
-    good = encoded(Message("run", "r2", 1))
+    good = encode(Message("run", "r2", 1))
     cases = {
         b"\xff": "no message of a robot",
         b'{"run": "run", "by": 3}': "no message of a robot",
         b"[" * 100_000: "no message of a robot",
         good.replace(b'"r2"', b'"r9"'): "not one of ours",
         good.replace(b'"run":"run"', b'"run":"another"'): "another task, or with other words",
-        encoded(Message("run", "r2", 1, knows={"r9": Version()})): "a robot that there is not: r9",
-        encoded(Message("run", "r2", 1, sentence="w9")): 'r2 follows "w9", r1 "w',
-        encoded(Message("run", "r2", 1, logs={"r2": WRONG})): "no robot can be",
+        encode(Message("run", "r2", 1, knows={"r9": Version()})): "a robot that there is not: r9",
+        encode(Message("run", "r2", 1, sentence="w9")): 'r2 follows "w9", r1 "w',
+        encode(Message("run", "r2", 1, logs={"r2": WRONG})): "no robot can be",
     }
     for data, why in cases.items():
         own.hears(data, 1)
@@ -488,7 +488,7 @@ def test_messages_that_are_none_are_refused_once() -> None:
     )
     assert name == "r2"
     part = LogPart(Version(2, 2, 2, 2), 0, events)
-    own.hears(encoded(Message("run", "r2", 1, logs={"r2": part})), 2)
+    own.hears(encode(Message("run", "r2", 1, logs={"r2": part})), 2)
     (said,) = pair.lines("r1", "why")
     assert "it waits for r1" in said
     assert pair.lines("r1", "from") == []
@@ -497,7 +497,7 @@ def test_messages_that_are_none_are_refused_once() -> None:
 def test_a_refused_message_decides_no_sentence() -> None:
     agreement = Agreement("r1", ["r2"], None, (), lambda _: "w0", lambda *_: True)
     own = Executive("run", agreement, pytest.fail, 5.0)
-    own.hears(encoded(Message("run", "r2", 1, sentence="w9", logs={"r2": WRONG})), 1)
+    own.hears(encode(Message("run", "r2", 1, sentence="w9", logs={"r2": WRONG})), 1)
     own.tick(2)
     assert agreement.sentence is None
 
