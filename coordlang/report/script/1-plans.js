@@ -7,53 +7,36 @@ class Fits {
     this.task = task;
     const position = words ? (from, at, to) => (wordOf(to) === wordOf(from) ? at : words[at + 1] === wordOf(to) ? at + 1 : -1)
       : () => 0;
-    this.node = []; this.out = []; this.layers = [];
-    const starts = !words || words[0] === wordOf(0);
-    let layer = new Map(starts ? [[0, [0, 0]]] : []);
-    const width = words ? words.length : 1, last = width - 1;
-    const levels = [layer], links = [];
+    const starts = !words || words[0] === wordOf(0), width = words ? words.length : 1;
+    let layer = starts ? [{ node: 0, said: 0, out: [], count: 0n }] : [];
+    const layers = [layer];
     for (let step = 0; step < task.steps; step++) {
-      const next = new Map(), here = new Map();
-      for (const [key, [node, at]] of layer) {
-        const found = [];
+      const next = new Map();
+      for (const { node, said, out } of layer) {
         for (let edge = task.first[node]; edge < task.first[node + 1]; edge++) {
-          const to = task.target[edge], said = position(node, at, to);
-          if (said < 0) continue;
-          const code = to * width + said;
-          if (!next.has(code)) next.set(code, [to, said]);
-          found.push([edge, code]);
+          const to = task.target[edge], then = position(node, said, to);
+          if (then < 0) continue;
+          const code = to * width + then;
+          if (!next.has(code)) next.set(code, { node: to, said: then, out: [], count: 0n });
+          out.push([edge, next.get(code)]);
         }
-        here.set(key, found);
       }
-      links.push(here); levels.push(next); layer = next;
+      layer = [...next.values()]; layers.push(layer);
     }
-    const counts = levels.map(() => new Map());
-    for (const [key, [, at]] of levels[task.steps]) if (at === last) counts[task.steps].set(key, 1n);
-    for (let step = task.steps - 1; step >= 0; step--) {
-      for (const [key, found] of links[step]) {
-        let sum = 0n;
-        for (const [, code] of found) sum += counts[step + 1].get(code) || 0n;
-        if (sum) counts[step].set(key, sum);
+    for (const at of layer) if (at.said === width - 1) at.count = 1n;
+    for (const nodes of layers.slice(0, -1).reverse()) {
+      for (const at of nodes) {
+        at.out = at.out.filter(([, to]) => to.count);
+        at.count = at.out.reduce((sum, [, to]) => sum + to.count, 0n);
       }
     }
-    this.count = [];
-    const number = levels.map(() => new Map());
-    levels.forEach((level, step) => {
-      const from = this.node.length;
-      for (const [key, [node]] of level) {
-        if (!counts[step].has(key)) continue;
-        number[step].set(key, this.node.length);
-        this.node.push(node); this.count.push(counts[step].get(key));
-      }
-      this.layers.push([from, this.node.length]);
-    });
-    levels.forEach((level, step) => {
-      for (const key of level.keys()) {
-        if (!number[step].has(key)) continue;
-        this.out.push(step === task.steps ? [] : links[step].get(key).filter(([, code]) => number[step + 1].has(code))
-          .map(([edge, code]) => [edge, number[step + 1].get(code)]));
-      }
-    });
+    const kept = layers.map(nodes => nodes.filter(at => at.count)), all = kept.flat();
+    all.forEach((at, number) => { at.number = number; });
+    this.node = all.map(at => at.node);
+    this.count = all.map(at => at.count);
+    this.out = all.map(at => at.out.map(([edge, to]) => [edge, to.number]));
+    let end = 0;
+    this.layers = kept.map(nodes => [end, end += nodes.length]);
     this.nodes = new Set(this.node);
     this.edges = new Set(this.out.flatMap(found => found.map(([edge]) => edge)));
   }
