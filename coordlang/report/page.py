@@ -63,12 +63,13 @@ def page_data(
     """
     first = selection.tasks[0].language
     model = first.model
-    tables = Tables(model, first.partition)
+    tables = Tables(len(model.robots))
     listed = _listed(language)
     for key in listed:  # they are the first states
         tables.state(key)
     tasks = [task_data(shown, tables, seed) for shown in selection.tasks]
-    states = [model.codec.decode(row) for row in tables.rows]
+    rows = np.stack([model.codec.parse_key(key) for key in tables.states])
+    states = [model.codec.decode(row) for row in rows]
     world = find_world(model, states)
     if not 1 < len(world.places) <= MOST_PLACES:  # no map: atoms are text
         world = replace(world, places=(), links=(), roles={})
@@ -94,7 +95,7 @@ def page_data(
             for robot, own in enumerate(tables.labels)
         ],
         "states": [[number[fact] for fact in state] for state in states],
-        "state_words": tables.words,
+        "state_words": first.partition.word_of(rows).tolist(),
         "mapped": len(listed),
         "pair": _pair(world, states[: len(listed)], starts),
         "state_graph": _state_graph(first) if 1 < len(language.states) <= _STATES_DRAWN else None,

@@ -15,16 +15,14 @@ from coordlang.execution.plan_sentence import carried_out
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.listed import goal_text
 from coordlang.language.sentences import Sentence, number_of_sentences
-from coordlang.language.words import Partition
 from coordlang.report.layout import layer_orders
 from coordlang.report.shown import ShownTask
 from coordlang.required.failure import TooManyToCount, failure_probability
 from coordlang.required.miscoordination import Miscoordination
 from coordlang.sites.world import World
 from coordlang.verification.by_definition import Verdict, verify
-from planners.joint.model import JointModel
 from planners.joint.states import split_atoms
-from planners.joint.tables import Ints, Rows
+from planners.joint.tables import Ints
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
 from planners.system.errors import OutOfMemory
@@ -44,22 +42,13 @@ _VERIFIED = 20_000
 class Tables:
     """States and labels that the page mentions, numbered in the order of their first mention."""
 
-    def __init__(self, model: JointModel, partition: Partition) -> None:
-        self.model = model
-        self.partition = partition
-        self.rows: list[Rows] = []
-        self.words: list[int] = []
-        self.labels: list[dict[str | None, int]] = [{None: 0} for _ in model.robots]
-        self._number: dict[str, int] = {}
+    def __init__(self, robots: int) -> None:
+        self.states: dict[str, int] = {}
+        self.labels: list[dict[str | None, int]] = [{None: 0} for _ in range(robots)]
 
     def state(self, key: str) -> int:
         """Return the number of a state, given by its key."""
-        number = self._number.setdefault(key, len(self._number))
-        if number == len(self.rows):
-            row = self.model.codec.parse_key(key)
-            self.rows.append(row)
-            self.words.append(int(self.partition.word_of(row[None, :])[0]))
-        return number
+        return self.states.setdefault(key, len(self.states))
 
     def label(self, robot: int, text: str | None) -> int:
         """Return the number of a robot's label; None is idling."""
