@@ -167,7 +167,7 @@ class Explanation(InTask):
             "task": describe(used.space, used.task),
             "covered": used.covered,
             "sentences": listed,
-            **tolerance_data(used.tolerance),
+            **tolerance_data(used.language.tolerance),
         }
 
     def __str__(self) -> str:
@@ -176,7 +176,7 @@ class Explanation(InTask):
     @property
     def head(self) -> str:
         """What the language is, in a line, and in another one what it tolerates."""
-        language, tolerance = self.used.language, self.used.tolerance
+        language, tolerance = self.used.language, self.used.language.tolerance
         number = language.provenance.tasks["count"]
         tasks = counted(number, "task") if number else "no recorded task"
         words, robots = counted(len(language.words), "word"), ", ".join(self.used.model.robots)

@@ -228,7 +228,7 @@ class InTask(Presented):
     @property
     def tolerance(self) -> Tolerance | None:
         """What may go wrong, or be longer, under the language; None: nothing."""
-        return self.used.tolerance
+        return self.used.language.tolerance
 
 
 def robot_number(robots: Sequence[str], name: str) -> int:

@@ -149,7 +149,7 @@ def simulate(files: Arguments, options: SimulateOptions) -> Simulated:
     if stopped is not None and not done:
         raise stopped
     record = record_of(prepared, floor, settings, done, wishes)
-    return Simulated(record, task.used.tolerance, stopped)
+    return Simulated(record, task.used.language.tolerance, stopped)
 
 
 def _step(used: TaskLanguage, step: str | None) -> str:

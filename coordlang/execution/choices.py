@@ -270,7 +270,7 @@ def to_record(choices: SentenceChoices, robots: Sequence[int] | None = None) -> 
         plans=json_count(Plans.of(choices.fits).count),
         covered=task_language.covered,
         guaranteed=choices.guaranteed,
-        tolerance=tolerance_data(task_language.tolerance).get("tolerance", UNSET),
+        tolerance=tolerance_data(task_language.language.tolerance).get("tolerance", UNSET),
         combinations_walked=choices.mixtures.nodes if choices.mixtures is not None else None,
         choices=[_robot(choices.fits, choices.robots[robot]) for robot in chosen],
     )

@@ -10,7 +10,6 @@ from itertools import pairwise
 import numpy as np
 
 from coordlang.language.listed import ListedTask, model_of_listed
-from coordlang.language.provenance import Tolerance
 from coordlang.language.recorded import check_source, options_of, recorded_list
 from coordlang.language.words import Language, Partition
 from coordlang.verification.by_definition import Verdict, verify
@@ -79,11 +78,6 @@ class TaskLanguage:
     def start(self) -> int:
         """The plan-space node of the task's initial state."""
         return int(self.space.starts[self.task])
-
-    @property
-    def tolerance(self) -> Tolerance | None:
-        """What may go wrong, or be longer, under the language; None: nothing."""
-        return self.language.tolerance
 
     @property
     def model(self) -> JointModel:

@@ -307,7 +307,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
                 loaded = build(found.domain, [found.problem], options.model_options(found))
                 return found, search(loaded.model, loaded.tasks[0]), messages
             task_language = self._language_in(found)
-        tolerance = task_language.tolerance
+        tolerance = task_language.language.tolerance
         if not task_language.covered:
             text = "the language does not cover this task: it guarantees nothing here"
             messages.append(_warning(text))
