@@ -13,7 +13,8 @@ from benchmarks.paper.reported import DIFFERING, SAVING_ALL, SAVING_DIFFERING
 from benchmarks.paper.sentences import MOST_LISTED, Comparison, compare, comparison_units
 from benchmarks.paper.suite import TITLES, method_of
 from benchmarks.paper.tables import elsewhere, in_percent, percent, rounded_mean, table
-from coordlang.language.sentences import Flexibility, Floats
+from coordlang.language.sentences import Flexibility
+from planners.joint.tables import Floats
 
 #: Tasks that the paper's figure shows.
 SHOWN = 100

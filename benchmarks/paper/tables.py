@@ -10,9 +10,8 @@ import numpy as np
 from benchmarks.frame import markdown
 from benchmarks.paper.recipe import Record
 from benchmarks.paper.suite import METHODS, world_and_method
-from coordlang.language.sentences import Floats
 from coordlang.required.failure import wilson
-from planners.joint.tables import Ints
+from planners.joint.tables import Floats, Ints
 
 #: Columns of a table: their heads, and what they show of a record.
 Columns = Mapping[str, Callable[[Record], object]]

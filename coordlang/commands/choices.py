@@ -145,7 +145,7 @@ def show_choices(found: RobotsChoices, options: ChoicesOptions) -> int:
         may_fail = found.tolerance is not None and found.tolerance.may_fail
         if is_tolerated := found.covered and may_fail:
             failure = found.failure
-            share = "" if failure is None else f" in {percent(float(failure))} of all runs"
+            share = "" if failure is None else f" in {percent(failure)} of all runs"
             said = f"choices of this task miscoordinate{share}, for example:"
         else:
             why = "the language does not cover it"

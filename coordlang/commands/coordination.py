@@ -78,7 +78,7 @@ class TaskCoordination(Presented, TaskAnswer):
             return line
         share = self.failures.estimate.text() if self.failures.estimate else None
         if self.failure is not None:
-            share = percent(float(self.failure))
+            share = percent(self.failure)
         if share:
             line += "\nWithout a word, robots that choose by themselves "
             line += f"fail in {share} of all runs."

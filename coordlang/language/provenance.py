@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from fractions import Fraction
 from hashlib import sha256
 from typing import Annotated, Any
 
@@ -83,13 +84,13 @@ def tolerance_data(tolerance: Tolerance | None) -> dict[str, Any]:
     return {"tolerance": data} if data else {}
 
 
-def percent(share: float) -> str:
+def percent(share: float | Fraction) -> str:
     """A probability as text: three digits, and never rounded to what it is not."""
     if share in (0, 1):
         return f"{100 * share:.0f} %"
     if share < 0.000_05:
         return "less than 0.01 %"
-    return f"{min(100 * share, 99.99):.3g} %" if share < 0.999 else "more than 99.9 %"
+    return f"{min(100 * float(share), 99.99):.3g} %" if share < 0.999 else "more than 99.9 %"
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,10 +9,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coordlang.language.words import Partition
-from planners.joint.tables import Ints
+from planners.joint.tables import Floats, Ints
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import OutOfMemory
 from planners.system.limits import memory_left
@@ -136,8 +135,6 @@ def _choices(plans: PlanSpace) -> tuple[tuple[tuple[str | None, ...], ...], ...]
 
 # ---- how much a language leaves open, and how much it need not say
 
-
-Floats = NDArray[np.float64]
 
 #: What a sentence of a node takes while sentences are counted, in bytes, and the most that are.
 _SENTENCE, _MOST_COUNTED = 200, 20_000_000

@@ -10,11 +10,9 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coordlang.sites.coordinates import Point, from_names
-
-Floats = NDArray[np.float64]
+from planners.joint.tables import Floats
 
 #: Sweeps over the layers of a plan space that order its nodes.
 _SWEEPS = 12

@@ -345,8 +345,8 @@ class Failures:
         """Return it as the end of a sentence, "robots .. fail ..": how often, over many tasks."""
         if self.mean is not None and self.worst is not None:
             return (
-                f"fail in {percent(float(self.mean))} of all runs, and in "
-                f"{percent(float(self.worst))} in the worst task"
+                f"fail in {percent(self.mean)} of all runs, and in "
+                f"{percent(self.worst)} in the worst task"
             )
         if self.estimate is not None:
             return f"fail in {self.estimate.text()} of all runs"

@@ -12,9 +12,9 @@ from itertools import product
 
 import numpy as np
 
-from coordlang.language.sentences import MANY, Floats
+from coordlang.language.sentences import MANY
 from coordlang.required.choices import Choices
-from planners.joint.tables import Ints, ranges
+from planners.joint.tables import Floats, Ints, ranges
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, counts
 

@@ -14,7 +14,6 @@ from fractions import Fraction
 
 import numpy as np
 
-from coordlang.language.sentences import Floats
 from coordlang.required.failure import FailureProbability, TooManyToCount, failure_probability
 from coordlang.required.plan_table import PlanTable
 from coordlang.symmetry.group import symmetry_group
@@ -23,7 +22,7 @@ from coordlang.vocabulary.job import Assignment, Job, Outcome, word_count
 from coordlang.vocabulary.local_search import WORK, LocalSearch
 from coordlang.vocabulary.loop import Budget
 from coordlang.vocabulary.minimal import MinimalSearch
-from planners.joint.tables import Ints
+from planners.joint.tables import Floats, Ints
 from planners.system.errors import OutOfTime
 from planners.system.limits import little_time_after, run_until_stopped
 

@@ -16,11 +16,10 @@ from random import Random
 
 import numpy as np
 
-from coordlang.language.sentences import Floats
 from coordlang.language.warping import Clause
 from coordlang.required.plan_table import PlanTable
 from coordlang.vocabulary.job import Job
-from planners.joint.tables import Ints
+from planners.joint.tables import Floats, Ints
 
 #: Share of the moves that change the words of an orbit.
 _ORBITS = 0.2

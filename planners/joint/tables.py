@@ -19,6 +19,8 @@ Ints = NDArray[np.int64]
 Numbers = NDArray[np.integer[Any]]
 #: Truth values.
 Bools = NDArray[np.bool_]
+#: Shares, or places on a plane.
+Floats = NDArray[np.float64]
 #: States as rows of 64-bit blocks, (states, blocks).
 Rows = NDArray[np.uint64]
 

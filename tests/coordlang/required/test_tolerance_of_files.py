@@ -175,8 +175,9 @@ def test_coordination_says_how_often_silence_fails(coordlang: Command, tmp_path:
         (5 / 66, "7.58 %"),
         (1e-9, "less than 0.01 %"),
         (0.9996, "more than 99.9 %"),
+        (1 - Fraction(1, 2**60), "more than 99.9 %"),
         (0.5, "50 %"),
     ],
 )
-def test_percent_never_rounds_to_certainty(share: float, text: str) -> None:
+def test_percent_never_rounds_to_certainty(share: float | Fraction, text: str) -> None:
     assert percent(share) == text
