@@ -163,11 +163,12 @@ def grid_problem_text(
     goals: Sequence[str],
     *,
     written_by: str,
+    declare_robots: bool = True,
 ) -> str:
     """Write a problem of the grid domain, in which robot number k is ``r{k+1}``.
 
     ``rows`` are the cells, row by row; ``neighbours`` gives those adjacent to a cell, in the order
-    in which they are written.
+    in which they are written.  Without ``declare_robots`` robots are constants of the domain.
     """
     robots = [f"r{number}" for number in range(1, len(starts) + 1)]
     listed = ["    " + " ".join(names) for names in rows]
@@ -177,7 +178,7 @@ def grid_problem_text(
         f"(define (problem {name})",
         f"  (:domain {domain})",
         "  (:objects",
-        f"    {' '.join(robots)} - robot",
+        *([f"    {' '.join(robots)} - robot"] if declare_robots else []),
         *listed[:-1],
         listed[-1] + " - cell",
         "  )",
