@@ -87,7 +87,7 @@ def tolerance_data(tolerance: Tolerance | None) -> dict[str, Any]:
 def percent(share: float | Fraction) -> str:
     """A probability as text: three digits, and never rounded to what it is not."""
     if share in (0, 1):
-        return f"{100 * share:.0f} %"
+        return f"{100 * int(share)} %"
     if share < 0.000_05:
         return "less than 0.01 %"
     return f"{min(100 * float(share), 99.99):.3g} %" if share < 0.999 else "more than 99.9 %"

@@ -262,8 +262,7 @@ ALIKE = ("ground", "understand", "choices", "inspect", "report")
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=[pytest.mark.thorough] if n in ALIKE else []) for n in WRITING],
+    "name", [pytest.param(n, marks=[pytest.mark.thorough] if n in ALIKE else []) for n in WRITING]
 )
 def test_kills(name: str, tmp_path: Path, said: dict[str, list[str]]) -> None:
     """A signal at a random moment, or when something in the folder changes."""

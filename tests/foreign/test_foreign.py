@@ -237,8 +237,7 @@ def varied(name: str, cost: str) -> Candidates:
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=[] if n in QUICK else [pytest.mark.slow]) for n in LANGUAGES],
+    "name", [pytest.param(n, marks=[] if n in QUICK else [pytest.mark.slow]) for n in LANGUAGES]
 )
 def test_a_language_for_varied_tasks(name: str) -> None:
     tasks, requiring, greedy, words, said = PAGE[name.partition("-")[0]]

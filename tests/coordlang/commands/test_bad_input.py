@@ -131,8 +131,7 @@ def test_large_costs(cost: str, code: int, shell: Shell) -> None:
 
 
 @pytest.mark.parametrize(
-    ("types", "listed"),
-    [("robot hall", "robot"), ("man hall", "man"), ("hall", "busy")],
+    ("types", "listed"), [("robot hall", "robot"), ("man hall", "man"), ("hall", "busy")]
 )
 def test_what_may_be_the_robots(types: str, listed: str, shell: Shell) -> None:
     """Likely types, else those that actions take, else predicates that never change."""

@@ -348,7 +348,7 @@ def test_what_a_former_process_said_comes_too_late() -> None:
 
     def chosen(now: float) -> bytes:
         """What r1 says as soon as it has chosen an event."""
-        r1, r2 = pair.at["r1"], pair.at["r2"]
+        r1, r2 = pair.at.values()
         r1.tick(now)
         while not r1._own.version.begun:
             for by, to in ((r1, r2), (r2, r1)):

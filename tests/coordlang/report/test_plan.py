@@ -75,8 +75,7 @@ def by_definition(spaces: list[PlanSpace]) -> Heat:
 
 
 @pytest.mark.parametrize(
-    ("domain", "problem"),
-    [("t-map", "problem"), ("three-cells", "problem"), ("grid", "gw2-2x3")],
+    ("domain", "problem"), [("t-map", "problem"), ("three-cells", "problem"), ("grid", "gw2-2x3")]
 )
 def test_heat_is_that_of_the_definition(domain: str, problem: str) -> None:
     language, lifted, asked = make_language(domain, problem)

@@ -64,9 +64,7 @@ def test_verify_counts_what_a_file_claims(
     assert bool(library.verify(path, *SQUARE)) == (code == 0)
 
 
-def test_a_bound_claimed_for_words_that_may_fail_is_checked(
-    coordlang: Command, tmp_path: Path
-) -> None:
+def test_bounds_of_words_that_may_fail_are_checked(coordlang: Command, tmp_path: Path) -> None:
     path, proof = silent(tmp_path / "l.json", SILENCE), tmp_path / "proof.json"
     data = json.loads(path.read_text())
     write_certificate(library.build(*SQUARE, tasks="all", method="minimal").certificate(), proof)
@@ -170,7 +168,7 @@ def test_coordination_says_how_often_silence_fails(coordlang: Command, tmp_path:
 @pytest.mark.parametrize(
     ("share", "text"),
     [
-        (0.0, "0 %"),
+        (Fraction(0), "0 %"),
         (1.0, "100 %"),
         (5 / 66, "7.58 %"),
         (1e-9, "less than 0.01 %"),

@@ -197,8 +197,7 @@ NIGHTLY = {"ma_buttons", *[n for n in SUPPORTED if not n.startswith("ma")][1::2]
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=[pytest.mark.thorough] * (n in NIGHTLY)) for n in SUPPORTED],
+    "name", [pytest.param(n, marks=[pytest.mark.thorough] * (n in NIGHTLY)) for n in SUPPORTED]
 )
 def test_what_is_solved_is_what_others_say(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -148,8 +148,7 @@ _OVER = """(define (problem over) (:domain ways) (:objects r1 r2 - robot a b c {
 
 
 @pytest.mark.parametrize(
-    ("price", "cost", "count"),
-    [(0, 3, 2), (1, 4, 3), (2, 4, 1), (None, 4, 1)],
+    ("price", "cost", "count"), [(0, 3, 2), (1, 4, 3), (2, 4, 1), (None, 4, 1)]
 )
 def test_idling_costs_what_the_cheapest_action_that_is_idling_costs(
     price: int | None, cost: int, count: int
