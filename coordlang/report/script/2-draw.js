@@ -24,7 +24,10 @@ function filled(element, attributes, children) {
 
 const grouped = value => String(value).replace(/\B(?=(\d{3})+$)/g, ',');
 const shortNumber = value => (String(value).length <= 13 ? grouped(value) : `about 10^${String(value).length - 1}`);
-const percent = share => (share > 0 && share < 0.00005 ? 'less than 0.01 %' : `${Number((100 * share).toPrecision(3))} %`);
+function percent(share) {
+  if (share > 0 && share < 0.00005) return 'less than 0.01 %';
+  return share < 1 && share >= 0.999 ? 'more than 99.9 %' : `${Number((100 * share).toPrecision(3))} %`;
+}
 const countedPlans = value => `${shortNumber(value)} ${String(value) === '1' ? DATA.kept.plan : DATA.kept.plans}`;
 const counted = (value, noun) => `${shortNumber(value)} ${noun}${String(value) === '1' ? '' : 's'}`;
 const cut = (text, length) => (text.length <= length ? text : `${text.slice(0, length - 1)}…`);
