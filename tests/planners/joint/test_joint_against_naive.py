@@ -3,38 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import Any
-from unittest.mock import patch
-
 import pytest
 from hypothesis import Phase, event, given, settings
 from hypothesis import strategies as st
 
-from planners.grounding import instantiate
 from planners.grounding.instantiate import idling_schemas
-from planners.grounding.reachability import reachable_arguments
-from planners.pddl.lifted import Atom, Domain, Problem
 from tests.support.joint_twin import built, check_model, twin_of
 from tests.support.random_models import random_threes
 from tests.support.random_pddl import KINDS, Kind, RandomModel, random_model
-
-
-@pytest.fixture(autouse=True, scope="module")
-def one_reachability_per_model() -> Iterator[None]:
-    """Every model is built for two costs: compile and run Tarski's program once."""
-    asked: dict[str, dict[str, list[tuple[str, ...]]]] = {}
-
-    def remembered(domain: Domain, problem: Problem, init: Iterable[Atom]) -> Any:
-        init = list(init)
-        key = domain.source.text + str((problem.objects, init))
-        if key not in asked:
-            asked.clear()
-            asked[key] = reachable_arguments(domain, problem, init)
-        return asked[key]
-
-    with patch.object(instantiate, "reachable_arguments", remembered):
-        yield
 
 
 @pytest.mark.parametrize("number", [20, pytest.param(600, marks=pytest.mark.slow)])
