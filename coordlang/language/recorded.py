@@ -126,14 +126,20 @@ def recorded_candidates(
     position: Position,
 ) -> Candidates:
     """The candidate tasks that a language file records, else the problems' own ones."""
-    kind, listed = language.provenance.tasks["kind"], recorded_list(language)
-    if kind == "problems" and not listed:
+    kind, count = language.provenance.tasks["kind"], language.provenance.tasks["count"]
+    listed = recorded_list(language)
+    if kind == "problems" and not (count or listed):
         return from_problems(domain, problems, options)
     try:
         if kind == "all":
             candidates = all_pairs(domain, problems, options)
             _require_same_pairs(language, candidates)
             return candidates
+        if len(listed) != count:  # made in Python: of files it is checked when they are read
+            raise BadInput(
+                f"the language records {count} tasks but lists {len(listed)}",
+                remedy="Say --tasks all or --tasks FILE.",
+            )
         make = from_listed if kind == "file" else from_recorded
         return make(domain, problems, listed, options, position)
     except BadInput as error:

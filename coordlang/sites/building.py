@@ -277,7 +277,8 @@ def _set_image_scales(levels: Sequence[_Level], named: Value | None) -> tuple[st
         if known is not None and apart and all(map(all, apart)):
             scale = known / fmean(here / there for here, there in apart)
         if scale is None:
-            unscaled += [level.name] if level.used else []
+            if level.used:
+                unscaled.append(level.name)
             scale = 1.0
         level.set_scale(scale, scale)
     return tuple(unscaled)

@@ -143,6 +143,9 @@ def test_build_and_verify(language: Path, tmp_path: Path) -> None:
         found = door.verify(source, *T_MAP, certificate=proof)
         assert found
         assert (found.words, found.tasks, found.witness, found.lower_bound) == (3, 132, None, 3)
+    miscounted = replace(loaded.provenance, tasks={"kind": "problems", "count": 2})
+    with pytest.raises(door.BadInput, match="records 2 tasks but lists 0"):
+        door.verify(replace(loaded, provenance=miscounted), *T_MAP)
     silent = replace(loaded, states=dict.fromkeys(loaded.states, "w0"))
     found = door.verify(silent, *T_MAP)
     assert not found
