@@ -193,6 +193,8 @@ class _Writer:
         self.problem, self.concurrency, self.names = problem, concurrency, PddlNames()
         self.values, self.apart = 0, False
         self.declared: dict[str, str] = {}
+        #: The types by their names; the problem does not list those of quantifiers alone.
+        self.types: dict[str, Any] = {}
         self.agents: tuple[Any, ...] = tuple(getattr(problem, "agents", ()))
         self.names.of("variable", None, AGENT[1:])
         shared = problem.ma_environment if self.agents else problem
@@ -218,6 +220,8 @@ class _Writer:
     def type_name(self, kind: Any) -> str:
         if not kind.is_user_type():
             raise refused(f"parameters of type {kind}")
+        for each in kind.ancestors:
+            self.types.setdefault(each.name, each)
         return "object" if kind.name == self.root else self.names.of("type", kind.name, kind.name)
 
     def own_type(self, agent: Any) -> str:
@@ -284,7 +288,7 @@ class _Writer:
     def type_lines(self) -> list[str]:
         kinds = [
             (self.type_name(t), self.type_name(t.father) if t.father else "object")
-            for t in self.problem.user_types
+            for t in [*self.types.values()]
         ]
         kinds += [(self.own_type(agent), self.agent_type) for agent in self.agents if self.apart]
         if self.agents:

@@ -69,8 +69,20 @@ def parse_domain(source: Source) -> Domain:
     `Unsupported` for durative actions, numeric fluents, derived predicates and other non-classical
     features.
     """
+    return parse_domains([source])[0]
+
+
+def parse_domains(sources: Sequence[Source]) -> list[Domain]:
+    """Read domains as `parse_domain` does; formulas may speak of the actions of all of them."""
+    begun = [_begin(source) for source in sources]
+    actions = {h.name.text: len(h.parameters) for *_, heads in begun for h in heads}
+    return [_finish(actions, *parts) for parts in begun]
+
+
+def _begin(source: Source) -> tuple[Group, Names, list[_Head]]:
+    """A text, its names, and its actions, whose formulas are not read yet."""
     root = parse(source)
-    name, sections = read_header(root, "domain")
+    _, sections = read_header(root, "domain")
     types = _read_types(root, sections)
     predicates = _without_privacy(_entries(sections, ":predicates"))
     # "- number" may stand behind functions.
@@ -81,8 +93,14 @@ def parse_domain(source: Source) -> Domain:
     names = replace(
         names, functions=_arities(_read_signatures(functions, types)), objects=constants
     )
-    heads = _read_heads(names, root, sections)
-    names = replace(names, actions={head.name.text: len(head.parameters) for head in heads})
+    return root, names, _read_heads(names, root, sections)
+
+
+def _finish(actions: Mapping[str, int], root: Group, names: Names, heads: list[_Head]) -> Domain:
+    """A domain whose formulas may speak of ``actions``, too."""
+    name, sections = read_header(root, "domain")
+    own = {head.name.text: len(head.parameters) for head in heads}
+    names = replace(names, actions={**actions, **own})
     schemas = tuple(_read_schema(names, head) for head in heads)
     _check_parts(schemas, heads)
     constraints, dependences = _read_network(names, schemas, sections)
@@ -93,15 +111,15 @@ def parse_domain(source: Source) -> Domain:
         )
     return Domain(
         name,
-        source,
-        types,
-        constants,
+        root.source,
+        dict(names.types),
+        dict(names.objects),
         dict(names.predicates),
         dict(names.functions),
         schemas,
         constraints,
         dependences,
-        signatures,
+        names.signatures,
     )
 
 

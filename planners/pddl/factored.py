@@ -14,13 +14,23 @@ from operator import or_
 from pathlib import Path
 from typing import Any, TypeVar
 
-from planners.pddl.domain import read_domain
+from planners.pddl.domain import parse_domains
 from planners.pddl.formula_tree import label
-from planners.pddl.lifted import And, Atom, Constraint, Domain, Problem, Schema
+from planners.pddl.lifted import (
+    And,
+    Atom,
+    Constraint,
+    Domain,
+    Effect,
+    Problem,
+    Quantified,
+    Schema,
+)
 from planners.pddl.problem import read_problem
 from planners.pddl.robots import objects_of
-from planners.pddl.sexpr import Source
+from planners.pddl.sexpr import Source, read_source
 from planners.system.errors import BadInput, Position
+from planners.system.limits import reaching
 from planners.system.messages import echoed
 
 K = TypeVar("K")
@@ -51,10 +61,12 @@ def read_factored(directory: str | Path) -> tuple[Domain, Problem]:
             position=Position(str(directory)),
             remedy="Unfactored files are given as DOMAIN PROBLEM, without --factored.",
         )
-    views: list[tuple[Domain, Problem]] = []
-    for robot, path in domains.items():
-        domain = read_domain(path)
-        views.append(_of_robot(robot, domain, read_problem(problems[robot], domain)))
+    with reaching(lambda: f"reading {directory}", "shorter files"):
+        read = parse_domains([*map(read_source, domains.values())])
+    views = [
+        _of_robot(robot, domain, read_problem(problems[robot], domain))
+        for robot, domain in zip(domains, read, strict=True)
+    ]
     domain = _join_domains([domain for domain, _ in views], str(directory))
     problem = _join_problems([problem for _, problem in views], str(directory))
     _require_owners(domain, problem, dict(zip(domains, (own for own, _ in views), strict=True)))
@@ -170,21 +182,26 @@ def _with_types(schema: Schema, types: tuple[str, ...]) -> Schema:
 
 
 def _without_agent(schema: Schema) -> Schema:
-    """The action with neither the name nor the type of its agent."""
+    """The action with neither the name nor the type of its agent, nor names of inner variables."""
     assert schema.acting is not None
-    # The new name is one that no token is: a variable may be called "?".
-    found: Schema = _renamed(_with_types(schema, ()), schema.acting.name, "")
+    found: Schema = _numbered(_with_types(schema, ()), (schema.acting.name,))
     return found
 
 
-def _renamed(part: Any, old: str, new: str) -> Any:
-    """A part of an action in which a name is replaced wherever it stands."""
+def _numbered(part: Any, scope: tuple[str, ...]) -> Any:
+    """A part of an action in which numbers stand for the variables in ``scope``.
+
+    Those of quantifiers and effects come into it; of variables of one name the last one counts.
+    """
     if isinstance(part, tuple):
-        return tuple(_renamed(inner, old, new) for inner in part)
+        return tuple(_numbered(inner, scope) for inner in part)
+    if isinstance(part, Quantified | Effect):
+        scope += tuple(variable.name for variable in part.variables)
     if is_dataclass(part) and not isinstance(part, type):
         own = {field.name: getattr(part, field.name) for field in fields(part)}
-        return replace(part, **{name: _renamed(inner, old, new) for name, inner in own.items()})
-    return new if part == old else part
+        return replace(part, **{name: _numbered(inner, scope) for name, inner in own.items()})
+    # No token has a blank: a variable may be called "?0".
+    return {name: f"? {number}" for number, name in enumerate(scope)}.get(part, part)
 
 
 def _require_owners(domain: Domain, problem: Problem, views: Mapping[str, Domain]) -> None:

@@ -22,15 +22,14 @@ PROBLEM = """(define (problem two) (:domain hall)
 
 
 def factored(folder: Path) -> Path:
-    """The hall as a file for each robot, which has a type of its own."""
+    """The hall as a file for each robot, which has a type of its own.  They go together."""
     folder.mkdir()
-    for robot in ("r1", "r2"):
-        domain = DOMAIN.replace(
-            "(:types robot room)", f"(:types {robot}kind - robot robot room)"
-        ).replace(
-            "(:action go :agent ?r - robot :parameters (?x",
-            f"(:action go-{robot} :parameters (?r - {robot}kind ?x",
-        )
+    for robot, other in (("r1", "r2"), ("r2", "r1")):
+        both = f"(door ?x ?y) (exists (?o - robot) (go-{other} ?o ?y ?x)))"
+        domain = DOMAIN.replace("(door ?x ?y))", both)
+        domain = domain.replace("(:types robot", f"(:types {robot}kind - robot robot")
+        old, new = ":action go :agent ?r - robot :parameters (", f":action go-{robot} :parameters "
+        domain = domain.replace(old, f"{new}(?r - {robot}kind ")
         (folder / f"domain-{robot}.pddl").write_text(domain)
         problem = PROBLEM.replace("r1 r2 - robot", f"{robot} - {robot}kind")
         problem = re.sub(rf"\(at (?!{robot} )[^)]*\)", "", problem)

@@ -562,15 +562,12 @@ def test_a_language_file_for_the_problem_that_the_library_read(
 # What goes wrong, and how it is said.
 
 
-def test_an_unsolvable_problem() -> None:
+def test_no_plan_and_an_empty_plan() -> None:
     problem = crossing(3)
     result = solve(problem)
     assert (result.status, result.plan) == (Status.UNSOLVABLE_PROVEN, None)
     with up.AnytimePlanner(name="coordlang") as planner:
         assert [r.status for r in planner.get_solutions(problem)] == [Status.UNSOLVABLE_PROVEN]
-
-
-def test_a_goal_that_holds_already() -> None:
     problem = crossing()
     problem.clear_goals()
     (plan,) = all_plans(problem)
@@ -620,6 +617,8 @@ def test_a_check_that_fails_is_an_error_where_the_user_wants_it() -> None:
 def test_what_nothing_uses_is_no_reason_to_refuse() -> None:
     problem = crossing()
     problem.add_fluent("length", up.IntType(), default_initial_value=3)
+    nobody = up.Variable("n", up.UserType("nobody", up.UserType("person")))
+    problem.add_goal(up.Not(up.Exists(up.Equals(nobody, nobody), nobody)))
     assert problem.kind <= CoordlangEngine.supported_kind()
     assert solve(problem).status == Status.SOLVED_OPTIMALLY
 
