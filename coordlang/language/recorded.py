@@ -37,11 +37,8 @@ def options_of(
     contradicts the file.
     """
     entries: Mapping[str, Any] = language.provenance.model
-    robots = language.provenance.robots or (model.names if model else ())
-    if entries.get("unowned") == "environment":
-        robots = tuple(robot for robot in robots if robot != ENVIRONMENT)
     recorded = ModelOptions(
-        robots,
+        language.provenance.robots or (model.names if model else ()),
         unowned=entries.get("unowned", "error"),
         cost=entries.get("cost", "makespan"),
         remember_actions=entries.get("remember_actions", False),
@@ -51,7 +48,10 @@ def options_of(
         recorded=bool(language.provenance.robots),
     )
     for name in sorted(given) if model else ():
-        _require_same(name, getattr(model, name), getattr(recorded, name))
+        mine, own = getattr(model, name), getattr(recorded, name)
+        if name == "robots" and recorded.unowned == "environment":  # it may be the extra one
+            mine, own = (tuple(r for r in names if r != ENVIRONMENT) for names in (mine, own))
+        _require_same(name, mine, own)
     return recorded
 
 

@@ -82,6 +82,8 @@ def find_team(domain: Domain, problem: Problem, choice: ModelOptions) -> Team:
     are listed), and `UsageError` for a choice that contradicts the files or names an unknown object
     or type.
     """
+    if choice.recorded and choice.unowned == "environment" and ENVIRONMENT not in problem.objects:
+        choice = replace(choice, robots=[name for name in choice.names if name != ENVIRONMENT])
     robots, by = _found(domain, problem, choice)
     if not robots:
         raise BadInput(

@@ -11,6 +11,9 @@ from random import Random
 
 import pytest
 
+from coordlang.language.provenance import Provenance
+from coordlang.language.recorded import options_of
+from coordlang.language.words import Language
 from planners.loading import PlanningInstance
 from planners.pddl import parse_domain, parse_problem
 from planners.pddl.model_options import ModelOptions, Unowned
@@ -216,20 +219,18 @@ def test_random_types_against_the_definition() -> None:
 @pytest.mark.parametrize(
     ("agent", "unowned"),
     [
-        *(
-            (":agent ?r - robot :parameters (", unowned)
-            for unowned in ("error", "environment", "shared")
-        ),
-        (":parameters (?r - robot ", "error"),
-        (":parameters (?r - robot ", "shared"),
+        *product([":agent ?r - robot :parameters ("], ["error", "environment", "shared"]),
+        *product([":parameters (?r - robot "], ["error", "shared"]),
     ],
 )
 def test_a_robot_called_environment_that_can_do_nothing(agent: str, unowned: Unowned) -> None:
-    """It is a robot as others; only an extra one that owns nothing is left out."""
+    """It is a robot as others; only an extra one that owns nothing is left out.  Files may name it."""
     domain = DOMAIN.replace(":agent ?r - robot :parameters (", agent)
     problem = PROBLEM.replace("r1", "car").replace("r2", "environment").replace("(door b a)", "")
-    loaded = model_of(domain, problem, ModelOptions(unowned=unowned))
-    assert loaded.model.robots == ("car", "environment")
+    recorded = Provenance(("car", "environment"), None, model={"unowned": unowned})
+    language = Language(("w",), {}, "w", recorded)
+    for options in (ModelOptions(unowned=unowned), options_of(language)):
+        assert model_of(domain, problem, options).model.robots == ("car", "environment")
 
 
 def test_an_undeclared_type_and_several_declarations_restrict_nothing_more() -> None:
