@@ -15,7 +15,7 @@ from coordlang.language.sentences import sentence
 from planners.joint.model import IDLE, FullState, Goal, JointModel
 from planners.joint.tables import Rows
 from planners.pddl.formula_tree import conjuncts, formula_text
-from planners.search.plan_file import NoSuchAction, json_count, read_plans
+from planners.search.plan_file import NoSuchAction, WholeStep, json_count, read_plans
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, Texts, counts
 from planners.system.errors import BadInput, Position, Refuted
@@ -108,6 +108,12 @@ def _executed(task_language: TaskLanguage, plan: Sequence[Texts]) -> tuple[Plan,
             yield numbers[-1]
 
     rows, second, why = carried_out(model, init, steps())
+    for number, (step, row) in enumerate(zip(plan, rows, strict=False)):
+        # Another joint action of the same parts may be possible there.
+        if isinstance(step, WholeStep) and not model.holds(step.action.precondition, row[None])[0]:
+            rows = rows[: number + 1]
+            why = f"the joint action {step.action.label} is not applicable here"
+            break
     if why is not None:
         raise NotAPlan(
             len(rows) - 1,
@@ -151,7 +157,11 @@ def read_plan_file(path: str | Path, model: JointModel) -> list[tuple[Texts, ...
             position=Position(str(path)),
             remedy="`coordlang plans DOMAIN PROBLEM` writes plans.",
         )
-    return [tuple(tuple(map(spelling, step)) for step in plan) for plan in plans]
+
+    def spelled(step: Texts) -> Texts:
+        return step if isinstance(step, WholeStep) else tuple(map(spelling, step))
+
+    return [tuple(map(spelled, plan)) for plan in plans]
 
 
 def _label_numbers(model: JointModel, step: Texts, number: int) -> tuple[int, ...]:

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import msgspec
 from msgspec import Meta
 
+from planners.grounding.actions import GroundAction
 from planners.joint.model import JointModel
 from planners.pddl.model_options import Execution
 from planners.search.plans import Plan, Plans, Texts, texts
@@ -85,6 +86,14 @@ class NoSuchAction(BadInput):
         self.step = step
 
 
+class WholeStep(tuple[str | None, ...]):
+    """What robots do in a joint step that a plan gives as a joint action: ``action``."""
+
+    action: GroundAction
+
+
+#: What ends a line; other separators may stand in a comment.
+_LINE_END = re.compile(r"\r\n?|\n")
 #: The comments with which a plan of `coordlang plans`, or of another planner, begins and ends.
 _BEGIN = re.compile(r"\s*;\s*(?:sampled )?plan \d+\b", re.IGNORECASE)
 _END = re.compile(r"\s*;\s*(?:makespan|cost) = \d", re.IGNORECASE)
@@ -170,7 +179,7 @@ def only_one_plan(text: str, position: Position) -> None:
     """
     begun = ended = False
     numbers: list[int] = []  # of the actions so far; one without a number is in the step before
-    for line, raw in enumerate(text.splitlines(), 1):
+    for line, raw in enumerate(_LINE_END.split(text), 1):
         title, action = bool(_BEGIN.match(raw)), raw.partition(";")[0].strip()
         found = re.match(r"(\d{1,8})(?:\.\d+)?\s*:", action)
         number = int(found[1]) if found else numbers[-1] if numbers else -1
@@ -211,8 +220,8 @@ def _from_json(text: str, model: JointModel, position: Position) -> list[tuple[T
 
 def _from_ipc(text: str, model: JointModel, name: str) -> tuple[Texts, ...]:
     only_one_plan(text, Position(name))
-    steps: dict[int, list[str | None]] = {}
-    for number, raw in enumerate(text.splitlines(), 1):
+    steps: dict[int, Texts] = {}
+    for number, raw in enumerate(_LINE_END.split(text), 1):
         line = raw.split(";")[0].strip().lower()
         if not line:
             continue
@@ -232,28 +241,29 @@ def _from_ipc(text: str, model: JointModel, name: str) -> tuple[Texts, ...]:
                 remedy="Steps are counted from 0, one number for all that "
                 "happens at the same time.",
             )
-        own = steps.setdefault(step, [None] * len(model.robots))
-        _put(own, step, action, model, Position(name, number, 1))
-    last = max(steps, default=-1)
-    return tuple(tuple(steps.get(k, [None] * len(model.robots))) for k in range(last + 1))
+        _put(steps, step, action, model, Position(name, number, 1))
+    idle = (None,) * len(model.robots)
+    return tuple(steps.get(k, idle) for k in range(max(steps, default=-1) + 1))
 
 
 def _put(
-    own: list[str | None], step: int, action: str, model: JointModel, position: Position
+    steps: dict[int, Texts], step: int, action: str, model: JointModel, position: Position
 ) -> None:
     """Enter an action for the robots that it belongs to."""
     ground = next((a for a in model.actions if a.label == action), None)
     if ground is None:
         raise NoSuchAction(action, step, position)
     if model.is_joint_action:
-        if any(own):
+        if step in steps:
             raise BadInput(
                 f"two joint actions in one step: {action} is the second",
                 position=position,
                 remedy="Each line of a joint-action plan is a step of its own.",
             )
-        own[:] = ground.parts
+        steps[step] = whole = WholeStep(ground.parts)
+        whole.action = ground
         return
+    own = [*steps.get(step, (None,) * len(model.robots))]
     for robot in ground.owners:
         if own[robot] is not None:
             raise BadInput(
@@ -262,3 +272,4 @@ def _put(
                 remedy="Give one of them another step number.",
             )
         own[robot] = action
+    steps[step] = tuple(own)

@@ -25,6 +25,8 @@ WORLDS = {
     "t": ("t-map/problem", "all"),
     "grid": ("grid/corners-4x4", None),
 }
+#: The last line of a plan of the T-map.
+LAST = "3: (move r2 c1-1 c0-1)"
 #: A command about a world: ``ask("say", "t", plan file)``.
 Ask = Callable[..., Outcome]
 
@@ -106,7 +108,7 @@ def test_says_what_plans_wrote(
             step[:] = [t and t.upper().replace("(", " ( ").replace(" ", "  ") for t in step]
     path.write_text(json.dumps(data))
     assert ask("say", "t", path).out == both.out
-    path.write_text(plans[0])
+    path.write_text(f"; \x0c (idle)\n{plans[0]}")  # a line ends at the end of a line only
     assert ask("say", "t", path).out == said[0] + "\n"
     one = json.loads(ask("say", "t", path, "--json").out)
     assert one == {"sentences": said[:1], "covered": True}
@@ -134,21 +136,14 @@ def test_says_what_plans_wrote(
             *("1: (move r1 c0-1 c1-1)", "1: (move r1 c1-1 c0-1)", 1),
             "step 2 cannot be taken: r1 cannot (move r1 c1-1 c0-1) here",
         ),
-        (
-            *("3: (move r2 c1-1 c0-1)", "", 1),
-            "after 3 steps the goal is not reached: (at r2 c0-1) does not hold",
-        ),
+        (LAST, "", 1, "after 3 steps the goal is not reached: (at r2 c0-1) does not hold"),
         (
             *("; makespan", "5: (move r2 c0-1 c1-1)\n6: (move r2 c1-1 c0-1)\n; makespan", 1),
             "takes 7 steps, and 4 are enough: the goal holds before step 5",
         ),
-        (
-            *("3: (move r2 c1-1 c0-1)", "4: (move r2 c1-1 c0-1)\n(move r2 c0-1 c1-1)", 1),
-            "after 6 steps the goal is not reached",
-        ),
+        (LAST, f"4{LAST[1:]}\n(move r2 c0-1 c1-1)", 1, "after 6 steps the goal is not reached"),
         ("0: (move r2 c1-0 c1-1)", "0:", 31, "plan.txt:2:1: expected '0: (action args)'"),
-        ("3: (move r2 c1-1 c0-1)", "123456789: (move r2 c1-1 c0-1)", 31, "too many steps"),
-        ("3: (move r2 c1-1 c0-1)", "4000000: (move r2 c1-1 c0-1)", 31, "too many steps"),
+        *((LAST, f"{n}{LAST[1:]}", 31, "too many steps") for n in (123456789, 4000000)),
     ],
 )
 def test_wrong_plan_files(
@@ -203,6 +198,19 @@ def test_several_plans_in_one_text(form: str, ask: Ask, plans: list[str], tmp_pa
     assert "--max 1" in outcome.err
 
 
+def test_a_joint_action_is_the_one_that_is_named(tmp_path: Path) -> None:
+    """There are two with the same parts, of which one is possible."""
+    part = "(:action {} ; subaction r1 (lift)\n :precondition {} :effect (and (up) (odd)))"
+    both = part.format("lift", "(not (odd))") + part.format("hold", "(odd)")
+    domain, problem, plan = (tmp_path / name for name in ("domain", "problem", "plan"))
+    domain.write_text(f"(define (domain d) (:predicates (up) (odd)) {both})")
+    problem.write_text("(define (problem p) (:domain d) (:init) (:goal (up)))")
+    plan.write_text("(hold)")
+    language = door.build(domain, problem).language
+    with pytest.raises(door.NotAPlan, match=r"joint action \(hold\) is not applicable"):
+        door.say(language, domain, problem, plan)
+
+
 # Understand.
 
 
@@ -233,26 +241,19 @@ def test_samples_are_seeded(ask: Ask) -> None:
 # Plan.
 
 
-def test_prints_a_plan_with_its_sentence(ask: Ask, tmp_path: Path) -> None:
+def test_a_plan_as_text_and_as_json(ask: Ask, tmp_path: Path) -> None:
     path = tmp_path / "plan.txt"
     for sentence in ("w0 w1 w3 w2 w0", "w0 w2 w3 w1 w0"):
-        outcome = ask("plan", "t", sentence)
-        assert outcome.code == 0
-        assert outcome.out.endswith(f"; makespan = 4\n; sentence = {sentence}\n")
+        outcome, end = ask("plan", "t", sentence), f"; makespan = 4\n; sentence = {sentence}\n"
+        assert (outcome.code, outcome.out.endswith(end)) == (0, True)
         assert "A* (relaxed) expanded" in outcome.err
         path.write_text(outcome.out)
         assert ask("say", "t", path).out == sentence + "\n"
-
-
-def test_a_plan_as_json(ask: Ask, tmp_path: Path) -> None:
     outcome = ask("plan", "t", "w0 w1 w3 w2 w0", "--json")
     data = json.loads(outcome.out)
     assert outcome.err == ""
-    keys = ("sentence", "count", "optimal_cost")
-    assert [data[key] for key in keys] == ["w0 w1 w3 w2 w0", 1, 4]
-    search = data["search"]
-    assert search["expanded"] == 4 < search["without_sentence"]["expanded"]
-    path = tmp_path / "plan.json"
+    assert (data["sentence"], data["count"], data["optimal_cost"]) == ("w0 w1 w3 w2 w0", 1, 4)
+    assert data["search"]["expanded"] == 4 < data["search"]["without_sentence"]["expanded"]
     path.write_text(outcome.out)
     assert len(read_plans(path, own_task("t-map").model)) == len(data["plans"]) == 1
 
@@ -296,7 +297,9 @@ def test_what_became_of_the_wishes(ask: Ask) -> None:
 # Choices.
 
 
-def test_choices_as_a_table(ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_choices_as_a_table_and_as_a_file(
+    ask: Ask, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     outcome = ask("choices", "cells", "w1 w0")
     assert (outcome.code, outcome.err) == (0, "")
     assert "r1 may follow 1 subplan (3 states):" in outcome.out
@@ -306,9 +309,6 @@ def test_choices_as_a_table(ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:
     outcome = ask("choices", "cells", "w1 w0", "--robot", "r2")
     assert "idle -> 1" in outcome.out
     assert outcome.out.endswith("  .. and 1 state more; --format json has all of them\n")
-
-
-def test_choices_as_a_file(ask: Ask, tmp_path: Path) -> None:
     path = tmp_path / "choices.json"
     outcome = ask("choices", "cells", "w1 w0", "--format", "json", "-o", path)
     assert (outcome.code, outcome.out) == (0, "")
@@ -317,7 +317,7 @@ def test_choices_as_a_file(ask: Ask, tmp_path: Path) -> None:
     assert [entry["robot"] for entry in data["choices"]] == ["r1", "r2"]
     keys = ("plans", "covered", "guaranteed", "combinations_walked")
     assert [data[key] for key in keys] == [2, True, True, 4]
-    one = ask("choices", "cells", "w1 w0", "--json", "--robot", "r2", "--robot", "r2").out
+    one = ask("choices", "cells", "w1 w0", "--json", *("--robot", "r2") * 2).out
     assert json.loads(one) == data | {"choices": data["choices"][1:]}
 
 
