@@ -107,11 +107,10 @@ class Role(Expression):
             reached: Bools = members.astype(np.float32) @ (linked if self.inverse else linked.T) > 0
             return reached
         found = np.zeros_like(members)
-        if world.predicates.get(self.predicate) == 2:
-            state, *ends = states.atoms(self.predicate)
-            one, other = reversed(ends) if self.inverse else ends
-            hit = members[state, other]
-            found[state[hit], one[hit]] = True
+        state, *ends = states.atoms(self.predicate, 2)
+        one, other = reversed(ends) if self.inverse else ends
+        hit = members[state, other]
+        found[state[hit], one[hit]] = True
         return found
 
 
@@ -141,12 +140,8 @@ class Named(Expression):
     def _read(self, states: States) -> Bools:
         world = states.world
         found = np.zeros((len(states), len(world.objects)), bool)
-        always = [*world.types.get(self.name, ())]
-        always += [args[0] for args in world.statics.get(self.name, ()) if len(args) == 1]
-        found[:, [world.number[name] for name in always]] = True
-        if world.predicates.get(self.name) == 1:
-            state, own = states.atoms(self.name)
-            found[state, own] = True
+        found[:, [world.number[name] for name in world.types.get(self.name, ())]] = True
+        found[states.atoms(self.name, 1)] = True
         return found
 
 
@@ -411,8 +406,8 @@ Feature = Sign | Residue | Least | Same
 
 _SIGNS = {-1: "<", 0: "=", 1: ">"}
 _TOKEN = re.compile(r"[()]|[^\s()]+")
-#: Longer definitions are refused; no feature of ours is as long.
-_LONGEST = 1_000
+#: Definitions of more names and brackets are refused; no feature of ours has as many.
+_LONGEST = 500
 #: Numbers in definitions, and values of features, are smaller than this.
 LARGEST = 1_000_000
 
@@ -444,10 +439,10 @@ def feature_of(text: str, position: Position) -> Feature:
 
 
 def _tree(text: str) -> Tree:
-    if len(text) > _LONGEST:
+    if len(tokens := _TOKEN.findall(text)) > _LONGEST:
         raise ValueError
     stack: list[list[Tree]] = [[]]
-    for token in _TOKEN.findall(text):
+    for token in tokens:
         if token == "(":
             stack.append([])
         elif token == ")":

@@ -108,7 +108,7 @@ class _Vocabulary:
 
     def __init__(self, worlds: Sequence[World], landmarks: bool) -> None:
         self.named = named_objects(worlds, landmarks)
-        self.fluents = sorted({known for world in worlds for known in world.predicates.items()})
+        self.fluents = sorted({known for world in worlds for known in world.fluents})
         self.relations = sorted({name for world in worlds for name in world.relations})
         self.paths = [
             name
@@ -118,7 +118,7 @@ class _Vocabulary:
         sets = {name for name, arity in self.fluents if arity == 1}
         for world in worlds:
             sets.update(world.types)
-            sets.update(n for n, tuples in world.statics.items() if len(tuples[0]) == 1)
+            sets.update(n for n, own in world.statics.items() if any(len(a) == 1 for a in own))
         self.sets = sorted(sets - {str(Everything())})  # what is called so is not read back
 
     def terms(self) -> Iterator[Term]:

@@ -76,19 +76,10 @@ class World:
         return {name: number for number, name in enumerate(self.objects)}
 
     @cached_property
-    def predicates(self) -> Mapping[str, int]:
-        """The fluent predicates with their numbers of arguments (the least, where it varies)."""
-        found: dict[str, int] = {}
-        for atom in self.model.codec.facts.atoms:
-            arity = len(atom.args)
-            found[atom.predicate] = min(arity, found.get(atom.predicate, arity))
-        return found
-
-    def arity(self, predicate: str) -> int | None:
-        """How many arguments the atoms of a predicate have, static or not; None if it has none."""
-        if predicate in self.statics:
-            return len(self.statics[predicate][0])
-        return self.predicates.get(predicate)
+    def fluents(self) -> Sequence[tuple[str, int]]:
+        """The fluent predicates, once with each number of arguments, sorted."""
+        atoms = self.model.codec.facts.atoms
+        return sorted({(atom.predicate, len(atom.args)) for atom in atoms})
 
     @cached_property
     def relations(self) -> Mapping[str, Sequence[Pair]]:
@@ -122,16 +113,15 @@ class States:
         """The true facts of each state."""
         return TrueFacts(self.world.model.codec.facts_part(self.rows))
 
-    def atoms(self, predicate: str) -> tuple[Ints, ...]:
-        """The true atoms of a predicate: their states, then the numbers of their arguments.
+    def atoms(self, predicate: str, arity: int) -> tuple[Ints, ...]:
+        """The true atoms of a predicate with so many arguments: their states, then the arguments.
 
-        All arrays are as long as there are such atoms in all states together.
+        All arrays, of numbers, are as long as there are such atoms in all states together.
         """
-        if predicate in self.known:
-            found: tuple[Ints, ...] = self.known[predicate]
+        if (key := (predicate, arity)) in self.known:
+            found: tuple[Ints, ...] = self.known[key]
             return found
         world = self.world
-        arity = world.arity(predicate) or 0
         static = [args for args in world.statics.get(predicate, ()) if len(args) == arity]
         if static:
             state = np.repeat(np.arange(len(self)), len(static))
@@ -146,8 +136,8 @@ class States:
                     args[fact] = [world.number[name] for name in atom.args]
             chosen: Bools = mine[self.true.fact]
             state, own = self.true.row[chosen], args[self.true.fact[chosen]]
-        self.known[predicate] = state, *(own[:, place] for place in range(arity))
-        return self.atoms(predicate)
+        self.known[key] = state, *(own[:, place] for place in range(arity))
+        return self.atoms(predicate, arity)
 
     def image(self, predicate: str, named: str, inverse: bool) -> Ints:
         """In each state the object x with (predicate named x), or (predicate x named) if inverse.
@@ -156,8 +146,8 @@ class States:
         """
         count = len(self.world.objects)
         found = np.full(len(self), count)
-        if self.world.arity(predicate) == 2 and named in self.world.number:
-            state, *ends = self.atoms(predicate)
+        if named in self.world.number:
+            state, *ends = self.atoms(predicate, 2)
             mine, other = reversed(ends) if inverse else ends
             hit = mine == self.world.number[named]
             np.minimum.at(found, state[hit], other[hit])
@@ -165,9 +155,7 @@ class States:
 
     def count(self, predicate: str, args: Sequence[str]) -> Ints:
         """Per state the number of true atoms of a predicate with these arguments, or `ANY`."""
-        if self.world.arity(predicate) != len(args):
-            return np.zeros(len(self), np.int64)
-        state, *own = self.atoms(predicate)
+        state, *own = self.atoms(predicate, len(args))
         hit = np.ones(len(state), bool)
         for wanted, names in zip(args, own, strict=True):
             if wanted != ANY:

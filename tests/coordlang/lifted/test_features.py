@@ -83,8 +83,9 @@ def test_values_are_those_of_the_definition(name: str) -> None:
 
 def concepts(world: World) -> st.SearchStrategy[f.Concept]:
     """Concepts over what a world has, and over names that it does not have."""
-    sets = [*world.types, *world.predicates, *world.statics, "nothing"]
-    roles = [*world.predicates, *world.relations, "nowhere"]
+    fluents = [name for name, _ in world.fluents]
+    sets = [*world.types, *fluents, *world.statics, "nothing"]
+    roles = [*fluents, *world.relations, "nowhere"]
     role = st.builds(f.Role, st.sampled_from(roles), st.booleans(), st.booleans())
     simple: st.SearchStrategy[f.Concept] = (
         st.just(f.Everything())
@@ -124,14 +125,9 @@ def feature(text: str) -> f.Feature:
 
 def test_by_hand() -> None:
     world = states_of("grid/gw2-2x3").world
-    row = world.model.state(
-        [
-            a
-            for a in world.model.codec.facts.atoms
-            if str(a.args) in ("('r1', 'c0-1')", "('r2', 'c1-2')")
-        ]
-    )[None, :]
-    here = States(world, row)
+    wanted = ("r1", "c0-1"), ("r2", "c1-2")
+    row = world.model.state([a for a in world.model.codec.facts.atoms if a.args in wanted])
+    here = States(world, row[None, :])
     texts = {
         "(mod (column (at r1)) 3)": 1,
         "(mod (row (at r2)) 3)": 1,

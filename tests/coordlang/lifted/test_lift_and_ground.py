@@ -64,14 +64,10 @@ def lifted(rings: Lifted, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_what_is_learned_is_said(rings: Lifted) -> None:
     data = rings.data()
     assert data["words"] == 4
-    assert [one["formula"] for one in data["features"]] == [
-        "min(column(at(r1)), 1)",
-        "min(row(at(r1)), 1)",
-    ]
-    assert [(v["problem"], v["states"], v["tasks"]) for v in data["verified"]] == [
-        ("gwb1-2x4", 56, 3080),
-        ("gwb2-3x3", 56, 3080),
-    ]
+    formulas = ["min(column(at(r1)), 1)", "min(row(at(r1)), 1)"]
+    assert [one["formula"] for one in data["features"]] == formulas
+    verified = [("gwb1-2x4", 56, 3080), ("gwb2-3x3", 56, 3080)]
+    assert [(v["problem"], v["states"], v["tasks"]) for v in data["verified"]] == verified
     assert data["tried"] > data["pool"] > len(data["features"])
 
 
@@ -140,6 +136,9 @@ def test_what_contradicts_what_was_learned(rings: Lifted) -> None:
         api.ground(rings.language, GRID, LARGER, robots=["r1"])
     with pytest.raises(UsageError, match=r"--cost makespan\+actions contradicts"):
         api.ground(rings.language, GRID, LARGER, cost="makespan+actions")
+    for wrong in ({"prefer": "nothing"}, {"complexity": 0}, {"seed": -1}):
+        with pytest.raises(UsageError):
+            api.lift(GRID, OPEN, jobs=1, **wrong)
 
 
 def test_a_problem_without_tasks(rings: Lifted, tmp_path: Path) -> None:
@@ -157,10 +156,14 @@ def test_a_problem_without_tasks(rings: Lifted, tmp_path: Path) -> None:
         api.ground(rings.language, GRID, stuck, jobs=1)
 
 
-@pytest.mark.parametrize("wrong", [{"prefer": "nothing"}, {"complexity": 0}, {"seed": -1}])
-def test_wrong_options(wrong: dict[str, object]) -> None:
-    with pytest.raises(UsageError):
-        api.lift(GRID, OPEN, jobs=1, **wrong)
+def test_names_of_any_form(tmp_path: Path) -> None:
+    """Long ones, and a predicate with one argument and with two."""
+    domain, problem, found = (tmp_path / name for name in ("d.pddl", "p.pddl", "l.json"))
+    text = GRID.read_text().replace("(at ?r - robot", "(at ?r - robot) (at ?r - robot")
+    domain.write_text(text.replace("(at ?r ?to)))", "(at ?r ?to) (at ?r)))"))
+    problem.write_text(SMALL.read_text().replace("r1", "r1" * 600))
+    api.lift(domain, problem, tasks="all", jobs=1).save(found)
+    assert api.ground(found, domain, problem, jobs=1).guarantee.method == "lifted; verified here"
 
 
 def test_an_empty_claim_helps_nobody(rings: Lifted) -> None:
@@ -189,10 +192,7 @@ DAMAGED: dict[str, tuple[Change, str]] = {
         "defines no feature",
     ),
     "values": (lambda d: d.update(values={"0": "w0"}), "are no values of 2 features"),
-    "beyond all bounds": (
-        lambda d: d.update(values={f"0 {10**25}": "w0"}),
-        "are no values of 2 features",
-    ),
+    "bounds": (lambda d: d.update(values={f"0 {10**25}": "w0"}), "are no values of 2 features"),
     "unknown word": (lambda d: d.update(values={"0 1": "w9"}), "which 'words' has not"),
     "equal words": (lambda d: d.update(words=["w0", "w0"]), "words must be different"),
     "own word": (lambda d: d.update(words=["w0", "w1", "w2", "w3", "v0.1"]), "unknown values"),
