@@ -84,6 +84,7 @@ def page_data(
             "plans": model.kept_plans,
             "unit": model.unit,
             "slack": model.slack,
+            "remembers": model.codec.memory is not None,
             "one": f"{'a' if model.slack else 'an'} {model.kept_plan}",
         },
         "words": [{"name": word} for word in language.words],
@@ -98,7 +99,7 @@ def page_data(
         "state_words": first.partition.word_of(rows).tolist(),
         "mapped": len(listed),
         "pair": _pair(world, states[: len(listed)], starts),
-        "state_graph": _state_graph(first) if 1 < len(language.states) <= _STATES_DRAWN else None,
+        "state_graph": _state_graph(first) if 1 < len(listed) <= _STATES_DRAWN else None,
         "tasks": tasks,
         "candidates": {
             "count": str(language.provenance.tasks.get("count", 0)),

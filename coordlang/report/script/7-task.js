@@ -309,7 +309,7 @@ function varyingFacts(task) {
   const varying = [...seen].filter(([, number]) => number < states.length).map(([fact]) => fact).sort((a, b) => a - b);
   const map = DATA.places.length > 0;
   // What robots did last is in the timetable.
-  const shown = varying.filter(fact => !DATA.facts[fact].text.startsWith('(last '));
+  const shown = varying.filter(fact => !DATA.kept.remembers || !DATA.facts[fact].text.startsWith('(last '));
   return { facts: shown.filter(fact => !map || !['at', 'with', 'mark'].includes(DATA.facts[fact].role[0])),
     marks: new Set(varying.map(fact => DATA.facts[fact].role).filter(role => role[0] === 'mark').map(role => role[2])) };
 }

@@ -12,7 +12,9 @@ import coordlang as door
 from coordlang.execution.task_language import language_in_task
 from coordlang.language.sentences import sentence
 from coordlang.report.page import LARGEST, make_report
+from planners.pddl import parse_domain, parse_problem
 from planners.pddl.lifted import And
+from planners.pddl.sexpr import Source
 from planners.search.plans import Plans
 from tests.coordlang.report.conftest import (
     Opener,
@@ -22,7 +24,7 @@ from tests.coordlang.report.conftest import (
     make_world,
     refuted,
 )
-from tests.support.domains import files_of, read
+from tests.support.domains import T_MAP, files_of, read
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -327,27 +329,27 @@ def test_a_place_is_chosen_on_the_floor_plan(
     page.keyboard.press("ArrowUp")
     assert page.evaluate(script) == words["c0-1"]
     page.click(".word-row[data-word='1']")
-    on = page.evaluate(
-        "document.querySelectorAll('#atlas .spot:not(.off) text:not(:empty)').length"
-    )
-    assert on == list(words["c0-1"].values()).count("1")
+    script = "document.querySelectorAll('#atlas .spot:not(.off) text:not(:empty)').length"
+    assert page.evaluate(script) == list(words["c0-1"].values()).count("1")
     assert page.is_visible("#heat svg.plan")
 
 
 @pytest.mark.thorough
 def test_odd_languages_and_tasks(open_page: Opener, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No map; no state mapped; a task that is done before it begins."""
+    """No map, facts that look remembered; no state mapped; a task done before it begins."""
     language, domain, problem = make_language("t-map", "problem")
     bare = replace(language, states={})
-    done = replace(
-        problem, goal=And(tuple(atom for atom in problem.init if atom.predicate == "at"))
-    )
-    for spoken, asked in [(language, problem), (bare, problem), (language, done)]:
+    done = replace(problem, goal=And(tuple(a for a in problem.init if a.predicate == "at")))
+    texts = [path.read_text().replace("(at ", "(last ") for path in T_MAP]
+    named = parse_domain(Source("domain", texts[0]))
+    asked = parse_problem(Source("problem", texts[1]), named)
+    last = door.build(named, asked, method="greedy").language, named, asked
+    for spoken, own, asked in [last, (bare, domain, problem), (language, domain, done)]:
         monkeypatch.setattr("coordlang.report.page.MOST_PLACES", 1)
-        opened = open_page(make_report(spoken, domain, [asked], tasks_shown=1).html)
+        opened = open_page(make_report(spoken, own, [asked], tasks_shown=1).html)
         assert not opened.page.is_visible("#stage")
         for mode in (-1, 0, 1):
             opened.page.click(f"[data-mode='{mode}']")
             opened.forward(5)
             assert opened.page.inner_text("#timeline")
-        assert opened.page.is_visible("#facts li") == (asked is problem)
+        assert opened.page.is_visible("#facts li") == (asked is not done)
