@@ -62,7 +62,11 @@ def search_within(
     """The plans of one task within the model's slack; ``makespan`` is the least one."""
     space = explore_within(model, task, makespan + model.slack, pieces)
     with reaching(lambda: f"the plans within slack, over {len(space):,} states", "less slack"):
-        graph = _plan_space(space, [(task.goal, task.init[None, :])])
+        return _on_plans(_plan_space(space, [(task.goal, task.init[None, :])]))
+
+
+def _on_plans(graph: PlanSpace) -> PlanSpace:
+    """The plan space with a table of just the states that plans pass through."""
     used, state = np.unique(graph.state, return_inverse=True)
     return replace(graph, rows=graph.rows[used], state=state)
 
@@ -77,7 +81,8 @@ def search_with_effort(
     forward = BoundedSearch(model, task, chosen, variables, pieces)
     with closing(forward), reaching(forward.so_far, SMALLER):
         forward.run()
-        return _plan_space(forward.space(), [(task.goal, task.init[None, :])]), forward
+        graph = _plan_space(forward.space(), [(task.goal, task.init[None, :])])
+        return _on_plans(graph), forward
 
 
 def joined(spaces: Sequence[PlanSpace]) -> PlanSpace:

@@ -166,6 +166,7 @@ def test_idling_costs_what_the_cheapest_action_that_is_idling_costs(
     for heuristic in ("auto", "blind", "projections", "relaxed"):
         space = search(model, task, heuristic=heuristic)
         assert (space.cost_of(0), Plans.of(space).count) == ((2, cost), count)
+        assert {*space.state.tolist()} == {*range(len(space.rows))}  # no others were kept
     for limit in (100_000, 0):
         plain = compile_classical(model, task, limit)
         found = optimal_plans(plain)
