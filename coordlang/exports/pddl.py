@@ -8,7 +8,7 @@ at this word or *goes on* to the next one.
 Its optimal plans are exactly the plans with the sentence, one to one (docs/use.md has the proof).
 With slack the sentence is followed at most as many times as joint steps are allowed.  Then every
 plan, not only the optimal ones, is a plan within the slack that has the sentence, with all, some or
-none of its rest at the end.
+none of its rest at the end; with all of it where words see what robots did last.
 
 States elsewhere never matter to optimal plans, so this needs no list of all states, and holds for
 tasks that the language does not cover, too.  A plan of higher cost follows the sentence as far as
@@ -78,13 +78,14 @@ class PddlExport:
         space = task_language.plans_with(words)
         makespan, second = space.cost_of(0)
         steps = makespan if model.slack else None
-        if model.slack:
-            makespan, second = plan_under_sentence(task_language, words).cost
         start = space.starts[0]
         task = PlanningTask("task", space.rows[space.state[start]], space.goals[space.goal[start]])
         plain = compile_classical(model, task, MAX_ACTIONS, longest=max(1, steps or makespan))
         tests = exclusive_terms(task_language)
-        named = _Naming(task_language, words, plain, tests, steps).task()
+        naming = _Naming(task_language, words, plain, tests, steps)
+        named = naming.task()
+        if model.slack and not naming.remembered:  # else a rest is seen, and is part of the plan
+            makespan, second = plan_under_sentence(task_language, words).cost
         if strips_only:
             _require_steps_counted(plain, model)
         named = with_positive_literals(named, only_goal=not strips_only)
@@ -299,6 +300,8 @@ class _Naming:
         old = (number < self.first_new or number == self.between for number, _ in self.plain.goal)
         if all(old):
             conditions.add((self.between, True))
+        if self.remembered:  # a rest may add words
+            conditions |= {(step, True) for step in self.taken[-1:]}
         return tuple(sorted(conditions))
 
 

@@ -224,9 +224,10 @@ def test_a_plan_that_is_cut_off_or_none(monkeypatch: pytest.MonkeyPatch) -> None
 # Within slack.
 
 WITHIN_SLACK = [
-    ("three-cells", 1),
-    pytest.param("three-cells", 2, marks=pytest.mark.thorough),
-    pytest.param("t-map", 1, marks=pytest.mark.thorough),
+    ("three-cells", 1, False),
+    ("three-cells", 1, True),
+    pytest.param("three-cells", 2, False, marks=pytest.mark.thorough),
+    pytest.param("t-map", 1, False, marks=pytest.mark.thorough),
 ]
 
 
@@ -250,17 +251,17 @@ def every_plan(task: ClassicalTask) -> Iterator[tuple[int, ...]]:
                 todo.append(((*plan, number), state.difference(action.deletes).union(action.adds)))
 
 
-@pytest.mark.parametrize(("folder", "slack"), WITHIN_SLACK)
+@pytest.mark.parametrize(("folder", "slack", "sees"), WITHIN_SLACK)
 def test_every_plan_within_slack_has_the_sentence(
-    folder: str, slack: int, monkeypatch: pytest.MonkeyPatch
+    folder: str, slack: int, sees: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All of them, with all, some or none of the steps at rest at the end."""
-    task_language = within_slack(folder, slack)
+    """With all, some or none of the steps at rest at the end; with all if words ``sees`` a rest."""
+    task_language = within_slack(folder, slack, remember_actions=sees)
     sentences = numbered_sentences(task_language)
     assert len(sentences) > 1
     of_task = Plans.of(task_language.space, task_language.task)
     for words, plans in sentences.items():
-        least = {plan: len(of_task.without_rest(plan)) for plan in plans}
+        least = {plan: len(plan if sees else of_task.without_rest(plan)) for plan in plans}
         wanted = {plan[:n] for plan in plans for n in range(least[plan], len(plan) + 1)}
         for limit in FORMS.values():
             monkeypatch.setattr("coordlang.exports.pddl.MAX_ACTIONS", limit)
