@@ -505,6 +505,7 @@ class RobotOptions(
     prefer: str | Sequence[str] = option(
         (), "Without SENTENCE: what it wishes, as for plan; may be repeated.", "PREFERENCE"
     )
+    run: str | None = option(None, "Which time this task is done, if it is done again.", "NAME")
     silent_after: float = option(10.0, "Name a robot that says nothing so long.", "SECONDS")
     play: int | None = option(None, "Play the robot, too, with times drawn by this seed.", "SEED")
     coordinates: CoordinatesSource | None = coordinates_option()

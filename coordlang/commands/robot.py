@@ -76,7 +76,7 @@ class RobotInTask(InTask):
         cannot be opened, and `BadInput` if stdin, which says what is done, ends too early.
         """
         own, robots = self.executive, self.used.model.robots
-        own.life = int.from_bytes(os.urandom(6))
+        own.life = int(time() * 1e6)
         player = None
         if options.play is not None:
             own.random = Random(f"{options.play} {own.robot}")
@@ -128,17 +128,18 @@ def robot(files: Arguments, options: RobotOptions) -> RobotInTask:
         return own
 
     wanted(wishes)  # what is wrong with them is said now
-    run = _run_of(read)
+    run = _run_of(read, options.run)
     agreement = Agreement(options.robot, others, sentence, wishes, best, accepts)
     executive = Executive(run, agreement, monitor_of, options.silent_after)
     points = read_coordinates_of(options.coordinates, read.files.problems[0])
     return RobotInTask(used, executive, run, points)
 
 
-def _run_of(read: ReadTask) -> str:
-    """A name of what all robots must have alike: domain, problem and language."""
+def _run_of(read: ReadTask, name: str | None) -> str:
+    """A name of what all robots must have alike: domain, problem, language, and any given name."""
     data = {key: value for key, value in to_data(read.used.language).items() if key != "producer"}
     same = [domain_sha256(read.files.domain), read.files.problems[0].source.sha256, data]
+    same += [] if name is None else [name]
     return sha256(json.dumps(same, sort_keys=True).encode()).hexdigest()[:16]
 
 

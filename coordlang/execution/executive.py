@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import reduce
 from random import Random
 from typing import Any
 
@@ -52,9 +53,9 @@ class Executive:
     ``run`` names what all must have alike (domain, task and words), ``agreement`` the robot and the
     others, ``monitor_of`` has its choices under a sentence; after ``silent_after`` seconds a robot
     that says nothing is named to the driver.  ``lines`` are for the driver, oldest first; whoever
-    writes them takes them away.  ``life`` is another number for every process that ever is this
-    robot.  ``random`` draws what to do; without it the robot does as little as it may, and keeps
-    most open.  So many messages were ``sent``.
+    writes them takes them away.  ``life`` is when this process began: greater than those of former
+    processes of this robot, whose messages may still come.  ``random`` draws what to do; without it
+    the robot does as little as it may, and keeps most open.  So many messages were ``sent``.
     """
 
     def __init__(
@@ -81,8 +82,6 @@ class Executive:
         self._counted = dict.fromkeys(self._logs, 0)
         #: The last message of each other robot: its process, what it has heard of and knows.
         self._last = {name: Message(run, name, 0) for name in self.others}
-        #: The processes that each other robot was before; what they said may still come.
-        self._former = {name: set[int]() for name in self.others}
         self._heard_at: dict[str, float] = {}
         self._silent: set[str] = set()
         self._refused: set[str] = set()
@@ -192,7 +191,7 @@ class Executive:
         """
         try:
             message = decoded(data, self._run, self.robot, self.others)
-            if message.life in self._former[message.by]:
+            if message.life < self._last[message.by].life:  # what a former process said
                 return
             self._agreement.check(message)
             self._take_in(message, now)
@@ -207,16 +206,18 @@ class Executive:
         self._advance(now)
 
     def _take_in(self, message: Message, now: float) -> None:
-        name = message.by
+        name, former = message.by, message.lives.get(self.robot, 0)
+        if self._monitor is None and former > self.life:  # the clock has gone back since
+            self.life = former + 1
         for of, part in message.logs.items():
+            if of == self.robot and self._monitor and self._own.version.lacks(part.version):
+                raise Contradiction(f"{name} knows of more than {self.robot} has done")
             was_done = self._logs[of].version.is_done
             if self._logs[of].join(part):
                 # All must know that all know who is done, before they leave.
                 is_news = self._logs[of].version.is_done and not was_done
                 self._to_tell |= {*self.others} if is_news else {name}
         is_new = self._last[name].life != message.life
-        if is_new:
-            self._former[name].add(self._last[name].life)
         self._last[name], self._heard_at[name] = message, now
         if name in self._silent:
             self._silent.discard(name)
@@ -297,7 +298,7 @@ class Executive:
         if self._monitor is None:
             if not self._has_joined or self._agreement.sentence is None:
                 return
-            self._monitor = self._monitor_of(self._agreement.sentence)
+            self._monitor = self._checked(self._monitor_of(self._agreement.sentence))
             self.lines.append({"sentence": self._agreement.sentence, "time": now})
             if self.underway is not None:  # before a restart; its end may be lost
                 number, subaction = self.underway
@@ -314,6 +315,17 @@ class Executive:
         if self.is_done and not self._has_finished:
             self._has_finished = True
             self.lines.append({"finished": True, "time": now})
+
+    def _checked(self, monitor: EventMonitor) -> EventMonitor:
+        """The monitor; raises `Refuted` if it excludes what others know that this robot did."""
+        try:
+            at = reduce(EventMonitor.after, [event.name for event in self._own.events], monitor)
+            if self.is_done and not at.finished:
+                at.after(None)
+        except MonitorError as error:
+            what = f"others say that {self.robot} did what it may not do: {error}"
+            raise Refuted(what, remedy="End all processes, and begin again.") from None
+        return monitor
 
     def _heeds_wishes(self, monitor: EventMonitor) -> bool:
         """Promise what is wished, if its choices allow it, and no meeting is arranged."""

@@ -19,7 +19,7 @@ from planners.system.errors import Refuted
 #: Events in one message; a robot that lacks more gets them one message after another.
 _EVENTS_SENT = 16
 
-_Number = Annotated[int, Meta(ge=0)]
+_Number = Annotated[int, Meta(ge=0, lt=1 << 53)]
 
 
 class Contradiction(ValueError):
@@ -79,7 +79,8 @@ class RobotLog:
     def join(self, part: LogPart) -> bool:
         """Take in what is new; whether anything was.  `Contradiction`: and all is as before."""
         known, told = self.events, part.version
-        is_possible = told.ended <= told.told <= told.begun <= told.events <= told.ended + 1
+        most = told.ended + (not told.is_done)
+        is_possible = told.ended <= told.told <= told.begun <= told.events <= most
         if not is_possible or part.first + len(part.events) > told.events:
             raise Contradiction(f"no robot can be so far: {told}")
         if part.first >= max(1, len(known)):
@@ -121,15 +122,15 @@ class Message(Struct, frozen=True, omit_defaults=True):
 
     run: str
     by: str
-    life: int
-    lives: dict[str, int] = {}
+    life: _Number
+    lives: dict[str, _Number] = {}
     knows: dict[str, Version] = {}
     logs: dict[str, LogPart] = {}
     sentence: str | None = None
     speaks: bool = False
     proposes: str | None = None
     answer: Answer | None = None
-    late: float | None = None
+    late: Annotated[float, Meta(ge=0)] | None = None
 
 
 _DECODER = msgspec.json.Decoder(Message)

@@ -343,7 +343,8 @@ def test_a_robot_that_comes_back_asks_who_is_done_too() -> None:
     assert fleet.lines("r1", "event") == [1]
 
 
-def test_what_a_former_process_said_comes_too_late() -> None:
+@pytest.mark.parametrize("again", [["r1"], ["r1", "r2"]])  # then r2 has not heard of it before
+def test_what_a_former_process_said_comes_too_late(again: Sequence[str]) -> None:
     pair = Pair(choices_in(EITHER_WAY, EITHER_WAY_BOTH), "r1", "r2")
 
     def chosen(now: float) -> bytes:
@@ -358,7 +359,8 @@ def test_what_a_former_process_said_comes_too_late() -> None:
 
     late = chosen(0)
     assert b"(go r1 a)" in late
-    pair.join("r1", 2)
+    for name in again:
+        pair.join(name, 2)
     pair.at["r1"].random = Mock(randrange=lambda number: number - 1)
     assert b"(go r1 b)" in chosen(1)
     pair.at["r2"].hears(late, 2)
@@ -416,7 +418,7 @@ def test_a_wish_is_promised_and_being_late_is_told() -> None:
 
 
 GO = Event("(go r1 a)", "(go r1 a)")
-WRONG = LogPart(Version(0, 1))
+WRONG, DONE = LogPart(Version(0, 1)), Version(is_done=True)
 
 
 @pytest.mark.parametrize(
@@ -432,6 +434,7 @@ WRONG = LogPart(Version(0, 1))
         ),
         ([LogPart(Version(1, 0, 0, 1), 0, (GO,))], True),
         ([LogPart(Version(2, 2, 2, 0), 0, (GO, GO))], True),
+        ([LogPart(Version(1, 1, 1, 0, True), 0, (GO,))], True),
         ([LogPart(Version(1, 1, 1, 1), 0, (GO, GO))], True),
     ],
 )
@@ -474,6 +477,8 @@ def test_messages_that_are_none_are_refused_once() -> None:
         encode(Message("run", "r2", 1, knows={"r9": Version()})): "a robot that there is not: r9",
         encode(Message("run", "r2", 1, sentence="w9")): 'r2 follows "w9", r1 "w',
         encode(Message("run", "r2", 1, logs={"r2": WRONG})): "no robot can be",
+        encode(Message("run", "r2", 1, logs={"r1": LogPart(DONE)})): "more than r1 has done",
+        encode(Message("run", "r2", 1, late=-1.0)): "Expected `float` >= 0.0",
     }
     for data, why in cases.items():
         own.hears(data, 1)
@@ -481,17 +486,19 @@ def test_messages_that_are_none_are_refused_once() -> None:
         (said,) = pair.lines("r1", "why")
         assert why in said
     # An event that waits for an own one cannot have ended.
-    name = pair.data["choices"][1]["robot"]
-    events = tuple(
-        Event(text, event["subaction"])
-        for text, event in pair.data["choices"][1]["passings"]["events"].items()
-    )
-    assert name == "r2"
+    its = pair.data["choices"][1]["passings"]["events"].items()
+    events = tuple(Event(text, event["subaction"]) for text, event in its)
     part = LogPart(Version(2, 2, 2, 2), 0, events)
     own.hears(encode(Message("run", "r2", 1, logs={"r2": part})), 2)
     (said,) = pair.lines("r1", "why")
     assert "it waits for r1" in said
     assert pair.lines("r1", "from") == []
+    # Of a robot that begins others may know what it did, if it is one of its choices.
+    for log in (LogPart(Version(1), 0, (GO,)), LogPart(DONE)):
+        with pytest.raises(Refuted, match="did what it may not do: event 1"):
+            Pair(turning_round(), "r1").at["r1"].hears(
+                encode(Message("run", "r2", 1, {"r1": 1}, logs={"r1": log})), 1
+            )
 
 
 def test_a_refused_message_decides_no_sentence() -> None:
