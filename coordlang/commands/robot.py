@@ -213,7 +213,10 @@ class _Loop:
         return not [to for to in unsent if self._own.unsent(to)]
 
     def _hears_driver(self, file: int) -> None:
-        read = os.read(file, _CHUNK)
+        try:
+            read = os.read(file, _CHUNK)
+        except OSError:  # it cannot be read, or its terminal is closed
+            read = b""
         if not read:
             self._stdin = []
             read = b"\n"  # that its last line may lack

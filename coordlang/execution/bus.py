@@ -17,7 +17,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from queue import SimpleQueue
-from typing import Any
+from typing import IO, Any
 from urllib.parse import quote
 
 from planners.system.errors import BadInput, UsageError
@@ -58,7 +58,7 @@ class _UnixBus:
         self._folder, self._robot, self._own = folder, robot, folder / _quoted(robot)
         self._lock, self._socket = self._entered()
 
-    def _entered(self) -> tuple[int, socket.socket]:
+    def _entered(self) -> tuple[IO[str], socket.socket]:
         """The robot's lock and its socket in the folder."""
         own = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         own.setblocking(False)
@@ -66,7 +66,7 @@ class _UnixBus:
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             if self._folder.stat().st_uid != os.getuid():
                 raise PermissionError(errno.EPERM, "the folder is another user's")
-            lock = os.open(f"{self._own}.lock", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
+            lock = os.fdopen(os.open(f"{self._own}.lock", os.O_CREAT | os.O_RDWR, 0o600))
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             self._own.unlink(missing_ok=True)
             own.bind(str(self._own))
@@ -100,9 +100,10 @@ class _UnixBus:
 
     def close(self) -> None:
         """Leave the bus; the folder stays for the others."""
-        self._own.unlink(missing_ok=True)
+        with suppress(OSError):  # a file may be where the folder was
+            self._own.unlink()
         self._socket.close()
-        os.close(self._lock)
+        self._lock.close()
 
 
 class _ZenohBus:

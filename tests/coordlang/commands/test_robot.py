@@ -160,9 +160,8 @@ def test_robots_agree_on_what_they_wish(language: Path, loaded: PlanningInstance
                 own.tick(0.0)
                 for to, data in own.messages():
                     next(o for o in executives if o.robot == to).hears(data, 0.0)
-        (agreed,) = {
-            line["sentence"] for own in executives for line in own.lines if "sentence" in line
-        }
+        lines = [line for own in executives for line in own.lines]
+        (agreed,) = {line["sentence"] for line in lines if "sentence" in line}
         wished = [*wishes.values()] or ["most-plans"]
         if "avoid:(at r1 c1-1)" in wished:
             wished = ["avoid:(at r1 c1-1)", *({*wished} - {"avoid:(at r1 c1-1)"})]
@@ -195,8 +194,9 @@ def test_what_cannot_be_is_refused(language: Path, folder: Path, shell: Shell) -
         found.process.stdin.close()
         found.process.stdin = None
         assert found.process.wait(20) == 31
-    closed = own_process("robot", language, *CORNERS, "--robot", "r1", "--bus", f"unix:{folder}")
-    assert subprocess.run(["sh", "-c", 'exec "$@" <&-', "sh", *closed], timeout=20).returncode == 31
+    command = own_process("robot", language, *CORNERS, "--robot", "r1", "--bus", f"unix:{folder}")
+    for closed in ('exec "$@" <&-', 'exec "$@" 0>/dev/null'):
+        assert subprocess.run(["sh", "-c", closed, "sh", *command], timeout=20).returncode == 31
 
 
 def test_robots_with_different_sentences_end(language: Path, folder: Path) -> None:
@@ -233,6 +233,10 @@ def test_a_bus_takes_any_names_and_carries_on_when_its_folder_is_removed(folder:
                     assert all(bus.send(name, name.encode()) for name in names)
             heard = {name: {*bus.receive()} for name, bus in buses.items()}
             assert heard == {name: {name.encode()} for name in names}
+        shutil.rmtree(folder / "bus")
+        (folder / "bus").touch()
+        with pytest.raises(UsageError, match="cannot be opened: File exists"):
+            buses["r"].send("a/b", b"")
 
 
 def test_nothing_is_executed_without_a_guarantee(loaded: PlanningInstance) -> None:
