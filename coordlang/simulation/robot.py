@@ -233,6 +233,9 @@ class Robot:
         chosen = [step.subaction for step in self.steps]
         if isinstance(ahead, EventMonitor) and self._is_underway:
             ahead.did(chosen[-1])
+        if self._chosen is not None:
+            chosen.append(self._chosen)
+            ahead = ahead.after(self._chosen)
         while not ahead.finished:
             chosen.append(drawn(ahead, random, ahead.allowed()))
             ahead = ahead.after(chosen[-1])
