@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Worker processes of this machine: an executor that can be ended at any moment.
 
-A worker ends when its parent does and when it is asked to (SIGINT, SIGTERM, SIGHUP); what is half
-written is removed then.
+A worker ends when its parent does and when it is asked to (SIGTERM, and SIGINT and SIGHUP unless
+they are ignored: ``nohup``); what is half written is removed then.
 """
 
 from __future__ import annotations
@@ -134,7 +134,9 @@ def _begin(work: Packed, memory: int | None) -> None:
         os.dup2(nowhere, standard)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     for number in ENDING:
-        signal.signal(number, _asked_to_end)
+        # SIGTERM is how the parent asks.
+        if number == signal.SIGTERM or signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _asked_to_end)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
     if memory is not None:
         load_libraries()

@@ -74,7 +74,7 @@ class Workers:
         """
         count, lost = min(self.processes, len(left)), 0
         effort = sum(batch.efforts[number] for number in left)
-        if not self.cluster and (count < 2 or effort < self.worth):
+        if not self.cluster and (count < 2 or effort < self.worth or _is_daemonic()):
             for number in left:
                 yield number, batch.function(batch.shared, batch.jobs[number])
             return
@@ -108,6 +108,13 @@ class Workers:
         left = memory_left()
         count = min(count, max(1, left // _LEAST_MEMORY))
         return in_processes(batch, jobs, count, left // count if has_memory_limit() else None)
+
+
+def _is_daemonic() -> bool:
+    """Whether this process may start no other (workers of `multiprocessing.Pool`, and Dask's)."""
+    from multiprocessing import current_process
+
+    return current_process().daemon
 
 
 def cores() -> int:

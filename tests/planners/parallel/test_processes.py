@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 from dataclasses import replace
-from multiprocessing import resource_tracker, spawn
+from multiprocessing import current_process, resource_tracker, spawn
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -36,11 +36,15 @@ TWO = Workers(2)
 SCRIPT = (
     "import signal, sys\n"
     "signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in the background\n"
+    "signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as by nohup\n"
     "from planners.parallel.workers import Workers; from tests.support import jobs\n"
 )
 
 
-def test_jobs_do_not_matter_and_small_work_stays_here() -> None:
+def test_jobs_do_not_matter_and_small_work_stays_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    def who(given: Batch) -> set[int]:
+        return {int(table["process"][0]) for table in TWO.tables(given)}
+
     parts = [range(low, low + 3) for low in range(0, 15, 3)]
     squares = batch(jobs.squares, 3, parts)
     results = {
@@ -48,11 +52,10 @@ def test_jobs_do_not_matter_and_small_work_stays_here() -> None:
         for number in (1, 2)
     }
     assert results[1] == results[2] == [[3 * n * n for n in part] for part in parts]
-    elsewhere = {int(table["process"][0]) for table in TWO.tables(squares)}
-    assert os.getpid() not in elsewhere
-    small = batch(jobs.squares, 3, parts, efforts=[1.0] * len(parts))
-    here = {int(table["process"][0]) for table in TWO.tables(small)}
-    assert here == {os.getpid()}
+    assert os.getpid() not in who(squares)
+    assert who(batch(jobs.squares, 3, parts, efforts=[1.0] * len(parts))) == {os.getpid()}
+    monkeypatch.setitem(vars(current_process())["_config"], "daemon", True)
+    assert who(squares) == {os.getpid()}  # as a worker of another pool it may start no process
 
 
 @pytest.mark.parametrize("number", [1, 2])
@@ -109,9 +112,11 @@ def test_no_worker_is_left_when_time_is_over(tmp_path: Path) -> None:
     assert not any(map(runs, workers(tmp_path)))
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize(
+    ("number", "count"), [(signal.SIGTERM, 3), (signal.SIGKILL, 3), (signal.SIGHUP, 2)]
+)
 def test_one_worker_is_ended_and_its_job_done_by_another(
-    number: signal.Signals, tmp_path: Path
+    number: signal.Signals, count: int, tmp_path: Path
 ) -> None:
     process = script(
         tmp_path,
@@ -120,9 +125,10 @@ def test_one_worker_is_ended_and_its_job_done_by_another(
     )
     until(lambda: len(workers(tmp_path)) == 2)
     os.kill(workers(tmp_path)[0], number)
-    until(lambda: len(workers(tmp_path)) == 3)
+    until(lambda: len(workers(tmp_path)) == count)
     (tmp_path / "go").touch()
     assert process.communicate(timeout=60) == (b"[0, 1, 2]\n", b"")
+    assert len(set(workers(tmp_path))) == count
 
 
 def test_workers_that_cannot_start(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -154,12 +160,9 @@ def test_a_script_without_main_guard_is_not_run_again(tmp_path: Path) -> None:
         SCRIPT
         + "print(len(list(Workers(2).tables(jobs.batch(jobs.squares, 1, [range(2)] * 2)))))\n"
     )
-    command = [sys.executable, "-P", "script.py"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        command, cwd=tmp_path, env=environment, capture_output=True, check=True, timeout=60
-    )
-    assert done.stdout == b"2\n"
+    command = [sys.executable, "-P", "script.py"]
+    assert subprocess.check_output(command, cwd=tmp_path, env=environment, timeout=60) == b"2\n"
 
 
 # ---- jobs that are kept
@@ -223,12 +226,8 @@ def test_no_bytes_are_taken_for_a_table(data: bytes) -> None:
 
 
 def test_tables_are_read_as_they_were_written(tmp_path: Path) -> None:
-    table = {
-        "a": np.arange(6).reshape(2, 3),
-        "text": np.array("ß"),
-        "empty": np.zeros((0, 2)),
-        "one": np.array(True),
-    }
+    a, empty = np.arange(6).reshape(2, 3), np.zeros((0, 2))
+    table = {"a": a, "text": np.array("ß"), "empty": empty, "one": np.array(True)}
     store = Store(tmp_path / "new" / "folder")
     store.write("k", table)
     read = store.read("k")
