@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
-from planners.system.errors import OutOfMemory, OutOfTime
+from planners.system.errors import CoordlangError, OutOfMemory, OutOfTime
 
 #: The alarm rings again, should nobody have caught it (libraries in C may lose an exception); not
 #: too soon, so that whoever caught it can save his work and stop the clock.
@@ -60,13 +60,22 @@ def time_limit(seconds: float | None) -> Iterator[None]:
     """Raise `OutOfTime` in the block when ``seconds`` of wall time are over (main thread only).
 
     Blocks may be nested; the limit that is over first rings, and it names its own seconds.
+    Libraries, above all while they are imported, make other errors of it: they leave the block as
+    `OutOfTime`, unless the clock has been stopped.
     """
     if seconds is None or seconds > _FOR_EVER or time_left() < seconds:
         yield
         return
 
+    rang = False
+
+    def over() -> OutOfTime:
+        return OutOfTime(f"the time limit of {seconds:g} s is over", remedy=_LONGER)
+
     def ring(_signal: int, _frame: FrameType | None) -> None:
-        raise OutOfTime(f"the time limit of {seconds:g} s is over", remedy=_LONGER)
+        nonlocal rang
+        rang = True
+        raise over()
 
     def lost(unraisable: sys.UnraisableHookArgs) -> None:
         if isinstance(unraisable.exc_value, OutOfTime):
@@ -81,6 +90,11 @@ def time_limit(seconds: float | None) -> Iterator[None]:
     try:
         signal.setitimer(signal.ITIMER_REAL, seconds, _AGAIN)  # inside: it may ring at once
         yield
+    except Exception as error:
+        is_ours = isinstance(error, CoordlangError | MemoryError | AssertionError)
+        if is_ours or not rang or time_left() == math.inf:
+            raise
+        raise over() from error
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
