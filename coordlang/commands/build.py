@@ -59,14 +59,14 @@ def build(arguments: Arguments, options: BuildOptions) -> Built:
     begin, deadline = perf_counter(), monotonic() + time_left()
     files = arguments.read()
     old = None
-    if options.start is None:
-        candidates = _candidates(files, options, files.source.model)
-    else:
-        old, candidates = _to_repair(options.start, files, options)
-    seconds = {"space": perf_counter() - begin}
-    note_size(candidates)
-    fewest = requiring(candidates.spaces) if candidates.kind != "all" else None
     with options.work.opened() as workers:
+        if options.start is None:
+            candidates = _candidates(files, options, files.source.model)
+        else:
+            old, candidates = _to_repair(options.start, files, options)
+        seconds = {"space": perf_counter() - begin}
+        note_size(candidates)
+        fewest = requiring(candidates.spaces) if candidates.kind != "all" else None
         built = build_language(
             candidates,
             options=way,

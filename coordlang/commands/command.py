@@ -228,8 +228,11 @@ def check_outputs(outputs: Iterable[OutputFile], inputs: Iterable[str]) -> None:
             continue  # a device or a pipe is written to, and never replaced
         elif os.path.exists(path) and any(os.path.samefile(path, other) for other in read):
             what = f"{option} {path} would overwrite an input file"
-        elif (other := written.setdefault(os.path.realpath(path), option)) != option:
-            what = f"{other} and {option} name the same file: {path}"
+        else:
+            place = os.path.realpath(path)
+            taken = {place, os.path.dirname(place)} if makes_folder else {place}
+            if others := {written.setdefault(each, option) for each in taken} - {option}:
+                what = f"{min(others)} and {option} name the same file: {path}"
         if what:
             raise UsageError(what, remedy=remedy)
 

@@ -156,8 +156,8 @@ def coordination(files: Arguments, options: CoordinationOptions) -> Coordination
     A task requires coordination (RC) if some mixture of its optimal plans is no optimal plan.
     Raises `ProvedImpossible` for a task without a plan.
     """
-    loaded = files.instance()
     with options.work.opened() as workers:
+        loaded = files.instance()
         found = answers(loaded, workers)
     slack = loaded.model.slack
     tasks = tuple(

@@ -293,6 +293,13 @@ def read_language(language: given.LanguageSource) -> tuple[Language | LiftedLang
     if isinstance(language, Language):
         return language, Position("the language")
     if not isinstance(language, str | PathLike):
+        from coordlang.lifted.language import LiftedLanguage
+
+        if not isinstance(language, LiftedLanguage):
+            raise UsageError(
+                f"expected a language, and this is of type {type(language).__name__}",
+                remedy="Give a file or a language: what `build` returns has one, .language.",
+            )
         return language, Position("the lifted language")
     data, position = read_bytes(fspath(language)), Position(fspath(language))
     if names_format(data, "coordlang/lifted"):

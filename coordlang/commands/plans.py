@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from typing import Any, ClassVar
@@ -148,7 +149,8 @@ def show_listed(
     if listing.sample:
         listed = found.sample(listing.sample, listing.seed)
     elif not listing.only_count:
-        listed = [*islice(found, DEFAULT_MAX if listing.most is None else listing.most)]
+        most = DEFAULT_MAX if listing.most is None else listing.most
+        listed = [*islice(found, min(most, sys.maxsize))]
     if options.form == "json":
         data = data_of(listed)
         if listing.sample:

@@ -7,6 +7,7 @@ The docstring of a record is the command's ``--help``.  Nothing heavy is importe
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -81,7 +82,8 @@ class Limits:
             raise click.BadParameter(
                 "expected a size such as 500M or 4G, or none", param_hint="'--memory-limit'"
             )
-        return int(float(match[1]) * 1024 ** " kmgt".index(match[2] or " "))
+        size = float(match[1]) * 1024 ** " kmgt".index(match[2] or " ")
+        return int(min(size, sys.maxsize))
 
 
 @dataclass_transform(frozen_default=True)

@@ -161,14 +161,14 @@ def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
     read, position = language_for(arguments.needed("LANGUAGE"), files, tasks, is_verified=False)
     check_source(read, files.domain, files.problems, position)
     model = files.options_of(read)
-    if tasks is None:
-        candidates = recorded_candidates(read, files.domain, files.problems, model, position)
-    else:
-        candidates = files.candidates(tasks, model)
-    require_solvable(candidates)
-    partition = read.partition(candidates.model)
-    note_size(candidates)
     with options.work.opened() as workers:
+        if tasks is None:
+            candidates = recorded_candidates(read, files.domain, files.problems, model, position)
+        else:
+            candidates = files.candidates(tasks, model)
+        require_solvable(candidates)
+        partition = read.partition(candidates.model)
+        note_size(candidates)
         verdict = verify_candidates(partition, candidates, workers, say)
         found, claims = NONE, read.tolerance is not None and read.tolerance.may_fail
         if not verdict.holds:

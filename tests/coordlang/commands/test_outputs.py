@@ -83,7 +83,8 @@ def test_links_devices_and_two_names_of_one_file(here: Shell) -> None:
     for name in ("x.json", "./x.json", "in/../x.json"):
         said = f"-o and --certificate name the same file: {name}"
         here(f"{BUILD} -o x.json --certificate {name}", 2, said)
-    assert not Path("x.json").exists()
+    here(f"{BUILD} -o new --resume new", 2, "-o and --resume name the same file")
+    assert not any(Path(name).exists() for name in ("x.json", "new"))
     here(f"{BUILD} --method minimal -o /dev/null --certificate /dev/null")
 
 
@@ -97,7 +98,6 @@ TO_FILE = [
     f"{EXPORT} --to ltlf -o",
     "tasks d.pddl p.pddl -o",
 ]
-
 
 TO_FOLDER = [f"{EXPORT} -o", "inspect d.pddl p.pddl --write", "domains --copy grid"]
 LONG = "x" * (os.pathconf("/", "PC_NAME_MAX") + 1)

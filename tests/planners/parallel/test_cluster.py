@@ -155,10 +155,10 @@ def test_there_is_no_cluster(
 
 
 def test_the_command_says_it_within_its_limit(silence: str) -> None:
-    files = [DOMAINS / "grid" / f"{stem}.pddl" for stem in ("domain", "corners-3x3")]
-    limits = ["--scheduler", silence, "--time-limit", "3"]
+    files = [DOMAINS / "grid" / f"{stem}.pddl" for stem in ("domain", "corners-6x6")]
+    limits = ["--tasks", "all", "-o", "-", "--scheduler", silence, "--time-limit", "3"]
     done = subprocess.run(
-        [sys.executable, "-m", "coordlang", "coordination", *files, *limits],
+        [sys.executable, "-m", "coordlang", "build", *files, *limits],
         capture_output=True,
         text=True,
         env=ENVIRONMENT,
