@@ -281,13 +281,17 @@ def refuse_first(faults: Iterator[Fault], position: Position) -> None:
         raise BadInput(what, position=position, remedy=remedy)
 
 
-def faults_of_robots(
-    model: ModelRecord, robots: Sequence[str] | UnsetType, remedy: str
+def faults_of_model(
+    model: ModelRecord, robots: Sequence[str] | UnsetType, remedy: str, slack: int = 0
 ) -> Iterator[Fault]:
-    """Robots that are no team, and a file of an older version, with another rule of idling."""
+    """Robots that are no team, options that exclude each other, an older rule of idling."""
     own = () if robots is UNSET else robots
     if robots is not UNSET and (len(set(own)) < len(own) or not own):
         yield "the robots must be different, and at least one", remedy
+    if model.words_see_slack is True and not slack:
+        yield "words see slack, and there is none", remedy
+    if model.execution == "asynchronous" and (slack or model.remember_actions):
+        yield "without a common step there is no slack, and no last action", remedy
     if model.idle is not None and set(model.idle) != set(own):
         yield (
             "this file is of an older version, in which some robot might not idle; its words are "
@@ -298,7 +302,8 @@ def faults_of_robots(
 
 def _faults(record: LanguageRecord) -> Iterator[Fault]:
     """What contradicts itself in a record, but for its words."""
-    yield from faults_of_robots(record.model, record.robots, _BUILD_AGAIN)
+    claimed = Tolerance() if record.tolerance is UNSET else record.tolerance
+    yield from faults_of_model(record.model, record.robots, _BUILD_AGAIN, claimed.slack or 0)
     if record.guarantee is not UNSET:
         yield from _faults_of_guarantee(record.guarantee, len(record.words))
     tasks = record.tasks
@@ -307,7 +312,6 @@ def _faults(record: LanguageRecord) -> Iterator[Fault]:
             f"the language records {tasks.count} tasks but lists {len(tasks.tasks or ())}",
             "Correct 'tasks', or build the language again.",
         )
-    claimed = Tolerance() if record.tolerance is UNSET else record.tolerance
     for what in _faults_of_tolerance(record, claimed):
         remedy = "Correct 'tolerance' and 'guarantee', or build the language again."
         yield f"{what} ('tolerance')", remedy
@@ -351,8 +355,6 @@ def _faults_of_tolerance(record: LanguageRecord, claimed: Tolerance) -> Iterator
         yield "'failure_mean' and 'failure_worst' belong together"
     if mean is not None and worst is not None and not 0 <= mean <= worst <= 1:
         yield f"failures of {mean} on average and {worst} at worst contradict each other"
-    if record.model.words_see_slack is True and not claimed.slack:
-        yield "words see slack, and there is none"
     is_language = record.guarantee is not UNSET and record.guarantee.coordination_language
     if mean is not None and is_language:
         yield "'guarantee' must say that it is no coordination language"

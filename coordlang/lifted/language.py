@@ -18,7 +18,7 @@ from coordlang.language.file import (
     Fault,
     FeatureValues,
     ModelRecord,
-    faults_of_robots,
+    faults_of_model,
     present,
     refuse_duplicates,
     refuse_first,
@@ -280,8 +280,8 @@ def lifted_from_bytes(data: bytes, position: Position) -> LiftedLanguage:
 
 
 def _faults(record: LiftedRecord) -> Iterator[Fault]:
-    """Robots that are no team, and words that are none."""
-    yield from faults_of_robots(record.model, record.robots, LIFT_AGAIN)
+    """Robots that are no team, a model that is none, and words that are none."""
+    yield from faults_of_model(record.model, record.robots, LIFT_AGAIN)
     words = set(record.words)
     if len(words) < len(record.words) or not words or any(w.split() != [w] for w in words):
         yield "the words must be different, without blanks, and at least one", LIFT_AGAIN

@@ -86,6 +86,8 @@ CONTRADICTORY: list[Change] = [
     lambda d: d["guarantee"].update(lower_bound=4),
     lambda d: d["guarantee"].update(coordination_language=False),  # and proved minimal
     lambda d: d.update(tolerance={"failure_mean": 0.1, "failure_worst": 0.5}),  # a language
+    lambda d: d["model"].update(execution="asynchronous", remember_actions=True),
+    lambda d: d.update(model={"execution": "asynchronous"}, tolerance={"slack": 1}),
     lambda d: d.update(no_language(d), tolerance={"failure_mean": 0.1}),
     lambda d: d.update(no_language(d), tolerance={"failure_worst": 0.1}),
     lambda d: d.update(no_language(d), tolerance={"failure_mean": 0.3, "failure_worst": 0.2}),
