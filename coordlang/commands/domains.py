@@ -156,8 +156,8 @@ def _map(grid: Path, scenario: Path, options: ImportOptions) -> ImportedSite:
     if options.task or options.clearance is not None:
         remedy = "Leave out --task and --clearance."
         raise UsageError("the scenario says who goes where on a map", remedy=remedy)
-    names = tuple(f"r{k}" for k in range(1, number + 1))
-    return ImportedSite(planning_files(grid, scenario, number), names, {})
+    texts = planning_files(grid, scenario, number)
+    return ImportedSite(texts, tuple(f"r{k}" for k in range(1, number + 1)), {})
 
 
 def _building(path: Path, options: ImportOptions) -> ImportedSite:
@@ -179,7 +179,7 @@ def _building(path: Path, options: ImportOptions) -> ImportedSite:
 def _robots(asked: int | str | Sequence[str] | None) -> int | list[str] | None:
     """How many robots are asked for, or which ones."""
     if isinstance(asked, str):
-        asked = int(asked) if asked.isdecimal() and len(asked) < 7 else asked.split(",")
-    if isinstance(asked, int) and asked < 1:
+        asked = int(asked) if asked.isdecimal() and len(asked) < 99 else asked.split(",")
+    if asked is not None and (asked < 1 if isinstance(asked, int) else not asked):
         raise UsageError(f"--robots {asked}: at least one is needed", remedy="Say --robots 2.")
     return asked if asked is None or isinstance(asked, int) else [name.strip() for name in asked]

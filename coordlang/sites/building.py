@@ -90,9 +90,13 @@ class Building:
 
 
 def pddl_name(text: str) -> str:
-    """A name that PDDL has, too, as like a text as may be; empty if nothing is left."""
+    """A name that PDDL has, too, as like a text as may be; empty if nothing is left.
+
+    None of those of graphs: an object of two kinds is declared twice.
+    """
     name = named_like(text)
-    return name if not name or name[0].isalpha() else f"p-{name}"
+    is_own = name[:1].isalpha() and not name.startswith("graph-")
+    return name if not name or is_own else f"p-{name}"
 
 
 def read_building(path: Path) -> Building:

@@ -216,6 +216,7 @@ def _started(
         asked = list(building.spawning)
     elif isinstance(asked, int):
         taken = {*building.spawning, *building.places}
+        asked = min(asked, len(building.places) + 1)  # there is no room for more
         more = (f"r{number}" for number in range(1, 1 + asked + len(taken)))
         asked = [*building.spawning, *(name for name in more if name not in taken)][:asked]
     starts: dict[str, str] = {}

@@ -102,9 +102,8 @@ def test_the_problem_is_understood(tmp_path: Path) -> None:
     assert found["statics"] == {"charger": 1, "lane": 9, "parking": 1}
     assert library.plans(*files).makespan == 2
     assert library.check(*files).agree
-    assert set(read_coordinates(tmp_path / "pddl" / "coordinates.json")) == set(
-        read_building(written(tmp_path)).places
-    )
+    places = {*read_building(written(tmp_path)).places}
+    assert {*read_coordinates(tmp_path / "pddl" / "coordinates.json")} == places
 
 
 def test_vertices_at_one_point_are_one_place(tmp_path: Path) -> None:
@@ -392,10 +391,7 @@ def test_what_is_wrong_and_where(
 
 def test_bytes_that_are_no_text(tmp_path: Path) -> None:
     path = written(tmp_path)
-    for data, message in (
-        (b"name: \xff\n", "no UTF-8 text"),
-        (b"x" * (2**25 + 1), "more than 32 MiB"),
-    ):
+    for data, message in ((b"name: \xff\n", "no UTF-8"), (b"x" * (2**25 + 1), "than 32 MiB")):
         path.write_bytes(data)
         with pytest.raises(BadInput, match=message):
             read_building(path)
@@ -418,7 +414,7 @@ def test_the_slow_parser_reads_the_same(tmp_path: Path, monkeypatch: pytest.Monk
 
 NAMES = [
     *("not", "and", "at", "move", "lane", "robot", "place", "object", "either", "number"),
-    *("?x", "(", ";", "é", "1"),
+    *("?x", "(", ";", "é", "1", "graph-0"),
 ]
 
 
@@ -431,11 +427,12 @@ def test_names_of_all_kinds_are_names_of_pddl(tmp_path: Path) -> None:
     inspected = library.inspect(*saved(tmp_path, texts), states=True).data()
     # In a row of places nobody passes: one of the two is always on the left.
     assert inspected["states"] == len(NAMES) * (len(NAMES) - 1) // 2
+    assert "graph-0" not in found.places  # a graph has this name: it would be declared twice
 
 
 ASKED = [
     (["--robots", "0"], "at least one is needed"),
-    (["--robots", "6"], "there is room for 5 robots"),
+    (["--robots", "1000000"], "there is room for 5 robots"),
     (["--robots", "Ada,ada"], "'ada' cannot be used"),
     (["--robots", "door,Ada"], "'door' cannot be used"),
     (["--robots", ","], "'' cannot be used"),
@@ -486,6 +483,8 @@ def test_no_robot_spawns(coordlang: Command, tmp_path: Path) -> None:
     path = written(tmp_path, SQUARE.replace("spawn_robot_name", "name"))
     outcome = coordlang("import", path, "-o", tmp_path / "new")
     assert (outcome.code, "no robot spawns" in outcome.err) == (31, True)
+    with pytest.raises(UsageError, match="at least one is needed"):
+        library.import_site(path, robots=[])
     assert coordlang("import", path, "-o", tmp_path / "new", "--robots", "x,y").code == 0
 
 
