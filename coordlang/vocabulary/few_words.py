@@ -56,7 +56,8 @@ def few_words(
     and how many were measured, and counted exactly.  Raises `TooManyToCount` if not even silence
     can be counted.
     """
-    search = _Search(job, words, worst)
+    # There are no more words than states: of any larger number the answer is the same.
+    search = _Search(job, min(words, len(job.states)), worst)
     stopped = run_until_stopped(lambda: search.run(start, work))
     if stopped is not None:
         with suppress(TooManyToCount, OutOfTime, KeyboardInterrupt), little_time_after(stopped):

@@ -193,10 +193,10 @@ def test_words_are_found_in_their_own_way(options: dict[str, object], message: s
 
 def test_a_function_gives_words_too() -> None:
     built = library.build(*SQUARE, tasks="all", words=2, worst=True)
-    assert built.failures.mean == Fraction(5, 132)
-    assert built.data()["failure_mean"] == 5 / 132
+    assert (built.failures.mean, built.data()["failure_mean"]) == (Fraction(5, 132), 5 / 132)
     assert not built.guarantee.coordination_language
     assert built_for("grid", "gw1-2x2").failures.mean == 0
+    assert few_words(job_for_few_words(Making(own_task("lock", "three-robots"))), 10**24)[1].mean
 
 
 def test_a_limit_before_a_language_is_found_and_none_after() -> None:
