@@ -7,7 +7,6 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
-from sys import maxsize
 from typing import Any, ClassVar
 
 from coordlang.commands.inputs import Arguments, public
@@ -151,7 +150,7 @@ def show_listed(
         listed = found.sample(listing.sample, listing.seed)
     elif not listing.only_count:
         most = DEFAULT_MAX if listing.most is None else listing.most
-        listed = [*islice(found, min(most, maxsize))]
+        listed = [*islice(found, min(most, sys.maxsize))]
     if options.form == "json":
         data = data_of(listed)
         if listing.sample:

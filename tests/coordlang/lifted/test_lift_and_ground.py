@@ -192,7 +192,7 @@ DAMAGED: dict[str, tuple[Change, str]] = {
         "defines no feature",
     ),
     "values": (lambda d: d.update(values={"0": "w0"}), "are no values of 2 features"),
-    "beyond all bounds": (lambda d: d.update(values={f"0 {10**25}": "w0"}), "no values of 2"),
+    "bounds": (lambda d: d.update(values={f"0 {10**25}": "w0"}), "are no values of 2 features"),
     "unknown word": (lambda d: d.update(values={"0 1": "w9"}), "which 'words' has not"),
     "equal words": (lambda d: d.update(words=["w0", "w0"]), "words must be different"),
     "own word": (lambda d: d.update(words=["w0", "w1", "w2", "w3", "v0.1"]), "unknown values"),
