@@ -178,7 +178,9 @@ def test_what_cannot_be_is_refused(language: Path, folder: Path, shell: Shell) -
     shell(f"{start} --robot r1 --prefer nothing", 2, "there is no such preference")
     shell(f"{start} --robot r1 --bus mqtt", 2, "there is no such bus", "unix:FOLDER")
     shell(f"{start} --robot r1 --bus unix:{folder}/{'long' * 40}", 2, "cannot be opened")
-    shell(f"{start} --robot r1 --silent-after 0", 2, "--silent-after 0.0: expected a number")
+    shell(
+        f"{start} --robot r1 --silent-after 0", 2, "--silent-after 0.0: expected a number above 0"
+    )
     shell(f'{start} "w0 w9" --robot r1', 31, "w9")
     shell(f"{start}", 2, "--robot")
     shell("build CORNERS --method greedy -o step.json", 0)

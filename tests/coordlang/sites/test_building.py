@@ -391,7 +391,10 @@ def test_what_is_wrong_and_where(
 
 def test_bytes_that_are_no_text(tmp_path: Path) -> None:
     path = written(tmp_path)
-    for data, message in ((b"name: \xff\n", "no UTF-8"), (b"x" * (2**25 + 1), "than 32 MiB")):
+    for data, message in (
+        (b"name: \xff\n", "no UTF-8 text"),
+        (b"x" * (2**25 + 1), "more than 32 MiB"),
+    ):
         path.write_bytes(data)
         with pytest.raises(BadInput, match=message):
             read_building(path)
