@@ -84,7 +84,7 @@ def page_data(
             "plans": model.kept_plans,
             "unit": model.unit,
             "slack": model.slack,
-            "remembers": model.codec.memory is not None,
+            "remembers": model.remembers,
             "one": f"{'a' if model.slack else 'an'} {model.kept_plan}",
         },
         "words": [{"name": word} for word in language.words],

@@ -79,10 +79,10 @@ def parse_domains(sources: Sequence[Source]) -> list[Domain]:
     return [_finish(actions, *parts) for parts in begun]
 
 
-def _begin(source: Source) -> tuple[Group, Names, list[_Head]]:
-    """A text, its names, and its actions, whose formulas are not read yet."""
+def _begin(source: Source) -> tuple[str, Source, Sections, Names, list[_Head]]:
+    """A domain's name, its text with the sections, and its actions, without their formulas."""
     root = parse(source)
-    _, sections = read_header(root, "domain")
+    name, sections = read_header(root, "domain")
     types = _read_types(root, sections)
     predicates = _without_privacy(_entries(sections, ":predicates"))
     # "- number" may stand behind functions.
@@ -93,12 +93,18 @@ def _begin(source: Source) -> tuple[Group, Names, list[_Head]]:
     names = replace(
         names, functions=_arities(_read_signatures(functions, types)), objects=constants
     )
-    return root, names, _read_heads(names, root, sections)
+    return name, source, sections, names, _read_heads(names, root, sections)
 
 
-def _finish(actions: Mapping[str, int], root: Group, names: Names, heads: list[_Head]) -> Domain:
+def _finish(
+    actions: Mapping[str, int],
+    name: str,
+    source: Source,
+    sections: Sections,
+    names: Names,
+    heads: list[_Head],
+) -> Domain:
     """A domain whose formulas may speak of ``actions``, too."""
-    name, sections = read_header(root, "domain")
     own = {head.name.text: len(head.parameters) for head in heads}
     names = replace(names, actions={**actions, **own})
     schemas = tuple(_read_schema(names, head) for head in heads)
@@ -111,7 +117,7 @@ def _finish(actions: Mapping[str, int], root: Group, names: Names, heads: list[_
         )
     return Domain(
         name,
-        root.source,
+        source,
         dict(names.types),
         dict(names.objects),
         dict(names.predicates),
