@@ -255,7 +255,6 @@ class Making:
             effort=options.effort,
             progress=self.progress,
             check=self.check,
-            workers=self.workers,
         )
 
     def verdict(self, partition: Partition) -> Verdict:

@@ -55,7 +55,7 @@ class Mixtures:
     def __init__(self, choices: Choices) -> None:
         self._choices, self._space = choices, choices.space
         self._edges = EdgeTrees(choices.space)
-        #: From which nodes mixtures have failed, as `met` was told, and how often.
+        #: From which nodes mixtures have failed, and under how many words.
         self._failed = Counter[int]()
         self._forget()
 
@@ -70,7 +70,7 @@ class Mixtures:
 
         A table (tuples, steps, robots) has step by step the edge of each plan.
         For each node that requires coordination, the rest of plans that begin alike; those first
-        that were `met` most often, then those with fewer steps to go.
+        that were found most often, then those with fewer steps to go.
 
         ``word``: (nodes) the word of each node of the plan space.  ``most``: about how many are
         wanted.  If there is none at all, ``word`` is a language for the tasks.  ``ways``: so many
@@ -102,13 +102,10 @@ class Mixtures:
                 break
             wanted = min(ways * _RANDOM_WAYS, most // len(found) - 1)
             plans += sorted(self._others(node, wanted, random))
+        self._failed.update(found.keys())
         by_steps = groupby(sorted(found), key=lambda node: int(space.layer[node]))
         plans_by_steps = ([own for node in nodes for own in found[node]] for _, nodes in by_steps)
         return [np.array(plans, np.int64).transpose(0, 2, 1) for plans in plans_by_steps]
-
-    def met(self, tuples: Ints) -> None:
-        """Look first at the nodes from which these failing plans go, one of their tables."""
-        self._failed.update(np.unique(self._space.sources_of(tuples[:, 0, 0])).tolist())
 
     def _of_node(self, node: int, random: Random | None = None) -> _Failing | None:
         """A mixture of plans from a node that fails while all of them have one sentence.

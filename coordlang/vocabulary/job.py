@@ -14,7 +14,6 @@ from coordlang.language.warping import Clause
 from coordlang.symmetry.group import Symmetry
 from coordlang.vocabulary.first_differences import FirstDifferences
 from planners.joint.tables import Ints
-from planners.parallel.workers import Workers
 from planners.search.plan_space import PlanSpace
 
 if TYPE_CHECKING:
@@ -48,7 +47,7 @@ class Job:
     ``by_clauses``: bounds are proved by clauses alone, as a certificate needs them.  ``progress``
     is called with a line of text now and then.  ``check`` verifies a partition by definition, and
     raises if it is no language; an anytime method calls it for every better one that it finds:
-    when it is stopped there is no time left.  ``workers`` do what can be done beside the method.
+    when it is stopped there is no time left.
     """
 
     candidates: Candidates
@@ -61,7 +60,6 @@ class Job:
     by_clauses: bool = False
     progress: Callable[[str], None] = lambda _: None
     check: Callable[[Assignment], None] = lambda _: None
-    workers: Workers = field(default_factory=lambda: Workers())
 
     @property
     def lower_bound(self) -> int:

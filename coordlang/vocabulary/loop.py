@@ -54,7 +54,7 @@ class Languages:
         """The languages for the candidate tasks of a job."""
         spaces, states = job.candidates.spaces, len(job.candidates.rows)
         group = symmetry_group(job.candidates)
-        return cls(Refuter(spaces, group, states, job.seed, job.progress, workers=job.workers))
+        return cls(Refuter(spaces, group, states, job.seed, job.progress))
 
     def holds(self, partition: Assignment) -> bool:
         """Whether it is a language; if not, the clauses that it violates are known afterwards."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass
 from random import Random
 
@@ -23,8 +22,6 @@ from coordlang.vocabulary.failing_tuples import Agreeing, FailingTuples
 from coordlang.vocabulary.job import Evidence
 from planners.joint.model import FullState
 from planners.joint.tables import Bools, Ints
-from planners.parallel.batch import Batch, Table, digest
-from planners.parallel.workers import Workers
 from planners.search.plan_space import PlanSpace
 
 #: Tasks are searched for counterexamples in parts, one after another: at least so many parts ..
@@ -61,19 +58,6 @@ class _Walked:
         """Failing tuples of plans by the word of each state (states), see `Mixtures.failing`."""
         return self.finder.failing(word[self.space.state], most, len(self.images), steps)
 
-    @property
-    def effort(self) -> float:
-        """Of a walk under one word: the moves of as many plans as robots from one node."""
-        space = self.space
-        return float((space.out_degrees.astype(np.float64) ** space.robots).sum())
-
-    @property
-    def identity(self) -> str:
-        """A hash of all that `failing` depends on, the partition apart."""
-        space = self.space
-        nodes = (space.state, space.goal, space.layer, space.first, space.starts)
-        return digest(*nodes, space.target, space.labels, self.images)
-
 
 class Refuter:
     """Decides whether partitions are languages, and keeps what refutes them.
@@ -81,7 +65,7 @@ class Refuter:
     Of goals that are images of each other under a symmetry one is walked: a partition is refuted
     by plans of the tasks to an image iff its image under the symmetry is refuted by plans of the
     tasks to the goal itself.  At the beginning plans are collected that refute the partition
-    ``first``, by default a single word, where walks are longest: as jobs of ``workers``.
+    ``first``, by default a single word, where walks are longest.
 
     ``pool``: the failing tuples met so far.  ``walks``: how often a part of the tasks was walked.
     """
@@ -94,26 +78,16 @@ class Refuter:
         seed: int,
         progress: Callable[[str], None] = lambda _: None,
         first: Ints | None = None,
-        workers: Workers | None = None,
     ) -> None:
         self.pool = FailingTuples(group, states)
         self.walks = 0
         self._random = np.random.default_rng(seed)
         self._parts = _parts(spaces, self.pool.images, Random(seed))
         word = np.zeros(states, np.int64) if first is None else first
-        batch = Batch(
-            "plans whose mixture fails",
-            _walk_alone,
-            (self._parts, word),
-            range(len(self._parts)),
-            digest(word, *(walked.identity for walked in self._parts)),
-            [walked.effort for walked in self._parts],
-        )
-        with closing((workers or Workers()).tables(batch)) as tables:
-            progress("collecting plans whose mixture fails")
-            for walked, table in zip(self._parts, tables, strict=True):
-                self._add(walked, [table[str(n)] for n in range(len(table))])
-                progress(f"collecting plans whose mixture fails: {len(self.pool):,}")
+        progress("collecting plans whose mixture fails")
+        for walked in self._parts:
+            self._add(walked, walked.failing(word, _AT_FIRST))
+            progress(f"collecting plans whose mixture fails: {len(self.pool):,}")
 
     def agreeing(
         self,
@@ -150,16 +124,7 @@ class Refuter:
         self.walks += 1
         for table in found:
             self.pool.add(table, walked.space)
-            if isinstance(walked.finder, Mixtures):  # here, not where a worker may have found it
-                walked.finder.met(table)
         return bool(found)
-
-
-def _walk_alone(shared: tuple[Sequence[_Walked], Ints], number: int) -> Table:
-    """One job: the failing plans of one part under a partition."""
-    parts, word = shared
-    found = parts[number].failing(word, _AT_FIRST)
-    return {str(n): edges for n, edges in enumerate(found)}
 
 
 def _parts(spaces: Sequence[PlanSpace], images: Sequence[Ints], random: Random) -> list[_Walked]:

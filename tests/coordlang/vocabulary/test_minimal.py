@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from itertools import combinations, islice, pairwise, permutations
-from pathlib import Path
 from random import Random
 
 import numpy as np
@@ -25,11 +24,8 @@ from coordlang.vocabulary.job import Assignment
 from coordlang.vocabulary.merging import merged
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import PartitionProblem
-from planners.joint.tables import Ints
-from planners.parallel.batch import Store
-from planners.parallel.workers import Workers
 from tests.support.candidates import small_candidates, states_of
-from tests.support.domains import all_tasks, own_task
+from tests.support.domains import all_tasks
 from tests.support.random_spaces import random_spaces
 from tests.support.task_languages import built_for
 
@@ -200,37 +196,3 @@ def test_walks_of_goals_up_to_symmetry_refute_what_is_no_language(folder: str, s
         assert (not refuter.violated(np.array(word))) == holds
         answers[holds] += 1
     assert min(answers.values()) >= 5, answers
-
-
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("robots", [2, 3])
-def test_first_walks_find_the_same_in_other_processes_and_from_kept_jobs(
-    robots: int, tmp_path: Path
-) -> None:
-    """The same plans in the same order, so the same clauses for the same reasons, and later, too."""
-    both = all_tasks("grid", "gw2-2x3"), own_task("grid", "three-robots-3x3")
-    candidates = both[robots - 2]
-    group, states = symmetry_group(candidates), len(candidates.rows)
-    halves = np.arange(states) % 2
-
-    def refuter(workers: Workers | None, first: Ints | None = None) -> Refuter:
-        return Refuter(candidates.spaces, group, states, 0, first=first, workers=workers)
-
-    kept = Workers(kept=Store(tmp_path))
-    here = refuter(None)
-    others = [refuter(workers) for workers in (Workers(2, worth=0), kept, kept)]
-    jobs = len(list(tmp_path.iterdir()))
-    assert jobs == len(here._parts)
-    for other in others:
-        assert other.walks == here.walks == jobs
-        assert len(other.pool) == len(here.pool) > 20
-    for _ in range(2):
-        violated = [
-            [(c, e.edges) for c, e in found.violated(halves).items()] for found in (here, *others)
-        ]
-        assert violated[0]
-        assert all(found == violated[0] for found in violated[1:])
-        for found in (here, *others):
-            found.pool = FailingTuples(group, states)  # it knows nothing, and has to walk
-    refuter(kept, first=halves)
-    assert len(list(tmp_path.iterdir())) == 2 * jobs, "other words, other jobs"
