@@ -23,6 +23,7 @@ from coordlang.vocabulary.loop import Budget, Languages, find
 from coordlang.vocabulary.refuter import Refuter
 from coordlang.vocabulary.sat import PartitionProblem, Undecided
 from planners.joint.tables import Bools, Ints, unique_rows
+from planners.search.graphs import parts_of_graph
 from planners.search.sat import whole
 
 #: Clauses that are taken of a refuted partition, before their images; and failing tuples after
@@ -218,13 +219,8 @@ class _Kind:
 
 
 def _orbits(to: Ints) -> Ints:
-    """(states) the least state to which a symmetry, again and again, takes each."""
-    every = np.arange(len(to))
-    least, image = every, to
-    while (image != every).any():
-        least = np.minimum(least, image)
-        image = to[image]
-    return least
+    """(states) a number for each set of states that a symmetry takes to each other."""
+    return parts_of_graph(len(to), np.arange(len(to)), to)[1]
 
 
 # ---- few facts that decide the words of one task
