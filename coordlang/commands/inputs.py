@@ -47,7 +47,6 @@ def public(
     Its parameters are those that the record ``takes``, then, by keyword, the options of the record.
     ``with_record`` of the result gets the record, and arguments by the names in ``takes``.
     """
-    given.ready(record)
     words = [word.strip("[]") for word in (record.takes if takes is None else takes).split()]
     word_of = {word.strip(".").lower(): word for word in words}
     parameters, of = [], inspect.Parameter
@@ -68,14 +67,15 @@ def public(
     def decorate(function: Callable[[Arguments, Any], Result]) -> Callable[..., Result]:
         def with_record(options: Any, **read: Any) -> Result:
             source = getattr(options, "source", options)
-            return function(Arguments(source, takes=tuple(words), values=read), options)
+            return function(Arguments(source, read), options)
 
         @functools.wraps(function)
         def called(*arguments: object, **keywords: Any) -> Result:
             named = {name: keywords.pop(name) for name in [*keywords] if name in word_of}
             options = record_from(record, keywords, function.__name__)
-            read = own.bind(*arguments, **named).arguments
-            return with_record(options, **{word_of[name]: value for name, value in read.items()})
+            read = own.bind(*arguments, **named)
+            read.apply_defaults()
+            return with_record(options, **{word_of[k]: v for k, v in read.arguments.items()})
 
         called.__signature__ = inspect.Signature([*parameters, *keyword_only])  # type: ignore[attr-defined]
         called.with_record = with_record  # type: ignore[attr-defined]
@@ -86,13 +86,9 @@ def public(
 
 @dataclass(frozen=True, slots=True)
 class Arguments:
-    """What a function is given: paths or objects read before, and how to read them.
-
-    ``takes`` are the arguments that there are, ``values`` those that were given.
-    """
+    """What a function is given: paths or objects read before, by name, and how to read them."""
 
     source: Source
-    takes: tuple[str, ...]
     values: Mapping[str, Any]
 
     @property
@@ -131,7 +127,7 @@ class Arguments:
 
             factored, problem = read_factored(fspath(self.source.factored))
             return PlanningInput(factored, [problem], self.source)
-        is_single = "PROBLEMS..." not in self.takes
+        is_single = "PROBLEMS..." not in self.values
         if domain is None or not problems or (is_single and len(problems) > 1):
             wanted = "one problem" if is_single else "problems"
             raise UsageError(

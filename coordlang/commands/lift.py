@@ -170,7 +170,7 @@ def _instance(
 ) -> Instance:
     """A problem; that of a factored folder where none is given."""
     given = {"DOMAIN": arguments.values.get("DOMAIN"), "PROBLEM": problem}
-    files = Arguments(options.source, (*given,), given).read()
+    files = Arguments(options.source, given).read()
     if files.source.model.slack:
         raise UsageError(
             "--slack: words over features are learned from optimal plans",

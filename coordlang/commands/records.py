@@ -18,7 +18,7 @@ import click
 
 from planners.pddl.model_options import ModelOptions
 from planners.system.errors import UsageError
-from planners.system.options import Record, cli_option, group, option
+from planners.system.options import cli_option, group, option
 
 if TYPE_CHECKING:
     from coordlang.language.listed import ListedTask
@@ -87,11 +87,12 @@ class Limits:
 
 
 @dataclass_transform(frozen_default=True)
+@dataclass(frozen=True)
 class CommandOptions:
     """What a command can be asked for; the docstring of each record is the command's ``--help``.
 
-    Each record that is made of this one is a frozen dataclass, once it is `ready`.  The command
-    ``takes`` arguments as the usage line shows them, and none where the option ``alone`` is given.
+    Each record that is made of this one is a frozen dataclass, too.  The command ``takes``
+    arguments as the usage line shows them, and none where the option ``alone`` is given.
     A terminal shows what it is ``doing``.  Its ``function`` has its name and is in the ``module``
     of its name, unless others are named, and searches no task again that was searched before if it
     ``keeps_plans``.  Its help begins with the options that are ``used`` most, by name, and ends
@@ -113,14 +114,7 @@ class CommandOptions:
     def __init_subclass__(cls, **said: str | bool) -> None:
         for name, value in said.items():
             setattr(cls, name, value)
-
-
-def ready(record: type[Record]) -> type[Record]:
-    """Make a record the dataclass that it is: a process asks for one, and all take long to make."""
-    for each in reversed(record.__mro__):
-        if issubclass(each, CommandOptions) and "__dataclass_fields__" not in vars(each):
-            dataclass(frozen=True)(each)
-    return record
+        dataclass(frozen=True, eq=False, repr=False)(cls)
 
 
 def output_option(help: str, metavar: str = "FILE", default: Any = None, **more: Any) -> Any:
@@ -666,4 +660,4 @@ class ImportOptions(
 
 def record_of(command: str) -> Any:
     """The record of a command, by its name."""
-    return ready(globals()[f"{command.capitalize()}Options"])
+    return globals()[f"{command.capitalize()}Options"]
