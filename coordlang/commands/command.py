@@ -45,6 +45,8 @@ def command_of(name: str, record: type[CommandOptions]) -> click.Command:
     on_cli = {o.name: o for o in options_of(record) if o.only != "python" and o.name not in hidden}
 
     def called(arguments: tuple[str, ...] = (), **values: object) -> int | None:
+        from coordlang.commands.inputs import Arguments
+
         context = click.get_current_context()
         said = click.core.ParameterSource.COMMANDLINE
         given = {k: v for k, v in values.items() if context.get_parameter_source(k) is said}
@@ -60,9 +62,9 @@ def command_of(name: str, record: type[CommandOptions]) -> click.Command:
             with working(record.doing) as context.meta[SAYING]:
                 files = [(each, given[each.name]) for each in on_cli.values() if each.name in given]
                 check_outputs(*_files(arguments, files, options))
-                function = getattr(module, record.function or name)
-                result = function.with_record(options, **read)
-            shown: int | None = getattr(module, f"show_{name}")(result, options)
+                function = getattr(module, record.function or name).__wrapped__
+                found = function(Arguments(getattr(options, "source", Source()), read), options)
+            shown: int | None = getattr(module, f"show_{name}")(found, options)
             return shown
 
     argument = click.Argument(["arguments"], nargs=-1, type=FILE, metavar=record.takes)

@@ -45,7 +45,7 @@ def public(
     """Make a function of `Arguments` and a record one with positional arguments and keywords.
 
     Its parameters are those that the record ``takes``, then, by keyword, the options of the record.
-    ``with_record`` of the result gets the record, and arguments by the names in ``takes``.
+    Commands, which have both, call what it wraps.
     """
     words = [word.strip("[]") for word in (record.takes if takes is None else takes).split()]
     word_of = {word.strip(".").lower(): word for word in words}
@@ -65,20 +65,16 @@ def public(
     ]
 
     def decorate(function: Callable[[Arguments, Any], Result]) -> Callable[..., Result]:
-        def with_record(options: Any, **read: Any) -> Result:
-            source = getattr(options, "source", options)
-            return function(Arguments(source, read), options)
-
         @functools.wraps(function)
         def called(*arguments: object, **keywords: Any) -> Result:
             named = {name: keywords.pop(name) for name in [*keywords] if name in word_of}
             options = record_from(record, keywords, function.__name__)
             read = own.bind(*arguments, **named)
             read.apply_defaults()
-            return with_record(options, **{word_of[k]: v for k, v in read.arguments.items()})
+            values = {word_of[name]: value for name, value in read.arguments.items()}
+            return function(Arguments(getattr(options, "source", options), values), options)
 
         called.__signature__ = inspect.Signature([*parameters, *keyword_only])  # type: ignore[attr-defined]
-        called.with_record = with_record  # type: ignore[attr-defined]
         return called
 
     return decorate

@@ -31,10 +31,11 @@ def report(arguments: Arguments, options: ReportOptions) -> Report:
 
 def show_report(page: Report, options: ReportOptions) -> None:
     """Write the page."""
-    output = options.output
-    shown = f"{counted(page.tasks - page.others, 'task')} of {page.candidates:,}"
-    if page.others:
-        shown += f" and {counted(page.others, 'other')}"
+    output, others = options.output, page.selection.others
+    candidates = int(page.language.provenance.tasks.get("count", 0))
+    shown = f"{counted(len(page.selection.tasks) - others, 'task')} of {candidates:,}"
+    if others:
+        shown += f" and {counted(others, 'other')}"
     place = "stdout" if output == "-" else visible(output)
     write(page.html, output, f"{shown}, {len(page.html):,} bytes, written to {place}")
-    warn_of_failures(page.tolerance)
+    warn_of_failures(page.language.tolerance)

@@ -22,7 +22,7 @@ from coordlang.explanation.words import (
     lifted_words,
     mapped_states,
 )
-from coordlang.language.provenance import Tolerance, domain_sha256, percent
+from coordlang.language.provenance import domain_sha256, percent
 from coordlang.language.recorded import options_of
 from coordlang.language.words import Language
 from coordlang.report.layout import graph_layout, place_layout
@@ -250,16 +250,11 @@ _FEW_WORDS = 8
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A page, how many tasks are shown in it of how many, and what the language tolerates.
-
-    ``others``: so many of those shown are no ``candidates``.
-    """
+    """A page of a language, and which tasks are shown in it."""
 
     html: bytes
-    tasks: int
-    others: int
-    candidates: int
-    tolerance: Tolerance | None
+    language: Language
+    selection: Selection
 
 
 def make_report(
@@ -307,9 +302,7 @@ def make_report(
             heat = heat_of(language, domain, problems, known, selection, position)
         html = _render({**shown, **drawn_plan(data, heat)}, data)
         if len(html) <= LARGEST:
-            candidates = int(language.provenance.tasks.get("count", 0))
-            number, others = len(selection.tasks), selection.others
-            return Report(html, number, others, candidates, language.tolerance)
+            return Report(html, language, selection)
         if len(selection.tasks) == 1:
             raise OutOfMemory(
                 f"the page of one task would have {len(html):,} bytes, more than {LARGEST:,}",

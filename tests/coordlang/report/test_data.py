@@ -183,7 +183,7 @@ def test_a_page_is_the_same_each_time_opens_offline_and_shows_fewer_tasks_if_too
     assert [part for part in ("http:", "https:", str(Path.cwd())) if part in text] == []
     monkeypatch.setattr("coordlang.report.page.LARGEST", len(one) - 1)
     less = make_report(language, domain, [problem], tasks_shown=4, seed=3)
-    assert less.tasks == 2
+    assert len(less.selection.tasks) == 2
     assert not data_of(less.html)["candidates"]["complete"]
     monkeypatch.setattr("coordlang.report.page._ATOMS_LISTED", 1)  # no picture of unlisted states
     data = data_of(make_report(language, domain, [problem], tasks_shown=1).html)
