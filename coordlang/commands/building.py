@@ -206,8 +206,7 @@ def repair_language(making: Making, start: Language, seed: int) -> Built:
         new_words=tuple(word for word in now.words if word not in number),
         new_words_bound=result.new_words_bound,
     )
-    outcome = Outcome(result.partition, job.lower_bound, result.figures, result.stopped)
-    return making.built(job, outcome, REPAIR, repaired=repaired)
+    return making.built(job, result, REPAIR, repaired=repaired)
 
 
 class Making:

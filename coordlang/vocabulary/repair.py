@@ -11,13 +11,13 @@ words is then looked for, as `minimal` does.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from contextlib import closing
 from dataclasses import dataclass
 from itertools import count
 
 from coordlang.language.warping import Clause
-from coordlang.vocabulary.job import Assignment, Job
+from coordlang.vocabulary.job import Assignment, Job, Outcome
 from coordlang.vocabulary.loop import Budget, Languages, ProblemsBySize, close_bounds, find
 from coordlang.vocabulary.sat import (
     PartitionProblem,
@@ -33,22 +33,17 @@ _COMPARISONS = 5_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Repair:
+class Repair(Outcome):
     """A partition, and how far it is from the old words.
 
-    ``partition``: state number -> word number, below ``old_words`` for an old word.  ``changed``:
-    the states that had another word.  ``changes_bound`` and ``new_words_bound``: no language
-    changes the words of fewer states; of those that change so few, none has fewer new words.
-    ``figures``: the work done, by name.  ``stopped``: the error that ended the search early, None
-    if it came to its end.
+    Word numbers are below ``old_words`` for an old word.  ``changed``: the states that had another
+    word.  ``changes_bound`` and ``new_words_bound``: no language changes the words of fewer states;
+    of those that change so few, none has fewer new words.
     """
 
-    partition: Assignment
-    changed: tuple[int, ...]
-    changes_bound: int
-    new_words_bound: int
-    figures: Mapping[str, float]
-    stopped: BaseException | None
+    changed: tuple[int, ...] = ()
+    changes_bound: int = 0
+    new_words_bound: int = 0
 
 
 def repair(job: Job, kept: Assignment, old_words: int, default: int) -> Repair:
@@ -91,15 +86,16 @@ class _Repair:
         proved = len(changed) == self._changes_bound
         return Repair(
             self.best,
-            tuple(changed),
-            self._changes_bound,
-            self._new_words_bound if proved else 0,
+            self._job.lower_bound,
             {
                 "rounds": self._languages.rounds,
                 "clauses": len(self._languages.clauses),
                 "symmetries": len(self._languages.group.symmetries),
             },
             stopped,
+            changed=tuple(changed),
+            changes_bound=self._changes_bound,
+            new_words_bound=self._new_words_bound if proved else 0,
         )
 
     def run(self) -> None:
