@@ -56,8 +56,8 @@ class _Values:
             of_state[codec.column(candidates.rows, fact)] = number
         number_of = {fact: number for number, fact in enumerate(variable.facts)}
         graph: nx.Graph[int] = nx.empty_graph(len(atoms))
-        for needed, made in variable.changes.values():
-            graph.add_edges_from((number_of[fact], number_of[made]) for fact in needed)
+        for before, after in variable.changes.values():
+            graph.add_edge(number_of[before], number_of[after])
         names = (
             " ".join((atom.predicate, *("?" if a in own else a for a in atom.args)))
             for atom in atoms

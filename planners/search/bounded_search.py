@@ -8,7 +8,6 @@ all optimal plans are in the layers (Proposition 16 of docs/concepts.md).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +17,6 @@ from planners.joint.tables import Ints, Rows
 from planners.search.goals import FAR, searched
 from planners.search.heuristics import Heuristic
 from planners.search.reachable import Edges, Exploration, PieceSizes, Space, grown, joined_edges
-from planners.search.state_variables import StateVariable
 from planners.system.errors import ProvedImpossible
 
 if TYPE_CHECKING:
@@ -72,11 +70,10 @@ class BoundedSearch(Exploration):
         model: JointModel,
         task: PlanningTask,
         heuristic: Heuristic,
-        variables: Sequence[StateVariable],
         pieces: PieceSizes,
     ) -> None:
         super().__init__(model, task.init[None, :], pieces)
-        self._task, self._heuristic, self._variables = task, heuristic, variables
+        self._task, self._heuristic = task, heuristic
         self.rounds = self.bound = 0
         #: The least makespan that is not refuted: where rounds are left out, ``bound`` is larger.
         self._least = 0
@@ -135,7 +132,7 @@ class BoundedSearch(Exploration):
                 return self.bound
             from planners.search.exact_bound import ExactQuestion
 
-            question = ExactQuestion(self._model, self._task, self._variables)
+            question = ExactQuestion(self._model, self._task)
         is_first, self._question = self._question is None, question
         effort = self._pieces.effort // (_FIRST_PART if is_first else 1)
         self.exact = question.bound(self._least, effort, self._pieces)

@@ -12,7 +12,7 @@ is answered with yes: more is searched then.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 
 import numpy as np
@@ -25,7 +25,6 @@ from planners.search.goals import SMALLER, goal_facts
 from planners.search.plan_formula import PlanFormula
 from planners.search.questions import FixedPlans, Literals, OutOfEffort, Plan
 from planners.search.reachable import Edges, PieceSizes, grown
-from planners.search.state_variables import StateVariable
 from planners.system.limits import reaching
 
 #: What a refuted makespan costs in conflicts, however easy it is: of a task without plan there
@@ -164,11 +163,9 @@ class ExactQuestion:
     ``at_least`` is a lower bound on it: shorter plans were refuted, or are known not to be.
     """
 
-    def __init__(
-        self, model: JointModel, task: PlanningTask, variables: Sequence[StateVariable]
-    ) -> None:
+    def __init__(self, model: JointModel, task: PlanningTask) -> None:
         self._model, self._task = model, task
-        self._formula = PlanFormula(model, task, variables)
+        self._formula = PlanFormula(model, task)
         self._plans = self._formula.plans()
         #: The literal that says that the task begins where the plans do; 0: they were refuted.
         self._begins = 0

@@ -65,14 +65,13 @@ class Heuristic(NamedTuple):
     exact: bool = False
 
 
-def search_heuristic(
-    name: str, model: JointModel, task: PlanningTask, variables: Sequence[StateVariable]
-) -> Heuristic:
+def search_heuristic(name: str, model: JointModel, task: PlanningTask) -> Heuristic:
     """The heuristic of this name together with the projections; ``auto`` chooses."""
     if name not in CHOICES:
         raise UsageError(f"there is no heuristic {name}", remedy=f"One of {', '.join(CHOICES)}.")
     if name == "blind":
         return Heuristic(name)
+    variables = state_variables(model, task.init)
     projections = Projections(model, task.goal, variables)
     exact = name == "auto" and isinstance(model.stepper, ComposingStepper)
     alone = Heuristic("projections", projections.value, projections.in_time, exact)
@@ -266,9 +265,8 @@ def _distances(variable: StateVariable, wanted: frozenset[int]) -> dict[int, int
     if len(goals) > 1:
         return found
     before: dict[int, list[int]] = defaultdict(list)
-    for needs, value in variable.changes.values():
-        if len(needs) == 1:  # with more it is never applicable
-            before[value].append(needs[0])
+    for old, new in variable.changes.values():
+        before[new].append(old)
     found[goals[0]] = 0
     queue = [goals[0]]
     for value in queue:

@@ -31,7 +31,6 @@ from planners.search.heuristics import search_heuristic
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, PieceSizes, Space
 from planners.search.slack import explore_within, require_rest, seeing, seen_rows
-from planners.search.state_variables import state_variables
 from planners.system.errors import ProvedImpossible
 from planners.system.limits import reaching
 
@@ -76,9 +75,8 @@ def search_with_effort(
 ) -> tuple[PlanSpace, BoundedSearch]:
     """The plans as `search` finds them, and how they were found."""
     with reaching(lambda: f"looking for bounds of {task.name}", SMALLER):
-        variables = state_variables(model, task.init)
-        chosen = search_heuristic(heuristic, model, task, variables)
-    forward = BoundedSearch(model, task, chosen, variables, pieces)
+        chosen = search_heuristic(heuristic, model, task)
+    forward = BoundedSearch(model, task, chosen, pieces)
     with closing(forward), reaching(forward.so_far, SMALLER):
         forward.run()
         graph = _plan_space(forward.space(), [(task.goal, task.init[None, :])])

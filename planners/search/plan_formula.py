@@ -24,7 +24,7 @@ from planners.search.goals import FactsOf
 from planners.search.graphs import csgraph
 from planners.search.questions import FixedPlans, Literals
 from planners.search.sat import flat_clauses
-from planners.search.state_variables import StateVariable
+from planners.search.state_variables import StateVariable, state_variables
 from planners.system.errors import OutOfMemory
 
 if TYPE_CHECKING:
@@ -40,9 +40,7 @@ class PlanFormula:
     variable implies that the task begins in the state before the step.
     """
 
-    def __init__(
-        self, model: JointModel, task: PlanningTask, variables: Sequence[StateVariable]
-    ) -> None:
+    def __init__(self, model: JointModel, task: PlanningTask) -> None:
         stepper = model.stepper
         assert isinstance(stepper, ComposingStepper)
         self._model, self._stepper, facts = model, stepper, len(model.codec.facts)
@@ -55,6 +53,7 @@ class PlanFormula:
         self._deleters: list[Literals] = [[] for _ in range(facts)]
         #: Per robot and some of its labels, as bytes, the variable that they imply.
         self._implied: dict[tuple[int, bytes], int] = {}
+        variables = state_variables(model, task.init)
         for variable in variables:
             self._exactly_one([fact + 1 for fact in variable.facts])
         for robot, actions in enumerate(stepper.labelled):

@@ -12,7 +12,6 @@ from planners.search.bounded_search import probe_size
 from planners.search.goals import FAR, Values
 from planners.search.heuristics import relaxed, search_heuristic
 from planners.search.reachable import PIECES, Exploration
-from planners.search.state_variables import state_variables
 
 #: Joint steps composed for all layers together, at most.
 _STEPS = 100_000
@@ -98,7 +97,7 @@ def estimate(
     depths = (depth for depth, rows in enumerate(layers) if model.holds(task.goal, rows).any())
     makespan = next(depths, None)
     hmax = int(relaxed(model, task.goal)(start)[0]) if makespan is None else makespan
-    heuristic = search_heuristic("auto", model, task, state_variables(model, task.init))
+    heuristic = search_heuristic("auto", model, task)
     bound = 0 if heuristic.value is None else int(heuristic.value(start)[0])
     choices = model.stepper.choices(model.codec.facts_part(start))
     found = SearchEstimate(

@@ -22,7 +22,6 @@ from planners.joint.tables import Bools, Ints, Rows, find_rows, unique_rows
 from planners.search.heuristics import search_heuristic
 from planners.search.plan_space import PlanSpace
 from planners.search.reachable import PIECES, Exploration, PieceSizes, Space
-from planners.search.state_variables import state_variables
 from planners.system.errors import UsageError
 from planners.system.limits import reaching
 
@@ -36,7 +35,7 @@ def explore_within(
     Breadth first, so that the steps to it are the least: every state of such a plan is kept.  The
     joint steps are those between states that are kept.
     """
-    heuristic = search_heuristic("auto", model, task, state_variables(model, task.init))
+    heuristic = search_heuristic("auto", model, task)
     found = Exploration(model, task.init[None, :], pieces)
 
     def so_far() -> str:

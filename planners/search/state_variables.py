@@ -30,12 +30,11 @@ class StateVariable(NamedTuple):
     """A group of facts of which exactly one is true.
 
     ``facts`` are its values by number, sorted; ``changes``, for each action that may change it, by
-    number in `JointModel.actions`: the facts of the variable that it needs to be true (none: it
-    does not say), and the one that it makes true.
+    number in `JointModel.actions`: the value before, which it needs, and the one after.
     """
 
     facts: tuple[int, ...]
-    changes: Mapping[int, tuple[tuple[int, ...], int]]
+    changes: Mapping[int, tuple[int, int]]
 
 
 def state_variables(model: JointModel, init: Rows) -> list[StateVariable]:
@@ -96,23 +95,24 @@ def _candidates(model: JointModel, true: set[int]) -> Iterator[frozenset[int]]:
 
 def _changes(
     facts: frozenset[int], read: Mapping[int, FactsOf]
-) -> dict[int, tuple[tuple[int, ...], int]] | None:
+) -> dict[int, tuple[int, int]] | None:
     """What actions do to a group; None if it may stop to have exactly one true fact."""
-    changes: dict[int, tuple[tuple[int, ...], int]] = {}
+    changes: dict[int, tuple[int, int]] = {}
     for number, own in read.items():
         adds, deletes, needs = own.adds & facts, own.deletes & facts, own.needs & facts
+        if len(needs) > 1:
+            continue  # never possible, as exactly one is true
         if any(fact in facts for _, fact, _ in own.conditional) or len(adds) > 1:
             return None
         if not adds:
             if deletes:
                 return None
             continue
-        (value,) = adds
-        lost = needs - {value}
-        if not needs or not lost <= deletes:
+        if not needs or not needs - adds <= deletes:
             return None
-        if lost:
-            changes[number] = (tuple(sorted(lost)), value)
+        if needs != adds:
+            (before,), (after,) = needs, adds
+            changes[number] = before, after
     return changes
 
 
