@@ -14,7 +14,6 @@ from math import prod
 from planners.grounding.actions import GroundAction
 from planners.grounding.reachability import Arguments, reachable_arguments
 from planners.pddl.formula_tree import (
-    GroundLeaf,
     conjuncts,
     joined,
     label,
@@ -216,6 +215,11 @@ def _terms(leaves: Iterable[Atom | StepAtom | Equal]) -> set[str]:
     return {t for a in leaves for t in ((a.left, a.right) if isinstance(a, Equal) else a.args)}
 
 
+def _bound(atom: Atom, binding: Binding) -> Atom:
+    """An atom with the values of its variables."""
+    return Atom(atom.predicate, tuple([binding.get(a, a) for a in atom.args]))
+
+
 class _Grounder:
     def __init__(
         self,
@@ -230,8 +234,6 @@ class _Grounder:
         self._statics = static_atoms(domain, problem)
         self._schemas = {schema.name: schema for schema in domain.schemas}
         self._bindings = Bindings(domain, problem, self._statics, reachable)
-        #: Every literal once: thousands of actions share what their preconditions have in common.
-        self._literals: dict[Formula, Formula] = {}
         self._owners_of = cache(self._owners_named)
         #: Ground quantified formulas by the values of variables in them: actions share most.
         self._quantified: dict[tuple[object, ...], Formula] = {}
@@ -275,9 +277,9 @@ class _Grounder:
         """
         # Asked for each node of each action: `match` takes longer.
         if isinstance(f, Atom):
-            atom = Atom(f.predicate, tuple([binding.get(a, a) for a in f.args]))
+            atom = _bound(f, binding)
             if f.predicate in self._fluents:
-                return self._literal(atom, positive)
+                return atom if positive else Not(atom)
             return Truth((atom in self._statics) == positive)
         if isinstance(f, Not):
             return self.formula(f.part, binding, not positive, acting)
@@ -346,7 +348,8 @@ class _Grounder:
             return Truth(not positive)
         if not positive and not owners.isdisjoint(acting):
             return TRUE
-        return self._literal(StepAtom(action, args), positive)
+        found = StepAtom(action, args)
+        return found if positive else Not(found)
 
     def _owners_named(self, action: str, args: tuple[str, ...]) -> frozenset[int] | None:
         """The owners of a subaction that a formula names; None for arguments of other types."""
@@ -361,21 +364,7 @@ class _Grounder:
         for inner in self._bindings.values(effect.variables, binding, guards):
             condition = self.formula(effect.condition, inner, True)
             if condition != FALSE:
-                yield Effect(self._atom(effect.atom, inner), effect.adds, condition)
-
-    def _literal(self, atom: GroundLeaf, positive: bool) -> Formula:
-        found = self._literals.setdefault(atom, atom)
-        if positive:
-            return found
-        negative = Not(found)
-        return self._literals.setdefault(negative, negative)
-
-    def _atom(self, atom: Atom, binding: Binding) -> Atom:
-        found = self._literal(
-            Atom(atom.predicate, tuple([binding.get(a, a) for a in atom.args])), True
-        )
-        assert isinstance(found, Atom)
-        return found
+                yield Effect(_bound(effect.atom, inner), effect.adds, condition)
 
     def _parts(self, schema: Schema, binding: Binding) -> tuple[str | None, ...]:
         if not schema.parts:
@@ -409,7 +398,7 @@ class _Grounder:
             if len(owners) != 1 or not possible:
                 continue
             cost = schema.cost
-            if not isinstance(cost, Atom) or self._atom(cost, binding) in self._problem.values:
+            if not isinstance(cost, Atom) or _bound(cost, binding) in self._problem.values:
                 yield owners[0], self._cost(schema, binding)
 
     def _cost(self, schema: Schema, binding: Binding) -> int:
@@ -421,7 +410,7 @@ class _Grounder:
                     remedy="Write costs in a larger unit, or leave out --cost makespan+cost.",
                 )
             return schema.cost or 0
-        atom = self._atom(schema.cost, binding)
+        atom = _bound(schema.cost, binding)
         value = self._problem.values.get(atom)
         if value is None or not 0 <= value <= MAX_COST or value != int(value):
             raise BadInput(
