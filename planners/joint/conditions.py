@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.grounding.actions import GroundAction
-from planners.joint.states import FactTable, StateCodec, TrueFacts, test_bit, test_bits
+from planners.joint.states import FactTable, StateCodec, TrueFacts, test_bits
 from planners.joint.tables import Bools, Ints, Numbers, Rows, ranges
 from planners.pddl.formula_tree import Compound, GroundLeaf, Leaf, conjuncts, fold, literals, signed
 from planners.pddl.lifted import TRUE, And, Atom, Effect, Formula, Junction, Not, StepAtom, Truth
@@ -44,7 +44,7 @@ class Evaluator:
                 case Truth(value):
                     return np.full(count, value)
                 case Atom() if (number := self.facts.index.get(found)) is not None:
-                    return test_bit(rows, which, number)
+                    return test_bits(rows, which, number)
                 case StepAtom() if (subaction := self.subactions.get(found)) is not None:
                     assert labels is not None, "a formula about the joint step without labels"
                     robot, label = subaction

@@ -138,7 +138,7 @@ class StateCodec:
 
     def column(self, rows: Rows, fact: int) -> Bools:
         """In which states of a table a fact is true."""
-        return test_bit(rows, slice(None), fact)
+        return test_bits(rows, slice(None), fact)
 
     def set(self, rows: Rows, which: Ints | Bools | slice, fact: int) -> None:
         """Make a fact true in some states of a table (by number or mask), in place."""
@@ -215,15 +215,10 @@ def bits(number: int) -> Iterator[int]:
         number ^= low
 
 
-def test_bits(rows: Rows, which: Ints, facts: Ints) -> Bools:
-    """Whether fact ``facts[k]`` is true in ``rows[which[k]]``."""
-    blocks = rows[which, facts // _BLOCK_BITS]
-    return (blocks >> (facts % _BLOCK_BITS).astype(np.uint64) & np.uint64(1)).astype(np.bool_)
-
-
-def test_bit(rows: Rows, which: Ints | slice, fact: int) -> Bools:
-    """Whether one fact is true in ``rows[which[k]]``."""
-    return (rows[which, fact // _BLOCK_BITS] & np.uint64(1 << fact % _BLOCK_BITS)).astype(np.bool_)
+def test_bits(rows: Rows, which: Ints | slice, facts: Ints | int) -> Bools:
+    """Whether fact ``facts[k]``, or one fact, is true in ``rows[which[k]]``."""
+    shift = np.asarray(facts % _BLOCK_BITS, np.uint64)
+    return (rows[which, facts // _BLOCK_BITS] >> shift & np.uint64(1)).astype(np.bool_)
 
 
 class TrueFacts:
