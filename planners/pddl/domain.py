@@ -87,12 +87,9 @@ def _begin(source: Source) -> tuple[str, Source, Sections, Names, list[_Head]]:
     predicates = _without_privacy(_entries(sections, ":predicates"))
     # "- number" may stand behind functions.
     functions = (i for i in _entries(sections, ":functions") if isinstance(i, Group))
-    signatures = _read_signatures(predicates, types)
-    names = Names(types, _arities(signatures), signatures, in_domain=True)
+    names = Names(types, _read_signatures(predicates, types), in_domain=True)
     constants = read_objects(names, sections.get(":constants", ()), {})
-    names = replace(
-        names, functions=_arities(_read_signatures(functions, types)), objects=constants
-    )
+    names = replace(names, functions=_read_signatures(functions, types), objects=constants)
     return name, source, sections, names, _read_heads(names, root, sections)
 
 
@@ -125,7 +122,6 @@ def _finish(
         schemas,
         constraints,
         dependences,
-        names.signatures,
     )
 
 
@@ -163,8 +159,9 @@ def _read_signatures(items: Iterable[Expression], types: Mapping[str, object]) -
             continue
         listed = typed_list(entry.items[1:], "a variable")
         own = [frozenset(t if t in types else "object" for t in given) for _, given in listed]
-        known = signatures.get((name, len(own)), own)
-        signatures[name, len(own)] = tuple(a | b for a, b in zip(known, own, strict=True))
+        of_name = signatures.setdefault(name, {})
+        known = of_name.get(len(own), own)
+        of_name[len(own)] = tuple(a | b for a, b in zip(known, own, strict=True))
     return signatures
 
 
@@ -179,14 +176,6 @@ def _without_privacy(items: Iterable[Expression]) -> Iterator[Expression]:
 
 def _entries(sections: Sections, head: str) -> Iterator[Expression]:
     return (item for section in sections.get(head, ()) for item in section.items[1:])
-
-
-def _arities(found: Iterable[tuple[str, int]]) -> dict[str, frozenset[int]]:
-    """Names with all their numbers of arguments."""
-    arities: dict[str, frozenset[int]] = {}
-    for name, arity in found:
-        arities[name] = arities.get(name, frozenset()) | {arity}
-    return arities
 
 
 def _fields(

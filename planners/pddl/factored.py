@@ -139,14 +139,11 @@ def _join_domains(domains: list[Domain], name: str) -> Domain:
         source=_union(name, domains),
         types=_merged((domain.types for domain in domains), _both),
         constants=_merged((domain.constants for domain in domains), _both),
-        predicates=_merged((domain.predicates for domain in domains), or_),
-        functions=_merged((domain.functions for domain in domains), or_),
+        predicates=_merged((domain.predicates for domain in domains), _signatures),
+        functions=_merged((domain.functions for domain in domains), _signatures),
         schemas=tuple(schemas.values()),
         constraints=_join_constraints(domains),
         dependences=tuple(dict.fromkeys(d for domain in domains for d in domain.dependences)),
-        signatures=_merged(
-            (domain.signatures for domain in domains), lambda a, b: tuple(map(or_, a, b))
-        ),
     )
 
 
@@ -228,6 +225,12 @@ def _merged(tables: Iterable[Mapping[K, V]], join: Callable[[V, V], V]) -> dict[
         for key, value in table.items():
             merged[key] = join(merged[key], value) if key in merged else value
     return merged
+
+
+def _signatures(
+    one: Mapping[int, tuple[frozenset[str], ...]], other: Mapping[int, tuple[frozenset[str], ...]]
+) -> dict[int, tuple[frozenset[str], ...]]:
+    return _merged((one, other), lambda a, b: tuple(map(or_, a, b)))
 
 
 def _both(one: tuple[V, ...], other: tuple[V, ...]) -> tuple[V, ...]:

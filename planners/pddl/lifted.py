@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from planners.pddl.sexpr import Source
 from planners.system.errors import Position
 
-#: The types that each argument of a predicate may have, by the predicate's name and arity.
-Signatures = dict[tuple[str, int], tuple[frozenset[str], ...]]
+#: The types that each argument of a predicate or function may have, by its name and its arity.
+Signatures = dict[str, dict[int, tuple[frozenset[str], ...]]]
 #: A term is a variable (``?x``) or the name of an object.
 Term = str
 
@@ -175,8 +175,8 @@ class Constraint:
 class Domain:
     """A domain as read: types, predicates and actions.
 
-    ``types`` maps each type to its direct supertypes, ``predicates`` a name to its arities;
-    ``signatures`` are what texts are checked against, and mean nothing for states and plans.
+    ``types`` maps each type to its direct supertypes.  The types of arguments of ``predicates`` are
+    what texts are checked against, and mean nothing for states and plans.
 
     ``constraints`` and ``dependences`` are the concurrency network: a pair (v, w) says that whoever
     matches w needs somebody who matches v with the same binding, in the same step.
@@ -186,12 +186,11 @@ class Domain:
     source: Source
     types: dict[str, tuple[str, ...]]
     constants: dict[str, tuple[str, ...]]
-    predicates: dict[str, frozenset[int]]
-    functions: dict[str, frozenset[int]]
+    predicates: Signatures = field(compare=False)
+    functions: Signatures = field(compare=False)
     schemas: tuple[Schema, ...]
     constraints: tuple[Constraint, ...] = ()
     dependences: tuple[tuple[str, str], ...] = ()
-    signatures: Signatures = field(default_factory=dict, compare=False)
 
     @property
     def is_joint_action(self) -> bool:

@@ -101,9 +101,8 @@ class Names:
     """
 
     types: Mapping[str, tuple[str, ...]]
-    predicates: Mapping[str, frozenset[int]]
-    signatures: Signatures = field(default_factory=dict)
-    functions: Mapping[str, frozenset[int]] = field(default_factory=dict)
+    predicates: Signatures
+    functions: Signatures = field(default_factory=dict)
     actions: Mapping[str, int] = field(default_factory=dict)
     objects: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     variables: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -114,7 +113,7 @@ class Names:
     @classmethod
     def of(cls, domain: Domain) -> Names:
         """What a text about a domain may speak of, without objects."""
-        return cls(domain.types, domain.predicates, domain.signatures, domain.functions)
+        return cls(domain.types, domain.predicates, domain.functions)
 
     def with_variables(self, variables: Iterable[Variable]) -> Names:
         """The same names with more variables in scope; a variable of the same name is shadowed."""
@@ -172,7 +171,7 @@ class Names:
 
         A type above the declared one has: its objects may be of that one.
         """
-        signature = self.signatures.get((item.head, len(item) - 1), ())
+        signature = self.predicates[item.head].get(len(item) - 1, ())
         for number, (part, allowed) in enumerate(zip(item.items[1:], signature, strict=False), 1):
             term = part.token("a term")
             own = (self.variables if term.text in self.variables else self.objects)[term.text]
@@ -191,7 +190,7 @@ class Names:
         """The term of a declared function, or of ``total-cost``."""
         if item.head not in self.functions and item.head != "total-cost":
             raise unknown("function", item, self.functions)
-        arities = self.functions.get(item.head, {len(item) - 1})
+        arities: Iterable[int] = self.functions.get(item.head, (len(item) - 1,))
         return Atom(item.head, self.arguments(item, arities, "function"))
 
     def arguments(self, item: Group, arities: Iterable[int], what: str) -> tuple[str, ...]:

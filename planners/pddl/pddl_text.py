@@ -89,7 +89,7 @@ def _types(types: tuple[str, ...]) -> str:
     return types[0] if types else "object"
 
 
-def _signatures(names: Mapping[str, frozenset[int]]) -> list[str]:
+def _signatures(names: Mapping[str, Iterable[int]]) -> list[str]:
     return [
         label(name, (f"?x{number}" for number in range(1, arity + 1)))
         for name, arities in names.items()

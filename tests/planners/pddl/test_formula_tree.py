@@ -70,8 +70,9 @@ FOREIGN = sorted(
 
 def check(path: Path) -> None:
     domain = read_domain(path)
-    again = parse_domain(Source("again", domain_text(domain)))
+    again = parse_domain(Source("again", text := domain_text(domain)))
     assert replace(again, source=NOWHERE) == replace(domain, source=NOWHERE)
+    assert sorted(domain_text(again).splitlines()) == sorted(text.splitlines())
     files = [p for p in path.parent.glob("*.pddl") if "(problem" in p.read_text("latin-1").lower()]
     for file in sorted(files)[:3]:
         problem = read_problem(file, domain)
