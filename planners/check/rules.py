@@ -352,12 +352,11 @@ def _outside(
 class Verdict:
     """Whether a plan is one.
 
-    ``makespan`` is its number of joint steps.  For an invalid plan ``step`` is the first step that
-    breaks a rule (from 0; the makespan if only the goal fails) and ``reason`` says which, in words.
+    For an invalid plan ``step`` is the first step that breaks a rule (from 0; the makespan if only
+    the goal fails) and ``reason`` says which, in words.
     """
 
     valid: bool
-    makespan: int
     step: int | None
     reason: str
 
@@ -387,14 +386,12 @@ def validate(
     for number, labels in enumerate(plan):
         after = rules.step(state, labels, joint_actions[number] if joint_actions else None)
         if isinstance(after, str):
-            return Verdict(False, len(plan), number, after)
+            return Verdict(False, number, after)
         state = after
     wanted = problem.goal if goal is None else goal
     at_end = Moment(state)
     if not rules.meaning.holds(wanted, {}, True, at_end):
         why = rules.meaning.why_not(wanted, {}, True, at_end)
         reason = f"the goal does not hold at the end: {why}"
-        return Verdict(False, len(plan), len(plan), reason)
-    return Verdict(
-        True, len(plan), None, "every step is a joint step and the goal holds at the end"
-    )
+        return Verdict(False, len(plan), reason)
+    return Verdict(True, None, "every step is a joint step and the goal holds at the end")

@@ -119,7 +119,6 @@ def _check_verdicts(
     for plan in plans:
         verdict = validate(domain, problem, team, plan)
         assert verdict.valid, verdict
-        assert verdict.makespan == len(plan)
         if plan:  # one step fewer would be a plan shorter than the optimal ones
             shorter = validate(domain, problem, team, plan[:-1])
             assert (shorter.valid, shorter.step) == (False, len(plan) - 1)

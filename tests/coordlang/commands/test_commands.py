@@ -44,7 +44,7 @@ def test_every_printed_plan_is_valid(files: str, form: str, shell: Shell) -> Non
     for plan in plans:
         verdict = validate(loaded.domain, loaded.problems[0], team, plan)
         assert verdict.valid, verdict.reason
-        assert verdict.makespan == 4
+        assert len(plan) == 4
 
 
 def test_plans_json_and_samples(shell: Shell) -> None:

@@ -62,7 +62,7 @@ ROOMS = world(
 )
 def test_plans(plan: list[Labels]) -> None:
     verdict = validate(*ROOMS, plan)
-    assert verdict == Verdict(True, len(plan), None, verdict.reason)
+    assert verdict == Verdict(True, None, verdict.reason)
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,7 @@ def test_another_task_brings_its_fluents_and_its_goal() -> None:
     broken = validate(*ROOMS, [["(move r1 a b)", None]], init=init, goal=goal)
     assert (broken.step, "(at r1 a) is false" in broken.reason) == (0, True)
     empty = validate(*ROOMS, [], goal=Atom("at", ("r2", "b")))
-    assert empty == Verdict(True, 0, None, empty.reason)
+    assert empty == Verdict(True, None, empty.reason)
 
 
 # -- action formulas, owners, quantifiers
