@@ -9,22 +9,16 @@ step.  Where robots keep no common step it is one an event of the robot, and who
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from itertools import chain
-from math import log10
 from operator import and_, or_
 from typing import NamedTuple
 
 from planners.search.plan_space import PlanSpace
 from planners.system.errors import OutOfMemory
-from planners.system.limits import memory_left, more_memory
-
-#: Bytes that one member of a subset takes, with its share of everything else.
-_MEMBER_BYTES = 160
-#: Up to so many bytes the free memory is not looked up.
-_SMALL = 1 << 24
+from planners.system.limits import reaching
 
 
 class Knowledge(NamedTuple):
@@ -91,17 +85,25 @@ def determinise(
 
     Three passes over the layers: nodes that behave alike are one (upwards), subset construction
     (downwards), equal futures are one (upwards).  Linear but for the subsets, of which there may be
-    exponentially many: raises `OutOfMemory`, with an estimate, before they fill the memory or have
-    more than ``most`` members.
+    exponentially many: raises `OutOfMemory` where they fill the memory or have more than ``most``
+    members.
     """
+    layers: list[_Layer] = []
+
+    def so_far() -> str:
+        sets = f"{sum(map(len, layers)):,} different histories of {space.model.robots[robot]}"
+        return f"{sets}, in {len(layers)} of {space.cost_of(0)[0] + 1} layers"
+
     number_of: dict[_Nodes, int] = {}
     merged: list[list[_State]] = []
-    for layer in reversed(_subsets(space, robot, truth, most)):
-        numbers: dict[_State, int] = {}
-        for subset, (known, moves) in layer.items():
-            state = known, tuple((own, number_of[nodes]) for own, nodes in moves.items())
-            number_of[subset] = numbers.setdefault(state, len(numbers))
-        merged.append(list(numbers))
+    with reaching(so_far, space.model.smaller("another sentence", "a smaller task")):
+        layers.extend(_subsets(space, robot, truth, most))
+        for layer in reversed(layers):
+            numbers: dict[_State, int] = {}
+            for subset, (known, moves) in layer.items():
+                state = known, tuple((own, number_of[nodes]) for own, nodes in moves.items())
+                number_of[subset] = numbers.setdefault(state, len(numbers))
+            merged.append(list(numbers))
     return _numbered(merged[::-1])
 
 
@@ -109,33 +111,34 @@ def determinise(
 _Nodes = tuple[int, ...]
 #: What is known in a state, and the number in the next layer of the state to which a label leads.
 _State = tuple[Knowledge, tuple[tuple[int, int], ...]]
+#: Where own beginnings of one length lead, with what is known there, and where labels lead.
+_Layer = dict[_Nodes, tuple[Knowledge, dict[int, _Nodes]]]
 
 
 def _subsets(
     space: PlanSpace, robot: int, truth: Sequence[int] | None, most: int | None
-) -> list[dict[_Nodes, tuple[Knowledge, dict[int, _Nodes]]]]:
-    """Where own beginnings lead, layer by layer, what is known there, and where labels lead."""
+) -> Iterator[_Layer]:
+    """The layers, the start first."""
     true = [0] * len(space) if truth is None else truth
     labels, targets = space.robot_labels(robot).tolist(), space.targets().tolist()
     alike = _alike(space, true, labels, targets)  # no set of own continuations is another one then
     subsets: dict[_Nodes, None] = {(alike[int(space.starts[0])],): None}
-    steps, members = space.cost_of(0)[0], 0
-    layers: list[dict[_Nodes, tuple[Knowledge, dict[int, _Nodes]]]] = []
-    for depth in range(steps + 1):
-        layers.append({})
-        for number, subset in enumerate(subsets):
+    members = 0
+    while subsets:
+        layer: _Layer = {}
+        for subset in subsets:
             after: dict[int, set[int]] = defaultdict(set)
             for edge in chain.from_iterable(map(space.out_edges, subset)):
                 after[labels[edge]].add(alike[targets[edge]])
             facts = [true[node] for node in subset]
             moves = {own: tuple(sorted(nodes)) for own, nodes in sorted(after.items())}
-            layers[-1][subset] = Knowledge(reduce(and_, facts), reduce(or_, facts)), moves
+            layer[subset] = Knowledge(reduce(and_, facts), reduce(or_, facts)), moves
             members += len(subset)
-            if number % 1024 == 0 or number == len(subsets) - 1:
-                _check(space, robot, members, most, depth)
-        every = (moves.values() for _, moves in layers[-1].values())
+            if most is not None and members > most:
+                raise OutOfMemory(f"a robot's histories have more than {most:,} members")
+        yield layer
+        every = (moves.values() for _, moves in layer.values())
         subsets = dict.fromkeys(chain.from_iterable(every))
-    return layers
 
 
 def _alike(
@@ -165,20 +168,3 @@ def _numbered(merged: Sequence[Sequence[_State]]) -> Automaton:
     for state in reversed(range(layers[-1].start)):
         left[state] = sum(left[to] for to in numbered[state].values())
     return Automaton(tuple(layers), tuple(numbered), tuple(left), tuple(known))
-
-
-def _check(space: PlanSpace, robot: int, members: int, most: int | None, depth: int) -> None:
-    size = members * _MEMBER_BYTES
-    if (most is None or members <= most) and (size < _SMALL or size < memory_left()):
-        return
-    # The rest at the rate at which they grew so far.
-    steps = space.cost_of(0)[0]
-    growth = log10(members) / max(depth, 1)
-    estimate = 10 ** min(18.0, log10(size / 2**30) + growth * (steps - depth))
-    smaller = space.model.smaller("another sentence", "a smaller task")
-    raise OutOfMemory(
-        f"the choices of {space.model.robots[robot]} have too many different histories: "
-        f"after {depth + 1} of {steps} steps their subsets have {members:,} members, at this rate "
-        f"about {estimate:,.1f} GiB in the end",
-        remedy=f"Use {smaller}, or {more_memory()}.",
-    )

@@ -82,7 +82,7 @@ def choices(task_language: TaskLanguage, words: Sequence[int], most: int = MOST)
     fits, model = task_language.plans_with(words), task_language.model
     subplans = [determinise(fits, robot) for robot in range(len(model.robots))]
     mixtures = None
-    with suppress(OutOfMemory):
+    with suppress(MemoryError):
         mixtures = walk_mixtures(task_language, fits, subplans, words, most)
     # Without a common step a node is no state in which a robot is when it has done its events.
     space = mixtures.space if mixtures and not model.is_asynchronous else None

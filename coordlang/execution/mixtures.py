@@ -16,15 +16,9 @@ from coordlang.execution.automaton import Automaton
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.required.miscoordination import Miscoordination, Trail, describe_failure
 from planners.joint.conditions import Labels
-from planners.joint.model import JointModel
 from planners.joint.tables import Ints, ranges, unique_rows
 from planners.search.edge_index import EdgeIndex
 from planners.search.plan_space import PlanSpace, UnfoldingStep
-from planners.system.errors import OutOfMemory
-from planners.system.limits import memory_left, more_memory
-
-#: Up to so many bytes the free memory is not looked up.
-SMALL = 1 << 24
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,12 +45,12 @@ def walk_mixtures(
     automata: Sequence[Automaton],
     words: Sequence[int],
     most: int,
-) -> Mixtures:
+) -> Mixtures | None:
     """Walk all combinations of the robots' subplans in the task's optimal plans, layer by layer.
 
     At most (product of the automata's layers) * (layer of the plan space) nodes.  ``automata`` are
-    the robots' subplans in ``fits``, the plans with the sentence ``words``.  Raises `OutOfMemory`,
-    with an estimate, before the joint moves fill the memory, or beyond ``most`` of them.
+    the robots' subplans in ``fits``, the plans with the sentence ``words``.  None, before they are
+    made, where there are more than ``most`` joint moves.
     """
     space = task_language.space
     index = EdgeIndex.of(space)
@@ -64,9 +58,12 @@ def walk_mixtures(
     table = np.array([[0] * robots + [task_language.start]])
     layers = [table[:, robots]]
     steps: list[UnfoldingStep] = []
-    walked, held = 1, 0
-    for step in range(automata[0].steps):
-        _check(space.model, moves, table, step, held, most)
+    walked, made = 1, 0.0
+    for _ in range(automata[0].steps):
+        degrees = [own.degree[at] for own, at in zip(moves, table.T, strict=False)]
+        made += np.prod(degrees, axis=0, dtype=float).sum()
+        if made > most:
+            return None
         source, labels, after = _together(moves, table)
         edge = table[source, robots]
         for robot in range(robots):
@@ -80,7 +77,6 @@ def walk_mixtures(
         steps.append(UnfoldingStep(source, edge, number))
         layers.append(table[:, robots])
         walked += len(table)
-        held += 40 * len(edge) + table.nbytes
     found = PlanSpace.from_layers(space, layers, steps, task_language.task)
     return Mixtures(found, None, walked)
 
@@ -133,26 +129,3 @@ def _witness(
         paths.append(plan)
     names = tuple(task_language.partition.words[w] for w in words)
     return describe_failure(space, Trail(start, tuple(zip(*paths, strict=True))), names)
-
-
-def _check(
-    model: JointModel,
-    own_moves: Sequence[_Moves],
-    table: Ints,
-    step: int,
-    held: int,
-    most: int,
-) -> None:
-    """Estimate a layer's joint moves before they are made."""
-    size = np.ones(len(table))
-    for robot, own in enumerate(own_moves):
-        size *= own.degree[table[:, robot]]
-    moves = float(size.sum())
-    needed = held + moves * (48 + 24 * len(own_moves))
-    if moves + held / 40 > most or (needed > SMALL and needed > memory_left()):
-        smaller = model.smaller("a smaller task")
-        raise OutOfMemory(
-            f"step {step + 1} has {moves:,.0f} combinations of what the robots may do: "
-            f"about {needed / 2**30:,.1f} GiB",
-            remedy=f"Use {smaller} or {more_memory()}.",
-        )

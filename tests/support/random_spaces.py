@@ -8,6 +8,7 @@ from dataclasses import fields, replace
 from functools import lru_cache
 from random import Random
 from typing import Any, get_args
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -133,7 +134,7 @@ def layered_space(sizes: Sequence[int], edges: Sequence[Sequence[tuple[int, int]
     """
     flat = [edge for own in edges for edge in own]
     return PlanSpace(
-        model=None,  # type: ignore[arg-type]
+        model=Mock(),
         rows=np.zeros((0, 1), np.uint64),
         state=np.arange(len(edges)),
         goal=np.zeros(len(edges), np.int64),
