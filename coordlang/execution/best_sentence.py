@@ -7,6 +7,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from heapq import heapify, heappop, heappush
+from itertools import islice
 from typing import Any
 
 from coordlang.execution.task_language import TaskLanguage
@@ -15,12 +16,10 @@ from planners.joint.model import JointModel
 from planners.joint.states import split_atoms
 from planners.pddl.lifted import Atom
 from planners.search.plan_space import PlanSpace
-from planners.system.errors import BadInput, OutOfMemory, UsageError
-from planners.system.limits import memory_left, more_memory
+from planners.system.errors import BadInput, UsageError
+from planners.system.limits import reaching
 from planners.system.messages import echoed
 
-#: Bytes of one entry of a prefix's counts.
-_ENTRY_BYTES = 200
 #: Joint actions that are followed at most to find the leading sentences of a task.
 _FOLLOWED = 2_000_000
 #: In place of a word, and of a node: the plan ends, with no further word.
@@ -192,36 +191,17 @@ def best_sentence(task_language: TaskLanguage, preferences: Sequence[Preference]
     prefixes that lead to the same nodes with the same counts are one.  ``shortest`` alone takes as
     many prefixes as the sentence has words.  The other preferences ask for the best string of a
     nondeterministic automaton, which has no polynomial algorithm in general (cf. Lyngsø and
-    Pedersen 2002 on hidden Markov models).  Raises `OutOfMemory` when there are more prefixes than
-    the memory holds.
+    Pedersen 2002 on hidden Markov models).
     """
-    graph = _Graph(task_language, preferences)
-    words: tuple[int, ...] = (graph.word[0],)
-    counts: Mapping[int, int] = {0: 1}
-    queue: list[Any] = [(graph.bound(words, counts), words, counts)]
-    seen: set[object] = set()
-    entries = 0
-    while queue:
-        bound, words, counts = heappop(queue)
-        if words[-1] == _END:
-            values = (abs(value) if isinstance(value, int) else value for value in bound[:-1])
-            return BestSentence(words[:-1], sum(counts.values()), tuple(values), len(seen))
-        same = words[-1], frozenset(counts.items() if graph.open else counts)
-        if same in seen:
-            continue  # the one that was here before is as good, and shorter or smaller
-        seen.add(same)
-        for word, further in graph.extensions(words[-1], counts).items():
-            entries += len(further)
-            longer = *words, word
-            heappush(queue, (graph.bound(longer, further), longer, further))
-        if entries * _ENTRY_BYTES > memory_left():
-            raise OutOfMemory(
-                f"{len(seen):,} beginnings of sentences were looked at, and the best sentence is "
-                "not decided yet",
-                remedy="Prefer the shortest sentence first, use a smaller task, or "
-                f"{more_memory()}.",
-            )
-    raise AssertionError("a task has at least one sentence")
+    graph, seen = _Graph(task_language, preferences), set[object]()
+
+    def so_far() -> str:
+        return f"{len(seen):,} beginnings of sentences"
+
+    with reaching(so_far, "a smaller task, or prefer the shortest sentence first"):
+        bound, words, plans = next(_whole_sentences(graph, seen))
+    values = (abs(value) if isinstance(value, int) else value for value in bound[:-1])
+    return BestSentence(words, plans, tuple(values), len(seen))
 
 
 def leading_sentences(task_language: TaskLanguage, number: int) -> list[tuple[Sentence, int]]:
@@ -230,19 +210,35 @@ def leading_sentences(task_language: TaskLanguage, number: int) -> list[tuple[Se
     At most ``number``, those with most plans first, without a list of all: the search of
     `best_sentence` goes on.  Fewer are found where two million joint actions do not suffice.
     """
-    graph = _Graph(task_language, ["most-plans"])
+    found = _whole_sentences(_Graph(task_language, ["most-plans"]))
+    return [(words, plans) for _, words, plans in islice(found, number)]
+
+
+def _whole_sentences(
+    graph: _Graph, seen: set[object] | None = None
+) -> Iterator[tuple[tuple[Any, ...], Sentence, int]]:
+    """Whole sentences with their bound and plans, best first.
+
+    With ``seen`` the best one is meant, by all values: it gets the prefixes that were looked at,
+    one of those that lead to the same points with the same counts.  Without it sentences of equal
+    first value come by their words, as far as `_FOLLOWED` joint actions lead.
+    """
     words: Sentence = (graph.word[0],)
-    queue: list[Any] = [(graph.bound(words, {0: 1})[0], words, {0: 1})]
-    found: list[tuple[Sentence, int]] = []
-    while queue and len(found) < number and graph.followed < _FOLLOWED:
+    counts: Mapping[int, int] = {0: 1}
+    queue: list[Any] = [((), words, counts)]
+    while queue and (seen is not None or graph.followed < _FOLLOWED):
         bound, words, counts = heappop(queue)
         if words[-1] == _END:
-            found.append((words[:-1], -bound))
+            yield bound, words[:-1], sum(counts.values())
             continue
+        if seen is not None:
+            same = words[-1], frozenset(counts.items() if graph.open else counts)
+            if same in seen:
+                continue  # the one that was here before is as good, and shorter or smaller
+            seen.add(same)
         for word, further in graph.extensions(words[-1], counts).items():
-            longer = *words, word
-            heappush(queue, (graph.bound(longer, further)[0], longer, further))
-    return found
+            bound = graph.bound((*words, word), further)
+            heappush(queue, (bound if seen is not None else bound[:1], (*words, word), further))
 
 
 def grants(

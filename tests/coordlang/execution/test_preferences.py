@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 from itertools import accumulate
 from random import Random
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -182,8 +183,8 @@ def test_random_graphs() -> None:
 
 def test_a_search_that_is_too_large_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     task_language = shipped("grid/corners-4x4")[1]
-    monkeypatch.setattr("coordlang.execution.best_sentence.memory_left", lambda: 500)
-    with pytest.raises(OutOfMemory, match="not decided yet"):
+    monkeypatch.setattr("coordlang.execution.best_sentence.heappush", Mock(side_effect=MemoryError))
+    with pytest.raises(OutOfMemory, match=r"Reached: 1 beginnings(.|\n)*shortest sentence first"):
         best_sentence(task_language, [read_preference(task_language, "most-plans")])
 
 
