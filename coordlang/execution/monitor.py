@@ -348,17 +348,6 @@ class _OwnEvent(NamedTuple):
     meets: Mapping[str, str]
 
 
-class _Count(NamedTuple):
-    """How many events have ended that interfere with a subaction.
-
-    Those of ``robot`` with the ``own`` one, or own ones with ``its``.
-    """
-
-    robot: str
-    own: str = ""
-    its: str = ""
-
-
 class EventMonitor(Monitor):
     """Follows a robot that keeps no common step with the others.
 
@@ -376,9 +365,10 @@ class EventMonitor(Monitor):
     def __init__(self, data: Mapping[str, Any], robot: str | None = None) -> None:
         super().__init__(data, robot)
         # Replaced and not changed, so that copies stay as they are: how many events were observed
-        # of each robot, the `_Count` s so far, and who waits for its partners in what.
+        # of each robot, how often what has ended ("": of the own robot), and who waits for its
+        # partners in what.
         self._observed: dict[str, int] = dict.fromkeys(self._others, 0)
-        self._counts: dict[_Count, int] = {}
+        self._ended: dict[tuple[str, str], int] = {}
         self._ready: dict[str, str] = {}
         self._underway: str | None = None
 
@@ -392,16 +382,14 @@ class EventMonitor(Monitor):
         for text, event in self._events.items():
             if lost := (event.after.keys() | event.meets.keys()) - self._others.keys():
                 raise _broken(f"event {_shown(text)} waits for {_shown(min(lost))}: no such robot")
-        #: What the end of an event counts for: (robot, subaction), "" for the own robot.
-        self._counted: dict[tuple[str, str], list[_Count]] = {}
-        interferes, inside = _get(record, "interferes", dict, where), f"{where}: 'interferes'"
-        for own in interferes:
-            by_robot = _get(interferes, own, dict, inside)
+        #: Own subaction -> other robot -> its subactions that interfere with it.
+        self._interferes: dict[str, dict[str, list[str]]] = _get(record, "interferes", dict, where)
+        inside = f"{where}: 'interferes'"
+        for own in self._interferes:
+            by_robot = _get(self._interferes, own, dict, inside)
             for robot in by_robot:
                 for text in _get(by_robot, robot, list, inside):
                     _check_plain(text, inside)
-                    self._counted.setdefault((robot, text), []).append(_Count(robot, own=own))
-                    self._counted.setdefault(("", own), []).append(_Count(robot, its=text))
         for number, state in enumerate(_get(entry, "states", list, where)):
             for text in _get(state, "next", dict, f"state {number}"):
                 if text != IDLE and text not in self._events:
@@ -426,8 +414,8 @@ class EventMonitor(Monitor):
 
     def concerns(self, event: str) -> tuple[str, ...]:
         """The robots that may wait for an own event, and so should be told when it has ended."""
-        counted = self._counted.get(("", self.subaction(event)), ())
-        return tuple(sorted({count.robot for count in counted}))
+        waiting = self._interferes.get(self.subaction(event), {})
+        return tuple(sorted(robot for robot, texts in waiting.items() if texts))
 
     def missing(self, event: str | None) -> dict[str, int | str]:
         """What an allowed event still waits for; nothing: it may start.
@@ -445,7 +433,8 @@ class EventMonitor(Monitor):
             robot: its for robot, its in own.meets.items() if self._ready.get(robot) != its
         }
         for robot, number in own.after.items():
-            if (left := number - self._counts.get(_Count(robot, own=own.subaction), 0)) > 0:
+            texts = self._interferes.get(own.subaction, {}).get(robot, ())
+            if (left := number - sum(self._ended.get((robot, text), 0) for text in texts)) > 0:
                 found[robot] = left
         return found
 
@@ -499,7 +488,7 @@ class EventMonitor(Monitor):
         while self.finished and self._here.moves:
             super().did(None)
         if self._underway:
-            self._count(("", self._events[self._underway].subaction))
+            self._count("", self._events[self._underway].subaction)
         self._underway = None
 
     def ended(self, robot: str, subaction: str, number: int) -> None:
@@ -520,11 +509,12 @@ class EventMonitor(Monitor):
         if text not in may_be[number - 1]:
             could = " or ".join([*may_be[number - 1]][:_SHOWN]) or "nothing"
             raise NotPossible(f"{what}: that is {could}")
-        if may_be[number - 1][text] > self._counts.get(_Count(robot, its=text), 0):
+        waits_for = (own for own, its in self._interferes.items() if text in its.get(robot, ()))
+        if may_be[number - 1][text] > sum(self._ended.get(("", own), 0) for own in waits_for):
             raise NotPossible(f"{what}: it waits for {self.robot}")
         self._observed = {**self._observed, robot: number}
         self._ready = {name: its for name, its in self._ready.items() if name != robot}
-        self._count((robot, text))
+        self._count(robot, text)
 
     def ready(self, robot: str, subaction: str) -> None:
         """Tell that another robot is ready to start this together with an own event."""
@@ -542,9 +532,8 @@ class EventMonitor(Monitor):
             raise MonitorError(f"there is no robot {_shown(robot)} beside {self.robot}: {names}")
         return self._others[robot]
 
-    def _count(self, ended: tuple[str, str]) -> None:
-        counted = self._counted.get(ended, ())
-        self._counts = self._counts | {key: self._counts.get(key, 0) + 1 for key in counted}
+    def _count(self, robot: str, ended: str) -> None:
+        self._ended = self._ended | {(robot, ended): self._ended.get((robot, ended), 0) + 1}
 
 
 def drawn(monitor: Monitor, random: Random, allowed: Sequence[str | None]) -> str | None:
