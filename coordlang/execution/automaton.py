@@ -135,7 +135,8 @@ def _subsets(
             layer[subset] = Knowledge(reduce(and_, facts), reduce(or_, facts)), moves
             members += len(subset)
             if most is not None and members > most:
-                raise OutOfMemory(f"a robot's histories have more than {most:,} members")
+                what = f"a robot's histories have more than {most:,} members"
+                raise OutOfMemory(what, remedy="Use another sentence, or a smaller task.")
         yield layer
         every = (moves.values() for _, moves in layer.values())
         subsets = dict.fromkeys(chain.from_iterable(every))
