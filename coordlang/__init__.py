@@ -48,11 +48,11 @@ if TYPE_CHECKING:
     from coordlang.execution.monitor import MonitorError as MonitorError
     from coordlang.execution.monitor import NotAllowed as NotAllowed
     from coordlang.execution.monitor import NotPossible as NotPossible
-    from coordlang.execution.plan_sentence import NotAPlan as NotAPlan
     from coordlang.execution.plan_sentence import NotOptimal as NotOptimal
     from coordlang.execution.task_language import NoPlanFits as NoPlanFits
     from coordlang.language.words import Language as Language
     from coordlang.required.miscoordination import Inseparable as Inseparable
+    from planners.search.plan_file import NotAPlan as NotAPlan
     from planners.system.errors import BadInput as BadInput
     from planners.system.errors import CoordlangError as CoordlangError
     from planners.system.errors import OutOfMemory as OutOfMemory
@@ -80,8 +80,9 @@ _DEFINED_IN = {
     "coordlang.language.words": "Language",
     "coordlang.execution.monitor": "EventMonitor Monitor MonitorError NotAllowed NotPossible",
     "coordlang.execution.task_language": "NoPlanFits",
-    "coordlang.execution.plan_sentence": "NotAPlan NotOptimal",
+    "coordlang.execution.plan_sentence": "NotOptimal",
     "coordlang.required.miscoordination": "Inseparable",
+    "planners.search.plan_file": "NotAPlan",
     "planners.system.errors": "CoordlangError Refuted UsageError ProvedImpossible OutOfMemory "
     "OutOfTime BadInput Unsupported",
     "planners.system.limits": "time_limit",

@@ -21,12 +21,12 @@ from coordlang.execution.best_sentence import (
     read_preference,
 )
 from coordlang.execution.guided_search import ExpandedStates, GuidedPlan, plan_under_sentence
-from coordlang.execution.plan_sentence import PlanDag, read_plan_file, sentence_of_plan
+from coordlang.execution.plan_sentence import PlanDag, sentence_of_plan
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import describe
 from coordlang.language.provenance import tolerance_data
 from planners.search.heuristics import HEURISTICS
-from planners.search.plan_file import json_count
+from planners.search.plan_file import json_count, read_plans
 from planners.search.plans import Plans, Texts, texts
 from planners.system.errors import CoordlangError, UsageError
 from planners.system.messages import counted
@@ -80,7 +80,7 @@ def say(files: Arguments, options: SayOptions) -> Said:
             remedy="A step has one text for each robot, None where it idles.",
         )
     is_file = isinstance(plan, str | PathLike)
-    plans = read_plan_file(fspath(plan), used.model.in_step) if is_file else [plan]
+    plans = read_plans(fspath(plan), used.model.in_step) if is_file else [plan]
     sentences = []
     for number, steps in enumerate(plans, 1):
         try:

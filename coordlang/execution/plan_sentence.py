@@ -3,37 +3,21 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import words_passed
 from coordlang.language.sentences import sentence
-from planners.joint.model import IDLE, FullState, Goal, JointModel
+from planners.joint.model import FullState, Goal, JointModel
 from planners.joint.tables import Rows
 from planners.pddl.formula_tree import conjuncts, formula_text
-from planners.search.plan_file import NoSuchAction, WholeStep, json_count, read_plans
+from planners.search.plan_file import NotAPlan, WholeStep, json_count
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, Texts, counts
-from planners.system.errors import BadInput, Position, Refuted
+from planners.system.errors import Refuted
 from planners.system.messages import counted
-
-
-class NotAPlan(Refuted):
-    """These joint steps are no plan of the task.
-
-    ``step`` is the first one that cannot be taken, from 0; the plan's length if only the goal fails
-    at the end.
-    """
-
-    def __init__(
-        self, step: int, reason: str, position: Position | None = None, remedy: str | None = None
-    ) -> None:
-        super().__init__(f"this is no plan: {reason}", position=position, remedy=remedy)
-        self.step = step
 
 
 class NotOptimal(Refuted):
@@ -128,40 +112,6 @@ def _executed(task_language: TaskLanguage, plan: Sequence[Texts]) -> tuple[Plan,
             remedy="Give the whole plan: it ends where the goal holds.",
         )
     return tuple(numbers), rows, second
-
-
-def read_plan_file(path: str | Path, model: JointModel) -> list[tuple[Texts, ...]]:
-    """Read the plans of a plan file (docs/formats.md), in the spelling of the model.
-
-    Raises `BadInput` for a file that is not a plan file or holds no plan, `NotAPlan` for an action
-    that the problem does not have.
-    """
-    try:
-        plans = read_plans(path, model)
-    except NoSuchAction as error:
-        raise NotAPlan(
-            error.step,
-            f"in step {error.step + 1}, {error.what}",
-            position=error.position,
-            remedy=error.remedy,
-        ) from None
-
-    def spelling(text: str | None) -> str | None:
-        if text is None or text.strip().lower() == IDLE:
-            return None
-        return "(" + " ".join(re.findall(r"[^\s()]+", text.lower())) + ")"
-
-    if not plans:
-        raise BadInput(
-            "there is no plan in it",
-            position=Position(str(path)),
-            remedy="`coordlang plans DOMAIN PROBLEM` writes plans.",
-        )
-
-    def spelled(step: Texts) -> Texts:
-        return step if isinstance(step, WholeStep) else tuple(map(spelling, step))
-
-    return [tuple(map(spelled, plan)) for plan in plans]
 
 
 def _label_numbers(model: JointModel, step: Texts, number: int) -> tuple[int, ...]:

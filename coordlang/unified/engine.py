@@ -39,7 +39,7 @@ from unified_planning.model.metrics import MinimizeMakespan
 from unified_planning.model.problem_kind_versioning import LATEST_PROBLEM_KIND_VERSION
 from unified_planning.plans import PlanKind
 
-from coordlang.execution.plan_sentence import NotAPlan, NotOptimal, sentence_of_plan
+from coordlang.execution.plan_sentence import NotOptimal, sentence_of_plan
 from coordlang.execution.task_language import NoPlanFits, TaskLanguage, language_in_task
 from coordlang.language.file import read_language
 from coordlang.language.recorded import options_of
@@ -52,6 +52,7 @@ from planners.grounding.instantiate import idling_schemas
 from planners.loading import build
 from planners.pddl.model_options import ModelOptions
 from planners.search.optimal_plans import search
+from planners.search.plan_file import NotAPlan
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plans, Texts
 from planners.system.errors import (

@@ -12,10 +12,10 @@ import msgspec
 from msgspec import Meta
 
 from planners.grounding.actions import GroundAction
-from planners.joint.model import JointModel
+from planners.joint.model import IDLE, JointModel
 from planners.pddl.model_options import Execution
 from planners.search.plans import Plan, Plans, Texts, texts
-from planners.system.errors import BadInput, Position
+from planners.system.errors import BadInput, Position, Refuted
 from planners.system.files import FileFormat, read_text
 from planners.system.messages import echoed
 
@@ -73,16 +73,17 @@ def json_count(number: int) -> int | str:
     return number if number <= _EXACT else str(number)
 
 
-class NoSuchAction(BadInput):
-    """A plan names an action that the problem does not have; ``step`` is where, from 0."""
+class NotAPlan(Refuted):
+    """These joint steps are no plan of the task.
 
-    def __init__(self, action: str, step: int, position: Position) -> None:
-        super().__init__(
-            f"{action} is no action of this problem",
-            position=position,
-            remedy="`coordlang inspect DOMAIN PROBLEM` shows what the robots can do. Leave out of "
-            "a plan what it calls idling.",
-        )
+    ``step`` is the first one that cannot be taken, from 0; the plan's length if only the goal fails
+    at the end.
+    """
+
+    def __init__(
+        self, step: int, reason: str, position: Position | None = None, remedy: str | None = None
+    ) -> None:
+        super().__init__(f"this is no plan: {reason}", position=position, remedy=remedy)
         self.step = step
 
 
@@ -163,12 +164,22 @@ def to_json(plans: Plans, listed: Sequence[Plan], task: int = 0) -> dict[str, An
 
 
 def read_plans(path: str | Path, model: JointModel) -> list[tuple[Texts, ...]]:
-    """The plans of a plan file, JSON or IPC text.  Raises `BadInput` with the line."""
+    """The plans of a plan file, JSON or IPC text, in the spelling of the model.
+
+    Raises `BadInput`, with the line, for a file that is no plan file or holds no plan, `NotAPlan`
+    for an action that the problem does not have.
+    """
     position = Position(str(path))
     text = read_text(path)
-    if text.lstrip().startswith("{"):
-        return _from_json(text, model, position)
-    return [_from_ipc(text, model, str(path))]
+    if not text.lstrip().startswith("{"):
+        return [_from_ipc(text, model, str(path))]
+    if plans := _from_json(text, model, position):
+        return plans
+    raise BadInput(
+        "there is no plan in it",
+        position=position,
+        remedy="`coordlang plans DOMAIN PROBLEM` writes plans.",
+    )
 
 
 def only_one_plan(text: str, position: Position) -> None:
@@ -215,7 +226,17 @@ def _from_json(text: str, model: JointModel, position: Position) -> list[tuple[T
                     remedy='As in ["(move r1 a b)", null]: null is a robot that idles.',
                 )
     order = [robots.index(robot) for robot in model.robots]
-    return [tuple(tuple(step[k] for k in order) for step in plan.actions) for plan in file.plans]
+    return [
+        tuple(tuple(_spelled(step[k]) for k in order) for step in plan.actions)
+        for plan in file.plans
+    ]
+
+
+def _spelled(text: str | None) -> str | None:
+    """A subaction in the spelling of the model."""
+    if text is None or text.strip().lower() == IDLE:
+        return None
+    return "(" + " ".join(re.findall(r"[^\s()]+", text.lower())) + ")"
 
 
 def _from_ipc(text: str, model: JointModel, name: str) -> tuple[Texts, ...]:
@@ -252,7 +273,13 @@ def _put(
     """Enter an action for the robots that it belongs to."""
     ground = next((a for a in model.actions if a.label == action), None)
     if ground is None:
-        raise NoSuchAction(action, step, position)
+        raise NotAPlan(
+            step,
+            f"in step {step + 1}, {action} is no action of this problem",
+            position=position,
+            remedy="`coordlang inspect DOMAIN PROBLEM` shows what the robots can do. Leave out of "
+            "a plan what it calls idling.",
+        )
     if model.is_joint_action:
         if step in steps:
             raise BadInput(

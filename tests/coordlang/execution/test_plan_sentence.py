@@ -12,7 +12,7 @@ import pytest
 from benchmarks.paper.task_choices import languages_in_tasks
 from coordlang.commands.building import build_language
 from coordlang.execution.guided_search import ExpandedStates, plan_under_sentence
-from coordlang.execution.plan_sentence import NotAPlan, NotOptimal, PlanDag, sentence_of_plan
+from coordlang.execution.plan_sentence import NotOptimal, PlanDag, sentence_of_plan
 from coordlang.execution.task_language import NoPlanFits, TaskLanguage
 from coordlang.language.candidates import Candidates
 from coordlang.language.listed import ground_task
@@ -22,6 +22,7 @@ from planners.joint.tables import Rows
 from planners.pddl.model_options import ModelOptions
 from planners.search.heuristics import HEURISTICS
 from planners.search.optimal_plans import search
+from planners.search.plan_file import NotAPlan
 from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans, Texts, texts
 from planners.system.errors import ProvedImpossible
