@@ -9,7 +9,6 @@ from heapq import heappop, heappush
 
 import numpy as np
 
-from coordlang.execution.plan_sentence import sentence_of_plan
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.sentences import sentence
 from coordlang.language.words import Partition
@@ -96,9 +95,9 @@ def plan_under_sentence(
     fits = space if words is None else task_language.plans_with(words)  # raises if there is none
     begin = start if words is None else int(fits.starts[0])
     if space.model.slack:
-        return _earliest(task_language, fits, begin)
+        return _read_off(task_language, fits, begin, _earliest(fits, begin))
     if space.model.is_asynchronous:
-        return _first(task_language, fits, begin)
+        return _read_off(task_language, fits, begin, fits.first_path(begin))
     states = states or ExpandedStates(task_language.model, task_language.partition)
     goal, init = space.goals[space.goal[start]], space.rows[space.state[start]]
     least = heuristic(bound, task_language.model, goal, init)
@@ -107,18 +106,18 @@ def plan_under_sentence(
     return found
 
 
-def _first(task_language: TaskLanguage, space: PlanSpace, start: int) -> GuidedPlan:
-    """The steps of the first plan from a node of a plan space, as soon as possible."""
-    cost = task_language.space.cost_of(task_language.task)
-    path = space.first_path(start)
-    states = space.state[space.nodes_on(start, path)]
-    passed = task_language.partition.word_of(space.rows)[states]
+def _read_off(
+    task_language: TaskLanguage, space: PlanSpace, start: int, path: Sequence[int]
+) -> GuidedPlan:
+    """The plan of a path in a plan space, without a search."""
+    passed = task_language.partition.word_of(space.rows)[space.state[space.nodes_on(start, path)]]
     steps = Plans(space, start, []).steps(tuple(map(space.labels_of, path)))
+    cost = len(steps), int(space.cost[list(path)].sum())
     return GuidedPlan(steps, sentence(passed.tolist()), cost, 0, 0, 0)
 
 
-def _earliest(task_language: TaskLanguage, space: PlanSpace, start: int) -> GuidedPlan:
-    """The plan within slack that rests soonest, the first one of these in their order."""
+def _earliest(space: PlanSpace, start: int) -> list[int]:
+    """The path of the plan within slack that rests soonest, the first of these in their order."""
     resting = rests(space.labels)
     # Per node the steps until a rest that lasts to the end; per edge those with it.
     left = np.zeros(len(space), np.int64)
@@ -128,15 +127,11 @@ def _earliest(task_language: TaskLanguage, space: PlanSpace, start: int) -> Guid
         through[edges.edges] = np.where(resting[edges.edges] & (after == 0), 0, 1 + after)
         left[edges.source] = np.iinfo(np.int64).max
         np.minimum.at(left, edges.source, through[edges.edges])
-    plan, second, node = [], 0, start
-    while left[node] > 0:
-        edge = next(e for e in space.out_edges(node) if through[e] == left[node])
-        plan.append(space.labels_of(edge))
-        second += int(space.cost[edge])
-        node = space.target_of(edge)
-    found = tuple(plan)
-    texts = [task_language.model.texts(step) for step in found]
-    return GuidedPlan(found, sentence_of_plan(task_language, texts), (len(found), second), 0, 0, 0)
+    path, node = list[int](), start
+    while space.layer[node] > 0:
+        path.append(next(e for e in space.out_edges(node) if through[e] == left[node]))
+        node = space.target_of(path[-1])
+    return path
 
 
 def _a_star(
