@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
+
+import msgspec
 
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.explanation.demands import words_passed
@@ -173,23 +174,21 @@ def _not_optimal(
 # ---- sentence -> its plans
 
 
-@dataclass(frozen=True, slots=True)
-class DagNode:
+class DagNode(msgspec.Struct, frozen=True, rename={"key": "state", "words": "said"}):
     """A joint state on a plan, by its ``key``.
 
     ``step`` joint steps are done, ``words`` of the sentence passed, its own ``word`` included, and
     ``plans`` pass through it.
     """
 
-    step: int
     key: str
     word: str
     words: int
+    step: int
     plans: int
 
 
-@dataclass(frozen=True, slots=True)
-class DagEdge:
+class DagEdge(msgspec.Struct, frozen=True, rename={"source": "from", "target": "to"}):
     """The joint actions from one node to another (numbers in `PlanDag.nodes`).
 
     ``actions`` has a text or None (idle) for each robot.
@@ -218,7 +217,7 @@ class PlanDag:
             for node in sorted(range(span.start, span.stop), key=lambda n: (-through[n], n)):
                 number[node] = len(self.nodes)
                 key, said = model.codec.key(space.rows[space.state[node]]), int(passed[node])
-                self.nodes.append(DagNode(step, key, names[word[node]], said, through[node]))
+                self.nodes.append(DagNode(key, names[word[node]], said, step, through[node]))
         found: dict[tuple[int, int], list[tuple[str | None, ...]]] = {}
         for node in range(len(space)):
             for edge in space.out_edges(node):
@@ -229,20 +228,9 @@ class PlanDag:
     def data(self) -> dict[str, Any]:
         """Nodes and edges as a JSON plan file has them (docs/formats.md)."""
         nodes = [
-            {
-                "state": node.key,
-                "word": node.word,
-                "said": node.words,
-                "step": node.step,
-                "plans": json_count(node.plans),
-            }
-            for node in self.nodes
+            {**msgspec.to_builtins(node), "plans": json_count(node.plans)} for node in self.nodes
         ]
-        edges = [
-            {"from": edge.source, "to": edge.target, "actions": [list(a) for a in edge.actions]}
-            for edge in self.edges
-        ]
-        return {"nodes": nodes, "edges": edges}
+        return {"nodes": nodes, "edges": msgspec.to_builtins(self.edges)}
 
 
 def _plans_through(space: PlanSpace) -> list[int]:
