@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
 from itertools import islice
 from typing import Any
@@ -251,10 +251,10 @@ def grants(
     automata = [one for one in preferences if isinstance(one, PlanPreference)]
     if len(automata) < len(preferences):
         return False
-    fits = replace(task_language, space=task_language.plans_with(words), task=0)
+    fits = task_language.plans_with(words)
     return all(
         one.grade(memory) == 0
-        for (_, memories), after in zip(*_points(fits, automata), strict=True)
+        for (_, memories), after in zip(*_points(fits, int(fits.starts[0]), automata), strict=True)
         if not after
         for one, memory in zip(automata, memories, strict=True)
     )
@@ -278,7 +278,7 @@ class _Graph:
     def __init__(self, task_language: TaskLanguage, preferences: Sequence[Preference]) -> None:
         self.preferences, self.followed = tuple(preferences), 0
         automata = [one for one in preferences if isinstance(one, PlanPreference)]
-        points, self.following = _points(task_language, automata)
+        points, self.following = _points(task_language.space, task_language.start, automata)
         self.node = [node for node, _ in points]
         self.word = [_END if node == _END else int(task_language.word[node]) for node in self.node]
         self.more = [0] * len(points)
@@ -350,10 +350,9 @@ _Point = tuple[int, tuple[Memory, ...]]
 
 
 def _points(
-    task_language: TaskLanguage, automata: Sequence[PlanPreference]
+    space: PlanSpace, start: int, automata: Sequence[PlanPreference]
 ) -> tuple[list[_Point], list[list[tuple[int, int]]]]:
     """The points from the start on, and what follows each: points with numbers of joint actions."""
-    space, start = task_language.space, task_language.start
     points = [(start, tuple(one.start(int(space.state[start])) for one in automata))]
     number, following = {points[0]: 0}, []
     for point in points:  # grows while it is walked

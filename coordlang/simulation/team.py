@@ -24,7 +24,7 @@ from coordlang.simulation.robot import SPEED, TICK, OwnWords
 from coordlang.simulation.simulator import BESIDE
 from coordlang.sites.clearance import distance
 from coordlang.sites.world import World, find_world
-from planners.search.plan_space import PlanSpace, UnfoldingStep
+from planners.search.plan_space import PlanSpace
 from planners.search.plans import Plan, Plans
 from planners.system.errors import BadInput, UsageError, note
 from planners.system.messages import echoed, some
@@ -74,7 +74,8 @@ class Mission:
         numbered = enumerate(model.robots)
         self.leads = {name: _leads(self.world, space, robot) for robot, name in numbered}
         self.steps = space.cost_of(task_language.task)[0]
-        self._plans = Plans.of(space, task_language.task)
+        task = [task_language.task]
+        self._plans = Plans.of(space.with_tasks(space.starts[task], space.second[task]))
         self._given: Team = {}
         if agreement == "sentence":
             found = choices(task_language, sentence)
@@ -153,12 +154,11 @@ class Mission:
 
     def _only(self, plan: Plan) -> PlanSpace:
         """A plan as a plan space of its own."""
-        space, start, only = self._plans.space, self._plans.start, np.zeros(1, np.int64)
-        path = space.path_with(start, plan)
+        path = self._plans.space.path_with(self._plans.start, plan)
         assert path is not None, "it was drawn from this space"
-        layers = [np.array([node]) for node in space.nodes_on(start, path)]
-        steps = [UnfoldingStep(only, np.array([edge]), only) for edge in path]
-        return PlanSpace.from_layers(space, layers, steps, self.task_language.task)
+        taken = np.zeros(len(self._plans.space.target), np.bool_)
+        taken[path] = True
+        return self._plans.space.along(taken)
 
     def _drawn(self, seed: str) -> Plan:
         return self._plans.unrank(Random(seed).randrange(self._plans.count))
