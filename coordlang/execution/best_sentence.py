@@ -191,7 +191,8 @@ def best_sentence(task_language: TaskLanguage, preferences: Sequence[Preference]
     prefixes that lead to the same nodes with the same counts are one.  ``shortest`` alone takes as
     many prefixes as the sentence has words.  The other preferences ask for the best string of a
     nondeterministic automaton, which has no polynomial algorithm in general (cf. Lyngsø and
-    Pedersen 2002 on hidden Markov models).
+    Pedersen 2002 on hidden Markov models).  Raises `OutOfMemory` when there are more prefixes than
+    the memory holds.
     """
     graph, seen = _Graph(task_language, preferences), set[object]()
 
