@@ -26,7 +26,6 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import tempfile
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -36,7 +35,16 @@ from time import process_time
 from typing import TYPE_CHECKING
 
 from benchmarks import frame
-from benchmarks.frame import SHARED, Figures, KeptRows, PrintedTable, asked_for, columns, run_python
+from benchmarks.frame import (
+    SHARED,
+    Figures,
+    KeptRows,
+    PrintedTable,
+    asked_for,
+    columns,
+    on_grid,
+    run_python,
+)
 from benchmarks.scale import Grid
 
 if TYPE_CHECKING:
@@ -143,56 +151,35 @@ def load(name: str, cost: str, *, asynchronous: bool = False) -> PlanningInstanc
 
 def scenario(name: str) -> PlanningInstance:
     """The first agents of a scenario."""
+    from coordlang.sites.movingai import planning_files
+    from planners.loading import build
+    from planners.pddl import parse_domain, parse_problem
+    from planners.pddl.sexpr import Source
+
     stem, agents = name.removesuffix(" agents").rsplit(", ", 1)
     file = SCENARIOS / f"{stem}.scen"
-    return on_map(map_of(file), file, int(agents))
+    texts = planning_files(map_of(file), file, int(agents))
+    domain = parse_domain(Source("domain.pddl", texts["domain.pddl"]))
+    return build(domain, [parse_problem(Source("problem.pddl", texts["problem.pddl"]), domain)])
 
 
 def far_apart(name: str) -> PlanningInstance:
     """Robots in cells that are far from each other: each new one as far as can be from all."""
-    from coordlang.sites.movingai import read_map
+    import networkx as nx
+    from gridmap import read_map
+
+    from planners.loading import build
 
     stem, robots = name.removesuffix(" far apart").rsplit(", ", 1)
-    path = SCENARIOS / f"{stem}.map"
-    found = read_map(path)
-    passable = frozenset(cell for row in range(found.height) for cell in found.in_row(row))
-    cells = [min(passable)]
+    grid = read_map(SCENARIOS / f"{stem}.map")
+    walked = partial(nx.single_source_shortest_path_length, nx.Graph(grid.edges))
+    cells = [next(iter(grid.cells))]
     while len(cells) < int(robots):
-        far = [walked(passable, cell) for cell in cells]
-        cells.append(max(sorted(far[0]), key=lambda cell: min(own[cell] for own in far)))
-    lines = ["version 1"]
-    for (y, x), (goal_y, goal_x) in zip(cells, [*cells[1:], cells[0]], strict=True):
-        size = f"{found.width}\t{found.height}"
-        lines.append(f"0\t{path.name}\t{size}\t{x}\t{y}\t{goal_x}\t{goal_y}\t0")
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "far.scen"
-        file.write_text("\n".join(lines) + "\n")
-        return on_map(path, file, int(robots))
-
-
-def walked(
-    passable: frozenset[tuple[int, int]], start: tuple[int, int]
-) -> dict[tuple[int, int], int]:
-    """The steps from a cell to those that can be reached."""
-    steps, queue = {start: 0}, [start]
-    for y, x in queue:
-        for cell in ((y + 1, x), (y - 1, x), (y, x + 1), (y, x - 1)):
-            if cell in passable and cell not in steps:
-                steps[cell] = steps[y, x] + 1
-                queue.append(cell)
-    return steps
-
-
-def on_map(path: Path, file: Path, agents: int) -> PlanningInstance:
-    """The first agents of a scenario file on a map."""
-    from coordlang.sites.movingai import planning_files
-    from planners.loading import load as load_files
-
-    texts = planning_files(path, file, agents)
-    with tempfile.TemporaryDirectory() as folder:
-        for file_name, text in texts.items():
-            (Path(folder) / file_name).write_text(text)
-        return load_files(Path(folder) / "domain.pddl", [Path(folder) / "problem.pddl"])
+        far = [walked(cell) for cell in cells]
+        reached = filter(far[0].__contains__, grid.cells)
+        cells.append(max(reached, key=lambda cell: min(own[cell] for own in far)))
+    domain, problem = on_grid(name, grid, len(cells), cells)
+    return build(domain, [problem])
 
 
 def one(name: str, asked: Asked) -> Figures:

@@ -19,7 +19,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from time import perf_counter, sleep
+from threading import Timer
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from generate import problem_text, scenario
@@ -133,14 +134,19 @@ class KeptRows:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """What a process printed (JSON), its exit code, seconds, CPU seconds and peak memory in MiB."""
+    """What a process printed, its exit code, seconds, CPU seconds and peak memory in MiB."""
 
-    data: dict[str, Any]
+    output: str
     code: int
     seconds: float
     cpu: float
     memory: int
     errors: str
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """What it printed as JSON, if that is an object."""
+        return json.loads(self.output) if self.output.startswith("{") else {}
 
     @property
     def why(self) -> str:
@@ -156,8 +162,9 @@ def run_python(
     most: float = MOST,
     python: str = sys.executable,
     cpu: int | None = None,
+    folder: Path = ROOT,
 ) -> Done:
-    """Run Python with these arguments, ``most`` seconds; what it prints is read as JSON.
+    """Run Python with these arguments in a folder, ``most`` seconds.
 
     With ``cpu``, in so many CPU seconds, and with no more address space than `MEMORY`.
     """
@@ -168,30 +175,27 @@ def run_python(
             stdout=out,
             stderr=err,
             stdin=subprocess.DEVNULL,
-            cwd=ROOT,
+            cwd=folder,
             start_new_session=True,
             preexec_fn=None if cpu is None else lambda: limit(cpu),
         )
-        pid = 0
+        ending = Timer(most, os.killpg, (process.pid, signal.SIGKILL))
+        ending.start()
         try:
-            while pid == 0:
-                pid, status, usage = os.wait4(process.pid, os.WNOHANG)
-                if pid == 0:
-                    sleep(0.02)
-                    if perf_counter() - start > most:
-                        os.killpg(process.pid, signal.SIGKILL)
+            _, status, usage = os.wait4(process.pid, 0)
+        except BaseException:
+            os.killpg(process.pid, signal.SIGKILL)
+            raise
         finally:
-            if pid == 0:
-                os.killpg(process.pid, signal.SIGKILL)
+            ending.cancel()
         process.returncode = os.waitstatus_to_exitcode(status)
         seconds = perf_counter() - start
         texts = []
         for stream in (out, err):
             stream.seek(0)
             texts.append(stream.read().decode(errors="replace"))
-    data = json.loads(texts[0]) if texts[0].startswith("{") else {}
     spent = round(usage.ru_utime + usage.ru_stime, 2)
-    return Done(data, process.returncode, seconds, spent, usage.ru_maxrss // 1024, texts[1])
+    return Done(texts[0], process.returncode, seconds, spent, usage.ru_maxrss // 1024, texts[1])
 
 
 def limit(cpu: int) -> None:

@@ -13,16 +13,13 @@ from __future__ import annotations
 
 import json
 import os
-import resource
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from time import perf_counter
 
 import psutil
 
-from benchmarks.frame import DOMAINS, PrintedTable
+from benchmarks.frame import DOMAINS, PrintedTable, run_python
 
 
 def cluster_seconds() -> float:
@@ -35,18 +32,14 @@ def cluster_seconds() -> float:
 def build(name: str, output: Path, *options: str) -> tuple[object, float, float]:
     """Build a language as a process of its own: what it is, wall and processor seconds."""
     folder, _, stem = name.partition("/")
-    files = [str(DOMAINS / folder / f"{file}.pddl") for file in ("domain", stem)]
-    before, since = resource.getrusage(resource.RUSAGE_CHILDREN), perf_counter()
-    command = [sys.executable, "-m", "coordlang", "build", *files, "--tasks", "all"]
-    command += ["-o", str(output), *options]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        sys.exit(done.stderr)
-    wall, after = perf_counter() - since, resource.getrusage(resource.RUSAGE_CHILDREN)
-    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    files = [DOMAINS / folder / f"{file}.pddl" for file in ("domain", stem)]
+    command = ("-m", "coordlang", "build", *files, "--tasks", "all", "-o", output, *options)
+    done = run_python(command)
+    if done.code:
+        sys.exit(done.errors)
     language = json.loads(output.read_text())
     del language["producer"]
-    return language, wall, cpu
+    return language, done.seconds, done.cpu
 
 
 def main() -> None:

@@ -20,10 +20,8 @@ for the same by bidirectional symbolic search (``symq_bd``, quality 1).
 from __future__ import annotations
 
 import argparse
-import os
 import re
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -60,22 +58,13 @@ WHOLE = tuple(f"whole {size}" for size in ("4x4", "5x5", "6x6", "8x8"))
 
 def asked(python: str, planner: str, folder: Path, limit: int) -> Figures:
     """What a planner answers about the files in a folder."""
-    with (folder / f"{planner[0]}.txt").open("w+") as out:
-        process = subprocess.Popen(
-            [python, "-c", PLANNERS[planner]],
-            cwd=folder,
-            stdout=out,
-            stderr=subprocess.STDOUT,
-            stdin=subprocess.DEVNULL,
-            preexec_fn=lambda: frame.limit(limit),
-        )
-        _, _, usage = os.wait4(process.pid, 0)
-        out.seek(0)
-        text = out.read()
+    script = ("-c", PLANNERS[planner])
+    done = frame.run_python(script, 20 * limit, python, cpu=limit, folder=folder)
+    text = done.output
     count, cost = re.search(r"Number of plans: (\d+)", text), re.search(r"Plan cost: (\d+)", text)
     return {
-        "seconds": round(usage.ru_utime + usage.ru_stime, 2),
-        "memory": usage.ru_maxrss // 1024,
+        "seconds": done.cpu,
+        "memory": done.memory,
         "plans": int(count[1]) if count and cost else None,
         "cost": int(cost[1]) if count and cost else None,
     }

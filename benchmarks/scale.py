@@ -16,6 +16,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from time import process_time
 from typing import TYPE_CHECKING
 
@@ -80,19 +81,6 @@ GRIDS = (
 BY_NAME = {grid.name: grid for grid in GRIDS}
 
 
-class Clock:
-    """CPU seconds since the last look."""
-
-    def __init__(self) -> None:
-        self._since = 0.0  # the interpreter and all imports belong to the first phase
-
-    def look(self) -> float:
-        """The seconds since then."""
-        now = process_time()
-        seconds, self._since = now - self._since, now
-        return round(seconds, 3)
-
-
 def build(grid: Grid) -> Figures:
     """From PDDL text to a verified greedy language, in this process."""
     from coordlang.language.candidates import all_pairs, from_problems
@@ -103,21 +91,23 @@ def build(grid: Grid) -> Figures:
     from coordlang.vocabulary.job import Job
     from planners.parallel.workers import Workers
 
-    clock, here = Clock(), Workers()
+    here = Workers()
     loaded = grid.load()
     candidates = (all_pairs if grid.every else from_problems)(loaded.domain, loaded.problems)
-    figures: Figures = {"tasks": candidates.count, "plans": clock.look()}
+    looks = [0.0, process_time()]  # the interpreter and all imports belong to the first phase
     found = differences(candidates, here)
-    figures["coordination"] = clock.look()
+    looks.append(process_time())
     outcome = greedy(Job(candidates, tuple(found.states.tolist()), found))
-    figures["greedy"] = clock.look()
+    looks.append(process_time())
     partition = Partition.of_states(candidates.rows, outcome.partition)
     verdict = verify_candidates(partition, candidates, here)
     assert verdict.holds
-    figures["verify"] = clock.look()
-    figures["words"] = len(partition.words)
-    counted = (found.nodes, found.edges, found.sets, found.evaluations)
-    return {**figures, **dict(zip(COUNTED, counted, strict=False))}
+    looks.append(process_time())
+    seconds = (round(after - before, 3) for before, after in pairwise(looks))
+    words = len(partition.words)
+    counted = (found.nodes, found.edges, found.sets, found.evaluations, words)
+    figures = zip((*PHASES, *COUNTED), (*seconds, *counted), strict=True)
+    return {"tasks": candidates.count, **dict(figures)}
 
 
 def measured(name: str, limit: int) -> Figures:

@@ -47,7 +47,7 @@ class GridMap:
 
 def open_grid(rows: int, columns: int) -> GridMap:
     """A full rectangle: every cell is adjacent to the up to four cells around it."""
-    return _of({(row, col) for row in range(rows) for col in range(columns)})
+    return of_cells({(row, col) for row in range(rows) for col in range(columns)})
 
 
 def ring(rows: int, columns: int) -> GridMap:
@@ -59,19 +59,21 @@ def ring(rows: int, columns: int) -> GridMap:
         raise ValueError(f"a ring needs at least two rows and two columns, not {rows}x{columns}")
     tour = _clockwise(rows, columns)
     edges = {(min(a, b), max(a, b)) for a, b in pairwise([*tour, tour[0]])}
-    return _of(set(tour), edges)
+    return of_cells(set(tour), edges)
 
 
 def path(length: int, bays: Sequence[int]) -> GridMap:
     """Cells in a row, with a bay below those in the columns ``bays``."""
-    return _of({(0, col) for col in range(length)} | {(1, col) for col in bays})
+    return of_cells({(0, col) for col in range(length)} | {(1, col) for col in bays})
 
 
 def two_rooms(rows: int, columns: int, corridor: int) -> GridMap:
     """Two rooms of equal size, joined by a corridor of so many cells along their first rows."""
     cells = {(row, col) for row in range(rows) for col in range(columns)}
     cells |= {(0, columns + k) for k in range(corridor)}
-    return _of(cells | {(row, col + columns + corridor) for row, col in cells if col < columns})
+    return of_cells(
+        cells | {(row, col + columns + corridor) for row, col in cells if col < columns}
+    )
 
 
 def rooms_and_corridors(random: Random, most: int = 12) -> GridMap:
@@ -93,7 +95,7 @@ def rooms_and_corridors(random: Random, most: int = 12) -> GridMap:
             cells |= {(row, column + k) for row in rows for k in range(width)}
             column += width
         if 5 <= len(cells) <= most:
-            return _of(cells)
+            return of_cells(cells)
 
 
 def three_cells() -> GridMap:
@@ -105,7 +107,7 @@ def three_cells() -> GridMap:
 def read_map(path: Path) -> GridMap:
     """A map in the format of movingai.com, see `coordlang.sites.movingai.read_map`."""
     found = movingai.read_map(path)
-    return _of({cell for row in range(found.height) for cell in found.in_row(row)})
+    return of_cells({cell for row in range(found.height) for cell in found.in_row(row)})
 
 
 def _clockwise(rows: int, columns: int) -> list[Cell]:
@@ -117,7 +119,7 @@ def _clockwise(rows: int, columns: int) -> list[Cell]:
     return [*top, *right, *bottom, *left]
 
 
-def _of(passable: set[Cell], edges: set[tuple[Cell, Cell]] | None = None) -> GridMap:
+def of_cells(passable: set[Cell], edges: set[tuple[Cell, Cell]] | None = None) -> GridMap:
     """The map of these cells in row-major order; without ``edges`` all cells that touch are
     adjacent.
     """

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from pathlib import Path
 from random import Random
 
-from benchmarks.frame import DOMAINS, SHARED
+from gridmap import GridMap, of_cells, read_map
+
+from benchmarks.frame import DOMAINS, SHARED, on_grid
 from benchmarks.paper.grid import cell_position, is_cell, placement
 from benchmarks.paper.suite import CORRIDOR, WORLDS, World, language_for
 from benchmarks.paper.task_choices import languages_in_tasks
@@ -20,10 +21,7 @@ from coordlang.language.listed import ListedTask
 from coordlang.language.words import Language
 from coordlang.required.choices import Choices
 from coordlang.sites.coordinates import Point
-from coordlang.sites.movingai import Cell, cell_name, grid_problem_text, read_map
-from planners.pddl import parse_problem, read_domain, read_problem
-from planners.pddl.lifted import Domain
-from planners.pddl.sexpr import Source
+from planners.pddl import read_domain, read_problem
 from planners.system.errors import BadInput, ProvedImpossible
 
 #: Tasks of a floor whose tasks are drawn, and draws after which there are as many as there are.
@@ -103,64 +101,46 @@ def tasks_of(floor: Floor, seed: int) -> tuple[Language, list[TaskLanguage]]:
 
 
 def _drawn(floor: Floor, seed: int) -> tuple[Candidates, Language]:
-    domain = read_domain(DOMAINS / "grid" / "domain.pddl")
-    cells = {cell_name(cell): cell for cell in _cells(floor)}
+    grid = _map(floor)
     random = Random(f"{seed} {floor.key}")
     found: list[ListedTask] = []
     for _ in range(DRAWS):
-        start, goal = (random.sample(list(cells), floor.robots) for _ in range(2))
+        start, goal = (random.sample(list(grid.cells), floor.robots) for _ in range(2))
         task = ListedTask(placement(start), placement(goal))
-        if _fits(task, found[:1], domain, cells):
+        if _fits(task, found[:1], grid):
             found.append(task)
         if len(found) == TASKS:
             break
-    candidates = _candidates(found, domain, cells)
+    candidates = _candidates(found, grid)
     built = build_language(candidates, "greedy", seed=seed)
     if built.stopped is not None:
         raise built.stopped
     return candidates, built.language
 
 
-def _fits(
-    task: ListedTask, first: Sequence[ListedTask], domain: Domain, cells: Mapping[str, Cell]
-) -> bool:
+def _fits(task: ListedTask, first: Sequence[ListedTask], grid: GridMap) -> bool:
     """Say whether a task requires coordination, and robots can get there from the first one."""
     try:
-        (space,) = _candidates([task], domain, cells).spaces
+        (space,) = _candidates([task], grid).spaces
         if Choices(space).requires[space.starts[0]]:
-            _candidates([*first, task], domain, cells)  # not so where robots are on a ring
+            _candidates([*first, task], grid)  # not so where robots are on a ring
             return True
     except (ProvedImpossible, BadInput):
         pass
     return False
 
 
-def _candidates(
-    listed: Sequence[ListedTask], domain: Domain, cells: Mapping[str, Cell]
-) -> Candidates:
-    """Tasks on a map, as candidates."""
-    first = listed[0].init, listed[0].goal
-    ends = [[text.strip("()").split()[-1] for text in atoms] for atoms in first]
-    near = _adjacent(cells).__getitem__
-    rows = [list(names) for _, names in groupby(cells, key=lambda name: cells[name][0])]
-    text = grid_problem_text("floor", domain.name, rows, near, *ends, written_by="")
-    return from_listed(domain, [parse_problem(Source("floor", text), domain)], listed)
+def _candidates(listed: Sequence[ListedTask], grid: GridMap) -> Candidates:
+    """Tasks on a map, as candidates; the problem starts where the first one does."""
+    starts = [text.strip("()").split()[-1] for text in listed[0].init]
+    domain, problem = on_grid("floor", grid, len(starts), starts)
+    return from_listed(domain, [problem], listed)
 
 
-def _cells(floor: Floor) -> list[Cell]:
+def _map(floor: Floor) -> GridMap:
     if floor.foreign:
-        found = read_map(foreign_map(floor))
-        return [cell for row in range(found.height) for cell in found.in_row(row)]
+        return read_map(foreign_map(floor))
     folder = DOMAINS / floor.world.folder
     domain = read_domain(folder / "domain.pddl")
     names = read_problem(folder / f"{floor.world.problem}.pddl", domain).objects
-    return sorted(cell_position(name) for name in names if is_cell(name))
-
-
-def _adjacent(cells: Mapping[str, Cell]) -> dict[str, list[str]]:
-    name = {cell: own for own, cell in cells.items()}
-    ways = ((-1, 0), (0, -1), (0, 1), (1, 0))
-    return {
-        own: [name[near] for dy, dx in ways if (near := (row + dy, column + dx)) in name]
-        for own, (row, column) in cells.items()
-    }
+    return of_cells({cell_position(name) for name in names if is_cell(name)})
