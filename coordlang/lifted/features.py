@@ -25,7 +25,6 @@ English, "the column of what ..".
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, get_args
 
@@ -33,6 +32,7 @@ import numpy as np
 
 from coordlang.lifted.world import ANY, NONE, States, attribute, distances, links
 from planners.joint.tables import Bools, Ints
+from planners.pddl.sexpr import Group, Source, Token, parse
 from planners.system.errors import BadInput, Position
 from planners.system.messages import echoed
 
@@ -405,9 +405,6 @@ Feature = Sign | Residue | Least | Same
 # ---- read from texts
 
 _SIGNS = {-1: "<", 0: "=", 1: ">"}
-_TOKEN = re.compile(r"[()]|[^\s()]+")
-#: Definitions of more names and brackets are refused; no feature of ours has as many.
-_LONGEST = 500
 #: Numbers in definitions, and values of features, are smaller than this.
 LARGEST = 1_000_000
 
@@ -425,8 +422,8 @@ _MADE: dict[tuple[str, str], type[Expression]] = {
 def feature_of(text: str, position: Position) -> Feature:
     """The feature that a text defines.  Raises `BadInput` for anything else."""
     try:
-        found: Feature | None = _read("Feature", _tree(text))
-    except (ValueError, IndexError):
+        found: Feature | None = _read("Feature", _tree(parse(Source("feature", text))))
+    except (ValueError, BadInput):
         found = None
     if found is None or str(found) != " ".join(text.split()):
         raise BadInput(
@@ -438,22 +435,8 @@ def feature_of(text: str, position: Position) -> Feature:
     return found
 
 
-def _tree(text: str) -> Tree:
-    if len(tokens := _TOKEN.findall(text)) > _LONGEST:
-        raise ValueError
-    stack: list[list[Tree]] = [[]]
-    for token in tokens:
-        if token == "(":
-            stack.append([])
-        elif token == ")":
-            done = stack.pop()
-            stack[-1].append(done)
-        else:
-            stack[-1].append(token)
-    (whole,), *open_groups = stack
-    if open_groups:
-        raise ValueError
-    return whole
+def _tree(part: Token | Group) -> Tree:
+    return part.text if isinstance(part, Token) else [_tree(item) for item in part.items]
 
 
 def _read(kind: str, tree: Tree) -> Any:

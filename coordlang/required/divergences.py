@@ -71,7 +71,7 @@ def _with_failing(known: Rows, here: _Mixing, sets: Ints, chunk: int) -> Rows:
     good = sets[~fails[number]]
     for span in spans(here.nodes_after(good).astype(np.float64), chunk):
         larger = here.extended(good[span])
-        larger = larger[~_implied(known, here.states_of(larger), last=larger.shape[1])]
+        larger = larger[~_implied(known, here.states_of(larger))]
         known = _with_failing(known, here, larger, chunk)
     return known
 
@@ -121,17 +121,12 @@ def minimal(rows: Ints) -> Ints:
     return known[~_implied(known, known)].astype(np.int64)
 
 
-def _implied(known: Rows, rows: Rows, last: int | None = None) -> Bools:
-    """Which of some divergences hold a known one that is smaller.
-
-    With ``last`` those alone are looked for that have the state of this column, the last one used.
-    """
+def _implied(known: Rows, rows: Rows) -> Bools:
+    """Which of some divergences hold a known one that is smaller."""
     implied = np.zeros(len(rows), np.bool_)
     used = int((rows != _NONE).any(axis=0).sum())  # with many robots few columns are
-    every = range(1, used if last is None else last)
-    for size in range(2, used - 1 if last is None else last):
-        for others in combinations(every, size if last is None else size - 1):
-            some = others if last is None else (*others, last)
+    for size in range(2, used - 1):
+        for some in combinations(range(1, used), size):
             left = np.flatnonzero(~implied)
             part = np.full((len(left), rows.shape[1]), _NONE)
             part[:, : 1 + size] = rows[left][:, [0, *some]]
