@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from math import prod
 from random import Random
 from statistics import fmean
@@ -18,8 +19,18 @@ from statistics import fmean
 import numpy as np
 
 from benchmarks.paper.grid import task_cells
-from benchmarks.paper.task_choices import Disruption, TaskChoices, languages_in_tasks
+from benchmarks.paper.task_choices import (
+    Disruption,
+    avoids,
+    choices_under,
+    draw_plan,
+    languages_in_tasks,
+    plans_of,
+    sentence_of,
+)
 from benchmarks.paper.warehouse import Delivery, human_in
+from coordlang.execution.automaton import Automaton
+from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.candidates import Candidates
 from coordlang.language.sentences import Sentence, sentence_counts
 from coordlang.language.words import Language
@@ -90,9 +101,9 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class Trials:
-    """All equally likely trials over the tasks of one plan space."""
+    """All equally likely trials over the tasks of one plan space, by number, in a language."""
 
-    choices: TaskChoices
+    languages: tuple[TaskLanguage, ...]
     disruptions: tuple[Disruption, ...]
     trials: tuple[Trial, ...]
 
@@ -101,15 +112,19 @@ class Trials:
 
         Plan and sentence get the same task, disruption and plan, the sentence being that plan's.
         """
-        plan = sentence = 0
+        plans, plan, sentence = plans_of(self.languages), 0, 0
+
+        @cache
+        def choices(task: int, words: Sentence) -> list[Automaton]:
+            return choices_under(self.languages[task], words)
+
         for _ in range(runs):
             trial = self.trials[random.randrange(len(self.trials))]
             disruption = self.disruptions[trial.disruption]
-            drawn = [(task, *self.choices.draw(task, random)) for task in trial.tasks]
-            plan += not any(disruption.breaks(agreed) for _, agreed, _ in drawn)
-            sentence += all(
-                self.choices.succeeds(task, words, disruption) for task, _, words in drawn
-            )
+            agreed = [(task, draw_plan(plans[task], random)) for task in trial.tasks]
+            plan += not any(disruption.breaks(own) for _, own in agreed)
+            parts = (choices(task, sentence_of(self.languages[task], own)) for task, own in agreed)
+            sentence += all(all(map(avoids, own, disruption.forbidden)) for own in parts)
         return {"runs": runs, "plan": plan, "sentence": sentence}
 
     def exact(self) -> dict[str, float] | None:
@@ -118,9 +133,9 @@ class Trials:
         ``possible`` is the rate of trials in which some optimal plan of every task succeeds.  None
         where there are too many sentences.
         """
-        language = self.choices.language
+        space, word = self.languages[0].space, self.languages[0].word
         try:
-            rates = success_rates(language.space, language.word, self.disruptions, MOST_STEPS)
+            rates = success_rates(space, word, self.disruptions, MOST_STEPS)
         except OutOfMemory:
             return None
         found = [[rates[task][trial.disruption] for task in trial.tasks] for trial in self.trials]
@@ -135,35 +150,34 @@ class Trials:
         }
 
 
-def _choices(candidates: Candidates, language: Language) -> TaskChoices:
+def _in_tasks(candidates: Candidates, language: Language) -> tuple[TaskLanguage, ...]:
     assert len(candidates.spaces) == 1, "these models are small"
-    return TaskChoices(next(iter(languages_in_tasks(language, candidates))))
+    return tuple(languages_in_tasks(language, candidates))
 
 
 def warehouse_trials(
     candidates: Candidates, language: Language, every: Sequence[Delivery]
 ) -> Trials:
     """Return the trials of deliveries: a human stands in any cell that is no corner."""
-    choices = _choices(candidates, language)
-    model = candidates.model
+    languages, model = _in_tasks(candidates, language), candidates.model
     corners = {cell for delivery in every for cell in delivery.start}
     cells = sorted({atom.args[1] for atom in model.codec.facts.atoms} - corners)
     disruptions = tuple(human_in(model, cell) for cell in cells)
     # Tasks are grouped by goal in a plan space, so they are found by their states.
-    number = {task_cells(choices.space, task): task for task in range(len(choices.space.starts))}
+    number = {task_cells(used.space, used.task): used.task for used in languages}
     trials = [
         Trial(tuple(number[leg] for leg in delivery.legs), disruption)
         for delivery in every
         for disruption in range(len(disruptions))
     ]
-    return Trials(choices, disruptions, tuple(trials))
+    return Trials(languages, disruptions, tuple(trials))
 
 
 def subaction_trials(candidates: Candidates, language: Language) -> Trials:
     """Return the trials in which one subaction is impossible that an optimal plan needs."""
-    choices = _choices(candidates, language)
-    disruptions = _single_subactions(candidates.model, choices.space)
-    space = choices.space
+    languages = _in_tasks(candidates, language)
+    space = languages[0].space
+    disruptions = _single_subactions(candidates.model, space)
     hit = [space.sources[~np.all(disruption.spared(space), axis=0)] for disruption in disruptions]
     concerned = [space.ancestors(nodes)[space.starts] for nodes in hit]
     trials = [
@@ -172,7 +186,7 @@ def subaction_trials(candidates: Candidates, language: Language) -> Trials:
         for number, tasks in enumerate(concerned)
         if tasks[task]
     ]
-    return Trials(choices, tuple(disruptions), tuple(trials))
+    return Trials(languages, tuple(disruptions), tuple(trials))
 
 
 def _single_subactions(model: JointModel, space: PlanSpace) -> list[Disruption]:

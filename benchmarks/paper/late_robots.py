@@ -13,14 +13,14 @@ from random import Random
 
 import numpy as np
 
-from benchmarks.paper.task_choices import sentence_of
+from benchmarks.paper.task_choices import draw_plan, plans_of, sentence_of
 from coordlang.execution.choices import knowing_own, monitor
 from coordlang.execution.monitor import EventMonitor, drawn
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.sentences import Sentence
 from planners.joint.model import JointModel
 from planners.joint.tables import Rows
-from planners.search.plans import Plan, Plans, counts
+from planners.search.plans import Plan, Plans
 
 #: A robot's part of a plan: its labels, without the rest at its end.
 Part = tuple[int, ...]
@@ -101,7 +101,7 @@ class DelayTrials:
     def __init__(self, languages: Sequence[TaskLanguage], *, together: bool = False) -> None:
         self._languages, self._together = languages, together
         self._execution = Execution(languages[0].model)
-        self._plans = _plans_of(languages)
+        self._plans = plans_of(languages)
         self._said: dict[tuple[int, Sentence], Plans] = {}
 
     def sample(self, delay: float, yields: bool, runs: int, random: Random) -> tuple[int, int, int]:
@@ -119,7 +119,7 @@ class DelayTrials:
 
     def _parts(self, task: int, random: Random) -> list[Part]:
         """What each robot does, in one run."""
-        used, plan = self._languages[task], _drawn(self._plans[task], random)
+        used, plan = self._languages[task], draw_plan(self._plans[task], random)
         robots = range(len(used.model.robots))
         if self._together:
             return [self._execution.part_of(plan, robot) for robot in robots]
@@ -127,7 +127,7 @@ class DelayTrials:
         if (task, words) not in self._said:
             self._said[task, words] = Plans.of(used.plans_with(words))
         said = self._said[task, words]
-        return [self._execution.part_of(_drawn(said, random), robot) for robot in robots]
+        return [self._execution.part_of(draw_plan(said, random), robot) for robot in robots]
 
     def lateness(
         self, task: int, parts: Sequence[Part], delay: float, yields: bool, random: Random
@@ -157,7 +157,7 @@ class EventTrials:
     def __init__(self, languages: Sequence[TaskLanguage], way: str) -> None:
         self._languages, self._way = languages, way
         self._execution = Execution(languages[0].model.in_step)
-        self._plans = _plans_of(languages)
+        self._plans = plans_of(languages)
         self._said: dict[tuple[int, Sentence], tuple[Plans, list[EventMonitor]]] = {}
 
     def sample(self, delay: float, runs: int, random: Random) -> tuple[int, ...]:
@@ -178,9 +178,9 @@ class EventTrials:
 
     def _run(self, task: int, delay: float, random: Random) -> tuple[int, int] | None:
         """The steps beyond the least makespan and the waits, None: it does not end in the goal."""
-        used, plan = self._languages[task], _drawn(self._plans[task], random)
+        used, plan = self._languages[task], draw_plan(self._plans[task], random)
         said, monitors = self._monitors(task, sentence_of(used, plan))
-        plans = [plan if self._way == "graph" else _drawn(said, random) for _ in monitors]
+        plans = [plan if self._way == "graph" else draw_plan(said, random) for _ in monitors]
         parts: list[list[str]] | None = None
         if self._way != "free":
             parts = [
@@ -305,17 +305,6 @@ class _Team:
                     self._monitors[other].ended(own.robot, text, self._done[robot])
 
 
-def _plans_of(languages: Sequence[TaskLanguage]) -> list[Plans]:
-    """The plans of every task; those of one plan space are counted once."""
-    spaces = {id(used.space): used.space for used in languages}
-    counted = {number: counts(space) for number, space in spaces.items()}
-    return [Plans(used.space, used.start, counted[id(used.space)]) for used in languages]
-
-
 def _in_goal(used: TaskLanguage, row: Rows) -> bool:
     goal = used.space.goals[used.space.goal[used.start]]
     return bool(used.model.holds(goal, row[None, :])[0])
-
-
-def _drawn(plans: Plans, random: Random) -> Plan:
-    return plans.unrank(random.randrange(plans.count))

@@ -20,7 +20,12 @@ from benchmarks.paper.plots import drawing
 from benchmarks.paper.recipe import Figure, Recipe, Record, Result, Section, Settings, Unit
 from benchmarks.paper.suite import CORRIDOR, METHODS, OTHERS, WORLDS, language_for, method_of
 from benchmarks.paper.tables import elsewhere, in_percent, table
-from benchmarks.paper.task_choices import TaskChoices, languages_in_tasks
+from benchmarks.paper.task_choices import (
+    choices_under,
+    first_plan,
+    languages_in_tasks,
+    optimal_choices,
+)
 from coordlang.execution.automaton import Automaton
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.listed import ListedTask
@@ -99,14 +104,11 @@ def freedom(tasks: Sequence[TaskLanguage]) -> dict[str, int]:
     of the tasks, which would take another agreement.
     """
     plan = sentence = optimal = 0
-    known: TaskChoices | None = None
     for one in tasks:
-        if known is None or known.space is not one.space:
-            known = TaskChoices(one)
-        first, words = known.first(one.task)
-        for robot, choices in enumerate(known.choices(one.task, words)):
+        first, words = first_plan(one)
+        for robot, choices in enumerate(choices_under(one, words)):
             agreed = _options(one.model, robot, {step[robot] for step in first})
-            every = known.optimal_choices(one.task, robot)
+            every = optimal_choices(one, robot)
             plan += len(agreed)
             sentence += len(_options(one.model, robot, choices.labels) - agreed)
             optimal += len(_options(one.model, robot, every.labels) - agreed)
@@ -126,10 +128,9 @@ def _options(model: JointModel, robot: int, labels: set[int]) -> set[str]:
 
 def detour(language: TaskLanguage) -> Result:
     """Return what happens when `PLACE` becomes interesting: the agreed parts and r1's detour."""
-    known = TaskChoices(language)
-    plan, words = known.first(language.task)
+    plan, words = first_plan(language)
     model, plans = language.model, Plans.of(language.space, language.task)
-    choices = known.choices(language.task, words)[0]
+    choices = choices_under(language, words)[0]
     own = _through_place(model, subplans(choices))
     # All parts of robot 1 through the place on some optimal plan, and those that are optimal
     # together with robot 2's agreed part.

@@ -18,12 +18,11 @@ from benchmarks.paper.floors import FLOORS, foreign_map, tasks_of
 from benchmarks.paper.recipe import Recipe, Record, Result, Section, Settings, Unit
 from benchmarks.paper.scenario import PLACE, detour, drawn_task, trading_rooms
 from benchmarks.paper.suite import CORRIDOR, language_for
-from benchmarks.paper.task_choices import languages_in_tasks
+from benchmarks.paper.task_choices import draw_plan, first_plan, languages_in_tasks, plans_of
 from coordlang.simulation.record import RunRecord, WishRecord
 from coordlang.simulation.simulator import Settings as How
 from coordlang.simulation.simulator import require_simulator
 from coordlang.simulation.team import Agreement
-from planners.search.plans import Plans
 from planners.system.errors import UsageError
 
 #: The ways to keep step, which these languages need.
@@ -69,16 +68,16 @@ def _run_floor(unit: Unit, settings: Settings) -> Result:
     if floor.foreign and not foreign_map(floor).is_file():
         return {"absent": f"the map {floor.foreign}"}
     language, tasks = tasks_of(floor, settings.seed)
+    plans = plans_of(tasks)
     found: dict[Agreement, dict[str, list[RunRecord]]] = {
         agreement: {way: [] for way in ways} for agreement, ways in _DRIVEN.items()
     }
     for number in range(unit.parameters["runs"]):
         random = Random(f"{settings.seed} {floor.key} {number}")
-        used = tasks[random.randrange(len(tasks))]
-        plans = Plans.of(used.space, used.task)
-        plan = plans.unrank(random.randrange(plans.count))
+        task = random.randrange(len(tasks))
+        plan = draw_plan(plans[task], random)
         for agreement, by_way in found.items():
-            prepared = mission_of(used, plan, agreement)
+            prepared = mission_of(tasks[task], plan, agreement)
             for way, runs in by_way.items():
                 runs.append(drive(prepared, _WAYS[way], number, dict(floor.known)))
     return {
@@ -96,7 +95,7 @@ def _run_detour(unit: Unit, settings: Settings) -> Result:
     """Let the place become interesting when r1 has done some steps; r2 is not informed."""
     candidates, language = language_for(CORRIDOR, "minimal", settings.seed, trading_rooms())
     used = drawn_task(list(languages_in_tasks(language, candidates)))
-    first = next(iter(Plans.of(used.space, used.task)))
+    first, _ = first_plan(used)
     prepared = mission_of(used, first, "sentence")
     wish = WishRecord("r1", _LEARNED, prepared.atom_at("r1", PLACE))
     found: Result = {"words": len(language.words), "known": detour(used), "steps": prepared.steps}

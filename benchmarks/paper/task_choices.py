@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plans, sentences and choices of the tasks of one plan space, computed once and kept."""
+"""Plans, sentences and choices in the tasks of a language."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from random import Random
 
 import numpy as np
@@ -48,57 +47,22 @@ class Disruption:
         return [~np.isin(space.robot_labels(robot), own) for robot, own in forbidden]
 
 
-class TaskChoices:
-    """The tasks of one plan space, in the language ``language``."""
+def plans_of(languages: Sequence[TaskLanguage]) -> list[Plans]:
+    """Return the plans of every task; those of one plan space are counted once."""
+    spaces = {id(used.space): used.space for used in languages}
+    counted = {number: counts(space) for number, space in spaces.items()}
+    return [Plans(used.space, used.start, counted[id(used.space)]) for used in languages]
 
-    def __init__(self, language: TaskLanguage) -> None:
-        self.language = language
-        self._choices: dict[tuple[int, Sentence], list[Automaton]] = {}
-        self._succeeds: dict[tuple[int, Sentence, str], bool] = {}
 
-    @property
-    def space(self) -> PlanSpace:
-        """The plan space of all tasks."""
-        return self.language.space
+def draw_plan(plans: Plans, random: Random) -> Plan:
+    """Return a plan drawn uniformly."""
+    return plans.unrank(random.randrange(plans.count))
 
-    @cached_property
-    def _counted(self) -> list[int]:
-        return counts(self.space)
 
-    def draw(self, task: int, random: Random) -> tuple[Plan, Sentence]:
-        """Return an optimal plan of a task, drawn uniformly, and its sentence."""
-        plans = Plans(self.space, int(self.space.starts[task]), self._counted)
-        return self._said(task, plans.unrank(random.randrange(plans.count)))
-
-    def first(self, task: int) -> tuple[Plan, Sentence]:
-        """Return the first optimal plan of a task, in the order of `Plans`, and its sentence."""
-        path = self.space.first_path(int(self.space.starts[task]))
-        return self._said(task, tuple(map(self.space.labels_of, path)))
-
-    def _said(self, task: int, plan: Plan) -> tuple[Plan, Sentence]:
-        return plan, sentence_of(replace(self.language, task=task), plan)
-
-    def succeeds(self, task: int, words: Sentence, disruption: Disruption) -> bool:
-        """Say whether every robot has a choice under a sentence that needs nothing forbidden."""
-        key = (task, words, disruption.name)
-        if key not in self._succeeds:
-            own = zip(self.choices(task, words), disruption.forbidden, strict=True)
-            self._succeeds[key] = all(avoids(automaton, forbidden) for automaton, forbidden in own)
-        return self._succeeds[key]
-
-    def choices(self, task: int, words: Sentence) -> list[Automaton]:
-        """Return each robot's choices under a sentence of a task."""
-        if (task, words) not in self._choices:
-            plans = replace(self.language, task=task).plans_with(words)
-            robots = range(len(self.language.model.robots))
-            self._choices[task, words] = [determinise(plans, robot) for robot in robots]
-        return self._choices[task, words]
-
-    def optimal_choices(self, task: int, robot: int) -> Automaton:
-        """Return the parts of a robot in all optimal plans of a task."""
-        only = np.array([task])
-        space = self.space.with_tasks(self.space.starts[only], self.space.second[only])
-        return determinise(space, robot)
+def first_plan(used: TaskLanguage) -> tuple[Plan, Sentence]:
+    """Return the first optimal plan of a task, in the order of `Plans`, and its sentence."""
+    plan = tuple(map(used.space.labels_of, used.space.first_path(used.start)))
+    return plan, sentence_of(used, plan)
 
 
 def sentence_of(used: TaskLanguage, plan: Plan) -> Sentence:
@@ -106,6 +70,19 @@ def sentence_of(used: TaskLanguage, plan: Plan) -> Sentence:
     path = used.space.path_with(used.start, plan)
     assert path is not None, "a plan is a path of its plan space"
     return sentence(used.word[used.space.nodes_on(used.start, path)].tolist())
+
+
+def choices_under(used: TaskLanguage, words: Sentence) -> list[Automaton]:
+    """Return each robot's choices under a sentence of a task."""
+    plans = used.plans_with(words)
+    return [determinise(plans, robot) for robot in range(len(used.model.robots))]
+
+
+def optimal_choices(used: TaskLanguage, robot: int) -> Automaton:
+    """Return the parts of a robot in all optimal plans of a task."""
+    only = np.array([used.task])
+    space = used.space.with_tasks(used.space.starts[only], used.space.second[only])
+    return determinise(space, robot)
 
 
 def avoids(automaton: Automaton, forbidden: frozenset[int]) -> bool:

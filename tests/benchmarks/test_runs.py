@@ -165,7 +165,7 @@ def test_a_sentence_may_succeed_of_which_no_plan_does() -> None:
     world, rows, columns = WAREHOUSES["open 3x3"]
     every = deliveries(rows, columns, "across")
     trials = warehouse_trials(*language_for(world, "minimal", 0, listed_tasks(every)), every)
-    used, said = replace(trials.choices.language, task=15), defaultdict(list)
+    used, said = trials.languages[15], defaultdict(list)
     for plan in Plans.of(used.space, 15):
         parts = zip(zip(*plan, strict=True), trials.disruptions[3].forbidden, strict=True)
         said[sentence_of(used, plan)].append([own.isdisjoint(part) for part, own in parts])
