@@ -103,7 +103,7 @@ class Role(Expression):
     def _step(self, states: States, members: Bools) -> Bools:
         world = states.world
         if self.predicate in world.relations:
-            linked = links(world, self.predicate).astype(np.float32)
+            linked = world.get(links, self.predicate).astype(np.float32)
             reached: Bools = members.astype(np.float32) @ (linked if self.inverse else linked.T) > 0
             return reached
         found = np.zeros_like(members)
@@ -241,8 +241,8 @@ class Attribute(Expression):
         return f"({self.name} {self.relation + ' ' if self.relation else ''}{self.term})"
 
     def _read(self, states: States) -> Ints:
-        of_object = np.append(attribute(states.world, self.name, self.relation), NONE)
-        number: Ints = of_object[states.get(self.term)]
+        known = states.world.get(attribute, self.name, self.relation)
+        number: Ints = np.append(known, NONE)[states.get(self.term)]
         return number
 
 
@@ -258,7 +258,7 @@ class Distance(Expression):
 
     def _read(self, states: States) -> Ints:
         here, there = states.get(self.one), states.get(self.other)
-        far = distances(states.world, self.relation)[here, there]
+        far = states.world.get(distances, self.relation)[here, there]
         return np.where((here == NONE) | (there == NONE), NONE, far)
 
 
@@ -310,7 +310,7 @@ class Gap(Expression):
     def _read(self, states: States) -> Ints:
         here: Bools = states.get(self.one)
         there: Bools = states.get(self.other)
-        far = distances(states.world, self.relation)
+        far = states.world.get(distances, self.relation)
         never = len(far) + 1
         far = np.where(far == NONE, never, far)
         least = np.full(len(states), never)

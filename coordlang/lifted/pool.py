@@ -189,7 +189,7 @@ def _different_numbers(found: Iterable[Number], states: Sequence[States]) -> lis
             seen.add(key)
             kept.append(number)
             for own, part in zip(states, parts, strict=True):
-                own.known[number] = part
+                own.known[number,] = part
     return kept
 
 
@@ -207,7 +207,7 @@ def _concepts(vocabulary: _Vocabulary, states: Sequence[States], most: int) -> l
                 seen.add(key)
                 level.append(concept)
                 for own, table in zip(states, members, strict=True):
-                    own.known[concept] = table
+                    own.known[concept,] = table
             if len(seen) > _CONCEPTS or len(seen) * entries > _ENTRIES:
                 return [concept for known in (*levels, level) for concept in known]
         levels.append(level)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, wraps
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -29,11 +29,22 @@ ANY = "_"
 
 Pair = tuple[str, str]
 T = TypeVar("T")
-#: What can be read of states: concepts, numbers, features.
-Readable = Callable[["States"], Any]
 
 
-class World:
+class Asked:
+    """Something of which functions tell, and what was told of it before, by ``known``."""
+
+    known: dict[object, Any]
+
+    def get(self, told: Callable[..., T], *names: object) -> T:
+        """What a function, or an expression, tells of it; it is asked once."""
+        if (key := (told, *names)) not in self.known:
+            self.known[key] = told(self, *names)
+        found: T = self.known[key]
+        return found
+
+
+class World(Asked):
     """A problem of a domain, as features see it.
 
     All ``objects`` by name, sorted; ``robots`` in the order of the model; ``types``: each type's
@@ -62,7 +73,6 @@ class World:
         self.types = dict(sorted(types.items()))
         given = {n: p for n, p in (points or {}).items() if n in problem.objects}
         self.points = _points(self.statics, given)
-        #: What was told of it, see `_once`.
         self.known: dict[object, Any] = {}
 
     @classmethod
@@ -92,7 +102,7 @@ class World:
 
 
 @dataclass(frozen=True)
-class States:
+class States(Asked):
     """States of a world, and what was read of them before."""
 
     world: World
@@ -101,12 +111,6 @@ class States:
 
     def __len__(self) -> int:
         return len(self.rows)
-
-    def get(self, what: Readable) -> Any:
-        """What something is in all states; it is read once."""
-        if what not in self.known:
-            self.known[what] = what(self)
-        return self.known[what]
 
     @cached_property
     def true(self) -> TrueFacts:
@@ -118,26 +122,7 @@ class States:
 
         All arrays, of numbers, are as long as there are such atoms in all states together.
         """
-        if (key := (predicate, arity)) in self.known:
-            found: tuple[Ints, ...] = self.known[key]
-            return found
-        world = self.world
-        static = [args for args in world.statics.get(predicate, ()) if len(args) == arity]
-        if static:
-            state = np.repeat(np.arange(len(self)), len(static))
-            own = np.array([[world.number[name] for name in args] for args in static])
-            own = np.tile(own, (len(self), 1))
-        else:
-            args = np.full((len(world.model.codec.facts), arity), NONE)
-            mine = np.zeros(len(args), bool)
-            for fact, atom in enumerate(world.model.codec.facts.atoms):
-                if atom.predicate == predicate and len(atom.args) == arity:
-                    mine[fact] = True
-                    args[fact] = [world.number[name] for name in atom.args]
-            chosen: Bools = mine[self.true.fact]
-            state, own = self.true.row[chosen], args[self.true.fact[chosen]]
-        self.known[key] = state, *(own[:, place] for place in range(arity))
-        return self.atoms(predicate, arity)
+        return self.get(_atoms, predicate, arity)
 
     def image(self, predicate: str, named: str, inverse: bool) -> Ints:
         """In each state the object x with (predicate named x), or (predicate x named) if inverse.
@@ -161,6 +146,25 @@ class States:
             if wanted != ANY:
                 hit &= names == self.world.number.get(wanted, NONE)
         return np.bincount(state[hit], minlength=len(self))
+
+
+def _atoms(states: States, predicate: str, arity: int) -> tuple[Ints, ...]:
+    world = states.world
+    static = [args for args in world.statics.get(predicate, ()) if len(args) == arity]
+    if static:
+        state = np.repeat(np.arange(len(states)), len(static))
+        own = np.array([[world.number[name] for name in args] for args in static])
+        own = np.tile(own, (len(states), 1))
+    else:
+        args = np.full((len(world.model.codec.facts), arity), NONE)
+        mine = np.zeros(len(args), bool)
+        for fact, atom in enumerate(world.model.codec.facts.atoms):
+            if atom.predicate == predicate and len(atom.args) == arity:
+                mine[fact] = True
+                args[fact] = [world.number[name] for name in atom.args]
+        chosen: Bools = mine[states.true.fact]
+        state, own = states.true.row[chosen], args[states.true.fact[chosen]]
+    return state, *(own[:, place] for place in range(arity))
 
 
 def named_objects(worlds: Sequence[World], landmarks: bool = False) -> tuple[str, ...]:
@@ -199,20 +203,6 @@ def _points(
 # ---- numbers of objects
 
 
-def _once(told: Callable[..., T]) -> Callable[..., T]:
-    """What a function tells of a world is computed once, and kept there."""
-
-    @wraps(told)
-    def known(world: World, *names: str) -> T:
-        if (told, names) not in world.known:
-            world.known[told, names] = told(world, *names)
-        found: T = world.known[told, names]
-        return found
-
-    return known
-
-
-@_once
 def attribute(world: World, name: str, relation: str) -> Ints:
     """The number that each object has, `NONE` where it has none: (objects).
 
@@ -253,7 +243,6 @@ def positions(pairs: Sequence[Pair]) -> Mapping[str, int]:
     return {place: steps for steps, places in along for place in places}
 
 
-@_once
 def links(world: World, relation: str) -> Bools:
     """(objects, objects): whether a static relation links the first object with the second."""
     table = np.zeros((len(world.objects), len(world.objects)), np.bool_)
@@ -264,11 +253,10 @@ def links(world: World, relation: str) -> Bools:
 
 def _joined(world: World, relation: str) -> Bools:
     """(objects, objects): whether the relation links two objects in either direction."""
-    linked = links(world, relation)
+    linked = world.get(links, relation)
     return linked | linked.T
 
 
-@_once
 def distances(world: World, relation: str) -> Ints:
     """(objects, objects): links of a static relation from one to another, `NONE` without a way.
 
