@@ -58,42 +58,21 @@ class Family:
     complexity: int = 8
 
 
-def grid(name: str, map_: GridMap, robots: int = 2) -> str:
-    """A problem of robots on a map."""
-    return problem_text(scenario(name, map_, robots), "grid")
+def maps(
+    name: str, make: Callable[..., GridMap], *sizes: int | tuple[int, int], robots: int = 2
+) -> tuple[str, ...]:
+    """Problems of robots on maps by size, each called by the name and its size."""
+    found = []
+    for size in sizes:
+        numbers = size if isinstance(size, tuple) else (size,)
+        called = f"{name}-{'x'.join(map(str, numbers))}"
+        found.append(problem_text(scenario(called, make(*numbers), robots), "grid"))
+    return tuple(found)
 
 
-def opened(*sizes: tuple[int, int]) -> tuple[str, ...]:
-    """Open grids."""
-    return tuple(grid(f"open-{r}x{c}", open_grid(r, c)) for r, c in sizes)
-
-
-def rings(*sizes: tuple[int, int], robots: int = 2) -> tuple[str, ...]:
-    """Rings: the borders of rectangles."""
-    return tuple(grid(f"ring-{r}x{c}", ring(r, c), robots) for r, c in sizes)
-
-
-def bays(each: int, *lengths: int) -> tuple[str, ...]:
-    """Paths with a bay in every so many-th cell, the first of them in the second one."""
-    return tuple(grid(f"bays-{each}-{n}", path(n, range(1, n, each))) for n in lengths)
-
-
-def bay(*lengths: int) -> tuple[str, ...]:
-    """Paths with one bay, in the second cell."""
-    return tuple(grid(f"bay-{n}", path(n, [1])) for n in lengths)
-
-
-def rooms(*corridors: int) -> tuple[str, ...]:
-    """Two rooms of 2x2 cells with a corridor between them."""
-    return tuple(grid(f"rooms-{n}", two_rooms(2, 2, n)) for n in corridors)
-
-
-def random_maps(first: int, number: int) -> tuple[str, ...]:
-    """Random maps of rooms and corridors, by number."""
-    return tuple(
-        grid(f"random-{k}", rooms_and_corridors(Random(f"{_SEED} {k}")))
-        for k in range(first, first + number)
-    )
+def bays(each: int) -> Callable[..., tuple[str, ...]]:
+    """Paths by length with a bay in every so many-th cell, the first of them in the second one."""
+    return partial(maps, f"bays-{each}", lambda n: path(n, range(1, n, each)))
 
 
 def made(make: Callable[[int], str], *sizes: int) -> tuple[str, ...]:
@@ -103,6 +82,10 @@ def made(make: Callable[[int], str], *sizes: int) -> tuple[str, ...]:
 
 def known_families() -> dict[str, Family]:
     """The rows."""
+    opened, rings = partial(maps, "open", open_grid), partial(maps, "ring", ring)
+    bay = partial(maps, "bay", lambda n: path(n, [1]))  # in the second cell
+    rooms = partial(maps, "rooms", partial(two_rooms, 2, 2))  # with a corridor of so many cells
+    random = partial(maps, "random", lambda k: rooms_and_corridors(Random(f"{_SEED} {k}")))
     push_box, elevator = families.push_box, families.elevator
     unseen = ((2, 7), (3, 5), (4, 4), (5, 5), (4, 6), (2, 10))
     larger = ((2, 5), (3, 5), (4, 4), (4, 5), (5, 5), (2, 9), (5, 6), (6, 6), (7, 7))
@@ -112,10 +95,12 @@ def known_families() -> dict[str, Family]:
         "open": Family("grid", opened((2, 3), (2, 4), (3, 3), (3, 4)), (), opened(*unseen)),
         "rings": Family("grid", rings((2, 4), (3, 3)), rings((3, 4)), rings(*larger)),
         "bay": Family("grid", bay(3, 4, 5), bay(6), bay(7, 8, 10, 12)),
-        "bays-2": Family("grid", bays(2, 3, 4, 5), bays(2, 6), bays(2, 7, 8, 9, 10)),
-        "bays-3": Family("grid", bays(3, 3, 4, 5, 6), bays(3, 7), bays(3, 8, 9, 10, 12)),
+        "bays-2": Family("grid", bays(2)(3, 4, 5), bays(2)(6), bays(2)(7, 8, 9, 10)),
+        "bays-3": Family("grid", bays(3)(3, 4, 5, 6), bays(3)(7), bays(3)(8, 9, 10, 12)),
         "rooms": Family("grid", rooms(1, 2), rooms(3), rooms(4, 5, 6, 8)),
-        "random": Family("grid", random_maps(0, 6), random_maps(6, 44), random_maps(50, 50), 9),
+        "random": Family(
+            "grid", random(*range(6)), random(*range(6, 50)), random(*range(50, 100)), 9
+        ),
         "handover": Family("handover", made(handover, 2, 3), (), made(handover, 4, 5)),
         "push-box": Family(
             "push-box", made(push_box, 3, 4, 5), made(push_box, 6), made(push_box, 7, 8)
