@@ -9,7 +9,7 @@ needs none of them; it selects among these without observing the other robots.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import prod
@@ -139,14 +139,9 @@ class Trials:
         except OutOfMemory:
             return None
         found = [[rates[task][trial.disruption] for task in trial.tasks] for trial in self.trials]
-
-        def mean(of: Callable[[SuccessRates], float]) -> float:
-            return round(fmean(prod(map(of, legs)) for legs in found), 6)
-
         return {
-            "plan": mean(lambda rate: rate.plan),
-            "sentence": mean(lambda rate: rate.sentence),
-            "possible": mean(lambda rate: float(rate.possible)),
+            what: round(fmean(prod(getattr(rate, what) for rate in legs) for legs in found), 6)
+            for what in ("plan", "sentence", "possible")
         }
 
 
