@@ -61,7 +61,7 @@ def divergences(choices: Choices, chunk: int = _CHUNK, most: float = inf) -> Int
 def _with_failing(known: Rows, here: _Mixing, sets: Ints, chunk: int) -> Rows:
     """Known divergences, those among sets of one size, and those among larger sets without one."""
     rows = here.states_of(sets)
-    open_rows = ~_among(known, rows)
+    open_rows = find_rows(known, rows) < 0
     sets = sets[open_rows]
     different, number = unique_rows(rows[open_rows])
     fails = here.failing(sets, number, len(different))
@@ -131,13 +131,8 @@ def _implied(known: Rows, rows: Rows) -> Bools:
             part = np.full((len(left), rows.shape[1]), _NONE)
             part[:, : 1 + size] = rows[left][:, [0, *some]]
             smaller = (part != rows[left]).any(axis=1)
-            implied[left] = smaller & _among(known, part)
+            implied[left] = smaller & (find_rows(known, part) >= 0)
     return implied
-
-
-def _among(known: Rows, rows: Rows) -> Bools:
-    found: Bools = find_rows(known, rows) >= 0
-    return found
 
 
 class _Mixing:
