@@ -433,7 +433,7 @@ class EventMonitor(Monitor):
             robot: its for robot, its in own.meets.items() if self._ready.get(robot) != its
         }
         for robot, number in own.after.items():
-            texts = self._interferes.get(own.subaction, {}).get(robot, ())
+            texts = {*self._interferes.get(own.subaction, {}).get(robot, ())}
             if (left := number - sum(self._ended.get((robot, text), 0) for text in texts)) > 0:
                 found[robot] = left
         return found
