@@ -13,19 +13,29 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planners.joint.conditions import Labels
 from planners.joint.tables import Bools, Ints, unique_rows
 from planners.search.plan_space import PlanSpace
 
 
-def _in_groups(group: Ints, size: int) -> Any:
-    """(size, rows) which rows belong to each group: times a table of numbers, its sums by group."""
-    from scipy.sparse import csr_array
+class _Groups:
+    """Rows of a table by the group that each belongs to, which may be none."""
 
-    most = int(np.bincount(group, minlength=size).max(initial=0))
-    ones = np.ones(len(group), np.min_scalar_type(most))
-    return csr_array((ones, (group, np.arange(len(group)))), (size, len(group)))
+    def __init__(self, group: Ints, size: int) -> None:
+        self._order = np.argsort(group, kind="stable")
+        self._counts = np.bincount(group, minlength=size)
+
+    def sums(self, table: Bools) -> NDArray[np.unsignedinteger[Any]]:
+        """How many of the rows of each group are true, column by column: (groups, columns)."""
+        first = np.cumsum(self._counts) - self._counts
+        most = int(self._counts.max(initial=0))
+        sums = np.zeros((len(self._counts), table.shape[1]), np.min_scalar_type(most))
+        for position in range(most):
+            larger = np.flatnonzero(self._counts > position)
+            sums[larger] += table[self._order[first[larger] + position]]
+        return sums
 
 
 class Parting:
@@ -42,31 +52,28 @@ class Parting:
         said = np.where(word[targets] != word[sources], word[targets] + 1, 0)
         classes, group = _different(sources, said)
         #: The steps by class, the classes by node, and whether a word is entered in each class.
-        self._classes = _in_groups(group, len(classes))
-        self._nodes = _in_groups(classes[:, 0], len(word))
+        self._classes, self._nodes = _Groups(group, len(classes)), _Groups(classes[:, 0], len(word))
         self._speaks = classes[:, 1:] > 0
         #: For each robot the steps by what they are for it, and these by class.
         self._own = []
         for robot, end in enumerate(ends):
             parts, part = _different(group, labels[:, robot].astype(np.int64), end)
-            parts_of = _in_groups(part, len(parts)), _in_groups(parts[:, 0], len(classes))
-            self._own.append(parts_of)
+            self._own.append((_Groups(part, len(parts)), _Groups(parts[:, 0], len(classes))))
 
     def at(self, left: Ints) -> Bools:
         """At which nodes plans may part, by goal: (nodes, goals).
 
         ``left`` (nodes, goals) are the steps to each goal, -1 where it cannot be reached.
         """
-        taken = (left[self._targets] + 1 == left[self._sources]).view(np.uint8)
-        steps = self._classes @ taken
+        taken = left[self._targets] + 1 == left[self._sources]
+        steps = self._classes.sums(taken)
         combinations = np.ones(steps.shape)
         for parts, of_class in self._own:
-            combinations *= of_class @ (parts @ taken > 0).view(np.uint8)
+            combinations *= of_class.sums(parts.sums(taken) > 0)
         speaks = self._speaks
         of_classes = combinations != steps, (steps > 0) & ~speaks, (steps > 0) & speaks
-        larger, silent, speaking = (self._nodes @ some.view(np.uint8) > 0 for some in of_classes)
-        parting: Bools = (larger | silent & speaking) & (left > 0)
-        return parting
+        larger, silent, speaking = (self._nodes.sums(some) > 0 for some in of_classes)
+        return (larger | silent & speaking) & (left > 0)
 
 
 def label_sequences(space: PlanSpace) -> tuple[Ints, Bools]:
