@@ -18,7 +18,7 @@ import re
 import zlib
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from decimal import Decimal
 from fnmatch import fnmatchcase
 from functools import cache, partial
@@ -92,13 +92,13 @@ class _State:
     """A state of the automaton of the own subplans that are open; it has no cycles.
 
     ``step`` steps or events are done there; ``known`` are the facts that are true (True) or may be
-    true (None).  ``moves`` lead on by what is done (None: idle; sorted, idling first); ``left`` is
-    the number of subplans from here on.
+    true (None).  ``moves`` lead on by what is done (None: idle; sorted, idling first), to states by
+    their numbers; ``left`` is the number of subplans from here on.
     """
 
     step: int
     known: Mapping[str, bool | None]
-    moves: dict[str | None, _State] = field(default_factory=dict)
+    moves: dict[str | None, int] = field(default_factory=dict)
     left: int = 1
 
 
@@ -144,9 +144,9 @@ class Monitor:
             raise _broken(f"{where}: an atom occurs twice in 'facts' and 'others'")
         #: What the file says that the robot may do, as it is written there.
         self._written = self._own_texts(entry, where)
-        states = _read_states(entry, facts, where, self._written)
-        self._most = max(MAX_NODES, _NODES_OF_STATE * len(states))
-        self._start = self._here = states[0]  # both, so that no step has states to give back
+        self._states = _read_states(entry, facts, where, self._written)
+        self._most = max(MAX_NODES, _NODES_OF_STATE * len(self._states))
+        self._here = self._states[0]
         self._has_promised = False
 
     def _own_texts(self, entry: Mapping[str, Any], where: str) -> set[str]:
@@ -180,23 +180,6 @@ class Monitor:
         Monitor.did(other, subaction)
         return other
 
-    def __getstate__(self) -> dict[str, Any]:
-        """What is open in a list: `pickle` and `deepcopy` would follow states too deeply."""
-        states, number = [self._here], {self._here: 0}
-        for state in states:  # which grows meanwhile
-            for to in state.moves.values():
-                if number.setdefault(to, len(states)) == len(states):
-                    states.append(to)
-        moves = [{text: number[to] for text, to in state.moves.items()} for state in states]
-        alone = [replace(state, moves={}) for state in states]
-        return {**self.__dict__, "_start": (alone, moves), "_here": None}
-
-    def __setstate__(self, data: dict[str, Any]) -> None:
-        states, moves = data["_start"]
-        for state, own in zip(states, moves, strict=True):
-            state.moves = {text: states[to] for text, to in own.items()}
-        self.__dict__.update({**data, "_start": states[0], "_here": states[0]})
-
     @property
     def step(self) -> int:
         """How many steps are done; or events, and when it has finished all steps of the plans."""
@@ -224,7 +207,7 @@ class Monitor:
         text = self._own(subaction)
         if text not in self._here.moves:
             raise NotAllowed(self, text)
-        self._here = self._here.moves[text]
+        self._here = self._states[self._here.moves[text]]
 
     def _own(self, subaction: str | None) -> str | None:
         """What the robot does as it is written in the file; None for idling."""
@@ -253,13 +236,14 @@ class Monitor:
         visits the question is NP-complete.)  Raises `MonitorError` beyond `MAX_NODES` nodes.
         """
         found = self._making(visit, avoid, do, never)
-        if found is None:
+        if not found:
             return Answer(None, 0)
-        at, subplan = found, []
+        at, subplan = found[0], []
         while at.moves:
-            text, at = next(iter(at.moves.items()))
+            text, to = next(iter(at.moves.items()))
+            at = found[to]
             subplan.append(text)
-        return Answer(tuple(subplan), found.left)
+        return Answer(tuple(subplan), found[0].left)
 
     def commit(
         self, *, visit: Texts = (), avoid: Texts = (), do: Texts = (), never: Texts = ()
@@ -269,19 +253,19 @@ class Monitor:
         As much work as `can`.  Raises `NotPossible`, and is then as it was before.
         """
         found = self._making(visit, avoid, do, never)
-        if found is None:
+        if not found:
             kept = " together with what was promised before" if self._has_promised else ""
             raise NotPossible(
                 f"{self.unit} {self.step + 1}: {self.robot} has no subplan left for this{kept}"
             )
         self._has_promised = True
-        self._start = self._here = found
+        self._states, self._here = found, found[0]
 
-    def _making(self, *detour: Texts) -> _State | None:
-        """The subplans from here on that make a detour and keep the promises; None if none do.
+    def _making(self, *detour: Texts) -> list[_State]:
+        """The subplans from here on that make a detour and keep the promises; nothing if none do.
 
         Its states are pairs: one that was open, and the parts of the detour that are made by then
-        (bits: the visits, then the dos).
+        (bits: the visits, then the dos).  The present comes first.
         """
         visit, avoid, do, never = map(_texts, detour)
         for atom in (*visit, *avoid):
@@ -290,29 +274,31 @@ class Monitor:
         made_by = cache(partial(_made_by, do, never, len(visit)))
         made = made_in(self._here)
         if made is None:
-            return None
-        found = {(self._here, made): _State(self._here.step, self._here.known)}
-        for state, before in (todo := list(found)):  # which grows meanwhile
+            return []
+        pairs, found = [(self._here, made)], [_State(self._here.step, self._here.known)]
+        number: dict[tuple[int, int], int] = {}
+        for (state, before), new in zip(pairs, found, strict=True):  # which grow meanwhile
             for text, to in state.moves.items():
-                now, then = made_by(self._done_in(text)), made_in(to)
+                there = self._states[to]
+                now, then = made_by(self._done_in(text)), made_in(there)
                 if now is None or then is None:
                     continue
-                after = to, before | now | then
-                if after not in found:
-                    found[after] = _State(to.step, to.known)
-                    todo.append(after)
-                found[state, before].moves[text] = found[after]
+                made = before | now | then
+                new.moves[text] = number.setdefault((to, made), len(found))
+                if new.moves[text] == len(found):
+                    pairs.append((there, made))
+                    found.append(_State(there.step, there.known))
             if len(found) > self._most:
                 raise MonitorError(
                     f"{len(visit) + len(do)} visits and dos at once are too many here: there are "
                     f"more than {self._most:,} ways to have made some of them; ask for fewer"
                 )
         whole = (1 << len(visit) + len(do)) - 1
-        for (state, made), new in reversed(found.items()):
-            new.moves = {text: to for text, to in new.moves.items() if to.left}
-            new.left = sum(to.left for to in new.moves.values())
+        for (state, made), new in zip(reversed(pairs), reversed(found), strict=True):
+            new.moves = {text: to for text, to in new.moves.items() if found[to].left}
+            new.left = sum(found[to].left for to in new.moves.values())
             new.left += not state.moves and made == whole
-        return new if new.left else None  # that of the present comes last
+        return found if found[0].left else []
 
     def _done_in(self, text: str | None) -> str | None:
         """What is done in a move, by its text."""
@@ -466,11 +452,11 @@ class EventMonitor(Monitor):
         text = self._own(event)
         if text is None or text == self._underway:
             return
-        here, to = self._here, self._here.moves[text]
+        here, to = self._here, self._states[self._here.moves[text]]
         # Until it has ended nothing else may be promised, and what it changes may be either.
         values = {atom: self._value(here, atom) for atom in here.known.keys() | to.known.keys()}
         known = {a: v if v is self._value(to, a) else None for a, v in values.items()}
-        self._here = _State(here.step, known, {text: to}, to.left)
+        self._here = _State(here.step, known, {text: here.moves[text]}, to.left)
         self._underway = text
         partners = self._events[text].meets
         # They were ready for this meeting, not for the next one.
@@ -674,8 +660,8 @@ def _entry(data: Any, robot: str | None) -> Mapping[str, Any]:
 
 def _read_states(
     entry: Mapping[str, Any], facts: Sequence[str], where: str, texts: set[str]
-) -> dict[int, _State]:
-    """The states of a file by number, read backwards; 0 is the start.
+) -> list[_State]:
+    """The states of a file, read backwards; 0 is the start.
 
     ``texts`` are known to be well written.  Raises `MonitorError` unless every state can be reached
     from state 0 in step 0 and leads to later states of the next step, so that there are no cycles,
@@ -687,36 +673,36 @@ def _read_states(
     if not records or steps[0] != 0:
         raise MonitorError("the automaton has no state 0 in step 0")
     states: dict[int, _State] = {}
-    reached, last = set[_State](), max(steps)
+    reached, last = set[int](), max(steps)
     for number, record in zip(reversed(range(len(records))), reversed(records), strict=True):
         moves = _moves(record, number, steps[number] + 1, states, texts)
         reached.update(moves.values())
         if not moves and steps[number] != last:
             raise MonitorError(f"state {number} ends after {steps[number]} of {last} steps")
-        left = sum(to.left for to in moves.values()) or 1
+        left = sum(states[to].left for to in moves.values()) or 1
         _check_count(record, "left", left, f"state {number}")
         states[number] = _State(steps[number], _known(record, facts, number), moves, left)
-    if lost := [number for number, state in states.items() if number and state not in reached]:
+    if lost := states.keys() - reached - {0}:
         raise MonitorError(f"state {min(lost)} cannot be reached from state 0")
     if "steps" in entry and _get(entry, "steps", int, "a robot's choices") != last:
         raise MonitorError(f"'steps' is {_shown(entry['steps'])}, but the states have {last}")
     if "subplans" in entry:
         _check_count(entry, "subplans", states[0].left, "a robot's choices")
-    return states
+    return [*reversed(states.values())]
 
 
 def _moves(
     record: Any, number: int, step: int, states: Mapping[int, _State], texts: set[str]
-) -> dict[str | None, _State]:
+) -> dict[str | None, int]:
     """What the robot may do in a state, idling first; ``texts`` are known to be well written."""
-    moves: dict[str | None, _State] = {}
+    moves: dict[str | None, int] = {}
     for text, to in _get(record, "next", dict, f"state {number}").items():
         if text not in texts:
             _check_plain(text, f"state {number}: 'next'")
             texts.add(text)
         if not _is_number(to) or to not in states or states[to].step != step:
             raise MonitorError(f"state {number} does not lead to a state of step {step}")
-        moves[None if text == IDLE else text] = states[to]
+        moves[None if text == IDLE else text] = to
     return dict(sorted(moves.items(), key=lambda move: move[0] or ""))
 
 
