@@ -13,7 +13,7 @@ import pickle
 import stat
 import sys
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -102,31 +102,20 @@ def code_hash(package: str) -> str:
 
 def digest(*parts: object) -> str:
     """The SHA-256 of numbers, texts, arrays, ranges, None and tuples: the same in every process."""
-    found = sha256()
-    for part in parts:
-        for chunk in _chunks(part):
-            found.update(len(chunk).to_bytes(8, "big"))
-            found.update(chunk)
-    return found.hexdigest()
+    return sha256(repr(_described(parts)).encode()).hexdigest()
 
 
-def _chunks(part: object) -> Iterator[bytes]:
-    """A value as bytes that say its type, too."""
+def _described(part: object) -> object:
+    """A value whose `repr` says all of it, its type included."""
     match part:
         case np.ndarray():
-            yield f"array {part.dtype.str} {part.shape}".encode()
-            yield np.ascontiguousarray(part).tobytes()
+            content = sha256(np.ascontiguousarray(part)).hexdigest()
+            return f"array {part.dtype.str} {part.shape} {content}"
         case tuple():
-            yield f"tuple {len(part)}".encode()
-            for inner in part:
-                yield from _chunks(inner)
-        case bytes():
-            yield b"bytes"
-            yield part
-        case None | bool() | int() | float() | str() | range():
-            yield f"{type(part).__name__} {part!r}".encode()
-        case _:
-            raise TypeError(f"{type(part).__name__} has no digest")
+            return tuple(map(_described, part))
+        case None | bool() | int() | float() | str() | bytes() | range():
+            return part
+    raise TypeError(f"{type(part).__name__} has no digest")
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,8 +126,8 @@ class Store:
     begins with a hash of its key and of all that follows: a file that is damaged, or has the name
     of another one, is said and not believed.
 
-    The folder is made when it is written to.  Where it and the folders beside it with the same name
-    up to the last ``-`` take more than ``most_bytes``, files that were not used for longest go.
+    The folder is made when it is written to.  Where it takes more than ``most_bytes``, files that
+    were not used for longest go.
     """
 
     path: Path
@@ -191,11 +180,10 @@ class Store:
     def _let_go(self, most: int) -> None:
         """Remove files until the others take no more than ``most`` bytes."""
         entries = []
-        for folder in self.path.parent.glob(f"{self.path.name.rpartition('-')[0]}-*"):
-            for path in folder.glob("[!.]*"):  # others are being written
-                with suppress(FileNotFoundError):  # another process was faster
-                    found = path.stat()
-                    entries.append((found.st_mtime, found.st_size, path))
+        for path in self.path.glob("[!.]*"):  # others are being written
+            with suppress(FileNotFoundError):  # another process was faster
+                found = path.stat()
+                entries.append((found.st_mtime, found.st_size, path))
         left = sum(size for _, size, _ in entries)
         for _, size, path in sorted(entries):
             if left <= most:

@@ -8,6 +8,7 @@ elsewhere: Dask sees to that.
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
 import platform
 import re
@@ -22,7 +23,6 @@ from typing import Any
 from uuid import uuid4
 
 import distributed
-import msgspec
 from distributed.scheduler import KilledWorker
 
 from planners.parallel.batch import Batch, Outcome, Packed, code_hash
@@ -162,21 +162,17 @@ class Cluster:
                 self.client.wait_for_workers(1, timeout=_TICK)
 
 
-class _SchedulerFile(msgspec.Struct):
-    address: str
-
-
 def _address_in(file: str) -> str:
     """The address that a scheduler has written into a file."""
     try:
-        address = msgspec.json.decode(Path(file).read_bytes(), type=_SchedulerFile).address
+        address = str(json.loads(Path(file).read_bytes())["address"])
     except OSError as error:
         raise UsageError(
             f"--scheduler {echoed(file)}: {error.strerror}, and it is no address",
             remedy="Say tcp://HOST:PORT, or the file that `dask scheduler --scheduler-file FILE` "
             "has written.",
         ) from None
-    except (ValueError, RecursionError):
+    except (ValueError, RecursionError, LookupError, TypeError):
         address = ""
     if not _ADDRESS.fullmatch(address):
         raise UsageError(

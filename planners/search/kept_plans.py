@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from planners.parallel.batch import Store
 
-#: The version of the tables: those of another one are never looked at, and go in time.
-_FORM = 8
+#: The name of their folder.  What other code has kept there is never looked at, and goes in time.
+_FOLDER = "plans-8"
 #: Bytes that all tables together may take.
 _MOST_BYTES = 2**30
 #: The arrays of a plan space that are kept; goals are those of the task.
@@ -54,7 +54,7 @@ def plan_store(folder: pathlib.Path) -> Store:
     """The store of plans in a folder, bounded."""
     from planners.parallel.batch import Store
 
-    return Store(folder / f"plans-{_FORM}", _MOST_BYTES)
+    return Store(folder / _FOLDER, _MOST_BYTES)
 
 
 def default_folder(environment: Mapping[str, str] = os.environ) -> pathlib.Path | None:

@@ -146,8 +146,7 @@ def test_the_oldest_entries_go(tmp_path: Path) -> None:
     for number in range(5):
         folder.write(f"k{number}", table)
         os.utime(folder.path / f"k{number}.table", (number, number))
-    other = tmp_path / "cache" / "plans-0" / "old"
-    other.parent.mkdir()
+    other = folder.path / "of other code"
     other.write_bytes(b"x" * size)
     os.utime(other, (-1, -1))
     assert folder.read("k0") is not None  # and is the newest now
