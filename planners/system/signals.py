@@ -71,7 +71,6 @@ class Postponed:
         self._handlers: dict[int, Callable[[int, FrameType | None], object]] = {}
         self._arrived: list[int] = []
         self._heard = False
-        self._over = False
 
     @property
     def arrived(self) -> bool:
@@ -101,7 +100,7 @@ class Postponed:
 
     def end(self) -> None:
         """Give the signals their handlers back, and hear those that have arrived."""
-        self._over = True  # a handler that is left, should one signal disturb this, passes it on
+        self._heard = True  # a handler that is left, should one signal disturb this, passes it on
         try:
             for number, handler in self._handlers.items():
                 signal.signal(number, handler)
@@ -114,7 +113,7 @@ class Postponed:
                 all_of_them.callback(signal.raise_signal, self._arrived.pop())
 
     def _arrive(self, number: int, frame: FrameType | None) -> None:
-        if self._over or self._heard:
+        if self._heard:
             self._handlers[number](number, frame)
         else:
             self._arrived.append(number)
@@ -128,11 +127,9 @@ def postponed_signals() -> Iterator[Postponed]:
     never run, and nothing is to be done.
     """
     postponed = Postponed()
-    if threading.current_thread() is not threading.main_thread():
-        yield postponed
-        return
     try:
-        postponed.begin()
+        if threading.current_thread() is threading.main_thread():
+            postponed.begin()
         yield postponed
     finally:
         postponed.end()
