@@ -106,8 +106,7 @@ def three_cells() -> GridMap:
 
 def read_map(path: Path) -> GridMap:
     """A map in the format of movingai.com, see `coordlang.sites.movingai.read_map`."""
-    found = movingai.read_map(path)
-    return of_cells({cell for row in range(found.height) for cell in found.in_row(row)})
+    return of_cells(set(movingai.read_map(path).cells.values()))
 
 
 def _clockwise(rows: int, columns: int) -> list[Cell]:

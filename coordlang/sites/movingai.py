@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 
 from coordlang.sites.shipped import shipped_domains
@@ -30,34 +31,17 @@ Agent = tuple[Cell, Cell]
 
 @dataclass(frozen=True, slots=True)
 class MovingMap:
-    """A map, row by row; a character of `PASSABLE` is a cell that robots can be in."""
+    """A map: the cells that robots can be in, by name, row by row from the left."""
 
-    rows: tuple[str, ...]
-
-    @property
-    def height(self) -> int:
-        """The number of rows."""
-        return len(self.rows)
-
-    @property
-    def width(self) -> int:
-        """The number of columns."""
-        return len(self.rows[0])
-
-    def in_row(self, row: int) -> Iterator[Cell]:
-        """The cells of a row that robots can be in, from the left."""
-        return ((row, at) for at, ground in enumerate(self.rows[row]) if ground in PASSABLE)
-
-    def __contains__(self, cell: Cell) -> bool:
-        row, column = cell
-        inside = 0 <= row < self.height and 0 <= column < self.width
-        return inside and self.rows[row][column] in PASSABLE
+    height: int
+    width: int
+    cells: Mapping[str, Cell]
 
     def near(self, name: str) -> list[str]:
         """The up to four cells around a cell, by name: above, left, right, below."""
-        row, column = map(int, name[1:].split("-"))
+        row, column = self.cells[name]
         around = ((row - 1, column), (row, column - 1), (row, column + 1), (row + 1, column))
-        return [cell_name(cell) for cell in around if cell in self]
+        return [other for other in map(cell_name, around) if other in self.cells]
 
 
 def cell_name(cell: Cell) -> str:
@@ -87,9 +71,15 @@ def read_map(path: Path) -> MovingMap:
         last = header + 1 + min(len(rows), sizes["height"])
         what = f"the map has {len(rows)} rows where the header says {sizes['height']}"
         raise _wrong(what, "Correct the header or the rows.", path, last)
-    if not any(character in row for row in rows for character in PASSABLE):
+    cells = [
+        (row, column)
+        for row, line in enumerate(rows)
+        for column, ground in enumerate(line)
+        if ground in PASSABLE
+    ]
+    if not cells:
         raise _wrong("this map has no passable cell", characters, path, header + 1)
-    return MovingMap(tuple(rows))
+    return MovingMap(**sizes, cells={cell_name(cell): cell for cell in cells})
 
 
 def read_agents(path: Path, grid: MovingMap, agents: int) -> tuple[Agent, ...]:
@@ -133,19 +123,16 @@ def planning_files(map_file: Path, scenario: Path, agents: int) -> dict[str, str
     found = read_agents(scenario, grid, agents)
     stem = scenario.name.removesuffix(".scen")
     name = f"{named_like(stem)}-{agents}"
-    cells = [list(map(cell_name, grid.in_row(row))) for row in range(grid.height)]
     text = grid_problem_text(
         name if name[:1].isalpha() else f"map-{name}",
         "grid",
-        list(filter(None, cells)),
+        [list(row) for _, row in groupby(grid.cells, key=lambda name: grid.cells[name][0])],
         grid.near,
         [cell_name(start) for start, _ in found],
         [cell_name(goal) for _, goal in found],
         written_by="coordlang import",
     )
-    coordinates = {
-        cell_name(cell): cell[::-1] for row in range(grid.height) for cell in grid.in_row(row)
-    }
+    coordinates = {name: cell[::-1] for name, cell in grid.cells.items()}
     domain = shipped_domains() / "grid" / "domain.pddl"
     return {
         "domain.pddl": domain.read_text(encoding="utf-8"),
@@ -243,7 +230,7 @@ def _agent(path: Path, line: int, text: str, grid: MovingMap) -> Agent:
         raise _wrong(f"{what}{grid.width} and {grid.height}", remedy, path, line)
     agent = (start_y, start_x), (goal_y, goal_x)
     for which, cell in zip(("start", "goal"), agent, strict=True):
-        if cell not in grid:
+        if cell_name(cell) not in grid.cells:
             what = f"the {which} is no passable cell of the map: x {cell[1]}, y {cell[0]}"
             remedy = "x counts columns from the left and y rows from the top, both from 0."
             raise _wrong(what, remedy, path, line)

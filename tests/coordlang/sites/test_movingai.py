@@ -145,7 +145,7 @@ def test_maps_of_others_are_read(tmp_path: Path) -> None:
     assert len(maps) >= 12
     for path in maps:
         grid = read_map(path)
-        row, column = next(cell for row in range(grid.height) for cell in grid.in_row(row))
+        row, column = next(iter(grid.cells.values()))
         scenario = tmp_path / "own.scen"
         line = f"0 m {grid.width} {grid.height} {column} {row} {column} {row} 0\n"
         scenario.write_text(line)
