@@ -4,13 +4,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
-from statistics import fmean
+from itertools import compress
+
+import numpy as np
 
 from coordlang.sites.building import Lane, Place
 from coordlang.sites.coordinates import Point
+from planners.joint.tables import Bools
 
 #: Metres that rounding may be wrong by.
 _ROUNDING = 1e-9
@@ -68,59 +70,42 @@ def excluded(
 
     What the rules for every pair of robots forbid is left out: sharing a place, and swapping.
     """
-    driving = list(driving)
+    driving, still = list(driving), list(map(staying, places))
     if not driving or (clearance <= 0 and not any(motion.groups for motion in driving)):
         return [], []
-    near = _Near(driving, clearance)
-    at = [(number, still) for still in map(staying, places) for number in near.of(still)]
+    near = _near([*driving, *still], clearance)
     blocked = [
-        (still.start, driving[number])
-        for number, still in sorted(at, key=lambda pair: pair[0])
-        if still.start not in (driving[number].start, driving[number].end)
-        and clash(still, driving[number], clearance)
+        (stays.start, drives)
+        for drives, row in zip(driving, near, strict=False)
+        for stays in compress(still, row[len(driving) :])
+        if stays.start not in (drives.start, drives.end) and clash(stays, drives, clearance)
     ]
-    return blocked, list(_pairs(driving, near, clearance))
+    pairs = [
+        (one, other)
+        for number, one in enumerate(driving)
+        for other in compress(driving[number + 1 :], near[number, number + 1 :])
+        if not _is_ruled_out(one, other) and clash(one, other, clearance)
+    ]
+    return blocked, pairs
 
 
-def _pairs(
-    driving: Sequence[Motion], near: _Near, clearance: float
-) -> Iterator[tuple[Motion, Motion]]:
-    for number, one in enumerate(driving):
-        for other in (driving[k] for k in near.of(one) if k > number):
-            is_swap = (one.start, one.end) == (other.end, other.start)
-            is_known = is_swap or one.start == other.start or one.end == other.end
-            if not is_known and clash(one, other, clearance):
-                yield one, other
+def _is_ruled_out(one: Motion, other: Motion) -> bool:
+    is_swap = (one.start, one.end) == (other.end, other.start)
+    return is_swap or one.start == other.start or one.end == other.end
 
 
-class _Near:
-    """Motions by groups, and by the squares of the floor that they may be near to.
-
-    Two motions that clash have one of them in common.
-    """
-
-    def __init__(self, motions: Sequence[Motion], clearance: float) -> None:
-        lengths = [math.dist(*line) for motion in motions for line in motion.on.values()]
-        self._around = clearance / 2 + _ROUNDING
-        self._side = clearance + max(fmean(lengths), max(lengths) / 100) if clearance > 0 else 0.0
-        self._there: dict[object, list[int]] = {}
-        for number, motion in enumerate(motions):
-            for key in self._keys(motion):
-                self._there.setdefault(key, []).append(number)
-
-    def of(self, motion: Motion) -> list[int]:
-        """The numbers of the motions that may clash with one, sorted."""
-        keys = self._keys(motion)
-        return sorted({number for key in keys for number in self._there.get(key, ())})
-
-    def _keys(self, motion: Motion) -> Iterator[object]:
-        yield from motion.groups
-        for level, line in motion.on.items() if self._side else ():
-            spans = []
-            for ends in zip(*line, strict=True):
-                low, high = min(ends) - self._around, max(ends) + self._around
-                spans.append(range(int(low // self._side), int(high // self._side) + 1))
-            yield from product((level,), *spans)
+def _near(motions: Sequence[Motion], clearance: float) -> Bools:
+    """Which motions may clash with which: they have a group in common, or their boxes are near."""
+    near = np.zeros((len(motions), len(motions)), np.bool_)
+    for group in frozenset[str]().union(*(motion.groups for motion in motions)):
+        inside = [group in motion.groups for motion in motions]
+        near |= np.outer(inside, inside)
+    for level in {level for motion in motions for level in motion.on}:
+        there = [number for number, motion in enumerate(motions) if level in motion.on]
+        ends = np.array([motions[number].on[level] for number in there])
+        low, high = ends.min(axis=1), ends.max(axis=1) + clearance
+        near[np.ix_(there, there)] |= ((low[:, None] <= high) & (low <= high[:, None])).all(axis=2)
+    return near
 
 
 def distance(one: Segment, other: Segment) -> float:
