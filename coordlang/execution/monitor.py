@@ -142,6 +142,8 @@ class Monitor:
         self._atoms = {**dict.fromkeys(facts, False), **dict.fromkeys(sorted(others))}
         if len(self._atoms) < len(facts) + len(others):
             raise _broken(f"{where}: an atom occurs twice in 'facts' and 'others'")
+        #: What events are, where there are no steps.
+        self._events: dict[str, _OwnEvent] = {}
         #: What the file says that the robot may do, as it is written there.
         self._written = self._own_texts(entry, where)
         self._states = _read_states(entry, facts, where, self._written)
@@ -280,7 +282,8 @@ class Monitor:
         for (state, before), new in zip(pairs, found, strict=True):  # which grow meanwhile
             for text, to in state.moves.items():
                 there = self._states[to]
-                now, then = made_by(self._done_in(text)), made_in(there)
+                event = self._events.get(text) if text else None
+                now, then = made_by(event.subaction if event else text), made_in(there)
                 if now is None or then is None:
                     continue
                 made = before | now | then
@@ -299,10 +302,6 @@ class Monitor:
             new.left = sum(found[to].left for to in new.moves.values())
             new.left += not state.moves and made == whole
         return found if found[0].left else []
-
-    def _done_in(self, text: str | None) -> str | None:
-        """What is done in a move, by its text."""
-        return text
 
     def _made_in(self, visit: Sequence[str], avoid: Sequence[str], state: _State) -> int | None:
         """The visits made in a state, as bits; None if it is to be avoided."""
@@ -390,9 +389,6 @@ class EventMonitor(Monitor):
     def subaction(self, event: str) -> str:
         """What is done in an event."""
         return self._event(event).subaction
-
-    def _done_in(self, text: str | None) -> str | None:
-        return None if text is None else self.subaction(text)
 
     def partners(self, event: str) -> tuple[str, ...]:
         """The robots that an event meets."""
