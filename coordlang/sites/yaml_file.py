@@ -28,28 +28,26 @@ _EMPTY = {"", "~", "null", "Null", "NULL"}
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """A value of a YAML file, and where it stands.
-
-    ``content`` is a text, or the values of a list, or a mapping's keys and values by turns.
-    ``is_plain``: a text that is not quoted.
-    """
+    """A value of a YAML file, and where it stands."""
 
     path: str
-    content: str | list[Value]
-    is_plain: bool
-    is_list: bool
-    line: int
-    column: int
+    node: yaml.Node
 
     @property
     def position(self) -> Position:
         """Where it begins."""
-        return Position(self.path, self.line, self.column)
+        mark = self.node.start_mark
+        return Position(self.path, mark.line + 1, mark.column + 1)
+
+    @property
+    def is_list(self) -> bool:
+        """Whether it is a list."""
+        return isinstance(self.node, yaml.SequenceNode)
 
     @property
     def is_empty(self) -> bool:
         """Whether nothing is written for it."""
-        return self.is_plain and self.content in _EMPTY
+        return self._plain() in _EMPTY
 
     def wrong(self, what: str, remedy: str) -> BadInput:
         """The error of this value, with file, line and column (the caller raises it)."""
@@ -59,40 +57,41 @@ class Value:
         """The values of a mapping by their keys; none for an empty value."""
         if self.is_empty:
             return {}
-        if self.is_list or isinstance(self.content, str):
+        if not isinstance(self.node, yaml.MappingNode):
             raise self._not("a mapping")
         found: dict[str, Value] = {}
-        for key, value in zip(self.content[::2], self.content[1::2], strict=True):
+        for node, value in self.node.value:
+            key = Value(self.path, node)
             if (name := key.text()) in found:
                 remedy = "Remove one of them, or give it another name."
                 raise key.wrong(f"the key {echoed(name)} occurs twice", remedy)
-            found[name] = value
+            found[name] = Value(self.path, value)
         return found
 
     def list(self, least: int = 0) -> Sequence[Value]:
         """The values of a list of at least so many; none for an empty value."""
         if self.is_empty and not least:
             return ()
-        if not self.is_list or isinstance(self.content, str) or len(self.content) < least:
+        if not self.is_list or len(self.node.value) < least:
             raise self._not(f"a list of {least} or more" if least else "a list")
-        return self.content
+        return [Value(self.path, node) for node in self.node.value]
 
     def text(self) -> str:
         """A text; a number or a flag as it is written, and nothing for an empty value."""
-        if not isinstance(self.content, str):
+        if not isinstance(self.node, yaml.ScalarNode):
             raise self._not("a text")
-        return "" if self.is_empty else self.content
+        return "" if self.is_empty else str(self.node.value)
 
     def number(self) -> float:
         """A finite decimal number."""
-        text = self._scalar()
+        text = self._plain() or ""
         if not (_NUMBER.fullmatch(text) and abs(number := float(text)) < 1e12):
             raise self._not("a number")
         return number
 
     def index(self, below: int | None = None) -> int:
         """A whole number from 0, and below another one if there is one."""
-        text = self._scalar()
+        text = self._plain() or ""
         number = int(text) if text.isascii() and text.isdecimal() and len(text) < 10 else -1
         if number < 0 or (below is not None and number >= below):
             until = "" if below is None else f" to {below - 1:,}"
@@ -101,20 +100,22 @@ class Value:
 
     def flag(self) -> bool:
         """``true`` or ``false``."""
-        flag = _FLAGS.get(self._scalar().lower())
+        flag = _FLAGS.get((self._plain() or "").lower())
         if flag is None:
             raise self._not("true or false")
         return flag
 
-    def _scalar(self) -> str:
-        """What is written for one value, and nothing for a list, a mapping or a quoted text."""
-        return self.content if self.is_plain and isinstance(self.content, str) else ""
+    def _plain(self) -> str | None:
+        """What is written for one value; None for a list, a mapping or a quoted text."""
+        is_plain = isinstance(self.node, yaml.ScalarNode) and not self.node.style
+        return str(self.node.value) if is_plain else None
 
     def _not(self, expected: str) -> BadInput:
-        if isinstance(self.content, str):
-            found = echoed(self.content)
-        else:
-            found = f"a list of {len(self.content):,}" if self.is_list else "a mapping"
+        found = "a mapping"
+        if isinstance(self.node, yaml.ScalarNode):
+            found = echoed(self.node.value)
+        elif self.is_list:
+            found = f"a list of {len(self.node.value):,}"
         return self.wrong(f"expected {expected}, found {found}", "Is it the right file?")
 
 
@@ -126,15 +127,17 @@ def read_yaml(path: Path) -> Value:
     """
     data, file = read_bytes(path, most=_MOST_BYTES), str(path)
     check_utf8(data, Position(file))
+    text = data.decode("utf-8-sig")
     try:
-        root = _read(data.decode("utf-8-sig"), file)
+        _require_plain(text, file)
+        root = yaml.compose(text, _LOADER)
     except yaml.YAMLError as error:
         said = str(getattr(error, "problem", None) or getattr(error, "reason", ""))
         mark = getattr(error, "problem_mark", None)
         raise _no_yaml(said, file, mark) from None
-    if not root:
+    if root is None:
         raise BadInput("the file is empty", position=Position(file), remedy="Is it the right file?")
-    return root[0]
+    return Value(file, root)
 
 
 def _no_yaml(said: str, file: str, mark: yaml.Mark | None) -> BadInput:
@@ -143,32 +146,21 @@ def _no_yaml(said: str, file: str, mark: yaml.Mark | None) -> BadInput:
     return BadInput(f"this is no YAML: {said}", position=where, remedy=remedy)
 
 
-def _read(text: str, file: str) -> list[Value]:
-    """The value of a text's document, if any; raises `BadInput` for what no plain data has."""
-    found: list[Value] = []
-    within, number = [found], 0
+def _require_plain(text: str, file: str) -> None:
+    """Raise `BadInput` for what no plain data of one document has."""
+    depth = number = documents = 0
     for event in yaml.parse(text, _LOADER):
-        if isinstance(event, yaml.CollectionEndEvent):
-            within.pop()
-        if isinstance(event, yaml.DocumentStartEvent) and found:
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        documents += isinstance(event, yaml.DocumentStartEvent)
+        if documents > 1:
             raise _no_yaml("but found another document", file, event.start_mark)
-        if not isinstance(event, yaml.NodeEvent):
-            continue
-        number += 1
-        value = Value(
-            file,
-            getattr(event, "value", []),
-            isinstance(event, yaml.ScalarEvent) and not event.style,
-            isinstance(event, yaml.SequenceStartEvent),
-            event.start_mark.line + 1,
-            event.start_mark.column + 1,
-        )
-        if what := _refused(event, len(within), number):
-            raise value.wrong(what, "A building is plain data: write out what it stands for.")
-        within[-1].append(value)
-        if isinstance(value.content, list):
-            within.append(value.content)
-    return found
+        if isinstance(event, yaml.NodeEvent):
+            number += 1
+            if what := _refused(event, depth + 1, number):
+                where = Position(file, event.start_mark.line + 1, event.start_mark.column + 1)
+                remedy = "A building is plain data: write out what it stands for."
+                raise BadInput(what, position=where, remedy=remedy)
+        depth += isinstance(event, yaml.CollectionStartEvent)
 
 
 def _refused(event: yaml.NodeEvent, depth: int, number: int) -> str:
