@@ -4,8 +4,6 @@
 The docstring of a record is the command's ``--help``.  Nothing heavy is imported here.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -176,7 +174,7 @@ class Jobs:
         None, "Keep finished jobs here, and go on.", "DIR", is_output=True, files=".table"
     )
 
-    def opened(self) -> AbstractContextManager[Workers]:
+    def opened(self) -> "AbstractContextManager[Workers]":
         """Who does jobs, for a block."""
         from planners.parallel.workers import workers
 

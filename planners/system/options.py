@@ -3,13 +3,13 @@
 
 A record is a frozen dataclass whose fields are made by `option` and `group`. The keyword arguments
 of the Python function, the options of the command line, the checks of their values and the tables
-of docs/cli.md come from it.
+of docs/cli.md come from it.  Its annotations are types, not texts: where it is written nothing is
+imported ``from __future__``.
 """
 
 from __future__ import annotations
 
 import inspect
-import sys
 import types
 from collections.abc import Iterator, Mapping
 from dataclasses import Field, field, fields
@@ -86,29 +86,26 @@ def group(record: type[object], without: str = "") -> Any:
 
 def options_of(record: type[object]) -> Iterator[Option]:
     """All options of a record, those of its groups among them; inherited ones come last."""
-    for each, kind in _fields(record):
+    for each in _fields(record):
         if "group" in each.metadata:
             for inner in options_of(each.metadata["group"]):
                 hidden = inner.name in each.metadata["without"]
                 yield inner._replace(only="python") if hidden else inner
         elif "option" in each.metadata:
-            # Annotations are texts; what a Union names in quotes need not be imported.
-            names = vars(sys.modules[kind.__module__])
-            read = eval(each.type, names) if isinstance(each.type, str) else each.type
-            given, described = _not_none(read), each.metadata["option"]
-            more: dict[str, Any] = {"kind": given, "takes_none": given != read}
+            given, described = _not_none(each.type), each.metadata["option"]
+            more: dict[str, Any] = {"kind": given, "takes_none": given != each.type}
             yield described._replace(name=each.name, default=each.default, **more)
 
 
-def _fields(record: type[Any]) -> list[tuple[Field[Any], type[object]]]:
-    """The fields, each with the class that says it: own ones first, and options before groups."""
-    classes = record.__mro__
-    said = [
-        (next(n for n, c in enumerate(classes) if f.name in inspect.get_annotations(c)), f)
-        for f in fields(record)
-    ]
-    said.sort(key=lambda found: (found[0], "group" in found[1].metadata))
-    return [(f, classes[n]) for n, f in said]
+def _fields(record: type[Any]) -> list[Field[Any]]:
+    """The fields: own ones first, and options before groups."""
+
+    def place(own: Field[Any]) -> tuple[int, bool]:
+        classes = enumerate(record.__mro__)
+        said = next(n for n, one in classes if own.name in inspect.get_annotations(one))
+        return said, "group" in own.metadata
+
+    return sorted(fields(record), key=place)
 
 
 def record_from(
