@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from coordlang.commands.inputs import Arguments, InTask, public, robot_number
+from coordlang.commands.inputs import Arguments, InTask, public
 from coordlang.commands.records import ChoicesOptions, File
 from coordlang.commands.terminal import (
     REFUTED,
@@ -104,7 +104,7 @@ class RobotsChoices(InTask):
 
     def monitor(self, robot: str) -> Monitor:
         """A run-time monitor of one robot; `UsageError` if there is no such robot."""
-        (number,) = _numbers(self.used.model.robots, robot)
+        (number,) = _numbers(self.used, robot)
         return execution.monitor(self.found.fits, self.found.robots[number], self.sentence)
 
     def data(self) -> dict[str, Any]:
@@ -126,12 +126,12 @@ def choices(files: Arguments, options: ChoicesOptions) -> RobotsChoices:
     """
     said = files.needed("SENTENCE")
     used = files.task().used
-    chosen = _numbers(used.model.robots, options.robot) or tuple(range(len(used.model.robots)))
+    chosen = _numbers(used, options.robot) or tuple(range(len(used.model.robots)))
     return RobotsChoices(used, execution.choices(used, used.words_of(said)), chosen)
 
 
-def _numbers(known: tuple[str, ...], whose: str | Sequence[str]) -> tuple[int, ...]:
-    return tuple(dict.fromkeys(robot_number(known, name) for name in names_in("--robot", whose)))
+def _numbers(used: TaskLanguage, whose: str | Sequence[str]) -> tuple[int, ...]:
+    return tuple(dict.fromkeys(map(used.robot_number, names_in("--robot", whose))))
 
 
 def show_choices(found: RobotsChoices, options: ChoicesOptions) -> int:

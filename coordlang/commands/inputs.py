@@ -223,16 +223,6 @@ class InTask(Presented):
         return self.used.language.tolerance
 
 
-def robot_number(robots: Sequence[str], name: str) -> int:
-    """The number of a robot that ``--robot`` names; `UsageError` if there is none of this name."""
-    if name not in robots:
-        raise UsageError(
-            f"--robot {name}: there is no such robot",
-            remedy=f"The robots are {', '.join(robots)}.",
-        )
-    return robots.index(name)
-
-
 def wishes_in(prefer: str | Sequence[str]) -> tuple[str, ...]:
     """What ``prefer`` says: one wish, or several."""
     return (prefer,) if isinstance(prefer, str) else tuple(prefer)

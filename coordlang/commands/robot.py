@@ -22,7 +22,6 @@ from coordlang.commands.inputs import (
     ReadTask,
     public,
     read_coordinates_of,
-    robot_number,
     wishes_in,
 )
 from coordlang.commands.records import RobotOptions
@@ -98,7 +97,7 @@ def robot(files: Arguments, options: RobotOptions) -> RobotInTask:
         raise UsageError("--prefer: the sentence is given", remedy="Leave out one of the two.")
     read = files.task(options.coordinates)
     used, robots = read.used, read.used.model.robots
-    number, others = robot_number(robots, options.robot), [r for r in robots if r != options.robot]
+    number, others = used.robot_number(options.robot), [r for r in robots if r != options.robot]
     if not used.model.is_asynchronous:
         raise UsageError(
             "the words are for joint steps, and a process keeps no common step",

@@ -12,7 +12,6 @@ from typing import Any
 
 from coordlang.execution.task_language import TaskLanguage
 from coordlang.language.sentences import Sentence
-from planners.joint.model import JointModel
 from planners.joint.states import split_atoms
 from planners.pddl.lifted import Atom
 from planners.search.plan_space import PlanSpace
@@ -61,7 +60,7 @@ def read_preference(task_language: TaskLanguage, text: str) -> Preference:
     if text.strip() in ("shortest", "most-plans"):
         return text.strip()
     if kind == "first":
-        return goes_first(task_language.model, argument.strip().lower())
+        return goes_first(task_language, argument.strip().lower())
     if kind == "avoid":
         return avoids(task_language, argument)
     raise UsageError(
@@ -70,7 +69,7 @@ def read_preference(task_language: TaskLanguage, text: str) -> Preference:
     )
 
 
-def goes_first(model: JointModel, robot: str) -> PlanPreference:
+def goes_first(task_language: TaskLanguage, robot: str) -> PlanPreference:
     """The preference that a robot goes first.
 
     Robot r goes before robot q if, in the first step in which one of the two *acts* (does not idle)
@@ -78,13 +77,8 @@ def goes_first(model: JointModel, robot: str) -> PlanPreference:
     if some other robot goes before r, else 1.  Raises `UsageError` for a robot that the model does
     not have.
     """
-    if robot not in model.robots:
-        raise UsageError(
-            f"--prefer first:{robot}: there is no such robot",
-            remedy=f"The robots are {', '.join(model.robots)}.",
-        )
-    own = model.robots.index(robot)
-    others = tuple(other for other in range(len(model.robots)) if other != own)
+    own = task_language.robot_number(robot, "--prefer first:")
+    others = tuple(other for other in range(task_language.space.robots) if other != own)
     grades = (
         f"{robot} goes first",
         f"no robot goes before {robot}",

@@ -21,7 +21,7 @@ from planners.pddl.model_options import ModelOptions
 from planners.search.asynchronous import as_executed
 from planners.search.kept_plans import search
 from planners.search.plan_space import PlanSpace, UnfoldingStep
-from planners.system.errors import BadInput, OutOfMemory, Position, Refuted, note
+from planners.system.errors import BadInput, OutOfMemory, Position, Refuted, UsageError, note
 from planners.system.messages import echoed
 
 
@@ -89,6 +89,16 @@ class TaskLanguage:
         """Whether the language lists every state on the plans of the space."""
         rows = self.space.rows[np.unique(self.space.state)]
         return bool((find_rows(self.partition.rows, rows) >= 0).all())
+
+    def robot_number(self, name: str, option: str = "--robot ") -> int:
+        """The number of a robot that an option names; `UsageError` if there is none of it."""
+        robots = self.model.robots
+        if name not in robots:
+            raise UsageError(
+                f"{option}{name}: there is no such robot",
+                remedy=f"The robots are {', '.join(robots)}.",
+            )
+        return robots.index(name)
 
     def words_of(self, text: str | Iterable[str]) -> tuple[int, ...]:
         """Word numbers of a sentence, ``"w2 w0"`` or ``("w2", "w0")``.
