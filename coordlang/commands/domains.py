@@ -125,7 +125,7 @@ def import_site(files: Arguments, options: ImportOptions) -> ImportedSite:
     Raises `BadInput`, with the line, for a wrong file, and `UsageError` for robots, places and
     tasks that it does not have.
     """
-    paths = [Path(fspath(path)) for path in files.values.get("FILES...", ())]
+    paths = [Path(fspath(path)) for path in files.values["FILES..."] if path is not None]
     kinds = sorted(path.suffix.lower() for path in paths)
     if kinds == [".map", ".scen"]:
         grid, scenario = sorted(paths, key=lambda path: path.suffix.lower())

@@ -20,7 +20,7 @@ from planners.pddl.model_options import ModelOptions
 from planners.system.errors import Position, UsageError, note
 from planners.system.files import names_format, read_bytes
 from planners.system.messages import Presented
-from planners.system.options import options_of, record_from
+from planners.system.options import Option, check_value, options_of, record_from
 
 if TYPE_CHECKING:
     from coordlang.execution.task_language import TaskLanguage
@@ -72,6 +72,10 @@ def public(
             read = own.bind(*arguments, **named)
             read.apply_defaults()
             values = {word_of[name]: value for name, value in read.arguments.items()}
+            for word, value in values.items():
+                for each in value if word.endswith("...") else (value,):
+                    if each is not None:
+                        check_value(Option("", names=(word,), kind=given.ARGUMENTS[word]), each)
             return function(Arguments(getattr(options, "source", options), values), options)
 
         called.__signature__ = inspect.Signature([*parameters, *keyword_only])  # type: ignore[attr-defined]
@@ -252,6 +256,7 @@ def load_language(path: given.File) -> Language:
     """
     from coordlang.language.file import read_language as read_language_file
 
+    check_value(Option("", names=("path",), kind=given.File), path)
     return read_language_file(fspath(path))
 
 
@@ -275,13 +280,6 @@ def read_language(language: given.LanguageSource) -> tuple[Language | LiftedLang
     if isinstance(language, Language):
         return language, Position("the language")
     if not isinstance(language, str | PathLike):
-        from coordlang.lifted.language import LiftedLanguage
-
-        if not isinstance(language, LiftedLanguage):
-            raise UsageError(
-                f"expected a language, and this is of type {type(language).__name__}",
-                remedy="Give a file or a language: what `build` returns has one, .language.",
-            )
         return language, Position("the lifted language")
     data, position = read_bytes(fspath(language)), Position(fspath(language))
     if names_format(data, "coordlang/lifted"):

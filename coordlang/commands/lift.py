@@ -56,6 +56,8 @@ from planners.system.writing import write_compressed
 
 #: What a lifted file says of the model.
 _MODEL = ("cost", "unowned", "remember_actions", "execution")
+#: What tasks are called, by their kind.
+_TASKS = {"all": "all its tasks", "problems": "its own task", "file": "the tasks of a file"}
 _PRODUCER = {"program": "coordlang", "version": coordlang.__version__}
 
 
@@ -254,13 +256,15 @@ def ground(arguments: Arguments, options: GroundOptions) -> Language:
             workers=workers,
         )
     if known == "refuted":
-        learned_from = ", ".join(v.problem for v in own.verified)
+        learned_from = ", ".join(f"{v.problem} ({_TASKS[v.kind]})" for v in own.verified)
+        asked = {"all": "all", "own": "problems"}.get(str(options.tasks), "file")
+        lift = "lift .. --check" if options.tasks == "own" else "lift .. --tasks all --check"
         placed = any(f"({axis} " in str(f) for axis in ("row", "column") for f in own.features)
         asks = " It is about where places lie: are they known here (--coordinates)?" * placed
         raise Refuted(
-            f"the lifted language is no coordination language for {files.problems[0].name}; it was "
-            f"verified on {learned_from or 'no problem'}",
-            remedy=f"Learn from this problem, too: `coordlang lift .. --check PROBLEM`.{asks}",
+            f"the lifted language is no coordination language for {files.problems[0].name} "
+            f"({_TASKS[asked]}); it was verified on {learned_from or 'no problem'}",
+            remedy=f"Learn from this problem, too: `coordlang {lift} PROBLEM`.{asks}",
         )
     return language
 

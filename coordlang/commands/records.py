@@ -23,19 +23,31 @@ if TYPE_CHECKING:
     from coordlang.language.words import Language
     from coordlang.lifted.language import LiftedLanguage
     from coordlang.verification.certificate_file import Certificate
+    from planners.loading import PlanningInstance
     from planners.parallel.workers import Workers
-    from planners.pddl.lifted import Problem
+    from planners.pddl.lifted import Domain, Problem
 
 File = str | PathLike[str]
 ProblemSource = Union[File, "Problem"]
 #: ``"all"``, a task file, its data, or tasks: each with ``init`` and ``goal``, lists of PDDL texts.
-TasksSource = Union[File, Mapping[str, Any], "Sequence[ListedTask | Mapping[str, Any]]"]
+TasksSource = File | Mapping[str, Any] | Sequence[Union["ListedTask", Mapping[str, Any]]]
 LanguageSource = Union[File, "Language", "LiftedLanguage"]
 CertificateSource = Union[File, "Certificate"]
 #: A file of coordinates, or place -> (x, y).
 CoordinatesSource = File | Mapping[str, tuple[float, float]]
 #: A sentence: ``"w1 w0"``, its words ``("w1", "w0")``, or one of `explain`.
 SentenceSource = str | Iterable[str]
+#: What stands for each argument of a command in Python.
+ARGUMENTS: Mapping[str, Any] = {
+    "DOMAIN": Union[File, "Domain", "PlanningInstance"],
+    "PROBLEM": ProblemSource,
+    "PROBLEMS...": ProblemSource,
+    "LANGUAGE": LanguageSource,
+    "LIFTED": Union[File, "LiftedLanguage"],
+    "PLAN": File | Sequence[Sequence[str | None]],
+    "SENTENCE": SentenceSource,
+    "FILES...": File,
+}
 
 #: Plans that are listed where no number is given.
 DEFAULT_MAX = 10

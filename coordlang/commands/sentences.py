@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from os import PathLike, fspath
@@ -74,11 +74,6 @@ def say(files: Arguments, options: SayOptions) -> Said:
     """
     plan = files.needed("PLAN")
     used = files.task().used
-    if isinstance(plan, Mapping):
-        raise UsageError(
-            "expected a plan file or the steps of one plan",
-            remedy="A step has one text for each robot, None where it idles.",
-        )
     is_file = isinstance(plan, str | PathLike)
     plans = read_plans(fspath(plan), used.model.in_step) if is_file else [plan]
     sentences = []

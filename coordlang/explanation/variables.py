@@ -9,13 +9,14 @@ agree in some arguments, the *key*: ``(at r2 a), (at r2 b), ..`` have the key ``
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain, combinations
 
 import numpy as np
 
-from planners.joint.model import JointModel
+from planners.joint.model import JointModel, own_text
 from planners.joint.tables import Bools, Ints, Rows, find_rows, unique_rows
 from planners.pddl.lifted import Atom
 
@@ -113,18 +114,22 @@ def _variable(group: _Group, used: Sequence[int], atoms: Sequence[Atom], none: b
     positions = dict(group.family)
     subjects = {p: p + _key_text(own, group.key) for p, own in group.family}
     values: list[Atom | None] = [atoms[number] for number in used]
-    texts = []
+    said = []
     for atom in (atoms[number] for number in used):
         own = positions[atom.predicate]
         others = [arg for position, arg in enumerate(atom.args) if position not in own]
-        texts.append((subjects[atom.predicate], _value(group.key, others)))
+        said.append((subjects[atom.predicate], others))
+    texts = [(subject, _value(map(partial(_short, group.key), others))) for subject, others in said]
+    if len({*texts}) < len(texts):  # an action is called idle or none
+        texts = [(subject, _value(others)) for subject, others in said]
     predicates = sorted({atoms[number].predicate for number in group.atoms})
     name = "/".join(subjects[predicate] for predicate in predicates)
     if len({positions[predicate] for predicate in predicates}) == 1:
         name = "/".join(predicates) + _key_text(positions[predicates[0]], group.key)
     if none:
         values.append(None)
-        texts.append((name, "none"))
+        is_object = any(value == "none" for _, value in texts)
+        texts.append((name, "no value" if is_object else "none"))
     return Variable(name, tuple(values), tuple(texts))
 
 
@@ -135,14 +140,14 @@ def _key_text(positions: Sequence[int], key: Sequence[str]) -> str:
     return f"({', '.join(shown)})" if key else ""
 
 
-def _value(key: Sequence[str], others: Sequence[str]) -> str:
-    """The other arguments in short; a remembered subaction without the robot of the key."""
-    texts = [
-        " ".join(name for name in other[1:-1].split() if name not in key)
-        if other.startswith("(")
-        else other
-        for other in others
-    ]
+def _short(key: Sequence[str], argument: str) -> str:
+    """An argument; a remembered subaction as the robot of the key says it of itself."""
+    return own_text(argument, key[0]) if key and argument.startswith("(") else argument
+
+
+def _value(arguments: Iterable[str]) -> str:
+    """The other arguments in one text."""
+    texts = [*arguments]
     if len(texts) == 1:
         return texts[0]
     return f"({', '.join(texts)})" if texts else ""

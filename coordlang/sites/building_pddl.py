@@ -266,8 +266,7 @@ def _goals(
             what = "has a task already" if robot else "is no robot"
             remedy = f"Expected ROBOT:PLACE, once for each of {names}."
             raise UsageError(f"--task {echoed(task)}: {echoed(said)} {what}", remedy=remedy)
-        exact = [p.name for p in building.places.values() if where and p.said == where]
-        place = exact[0] if len(exact) == 1 else pddl_name(where)
+        place = _place_called(where, robot, building, task)
         if place not in robot.reached:
             what = "no lanes lead there" if place in building.places else "there is no such place"
             remedy = f"It can go to {some(sorted(robot.reached), 40)}."
@@ -275,6 +274,25 @@ def _goals(
         goals[robot.name] = place
     _require_apart(building, goals, "end", clearance)
     return goals
+
+
+def _place_called(where: str, robot: Robot, building: Building, task: str) -> str:
+    """The PDDL name of a place that a task calls as the file does, or as PDDL does.
+
+    Places of one name that the robot can go to are told apart by level and vertex.
+    """
+    name, places = pddl_name(where), building.places.values()
+    said = [p for p in places if where and p.said == where]
+    alike = [p for p in places if name and name in (p.name, pddl_name(p.said))]
+    named_so = said or alike or [p for p in places if p.numbered == name]
+    found = [p for p in named_so if p.name in robot.reached] or named_so[:1]
+    if len(found) > 1:
+        ways = [f"{p.numbered if p.name == name else p.name} (level {p.level})" for p in found]
+        raise UsageError(
+            f"--task {echoed(task)}: {counted(len(found), 'place')} have this name",
+            remedy=f"Say {named(ways[:10], 'or')}.",
+        )
+    return found[0].name if found else name
 
 
 def _require_apart(

@@ -207,4 +207,5 @@ def _tree(node: Expression) -> object:
     if isinstance(node, Token):
         return node.text
     parts = [_tree(part) for part in node.items]
-    return (node.head, frozenset(parts[1:])) if node.head in ("and", "or") else tuple(parts)
+    is_set = node.head in ("and", "or") and str not in map(type, parts[1:])
+    return (node.head, frozenset(parts[1:])) if is_set else tuple(parts)

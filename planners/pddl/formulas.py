@@ -36,14 +36,15 @@ def read_formula(names: Names, item: Expression) -> Formula:
     """A precondition, condition or goal.
 
     ``(name ..)`` is an atom when ``name`` is a declared predicate, else a literal about the same
-    joint step when it is an action.  Raises `BadInput` or `Unsupported` with the place.
+    joint step when it is an action, also where the name is a word of PDDL: formulas are no
+    arguments, so the two are told apart.  Raises `BadInput` or `Unsupported` with the place.
     """
     item = item.group("a formula in parentheses")
     if len(item) == 0:
         return TRUE
     head = item.items[0].token("a predicate, 'and', 'or', 'not', ..").text
-    if head in names.predicates:
-        return _atom(names, item)
+    if not names.is_word(item):
+        return _literal(names, item)
     match head:
         case "and":
             return And(_parts(names, item))
@@ -61,9 +62,14 @@ def read_formula(names: Names, item: Expression) -> Formula:
             return (Forall if head == "forall" else Exists)(variables, part)
         case "=":
             return _equal(names, item)
-    if head in names.actions:
-        return StepAtom(head, names.arguments(item, [names.actions[head]], "action"))
     raise unknown("predicate", item, names.predicates)
+
+
+def _literal(names: Names, item: Group) -> Atom | StepAtom:
+    if item.head in names.predicates or item.head not in names.actions:
+        return _atom(names, item)
+    own = names.arguments(item, [names.actions[item.head]], "action")
+    return StepAtom(item.head, own)
 
 
 def _parts(names: Names, item: Group, number: int | None = None) -> tuple[Formula, ...]:
@@ -106,7 +112,7 @@ def _effects(
     if len(item) == 0:
         return
     head = item.items[0].token("a predicate, 'and', 'not', 'when', ..").text
-    if head in names.predicates:
+    if head in names.predicates and not names.is_word(item):
         yield Effect(_atom(names, item), True, condition, variables)
         return
     match head:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How PDDL files are understood: who the robots are, what optimal means, what states remember."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, cast
 
@@ -47,7 +47,7 @@ class ModelOptions:
     def __post_init__(self) -> None:
         object.__setattr__(self, "robots", names_in("--robots", self.robots))
         if self.robot_type is not None:
-            if not isinstance(self.robot_type, str) or not self.robot_type.strip():
+            if not self.robot_type.strip():
                 raise UsageError(
                     "--robot-type: expected a name", remedy="As in --robot-type robot."
                 )
@@ -107,18 +107,10 @@ class ModelOptions:
 def names_in(spelling: str, given: str | Sequence[str]) -> tuple[str, ...]:
     """The names that an option is given, in texts with commas, in lower case.
 
-    Raises `UsageError` for what is no text, and for a text without a name.
+    Raises `UsageError` for texts without a name.
     """
     texts = [given] if isinstance(given, str) else given
-    if not isinstance(texts, Iterable):
-        raise UsageError(f"{spelling}: expected names", remedy=f"As in {spelling} r1,r2.")
-    names = []
-    for text in texts:
-        if not isinstance(text, str):
-            raise UsageError(
-                f"{spelling}: {echoed(text)} is no name", remedy="Give texts, such as 'r1'."
-            )
-        names += [name.strip().lower() for name in text.split(",") if name.strip()]
+    names = [name.strip().lower() for text in texts for name in text.split(",") if name.strip()]
     if not names and given != ():
         raise UsageError(f"{spelling}: expected names", remedy=f"As in {spelling} r1,r2.")
     return tuple(names)

@@ -27,6 +27,8 @@ _FEATURES = {
     **dict.fromkeys(("oneof", "probabilistic", "unknown"), "non-deterministic effect '({} ..)'"),
     "preference": "a preference",
 }
+#: Words of formulas and effects.
+_WORDS = frozenset(("and", "or", "not", "imply", "forall", "exists", "when", "increase", "="))
 #: Characters of a name in an example.
 _SHOWN = 60
 
@@ -114,6 +116,12 @@ class Names:
     def of(cls, domain: Domain) -> Names:
         """What a text about a domain may speak of, without objects."""
         return cls(domain.types, domain.predicates, domain.functions)
+
+    def is_word(self, item: Group) -> bool:
+        """Whether a list begins with a word of PDDL: in ``(or ?x)`` it may name a predicate."""
+        declared = *self.predicates.get(item.head, ()), self.actions.get(item.head)
+        is_flat = len(item) - 1 in declared and all(isinstance(i, Token) for i in item.items)
+        return item.head in _WORDS and (item.head == "=" or not is_flat)
 
     def with_variables(self, variables: Iterable[Variable]) -> Names:
         """The same names with more variables in scope; a variable of the same name is shadowed."""

@@ -63,10 +63,11 @@ def _read_goal(names: Names, root: Group, sections: Sections) -> Formula:
 
 
 def _read_init(names: Names, item: Group, init: set[Atom], values: dict[Atom, float]) -> None:
-    if item.head == "and":
+    is_word = names.is_word(item)
+    if is_word and item.head == "and":
         for part in item.items[1:]:
             _read_init(names, part.group("an atom in parentheses"), init, values)
-    elif item.head == "not" and len(item) == 2:
+    elif is_word and item.head == "not" and len(item) == 2:
         read_formula(names, item.items[1])  # closed world: checked, and nothing to add
     elif item.head == "=" and len(item) == 3 and isinstance(item.items[1], Group):
         number = item.items[2]

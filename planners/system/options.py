@@ -10,14 +10,17 @@ imported ``from __future__``.
 from __future__ import annotations
 
 import inspect
+import re
 import types
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import Field, field, fields
 from itertools import product
-from typing import Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
+from numbers import Real
+from os import PathLike, fspath
+from typing import Any, ForwardRef, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
 
 from planners.system.errors import UsageError
-from planners.system.messages import named
+from planners.system.messages import echoed, named
 
 Record = TypeVar("Record")
 
@@ -134,7 +137,7 @@ def record_from(
     }
     for name, value in values.items():
         if value is not None:
-            _check(known[name], value)
+            check_value(known[name], value)
     _refuse_contradictions(known, values)
     made: Record = _made(record, values)
     return made
@@ -186,8 +189,8 @@ def _require(needed: Option, value: object, by: Option, own: object, is_given: b
     raise UsageError(f"{belongs} {named(accepted, 'or')}" if accepted else belongs, remedy=remedy)
 
 
-def _check(given: Option, value: object) -> None:
-    """Raise `UsageError` for a value of another kind, or a number below the least."""
+def check_value(given: Option, value: object) -> None:
+    """Raise `UsageError` for a value of another kind, a number below the least, or no path."""
     if given.values and value not in given.values:
         raise UsageError(
             f"{given.spelling} {value}: there is no such value",
@@ -198,6 +201,8 @@ def _check(given: Option, value: object) -> None:
             f"{given.spelling} is given or not: {value} is neither",
             remedy="In Python it is True or False.",
         )
+    if not given.values and given.kind not in (bool, int):
+        _check_kind(given, value)
     least = given.least
     if given.kind is not int or (type(value) is int and (least is None or value >= least)):
         return
@@ -208,9 +213,61 @@ def _check(given: Option, value: object) -> None:
     )
 
 
+def _check_kind(given: Option, value: object) -> None:
+    """Raise `UsageError` for a value of another type than the option's, and for no path."""
+    kinds = get_args(given.kind) if _is_union(given.kind) else (given.kind,)
+    if not _is_of(given.kind, value):
+        expected = named([*map(_kind_text, kinds)], "or")
+        has_language = "Give the language of this result, .language."
+        raise UsageError(
+            f"{given.spelling}: expected {expected}, found {echoed(value)}",
+            remedy=has_language if hasattr(value, "language") else "Give another value.",
+        )
+    is_path = any(get_origin(each) is PathLike for each in kinds)
+    if is_path and isinstance(value, str | PathLike):
+        path = fspath(value)
+        if not path or "\0" in path:
+            what = f"{given.spelling} {echoed(path)}: nothing can be read or written by this name"
+            raise UsageError(what, remedy="Give another name, or leave it out.")
+
+
+def _is_union(kind: object) -> bool:
+    return get_origin(kind) in (Union, types.UnionType)
+
+
+def _is_of(kind: Any, value: object) -> bool:
+    """Whether a value is of a kind; of one in quotes, which is not imported, by its name.
+
+    Other iterables stand for sequences: a set of names, say.  Items that come once are not checked.
+    """
+    if isinstance(kind, ForwardRef):
+        return any(each.__name__ == kind.__forward_arg__ for each in type(value).__mro__)
+    if _is_union(kind):
+        return any(_is_of(each, value) for each in get_args(kind))
+    of, parts = get_origin(kind) or kind, get_args(kind)
+    of = {float: Real, Sequence: Iterable, Any: object}.get(of, of)
+    is_other = of is Iterable and isinstance(value, str | bytes | Mapping)
+    if not isinstance(value, of) or isinstance(value, bool) or is_other:
+        return False
+    if isinstance(value, Mapping) and parts:
+        return all(all(map(_is_of, parts, entry)) for entry in value.items())
+    if not parts or not isinstance(value, Collection):
+        return True
+    if of is tuple and Ellipsis not in parts:
+        return len(parts) == len(value) and all(map(_is_of, parts, value))
+    return all(_is_of(parts[0], each) for each in value)
+
+
+def _kind_text(kind: Any) -> str:
+    """A kind as Python writes it, without modules."""
+    if isinstance(kind, type) and not get_args(kind):
+        return kind.__name__
+    return re.sub(r"\w+\.|ForwardRef\('(\w+)'\)", r"\1", str(kind))
+
+
 def _not_none(kind: Any) -> object:
     """The kind of a value that is given: that of an optional one without None."""
-    if get_origin(kind) in (Union, types.UnionType):
+    if _is_union(kind):
         others = tuple(each for each in get_args(kind) if each is not type(None))
         return others[0] if len(others) == 1 else Union[others]  # noqa: UP007 - made, not written
     return kind

@@ -190,12 +190,10 @@ def test_say_and_understand(language: Path, tmp_path: Path) -> None:
     assert plans.rank(left[0]) is not None
     assert len(left.dag().nodes) == 5
     assert door.plan(language, *T_MAP, SENTENCE).steps == left[0]
-    for wrong in (
-        lambda: door.understand(language, *T_MAP, "w0 w1"),
-        lambda: door.explain(language, *T_MAP, task=True, sentence="w0 w1"),
-    ):
-        with pytest.raises(door.NoPlanFits):
-            wrong()
+    with pytest.raises(door.NoPlanFits):
+        door.understand(language, *T_MAP, "w0 w1")
+    with pytest.raises(door.NoPlanFits):
+        door.explain(language, *T_MAP, task=True, sentence="w0 w1")
     with pytest.raises(door.NotAPlan):
         door.say(language, *T_MAP, [("(move r1 c0-1 c1-1)", "(move r2 c1-0 c1-1)")])
     with pytest.raises(door.NotOptimal):
@@ -245,7 +243,10 @@ BUILD = [
     ({"prefer": "flexible", "method": "greedy"}, "--prefer flexible belongs to"),
     ({"alpha_only": True}, "--alpha-only belongs to"),
     ({"unsolvable": "ignore"}, "--unsolvable ignore"),
-    ({"start": {}}, "expected a language, and this is of type dict"),
+    (
+        {"start": {}},
+        r"--start: expected str, PathLike\[str\], Language or LiftedLanguage, found {}",
+    ),
 ]
 USES = [
     ("plan", {}, "expected a SENTENCE or --prefer"),
@@ -254,15 +255,16 @@ USES = [
     ("explain", {"sentence": "w0"}, "--sentence"),
     ("export", {"sentence": "w0", "to": "sas"}, "--to sas"),
     ("verify", {"robot_type": "robot"}, "Leave out --robot-type"),
+    ("verify", {"resume": ""}, "--resume '': nothing can be read"),
+    *(("verify", {name: [3]}, f"--{name}: expected str") for name in ("certificate", "tasks")),
     *(("choices", {"sentence": "w0", "robot": r}, "") for r in (3, [3], "r9", ["r1", "r9"])),
 ]
 #: Users met remember_actions="no", which was taken for True, and cost="", for the default.
 VALUES: list[dict[str, Any]] = [
     *({"remember_actions": value} for value in ("no", 1)),
-    *({"cost": value} for value in ("", 3)),
     *({"unowned": value} for value in ("", ["error"])),
-    *({"robot_type": value} for value in ("", 3)),
-    *({"robots": value} for value in (5, [1], "")),
+    *({name: value} for name in ("cost", "robot_type") for value in ("", 3)),
+    *({name: value} for name in ("robots", "factored") for value in (5, [1], "")),
 ]
 
 
@@ -285,8 +287,9 @@ def test_a_wrong_value_is_an_error_and_never_another_answer(
 
 
 def test_wrong_uses() -> None:
-    with pytest.raises(door.UsageError):
-        door.plans(T_MAP[0])
+    for files in ((T_MAP[0],), (3, T_MAP[1]), (T_MAP[0], 3), (T_MAP[0], "\0")):
+        with pytest.raises(door.UsageError):
+            door.plans(*files)
     # The second is the command line's alone.
     for unknown, more in (("costs", "; did you mean 'cost'"), ("as_json", "")):
         with pytest.raises(TypeError, match=rf"plans\(\) got an .* '{unknown}'{more}"):

@@ -37,6 +37,7 @@ from tests.support.candidates import (
 )
 from tests.support.domains import all_tasks, own_task
 from tests.support.task_languages import built_for, language_of, random_language
+from tests.support.texts import model_of
 
 
 def holds(formula: Cover, atoms: set[str]) -> bool:
@@ -56,11 +57,8 @@ def check_exact(language: Language, candidates: Candidates, formulas: dict[str, 
         for term, count in zip(formula.terms, formula.counts, strict=True):
             alone = Cover((term,), (count,), 0, False)
             mine = [k for k, w in language.states.items() if w == word]
-            assert (
-                count
-                == sum(holds(alone, {*model.codec.decode(model.codec.parse_key(k))}) for k in mine)
-                > 0
-            )
+            atoms_of = ({*model.codec.decode(model.codec.parse_key(k))} for k in mine)
+            assert count == sum(holds(alone, own) for own in atoms_of) > 0
 
 
 @pytest.mark.parametrize("robots", [2, 3])
@@ -76,33 +74,24 @@ def test_exactly_one_formula_is_true_in_every_mapped_state(robots: int) -> None:
             atoms = {*candidates.model.codec.decode(candidates.model.codec.parse_key(key))}
             true = [w for w, f in told.rules if f is None or holds(f, atoms)]
             assert word in true
-            assert (
-                true[0] == word
-                if told.in_order
-                else [w for w in true if dict(told.rules)[w]] in ([word], [])
-            )
+            listed = true[:1] if told.in_order else [w for w in true if dict(told.rules)[w]]
+            assert listed in ([word], [])
         seen["in order"] += told.in_order
         seen["every other state"] += any(formula is None for _, formula in told.rules)
         seen["each"] += all(formula is not None for _, formula in told.rules)
         seen["several terms"] += any(len(f.terms) > 1 for f in formulas.values())
         seen["a word without states"] += any(not f.states for f in formulas.values())
         seen["several values"] += any(len(v.values) > 2 for v in mapped.variables)
-    assert all(
-        seen[case]
-        for case in ("every other state", "each", "several terms", "a word without states")
-    ), seen
-    assert seen["several values"]
+    cases = "every other state", "each", "several terms", "several values", "a word without states"
+    assert all(seen[case] for case in cases), seen
 
 
 def test_where_a_robot_is() -> None:
     """The three words of the running example say where one of the robots is."""
     candidates, language = all_tasks("three-cells"), built_for("three-cells").language
     formulas = all_covers(mapped_states(language.partition(candidates.model), candidates.model))
-    for robot in ("r1", "r2"):
-        if {shown(f) for f in formulas.values()} == {f"at({robot}) = {cell}" for cell in "abc"}:
-            break
-    else:
-        raise AssertionError({w: shown(f) for w, f in formulas.items()})
+    said = {shown(f) for f in formulas.values()}
+    assert said in [{f"at({robot}) = {cell}" for cell in "abc"} for robot in ("r1", "r2")]
     assert all(f.fewest and f.length == 1 and len(f.conjunctions()) == 1 for f in formulas.values())
 
 
@@ -154,14 +143,11 @@ def test_further_states_have_the_default() -> None:
     free = all_covers(mapped_states(table, candidates.model))
     exact = all_covers(mapped_states(table, candidates.model, candidates.rows))
     states = [set(candidates.model.codec.decode(row)) for row in candidates.rows]
-    assert all(
-        [w for w, f in exact.items() if holds(f, s)] == [language.states.get(k, "w0")]
-        for k, s in zip(keys, states, strict=True)
-    )
-    assert not all(
-        [w for w, f in free.items() if holds(f, s)] == [language.states.get(k, "w0")]
-        for k, s in zip(keys, states, strict=True)
-    )
+    for formulas, are_right in ((exact, True), (free, False)):
+        assert are_right == all(
+            [w for w, f in formulas.items() if holds(f, s)] == [language.states.get(k, "w0")]
+            for k, s in zip(keys, states, strict=True)
+        )
     assert exact["w1"].length > free["w1"].length
 
 
@@ -273,6 +259,13 @@ def test_variables_are_invariants(folder: str, stem: str, names: set[str]) -> No
     assert len(np.unique(value, axis=0)) == len(space.rows)
 
 
+#: An object and an action are called none, and an action idle; robots meet in two ways.
+NAMED_NONE = """(define (domain d) (:types robot) (:constants none a) (:predicates (at ?p) (met))
+ (:action none :agent ?r - robot :parameters () :effect (not (at none)))
+ (:action idle :agent ?r - robot :parameters () :precondition (not (at none)) :effect (at a))
+ (:action meet :parameters (?r ?o - robot) :precondition (not (= ?r ?o)) :effect (met)))"""
+
+
 def test_remembered_actions_are_one_variable_a_robot() -> None:
     candidates = own_task("three-cells", options=ModelOptions(remember_actions=True))
     language = build_language(candidates, "greedy").language
@@ -281,6 +274,18 @@ def test_remembered_actions_are_one_variable_a_robot() -> None:
     check_exact(language, candidates, formulas)
     names = {variable.name for variable in valuation(candidates.model, table.rows)[0]}
     assert {"last(r1)", "last(r2)"} <= names
+    task = (
+        "(define (problem p) (:domain d) (:objects r1 r2 - robot) (:init (at none)) (:goal (met)))"
+    )
+    texts: dict[str, list[str]] = {}
+    for remember in (False, True):
+        world = model_of(NAMED_NONE, task, ModelOptions(remember_actions=remember))
+        rows = explore(world.model, world.tasks[0].init[None]).rows
+        for variable in valuation(world.model, rows)[0]:
+            texts[variable.name] = [value for _, value in variable.texts]
+            assert len({*variable.texts}) == len(variable.texts)
+    assert texts["at"] == ["a", "none", "no value"]
+    assert {"none", "idle", "(none r1)", "(meet r1 r2)", "(meet r2 r1)"} < {*texts["last(r1)"]}
 
 
 # ---- languages whose formulas are short

@@ -29,6 +29,7 @@ PREDICATE = "(door ?x ?y - room)"
 AGENT = ":agent ?r - robot :parameters (?x ?y - room)"
 OBJECTS = "r1 r2 - robot a b c - room"
 EFFECT = "(and (at ?r ?y) (not (at ?r ?x)))"
+WHEN = "(and (at ?r ?y) (when (door ?x ?y) (not (at ?r ?x))))"
 #: A case: the number of optimal plans, or the exit code and a piece of the message; the domain, the
 #: problem, options.
 Case = tuple[int | tuple[int, str], str, str, tuple[str, ...]]
@@ -79,11 +80,9 @@ JOINT = """(define (domain lift) (:predicates (up)) (:action lift :parameters ()
   ; subaction r1 (lift)
   MORE
 )"""
+FAR = "(:functions (total-cost) - number (far ?x ?y - room) - number)"
 COSTLY = d(
-    *(
-        f"{PREDICATE})",
-        f"{PREDICATE}) (:functions (total-cost) - number (far ?x ?y - room) - number)",
-    ),
+    *(f"{PREDICATE})", f"{PREDICATE}) {FAR}"),
     *(EFFECT, "(and (at ?r ?y) (not (at ?r ?x)) (increase (total-cost) (far ?x ?y)))"),
 )
 VALUES = "(= (far a b) 3) (= (far b a) 1) (= (far b c) 1) (= (far c b) 1)"
@@ -303,6 +302,14 @@ CASES: dict[str, Case] = {
         (11, ""), where("(exists (?g - ghost) (and))", "robot room)", "robot room ghost)")
     ),
     "an empty or": case((11, ""), where("(or)")),
+    "words of PDDL as names": case(
+        1,
+        change(
+            where("(forall (?o - robot) (not (go ?o ?y ?x)))", EFFECT, WHEN),
+            *("(door ", "(and ", "(at ", "(not ", "(go", "(or", ":action go", ":action or"),
+        ),
+        p("(door ", "(and ", "(at ", "(not "),
+    ),
     # names
     "a predicate named like the action": case(
         (11, ""), where("(go ?r ?x ?y)", PREDICATE, f"{PREDICATE} (go ?r ?x ?y)")
