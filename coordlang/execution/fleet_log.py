@@ -103,7 +103,7 @@ class RobotLog:
         return [event for event in self.events[:number] if robot in event.partners]
 
 
-class Answer(Struct, frozen=True):
+class Reply(Struct, frozen=True):
     """A robot's answer to a proposed sentence: it agrees, or has ``wishes`` that are not met."""
 
     sentence: str
@@ -129,7 +129,7 @@ class Message(Struct, frozen=True, omit_defaults=True):
     sentence: str | None = None
     speaks: bool = False
     proposes: str | None = None
-    answer: Answer | None = None
+    answer: Reply | None = None
     late: Annotated[float, Meta(ge=0)] | None = None
 
 
@@ -177,7 +177,7 @@ class Agreement:
         self.sentence, self._wishes = sentence, tuple(wishes)
         self._best, self._grants = best, grants
         self._proposal: str | None = None
-        self._answer: Answer | None = None
+        self._answer: Reply | None = None
         self._heard: dict[str, Message | None] = dict.fromkeys(others)
 
     def check(self, message: Message) -> None:
@@ -209,7 +209,7 @@ class Agreement:
             proposed = heard[proposer].proposes
             if proposed is not None and (not self._answer or self._answer.sentence != proposed):
                 is_granted = self._grants(proposed, self._wishes)
-                self._answer = Answer(proposed, () if is_granted else self._wishes)
+                self._answer = Reply(proposed, () if is_granted else self._wishes)
             return
         if self._proposal is None:
             self._proposal = self._best(self._wishes)

@@ -24,7 +24,7 @@ _SAME = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Message:
+class Notice:
     """What a robot tells all others: that it has done so many steps, or come to this word.
 
     ``number`` counts steps from 1 (``step``), or is the index of a word in the sentence (``word``).
@@ -59,7 +59,7 @@ class Pace:
         """Whether all robots turn in the same time before they drive, and idle without time."""
         return self._way in ("clock", "barrier")
 
-    def hears(self, messages: Iterable[Message]) -> None:
+    def hears(self, messages: Iterable[Notice]) -> None:
         """Take in how far the others are."""
         for message in messages:
             self._heard[message.sender] = max(self._heard[message.sender], message.number)
@@ -156,7 +156,7 @@ class Sensed:
     time: float
     pose: Pose
     ahead: float | None
-    heard: tuple[Message, ...] = ()
+    heard: tuple[Notice, ...] = ()
     wanted: tuple[str, ...] = ()
 
 
@@ -204,7 +204,7 @@ class Robot:
         #: Own steps done, and words of the sentence passed at most, by its own account.
         self.done = self.words = 0
         self._is_turning = False
-        self._messages: list[Message] = []
+        self._messages: list[Notice] = []
         self._events: list[Event] = []
         #: The event that it has chosen and not started, where there are no steps.
         self._chosen: str | None = None
@@ -273,7 +273,7 @@ class Robot:
             return STANDING
         return self._driven(self._points[step.place], step, sensed)
 
-    def told(self) -> tuple[list[Message], list[Event]]:
+    def told(self) -> tuple[list[Notice], list[Event]]:
         """What it has told all robots since this was asked last, and what is worth recording."""
         told = self._messages, self._events
         self._messages, self._events = [], []
@@ -291,7 +291,7 @@ class Robot:
     def _is_underway(self) -> bool:
         return bool(self.steps) and self.steps[-1].end is None
 
-    def _hear_of_events(self, monitor: EventMonitor, heard: Sequence[Message]) -> None:
+    def _hear_of_events(self, monitor: EventMonitor, heard: Sequence[Notice]) -> None:
         for message in heard:
             if message.sender == self.name:
                 continue
@@ -322,7 +322,7 @@ class Robot:
             self._tell("ready", self.done + 1, monitor.subaction(event))
 
     def _tell(self, kind: Kind, number: int, subaction: str = "") -> None:
-        self._messages.append(Message(self.name, kind, number, subaction))
+        self._messages.append(Notice(self.name, kind, number, subaction))
 
     def _begin(self, subaction: str | None, time: float) -> None:
         place = self._leads.get(subaction) if subaction is not None else None

@@ -21,7 +21,7 @@ from coordlang.simulation.record import (
     StepRecord,
     WishRecord,
 )
-from coordlang.simulation.robot import TICK, Message, Pace, Pose, Robot, Sensed, period
+from coordlang.simulation.robot import TICK, Notice, Pace, Pose, Robot, Sensed, period
 from coordlang.simulation.simulator import POSITION_NOISE, WALL, Settings, Simulator
 from coordlang.simulation.team import Mission
 
@@ -119,7 +119,7 @@ class _Going:
         self.simulator = Simulator(floor, poses, settings, seed)
         self.ticks = self.messages = self.collisions = self.changes = 0
         self.last_change, self.nearest = 0.0, math.inf
-        self.heard: tuple[Message, ...] = ()
+        self.heard: tuple[Notice, ...] = ()
         self.touching: set[tuple[str, str]] = set()
         self.events: list[EventRecord] = []
         self.poses: dict[str, list[Pose]] = {name: [] for name in self.robots}
@@ -189,7 +189,7 @@ class _Going:
             poses=self.poses,
         )
 
-    def _sensed(self, name: str, robot: Robot, heard: tuple[Message, ...]) -> Sensed:
+    def _sensed(self, name: str, robot: Robot, heard: tuple[Notice, ...]) -> Sensed:
         spread, random = POSITION_NOISE * self.settings.noise, self.sensing[name]
         x, y, heading = (value + random.gauss(0, spread) for value in self.simulator.pose(name))
         ahead: float | None = math.inf
