@@ -96,7 +96,7 @@ def why_not_here() -> str | None:
     """Return why coordlang does not run on this system, or None where it does."""
     if sys.platform == "win32" or importlib.util.find_spec("resource") is None:
         return (
-            f"coordlang runs on Linux and macOS, not on this system ({sys.platform}): its limits "
+            f"coordlang runs on Linux, not on this system ({sys.platform}): its limits "
             "of time and memory need POSIX signals\n"
             "  On Windows use WSL (https://learn.microsoft.com/windows/wsl/install): "
             "`wsl --install`, then `pip install coordlang` in it."

@@ -328,6 +328,6 @@ def test_a_system_without_posix_limits_is_refused(
     env = dict(os.environ, PYTHONPATH=str(ROOT))
     done = subprocess.run(command, env=env, text=True, capture_output=True)
     assert (done.returncode, done.stdout) == (code, "")
-    assert f"{before}coordlang runs on Linux and macOS, not on this system" in done.stderr
+    assert f"{before}coordlang runs on Linux, not on this system" in done.stderr
     assert "\n  On Windows use WSL" in done.stderr
     assert not {"ImportError", "ModuleNotFoundError"} & {*done.stderr.replace(":", " ").split()}
