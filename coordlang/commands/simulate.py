@@ -131,12 +131,9 @@ def simulate(files: Arguments, options: SimulateOptions) -> Simulated:
     prepared = _prepared(task.used, options, preferred)
     points = read_coordinates_of(options.coordinates, task.files.problems[0])
     floor = Floor(prepared.world, points)
-    settings = replace(
-        settings,
-        step=_step(task.used, options.step),
-        radius=min(settings.radius, MOST_RADIUS * floor.shortest),
-    )
-    settings = replace(settings, radius=prepared.radius_on(floor, settings.radius))
+    step, most = _step(task.used, options.step), MOST_RADIUS * floor.shortest
+    radius = prepared.radius_on(floor, min(settings.radius, most))
+    settings = replace(settings, step=step, radius=radius)
     wishes = [_wish(prepared, text) for text in on_the_way]
     done: list[RunRecord] = []
 

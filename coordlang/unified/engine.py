@@ -45,7 +45,7 @@ from coordlang.language.file import read_language
 from coordlang.language.recorded import options_of
 from coordlang.language.words import Language
 from coordlang.unified import NAME
-from coordlang.unified.plans import NoSteps, label, of_up, to_up
+from coordlang.unified.plans import NoSteps, leaves_steps_open, of_up, to_up
 from coordlang.unified.translation import FEATURES, Concurrency, Subactions, Translated, translate
 from planners.check.rules import validate
 from planners.grounding.instantiate import idling_schemas
@@ -175,6 +175,11 @@ def _read(given: Language | str | None) -> Language | None:
     return language
 
 
+#: What is said of a plan that is valid step by step, and orders its actions less than that.
+_OPEN = (
+    "the plan's order does not say which actions share a step: each was taken to be done as early "
+    "as its predecessors allow, and in another order it may be no plan"
+)
 #: What ends a search without a plan, and what it means; the first that fits counts.
 _STATUS = {
     # There may be plans with another sentence, so this is not a proof that there is none.
@@ -352,9 +357,8 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
                 loaded = build(found.domain, [found.problem], options.model_options(found))
                 steps = of_up(found, loaded.model, loaded.team, plan)
                 texts = [step for step, _ in steps]
-                names = None
-                if loaded.model.is_joint_action:
-                    names = [label(found, action) for _, (action, *_) in steps]
+                is_joint = loaded.model.is_joint_action
+                names = [next(iter(actions)) for _, actions in steps] if is_joint else None
                 verdict = validate(
                     found.domain, found.problem, loaded.team, texts, joint_actions=names
                 )
@@ -370,11 +374,13 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
             return self._invalid(wrong_sentence, None)
         if verdict.valid:
             metrics = {"makespan": str(len(steps))}
+            if leaves_steps_open(plan):
+                messages.append(_warning(_OPEN))
             return ValidationResult(Validity.VALID, self.name, messages, metrics=metrics)
         assert verdict.step is not None
         if verdict.step == len(steps):
             return self._invalid(verdict.reason, Reason.UNSATISFIED_GOALS)
-        action = next(iter(steps[verdict.step][1]), None)
+        action = next(iter(steps[verdict.step][1].values()), None)
         why = f"step {verdict.step + 1}: {verdict.reason}"
         return self._invalid(why, Reason.INAPPLICABLE_ACTION, action)
 

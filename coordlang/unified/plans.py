@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from fractions import Fraction
+from itertools import pairwise, product
 from typing import Any
 
 import networkx
@@ -69,8 +70,8 @@ def to_up(found: Translated, plans: Plans, plan: Plan, kind: Any, environment: A
 
 def of_up(
     found: Translated, model: JointModel, team: Team, plan: Any
-) -> list[tuple[Texts, tuple[Any, ...]]]:
-    """The joint steps of a unified-planning plan: what each robot does, and the actions.
+) -> list[tuple[Texts, dict[str, Any]]]:
+    """The joint steps of a unified-planning plan: what each robot does, and the actions by text.
 
     A partial-order plan is read layer by layer, each action as early as its predecessors allow.
     Raises `NoSteps`, and `UsageError` for a plan of another kind.
@@ -78,15 +79,25 @@ def of_up(
     result = []
     for actions in _steps(plan):
         step: list[str | None] = [None] * len(model.robots)
-        for action in actions:
-            for robot, part in _parts(model, team, found, action):
+        named = [(label(found, action), action) for action in actions]
+        for text, action in named:
+            for robot, part in _parts(model, team, found, text, action):
                 if step[robot] is not None:
                     raise NoSteps(
                         f"{model.robots[robot]} does {step[robot]} and {part} in one step"
                     )
                 step[robot] = part
-        result.append((tuple(step), tuple(actions)))
+        result.append((tuple(step), dict(named)))
     return result
+
+
+def leaves_steps_open(plan: Any) -> bool:
+    """Whether the order of a partial-order plan does not say in which steps its actions are."""
+    if not isinstance(plan, PartialOrderPlan):
+        return False
+    before = networkx.transitive_closure_dag(networkx.DiGraph(plan.get_adjacency_list))
+    pairs = (pair for one, other in pairwise(_steps(plan)) for pair in product(one, other))
+    return not all(before.has_edge(*pair) for pair in pairs)
 
 
 def _steps(plan: Any) -> Sequence[Sequence[Any]]:
@@ -129,13 +140,12 @@ def label(found: Translated, action: Any) -> str:
 
 
 def _parts(
-    model: JointModel, team: Team, found: Translated, action: Any
+    model: JointModel, team: Team, found: Translated, text: str, action: Any
 ) -> list[tuple[int, str | None]]:
-    """The robots that take part in an action, with their parts.
+    """The robots that take part in an action, by its text, with their parts.
 
     Raises `NoSteps` for a joint action that is never possible.
     """
-    text = label(found, action)
     if not model.is_joint_action:
         name, *args = text[1:-1].split()
         schema = next(s for s in found.domain.schemas if s.name == name)

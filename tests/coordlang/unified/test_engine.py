@@ -248,10 +248,8 @@ def test_agents_of_different_kinds() -> None:
     assert sorted(schema.name for schema in found.domain.schemas) == ["act", "act__2"]
     (plan,) = all_plans(problem)
     assert steps_of(found, plan) == [["(act guard)"], ["(act__2 guest)"]]
-    assert [
-        f"{a.agent.name}.{a.action.name}"
-        for a in plan.convert_to(PlanKind.SEQUENTIAL_PLAN, problem).actions
-    ] == ["guard.act", "guest.act"]
+    actions = plan.convert_to(PlanKind.SEQUENTIAL_PLAN, problem).actions
+    assert [f"{a.agent.name}.{a.action.name}" for a in actions] == ["guard.act", "guest.act"]
 
 
 # Every feature of conditions and effects, against unified-planning's own simulator.
@@ -673,11 +671,8 @@ def test_wrong_parameters(params: dict[str, Any], message: str) -> None:
 def test_who_the_robots_are() -> None:
     problem = crossing()
     kind = problem.user_type("robot")
-    for params in (
-        {"robots": problem.objects(kind)},
-        {"robots": ("r1", "r2")},
-        {"robot_type": kind},
-    ):
+    robots = problem.objects(kind)
+    for params in ({"robots": robots}, {"robots": ("r1", "r2")}, {"robot_type": kind}):
         assert solve(problem, **params).metrics["plans"] == "2"
     nobody = PDDLReader().parse_problem_string(
         "(define (domain d) (:predicates (on)) (:action press :parameters () :effect (on)))",
@@ -730,10 +725,8 @@ def test_invalid_plans() -> None:
     ):
         refused(SequentialPlan([action]), inapplicable)
     refused(TimeTriggeredPlan([(Fraction(0), one, Fraction(3))]), inapplicable)
-    with (
-        pytest.warns(UserWarning, match="cannot validate"),
-        pytest.raises(UPUsageError, match="a STNPlan cannot be validated"),
-    ):
+    warned = pytest.warns(UserWarning, match="cannot validate")
+    with warned, pytest.raises(UPUsageError, match="a STNPlan cannot be validated"):
         verdict(problem, STNPlan([]))
 
 
@@ -777,9 +770,8 @@ def test_the_engine_by_a_file_beside_the_program(tmp_path: Path) -> None:
         "from unified_planning.shortcuts import OneshotPlanner\n"
         "with OneshotPlanner(name='coordlang') as planner:\n    print(planner.name)\n"
     )
-    done = subprocess.run(
-        [sys.executable, str(program)], capture_output=True, text=True, check=True
-    )
+    line = [sys.executable, str(program)]
+    done = subprocess.run(line, capture_output=True, text=True, check=True)
     said = done.stdout.splitlines()
     assert (said[0], said[-1]) == ("False", "coordlang")
 
@@ -805,3 +797,9 @@ def test_a_valid_plan_may_have_an_action_that_is_idling(robot: str, valid: bool)
     with up.PlanValidator(name="sequential_plan_validator") as validator:
         assert validator.validate(problem, SequentialPlan([move, idle])).status == found.status
     assert (found.status == Validity.VALID) == valid
+    # Where the order does not say the steps, a message says that another order may be no plan.
+    again = ActionInstance(idle.action, idle.actual_parameters)
+    for order, said in ((((idle, move), (move, again)), False), (((idle, again),), True)):
+        followers = {a: [b for one, b in order if one is a] for a in (idle, move, again)}
+        found = verdict(problem, PartialOrderPlan(followers), robot_type="robot")
+        assert said == ("may be no plan" in str(found.log_messages)) or not valid
