@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import Any
+from warnings import catch_warnings, simplefilter
 
 from coordlang.commands.inputs import Arguments, extended, language_for, note_size, public
 from coordlang.commands.records import VerifyOptions
@@ -20,8 +22,10 @@ from coordlang.verification.by_definition import Verdict, verify_candidates
 from coordlang.verification.certificate_file import read_certificate
 from coordlang.verification.check_certificate import Checked
 from coordlang.verification.check_certificate import check as check_certificate
+from planners.loading import PlanningInstance
 from planners.pddl.model_options import ModelOptions
-from planners.system.errors import Refuted
+from planners.pddl.robots import ENVIRONMENT, find_team
+from planners.system.errors import BadInput, Note, Refuted, UsageError, note
 from planners.system.messages import Presented, counted
 
 
@@ -95,7 +99,7 @@ class Verification(Presented, Verdict):
             "miscoordination": witness_data(self.witness),
             "lower_bound": bound,
             "reasons": self.certificate.reasons if self.certificate else None,
-            "proved_minimal": None if bound is None else bound == self.words,
+            "proved_minimal": None if bound is None else self.holds and bound == self.words,
             **self.failures.data(),
             **tolerance_data(self.tolerance),
         }
@@ -167,6 +171,8 @@ def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
         else:
             candidates = files.candidates(tasks, model)
         require_solvable(candidates)
+        if "robots" not in files.source.given:
+            _note_other_robots(candidates.loaded)
         partition = read.partition(candidates.model)
         note_size(candidates)
         verdict = verify_candidates(partition, candidates, workers, say)
@@ -193,9 +199,23 @@ def verify(arguments: Arguments, options: VerifyOptions) -> Verification:
     return extended(Verification, verdict, *more)
 
 
+def _note_other_robots(loaded: PlanningInstance) -> None:
+    """Write a note where the robots of a language file are not those that are found without it."""
+    with suppress(BadInput, UsageError):  # there is no other way to tell who they are
+        with catch_warnings():
+            simplefilter("ignore", Note)
+            found = find_team(loaded.domain, loaded.problems[0], ModelOptions()).robots
+        if {*found, ENVIRONMENT} != {*loaded.team.robots, ENVIRONMENT}:
+            robots = ", ".join(loaded.team.robots)
+            without = f"without it they are {', '.join(found)}"
+            note(f"the language file says that the robots are {robots}; {without}")
+
+
 def show_verify(found: Verification, options: VerifyOptions) -> int:
     """Print the verdict; `Refuted` if a certificate proves less than the language claims."""
     show_answer(found, as_json=options.as_json)
+    if options.certificate is not None and found.certificate is None:
+        note("the certificate was not checked: the words are refuted")
     if not (found.holds or found.is_tolerated):
         return REFUTED
     if options.dimacs and found.certificate is not None:

@@ -67,12 +67,14 @@ def test_build_verify_explain(shell: Shell, language: Path) -> None:
     assert (data["tasks"]["kind"], data["tasks"]["count"]) == ("all", 132)
     assert (data["robots"], len(data["states"])) == (["r1", "r2"], 12)
     # One word for all states is none.
-    data["states"] = dict.fromkeys(data["states"], "w0")
-    language.write_text(json.dumps(data))
+    language.write_text(json.dumps(data | {"states": dict.fromkeys(data["states"], "w0")}))
     shell("verify language.json T-MAP", 1, 'refuted: plans with the sentence "w0', "breaks")
     data = json.loads(shell("verify language.json T-MAP --json", 1).out)
     assert (data["holds"], data["miscoordination"]["sentence"]) == (False, ["w0"])
     assert data["robots"] == ["r1", "r2"]
+    files = f"{DOMAINS}/handover/domain.pddl {DOMAINS}/handover/exchange.pddl"
+    shell(f"build {files} --robots r1 --unowned environment -o l.json")
+    shell(f"verify l.json {files}", 0, "robots are r1, environment; without it they are r1, r2")
 
 
 def test_build_from_a_task_file_and_for_problems(shell: Shell) -> None:

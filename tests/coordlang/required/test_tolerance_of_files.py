@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -75,6 +76,8 @@ def test_bounds_of_words_that_may_fail_are_checked(coordlang: Command, tmp_path:
         assert (unchecked.code, f"at least {claimed} words" in unchecked.out) == (0, True)
         found = coordlang("verify", path, *SQUARE, "--certificate", proof)
         assert (found.code, "lower bound 3" in found.out) == (code, claimed == 3)
+    three = replace(library.load_language(path), words=("w0", "w1", "w2"))
+    assert not library.verify(three, *SQUARE, certificate=proof).data()["proved_minimal"]
 
 
 def test_what_cannot_be_counted_cannot_be_claimed(

@@ -292,6 +292,7 @@ FORGED: list[tuple[Callable[[Data, Data, int], object], str]] = [
         lambda _, c, __: c.update(refuted=2),
         "that 4 words are needed; the certificate proves 3 only",
     ),
+    (lambda d, *_: d.update(states={}), "note: the certificate was not checked"),
     (lambda d, _, __: claims(d, 4, True), "'proved_minimal' contradicts the lower bound"),
 ]
 
