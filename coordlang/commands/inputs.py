@@ -20,7 +20,7 @@ from planners.pddl.model_options import ModelOptions
 from planners.system.errors import Position, UsageError, note
 from planners.system.files import names_format, read_bytes
 from planners.system.messages import Presented
-from planners.system.options import Option, check_value, options_of, record_from
+from planners.system.options import Option, checked_value, options_of, record_from
 
 if TYPE_CHECKING:
     from coordlang.execution.task_language import TaskLanguage
@@ -71,17 +71,23 @@ def public(
             options = record_from(record, keywords, function.__name__)
             read = own.bind(*arguments, **named)
             read.apply_defaults()
-            values = {word_of[name]: value for name, value in read.arguments.items()}
-            for word, value in values.items():
-                for each in value if word.endswith("...") else (value,):
-                    if each is not None:
-                        check_value(Option("", names=(word,), kind=given.ARGUMENTS[word]), each)
+            values = {}
+            for name, value in read.arguments.items():
+                word = word_of[name]
+                each = functools.partial(_argument, word)
+                values[word] = tuple(map(each, value)) if word.endswith("...") else each(value)
             return function(Arguments(getattr(options, "source", options), values), options)
 
         called.__signature__ = inspect.Signature([*parameters, *keyword_only])  # type: ignore[attr-defined]
         return called
 
     return decorate
+
+
+def _argument(word: str, value: object) -> object:
+    """The value of an argument, None where there is none; `UsageError` for one of another type."""
+    described = Option("", names=(word,), kind=given.ARGUMENTS[word])
+    return None if value is None else checked_value(described, value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,7 +262,7 @@ def load_language(path: given.File) -> Language:
     """
     from coordlang.language.file import read_language as read_language_file
 
-    check_value(Option("", names=("path",), kind=given.File), path)
+    checked_value(Option("", names=("path",), kind=given.File), path)
     return read_language_file(fspath(path))
 
 

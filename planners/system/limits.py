@@ -59,7 +59,8 @@ _GROUPS = "/sys/fs/cgroup"
 def time_limit(seconds: float | None) -> Iterator[None]:
     """Raise `OutOfTime` in the block when ``seconds`` of wall time are over (main thread only).
 
-    Blocks may be nested; the limit that is over first rings, and it names its own seconds.
+    No time is over at once.  Blocks may be nested; the limit that is over first rings, and it names
+    its own seconds.
     Libraries, above all while they are imported, make other errors of it: they leave the block as
     `OutOfTime`, unless the clock has been stopped.
     """
@@ -88,7 +89,8 @@ def time_limit(seconds: float | None) -> Iterator[None]:
     begin = time.monotonic()
     outer, again = signal.getitimer(signal.ITIMER_REAL)
     try:
-        signal.setitimer(signal.ITIMER_REAL, seconds, _AGAIN)  # inside: it may ring at once
+        # Inside: it may ring at once; and 0 would stop the clock.
+        signal.setitimer(signal.ITIMER_REAL, max(1e-6, seconds), _AGAIN)
         yield
     except Exception as error:
         is_ours = isinstance(error, CoordlangError | MemoryError | AssertionError)

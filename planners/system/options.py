@@ -23,6 +23,8 @@ from planners.system.errors import UsageError
 from planners.system.messages import echoed, named
 
 Record = TypeVar("Record")
+#: Where the classes are that options name in quotes.
+_OURS = ("planners", "coordlang")
 
 
 class Option(NamedTuple):
@@ -137,7 +139,7 @@ def record_from(
     }
     for name, value in values.items():
         if value is not None:
-            check_value(known[name], value)
+            values[name] = checked_value(known[name], value)
     _refuse_contradictions(known, values)
     made: Record = _made(record, values)
     return made
@@ -189,8 +191,13 @@ def _require(needed: Option, value: object, by: Option, own: object, is_given: b
     raise UsageError(f"{belongs} {named(accepted, 'or')}" if accepted else belongs, remedy=remedy)
 
 
-def check_value(given: Option, value: object) -> None:
-    """Raise `UsageError` for a value of another kind, a number below the least, or no path."""
+def checked_value(given: Option, value: object) -> object:
+    """The value of an option; items that come only once, in a tuple.
+
+    Raises `UsageError` for a value of another kind, a number below the least, or no path.
+    """
+    if isinstance(value, Iterator):
+        value = tuple(value)
     if given.values and value not in given.values:
         raise UsageError(
             f"{given.spelling} {value}: there is no such value",
@@ -204,13 +211,13 @@ def check_value(given: Option, value: object) -> None:
     if not given.values and given.kind not in (bool, int):
         _check_kind(given, value)
     least = given.least
-    if given.kind is not int or (type(value) is int and (least is None or value >= least)):
-        return
-    what = "a whole number" if least is None else f"{least} or more"
-    raise UsageError(
-        f"{given.spelling} {value}: expected {what}",
-        remedy=f"Say {given.spelling} {max(least or 0, 1)}.",
-    )
+    if given.kind is int and (type(value) is not int or (least is not None and value < least)):
+        what = "a whole number" if least is None else f"{least} or more"
+        raise UsageError(
+            f"{given.spelling} {value}: expected {what}",
+            remedy=f"Say {given.spelling} {max(least or 0, 1)}.",
+        )
+    return value
 
 
 def _check_kind(given: Option, value: object) -> None:
@@ -238,15 +245,18 @@ def _is_union(kind: object) -> bool:
 def _is_of(kind: Any, value: object) -> bool:
     """Whether a value is of a kind; of one in quotes, which is not imported, by its name.
 
-    Other iterables stand for sequences: a set of names, say.  Items that come once are not checked.
+    Other collections stand for sequences: a set of names, say.
     """
     if isinstance(kind, ForwardRef):
-        return any(each.__name__ == kind.__forward_arg__ for each in type(value).__mro__)
+        own = (each for each in type(value).__mro__ if each.__module__.partition(".")[0] in _OURS)
+        return any(each.__name__ == kind.__forward_arg__ for each in own)
     if _is_union(kind):
         return any(_is_of(each, value) for each in get_args(kind))
+    if kind is Any:
+        return True
     of, parts = get_origin(kind) or kind, get_args(kind)
-    of = {float: Real, Sequence: Iterable, Any: object}.get(of, of)
-    is_other = of is Iterable and isinstance(value, str | bytes | Mapping)
+    of = {float: Real, Sequence: Collection}.get(of, of)
+    is_other = of in (Collection, Iterable) and isinstance(value, str | bytes | Mapping)
     if not isinstance(value, of) or isinstance(value, bool) or is_other:
         return False
     if isinstance(value, Mapping) and parts:

@@ -287,7 +287,8 @@ def test_a_wrong_value_is_an_error_and_never_another_answer(
 
 
 def test_wrong_uses() -> None:
-    for files in ((T_MAP[0],), (3, T_MAP[1]), (T_MAP[0], 3), (T_MAP[0], "\0")):
+    problem = type("Problem", (), {})()  # of another library
+    for files in ((T_MAP[0],), (3, T_MAP[1]), (T_MAP[0], problem), (T_MAP[0], "\0")):
         with pytest.raises(door.UsageError):
             door.plans(*files)
     # The second is the command line's alone.
