@@ -154,15 +154,23 @@ def _read_signatures(items: Iterable[Expression], types: Mapping[str, object]) -
         entry = item.group("a predicate in parentheses")
         if len(entry) == 0:
             raise entry.fail("expected a name, found '()'", "As in (at ?r - robot ?x - place).")
-        name = entry.items[0].token("the name of a predicate").text
-        if name == "=":  # some domains declare it; it stays the equality of objects
+        token = entry.items[0].token("the name of a predicate")
+        if (name := token.text) == "=":  # some domains declare it; it stays the equality of objects
             continue
         listed = typed_list(entry.items[1:], "a variable")
         own = [frozenset(t if t in types else "object" for t in given) for _, given in listed]
+        _require_told_apart(token, len(own))
         of_name = signatures.setdefault(name, {})
         known = of_name.get(len(own), own)
         of_name[len(own)] = tuple(a | b for a, b in zip(known, own, strict=True))
     return signatures
+
+
+def _require_told_apart(name: Token, arguments: int) -> None:
+    """Raise `BadInput` for ``(and)`` and ``(or)``, which are formulas: always and never true."""
+    if not arguments and name.text in ("and", "or"):
+        what = f"({name.text}) is a formula, and names nothing else"
+        raise name.fail(what, "Give it another name, or arguments.")
 
 
 def _without_privacy(items: Iterable[Expression]) -> Iterator[Expression]:
@@ -225,6 +233,7 @@ def _read_heads(names: Names, root: Group, sections: Sections) -> list[_Head]:
         raise root.fail("this domain has no action", remedy)
     by_name: dict[str, _Head] = {}
     for head in heads:
+        _require_told_apart(head.name, len(head.parameters))
         if by_name.setdefault(head.name.text, head) is not head:
             what = f"action {echoed(head.name.text)} is declared twice"
             raise head.name.fail(what, "Rename or remove one of them.")

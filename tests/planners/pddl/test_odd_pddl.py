@@ -302,6 +302,8 @@ CASES: dict[str, Case] = {
         (11, ""), where("(exists (?g - ghost) (and))", "robot room)", "robot room ghost)")
     ),
     "an empty or": case((11, ""), where("(or)")),
+    "a predicate that is a formula": case((31, ":63: (or) is"), d(PREDICATE, f"{PREDICATE} (or)")),
+    "an action that is one": case((31, "(and) is a formula"), with_action("and :parameters ()")),
     "words of PDDL as names": case(
         1,
         change(

@@ -7,7 +7,6 @@ import errno
 import os
 import warnings
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 from unittest.mock import Mock
@@ -18,7 +17,6 @@ import pytest
 from planners.joint.model import PlanningTask
 from planners.loading import PlanningInstance
 from planners.parallel.batch import Store
-from planners.pddl.lifted import FALSE
 from planners.pddl.model_options import Cost, ModelOptions
 from planners.search import kept_plans
 from planners.search.portions import Explored
@@ -36,12 +34,6 @@ PUSH = """(define (domain d) (:types robot) (:predicates (up ?r - robot) (done) 
  (:action push :agent ?r - robot :parameters ()
   :precondition (forall (?o - robot) (or (= ?o ?r) (not (lift ?o)))) :effect (done)))"""
 NEVER = "(:action never :agent ?r - robot :parameters () :precondition (no) :effect (lift ?r)))"
-#: Its goal has the text that "never" has.
-OR = (
-    "(define (domain d) (:types robot) (:predicates (or))"
-    " (:action lift :agent ?r - robot :parameters () :effect (or)))",
-    "(define (problem p) (:domain d) (:objects r1 r2 - robot) (:goal (or)))",
-)
 #: Who reads (power) says who waits for whom; the joint steps are the same.
 POWER = """(define (domain d) (:types robot) (:constants r1 r2 - robot) (:predicates (a) (b) (power))
  (:action go :agent ?r - robot :parameters ()
@@ -122,9 +114,6 @@ def test_an_action_and_a_predicate_of_one_name_are_two() -> None:
     named = PUSH.replace("(no)", "(no) (lift ?r - robot)")[:-1] + NEVER
     task = "(define (problem p) (:domain d) (:objects r1 r2 - robot) (:goal (and (done) (up r1))))"
     assert len({kept_plans.model_digest(loaded(text, task).model) for text in (PUSH, named)}) == 2
-    world = loaded(*OR)
-    never = replace(world.tasks[0], goal=FALSE)
-    assert len({kept_plans.key_of("model", task) for task in (world.tasks[0], never)}) == 2
 
 
 def test_jobs_without_a_common_step_are_those_of_one_model() -> None:
