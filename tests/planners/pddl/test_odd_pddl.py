@@ -120,24 +120,16 @@ SAME_DOMAIN: dict[str, tuple[str, ...]] = {
     "untyped agent before typed parameters": (":agent ?r - robot", ":agent ?r"),
     # types and objects
     "supertypes forward and undeclared": (
-        "(:types robot room)",
-        "(:types robot - mobile mobile - thing room - place)",
+        *("(:types robot room)", "(:types robot - mobile mobile - thing room - place)"),
     ),
     "two parents": ("robot room)", "robot - m robot - n room m n - object)"),
     "object among the types": ("robot room)", "object - thing robot room - object)"),
     "either in a parameter": (AGENT, ":agent ?r - robot :parameters (?x ?y - (either room robot))"),
     "a parameter of type object": (AGENT, ":agent ?r - robot :parameters (?x ?y - object)"),
-    "no space before variables": (
-        "(at ?r - robot ?x",
-        "(at?r - robot?x",
-        "(door ?x ?y))",
-        "(door?x?y))",
-    ),
+    "no space before ?": ("(at ?r - robot ?x", "(at?r - robot?x", "(door ?x ?y))", "(door?x?y))"),
     "private predicates": (
-        "(:predicates (at",
-        "(:predicates (:private ?r - robot (at",
-        "?x - room)",
-        "?x - room))",
+        *("(:predicates (at", "(:predicates (:private ?r - robot (at"),
+        *("?x - room)", "?x - room))"),
     ),
     # sections and effects
     "requirements of others": (":typing", ":typing :foo :durative-actions :numeric-fluents"),
@@ -161,10 +153,7 @@ SAME_DOMAIN: dict[str, tuple[str, ...]] = {
         "(and (at ?r ?y) (forall (?x - room) (forall (?x.1 - room) "
         "(when (and (at ?r ?x) (= ?x.1 ?y) (not (= ?x ?x.1))) (not (at ?r ?x))))))",
     ),
-    "an atom both deleted and added": (
-        EFFECT,
-        "(and (not (at ?r ?y)) (at ?r ?y) (not (at ?r ?x)))",
-    ),
+    "an atom deleted and added": (EFFECT, "(and (not (at ?r ?y)) (at ?r ?y) (not (at ?r ?x)))"),
     "a comment about subactions": (":precondition", "; subactions of one robot\n :precondition"),
 }
 #: The problem said in another way.
@@ -198,9 +187,7 @@ CASES: dict[str, Case] = {
     "untyped agent": case(
         2, UNTYPED, p(OBJECTS, "r1 r2 a b c", "(:init", "(:init (robot r1) (robot r2)")
     ),
-    "two variables behind :agent": case(
-        (31, "d.pddl:5"), d(":agent ?r - robot", ":agent ?r ?q - robot")
-    ),
+    "two agents": case((31, "d.pddl:5"), d(":agent ?r - robot", ":agent ?r ?q - robot")),
     "an agent whose type is behind :agent only": case(
         2, with_action("hop :agent ?r - robot :parameters (?y - room ?r) :effect (at ?r ?y)")
     ),
