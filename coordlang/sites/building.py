@@ -37,14 +37,14 @@ _Params = Mapping[str, Value]
 class Place:
     """A vertex with lanes; vertices of a level at one point are one place.
 
-    ``said`` is its name in the file, if it has one, and ``numbered`` one made of the level and the
-    number of the vertex.  ``point`` is in metres on its ``level``, x to
+    ``said`` is its name in the file, if it has one, and ``vertex`` says its level and the number of
+    its vertex, ``L1:0``.  ``point`` is in metres on its ``level``, x to
     the right and y down.  ``groups`` are the mutex groups and the lift that it belongs to.
     """
 
     name: str
     said: str
-    numbered: str
+    vertex: str
     level: str
     point: Point
     is_charger: bool
@@ -141,17 +141,13 @@ class _Vertex:
     params: list[_Params] = field(default_factory=list)
     name: str = ""
 
-    @property
-    def numbered(self) -> str:
-        return pddl_name(f"{self.level}-{self.number}") or f"p-{self.number}"
-
     def place(self) -> Place:
         is_charger, is_parking = (
             any(_flag(params, name) for params in self.params)
             for name in ("is_charger", "is_parking_spot")
         )
         groups = frozenset[str]().union(*map(_groups, self.params))
-        names = self.name, self.said, self.numbered
+        names = self.name, self.said, f"{self.level}:{self.number}"
         return Place(*names, self.level, self.point, is_charger, is_parking, groups)
 
     def robots(self) -> list[str]:
@@ -325,9 +321,10 @@ def _spawning(vertices: Iterable[_Vertex]) -> dict[str, _Vertex]:
 def _set_names(vertices: Iterable[_Vertex], taken: set[str]) -> None:
     """Name places as the file does, or, if that is none or taken, by level and vertex, too."""
     for vertex in vertices:
-        vertex.name = pddl_name(vertex.said) or vertex.numbered
+        number = pddl_name(f"{vertex.level}-{vertex.number}") or f"p-{vertex.number}"
+        vertex.name = pddl_name(vertex.said) or number
         while vertex.name in taken:
-            vertex.name = f"{vertex.name}-{vertex.numbered}"
+            vertex.name = f"{vertex.name}-{number}"
         taken.add(vertex.name)
 
 

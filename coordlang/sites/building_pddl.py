@@ -277,21 +277,19 @@ def _goals(
 
 
 def _place_called(where: str, robot: Robot, building: Building, task: str) -> str:
-    """The PDDL name of a place that a task calls as the file does, or as PDDL does.
+    """The PDDL name of a place that a task calls as the file does, or PDDL, or by its vertex.
 
-    Places of one name that the robot can go to are told apart by level and vertex.
+    Raises `UsageError` where the robot can go to several places of the name.
     """
     name, places = pddl_name(where), building.places.values()
     said = [p for p in places if where and p.said == where]
     alike = [p for p in places if name and name in (p.name, pddl_name(p.said))]
-    named_so = said or alike or [p for p in places if p.numbered == name]
+    named_so = [p for p in places if p.vertex == where] or said or alike
     found = [p for p in named_so if p.name in robot.reached] or named_so[:1]
     if len(found) > 1:
-        ways = [f"{p.numbered if p.name == name else p.name} (level {p.level})" for p in found]
-        raise UsageError(
-            f"--task {echoed(task)}: {counted(len(found), 'place')} have this name",
-            remedy=f"Say {named(ways[:10], 'or')}.",
-        )
+        what = f"--task {echoed(task)}: {counted(len(found), 'place')} have this name"
+        remedy = f"Say their level and vertex: {named([p.vertex for p in found][:10], 'or')}."
+        raise UsageError(what, remedy=remedy)
     return found[0].name if found else name
 
 

@@ -182,13 +182,13 @@ def test_lifts_join_levels_and_fiducials_scale_them(tmp_path: Path) -> None:
     ]
     assert rides == [(3, "l1-1", "p-2-1"), (3, "p-2-1", "l1-1")]
     assert {lane.graph for lane in found.lanes} == {1, 3}
-    texts, robots = building_files(found, ["s", "r"], ["s:l1-0"], 0)
+    texts, robots = building_files(found, ["s", "r"], ["s:L1:0"], 0)
     assert robots == ("s", "r")
     # The first graph with a lane where r starts leads into the lift, and not out of it again.
     assert "(uses s graph-3) (uses r graph-1)" in texts["problem.pddl"]
     own = building_files(found, ["s"], ["s:p-2-1"], 0)[0]
     assert "graph" not in own["domain.pddl"] + own["problem.pddl"]
-    for task, message in (("r:p-2-1", "no lanes lead"), ("s:a", "Say l1-0 .level L1. or a-p-2-0")):
+    for task, message in (("r:p-2-1", "no lanes lead"), ("s:a", "vertex: L1:0 or 2:0")):
         with pytest.raises(UsageError, match=message):
             building_files(found, None, [task], 0)
     roof = "  roof:\n    walls: []\n"
@@ -200,7 +200,7 @@ def test_lifts_join_levels_and_fiducials_scale_them(tmp_path: Path) -> None:
 def test_one_robot_is_in_a_lift(tmp_path: Path) -> None:
     text = re.sub(r", \[\d, \d, {graph_idx: \[2, 1\]}\]", "", TWO_LEVELS)
     found = read_building(written(tmp_path, text))
-    files = saved(tmp_path, building_files(found, None, ["r:a-p-2-0", "s:l1-0"], 0)[0])
+    files = saved(tmp_path, building_files(found, None, ["r:a-p-2-0", "s:L1:0"], 0)[0])
     with pytest.raises(library.ProvedImpossible):
         library.plans(*files)  # the shaft holds one robot: they cannot trade places
     files = saved(tmp_path, building_files(found, ["r"], ["r:a-p-2-0"], 0)[0])
