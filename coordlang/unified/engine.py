@@ -14,6 +14,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
+from os import PathLike
 from typing import Any
 
 from unified_planning.engines import (
@@ -66,12 +67,18 @@ from planners.system.errors import (
     UsageError,
 )
 from planners.system.limits import time_limit
-from planners.system.options import record_from
+from planners.system.options import Option, checked_value, record_from
 
 #: The kinds of plans that the engine returns and validates.
 PLAN_KINDS = (PlanKind.PARTIAL_ORDER_PLAN, PlanKind.SEQUENTIAL_PLAN, PlanKind.TIME_TRIGGERED_PLAN)
 #: The parameters that are options of the model.
 _MODEL = ("robots", "robot_type", "unowned", "cost", "remember_actions")
+#: The types of other parameters.
+_KINDS: Mapping[str, Any] = {
+    "subactions": Mapping,
+    "language": str | PathLike[str] | Language,
+    "sentence": str | Iterable[str],
+}
 _OPTION = re.compile(r"(?<![\w-])--([a-z]+(?:-[a-z]+)*)")
 
 
@@ -106,6 +113,9 @@ class EngineOptions:
             if model.get("robot_type") is not None:
                 [model["robot_type"]] = _names([model["robot_type"]])
             record_from(ModelOptions, model, NAME)
+            for name, kind in _KINDS.items():
+                if given.get(name) is not None:
+                    given[name] = checked_value(Option("", names=(name,), kind=kind), given[name])
             options = cls(model, **{**given, "language": _read(given.get("language"))})
             if options.sentence is not None and options.language is None:
                 raise UsageError("a sentence needs its language", remedy="Give language, too.")
