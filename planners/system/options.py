@@ -160,7 +160,8 @@ def _made(record: type[Any], values: Mapping[str, object]) -> Any:
 
 def _refuse_contradictions(known: Mapping[str, Option], values: Mapping[str, object]) -> None:
     """Raise `UsageError` for an option beside one that it excludes, or without what it needs."""
-    given = [known[n] for n, value in values.items() if value is not False and value != ()]
+    nothing: Sequence[object] = (), []
+    given = [known[n] for n, v in values.items() if v is not False and v not in nothing]
     for each, other in product(given, repeat=2):
         if other.name in each.without:
             raise UsageError(

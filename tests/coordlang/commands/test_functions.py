@@ -220,6 +220,8 @@ def test_parsed_objects_stand_for_files(language: Path) -> None:
     assert door.verify(door.Language(read.words, read.states, read.default), domain, problem)
     with pytest.raises(door.UsageError, match="no problem to learn from"):
         door.lift(T_MAP[0], check=[T_MAP[1]])
+    with pytest.raises(door.BadInput, match="no such folder"):
+        door.lift(factored="none", check=[])
     with pytest.raises(door.UsageError, match="fixed"):
         door.plans(loaded, cost="makespan")
     with pytest.raises(door.UsageError, match="contradicts the language file"):
@@ -235,10 +237,8 @@ def test_of_two_contradictions_the_same_is_told(language: Path, given: tuple[str
 
 
 BUILD = [
-    ({"cost": "steps"}, "--cost steps: there is no such value"),
-    ({"unowned": "nobody"}, "--unowned nobody: there is no such value"),
+    *(({n: "no"}, f"--{n} no: there is no such value") for n in ("cost", "unowned", "method")),
     ({"robots": ","}, "--robots"),
-    ({"method": "worst"}, "--method worst: there is no such value"),
     ({"prefer": "short", "method": "minimal"}, "--prefer short: there is no such value"),
     ({"prefer": "flexible", "method": "greedy"}, "--prefer flexible belongs to"),
     ({"alpha_only": True}, "--alpha-only belongs to"),
