@@ -181,7 +181,8 @@ def _step_lines(part: RobotPart, unit: str) -> list[str]:
     for subactions, run in groupby(part.by_step):
         first, last = last + 1, last + len(list(run))
         name = f"{unit} {first}" if first == last else f"{unit}s {first} to {last}"
-        lines.append(f"    {name}: {_alternatives([own or idling for own in subactions])}")
+        ways = [idling if own is None else _told(own) for own in subactions]
+        lines.append(f"    {name}: {_alternatives(ways)}")
     return lines
 
 
@@ -195,8 +196,13 @@ def _sequence(subplan: Sequence[str | None], unit: str) -> str:
         if own is None:
             parts.append("wait" if number == 1 else f"wait {number} steps")
         else:
-            parts += [own] * number
+            parts += [_told(own)] * number
     return ", ".join(parts)
+
+
+def _told(own: str) -> str:
+    """A subaction as it stands beside ``wait``, which is idling."""
+    return f"({own})" if own == "wait" else own
 
 
 def _alternatives(texts: Sequence[str], between: str = " or ") -> str:
@@ -211,11 +217,12 @@ def _cause(change: WordChange) -> str:
     if not change.robots:
         return "whatever the robots do"
     if len(change.robots) == 1:
-        ways = [way.subactions[0] or "waiting" for way in change.ways]
+        only = [way.subactions[0] for way in change.ways]
+        ways = ["waiting" if own is None else _told(own) for own in only]
         return f"{change.robots[0]} decides it by {_alternatives(ways)}"
     ways = [
         " and ".join(
-            f"{name} {own or 'wait'}"
+            f"{name} {'wait' if own is None else _told(own)}"
             for name, own in zip(change.robots, way.subactions, strict=True)
         )
         for way in change.ways

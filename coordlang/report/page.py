@@ -208,9 +208,10 @@ def _label(model: JointModel, world: World, robot: int, text: str | None) -> dic
         return {"text": "idle", "short": "idle", "moves": []}
     label = model.label_number(robot, text)
     moves = () if label is None else world.moves(model, robot, label)
+    short = own_text(text, model.robots[robot])
     return {
         "text": text,
-        "short": own_text(text, model.robots[robot]),
+        "short": text if short == "idle" else short,
         "moves": [[world.things.index(thing), world.places.index(place)] for thing, place in moves],
     }
 

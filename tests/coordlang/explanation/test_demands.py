@@ -152,13 +152,13 @@ def settled(task_language: TaskLanguage, states: set[int], after: int, robots: l
 @pytest.mark.parametrize(
     ("number", "said"),
     [
-        (18, "r1 has 18 ways, any combination of:"),
+        (18, "r1 has 18 ways, any combination of:\n    step 1: wait or (wait)\n"),
         (15, "r1 has 15 ways, not every combination of these (choices lists them):"),
     ],
 )
 def test_many_ways_in_plain_sentences(number: int, said: str) -> None:
     """Few ways stand in docs/tutorial.md."""
-    part = RobotPart("r1", number, [], [["a", "b"], ["c", "d", "e"], ["f", "g", "h"]])
+    part = RobotPart("r1", number, [], [[None, "wait"], ["c", "d", "e"], ["f", "g", "h"]])
     assert said in demands_text(SentenceDemands(("w0",), 5, 3, [part], []))
 
 
