@@ -119,9 +119,10 @@ class Names:
 
     def is_word(self, item: Group) -> bool:
         """Whether a list begins with a word of PDDL: in ``(or ?x)`` it may name a predicate."""
+        if item.head not in _WORDS or item.head == "=":
+            return item.head in _WORDS
         declared = *self.predicates.get(item.head, ()), self.actions.get(item.head)
-        is_flat = len(item) - 1 in declared and all(isinstance(i, Token) for i in item.items)
-        return item.head in _WORDS and (item.head == "=" or not is_flat)
+        return len(item) - 1 not in declared or any(isinstance(i, Group) for i in item.items)
 
     def with_variables(self, variables: Iterable[Variable]) -> Names:
         """The same names with more variables in scope; a variable of the same name is shadowed."""
