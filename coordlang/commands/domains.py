@@ -115,7 +115,7 @@ class ImportedSite(Presented):
                 remedy = "Remove it, or name another folder."
                 what = f"{path} is there already, and says something else"
                 raise UsageError(what, remedy=remedy)
-        write_texts(Path(folder), self.texts)
+        write_texts(fspath(folder), self.texts)
 
 
 @public(ImportOptions)

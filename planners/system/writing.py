@@ -92,7 +92,7 @@ def write_compressed(
 def made_folder(path: str | PathLike[str]) -> Path:
     """A folder, which is made if it is missing; raises `UsageError` if it cannot be."""
     try:
-        Path(path).mkdir(parents=True, exist_ok=True)
+        os.makedirs(path, exist_ok=True)  # of an empty name it is none, where Path means "."
     except OSError as error:
         raise UsageError(
             f"the folder {path} cannot be made: {error.strerror}",

@@ -94,14 +94,15 @@ def test_what_is_read(tmp_path: Path) -> None:
 def test_the_problem_is_understood(tmp_path: Path) -> None:
     with pytest.warns(Note, match=r"clearance 0 m|not used: doors \(2\) and speed_limit \(1\)"):
         site = library.import_site(written(tmp_path), task=["Ada:lift", "bob 2:door-l1-4"])
+    with pytest.raises(UsageError, match="cannot be made"):
+        site.save("")
     site.save(tmp_path / "pddl")
     files = tmp_path / "pddl" / "domain.pddl", tmp_path / "pddl" / "problem.pddl"
     found = library.inspect(*files, states=True).data()
     assert (found["robots"], found["states"]) == (("ada", "bob-2"), 5 * 4)
     assert found["goal"] == "(and (at ada lift) (at bob-2 door-l1-4))"
     assert found["statics"] == {"charger": 1, "lane": 9, "parking": 1}
-    assert library.plans(*files).makespan == 2
-    assert library.check(*files).agree
+    assert (library.plans(*files).makespan, library.check(*files).agree) == (2, True)
     places = {*read_building(written(tmp_path)).places}
     assert {*read_coordinates(tmp_path / "pddl" / "coordinates.json")} == places
 
