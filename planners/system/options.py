@@ -218,7 +218,7 @@ def checked_value(given: Option, value: object) -> object:
             f"{given.spelling} {value}: expected {what}",
             remedy=f"Say {given.spelling} {max(least or 0, 1)}.",
         )
-    return value
+    return float(value) if given.kind is float and isinstance(value, Real) else value
 
 
 def _check_kind(given: Option, value: object) -> None:
@@ -260,6 +260,8 @@ def _is_of(kind: Any, value: object) -> bool:
     is_other = of in (Collection, Iterable) and isinstance(value, str | bytes | Mapping)
     if not isinstance(value, of) or isinstance(value, bool) or is_other:
         return False
+    if isinstance(value, int) and of is Real:
+        return abs(value) <= sys.float_info.max
     if isinstance(value, Mapping) and parts:
         return all(all(map(_is_of, parts, entry)) for entry in value.items())
     if not parts or not isinstance(value, Collection):

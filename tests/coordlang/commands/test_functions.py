@@ -250,8 +250,8 @@ BUILD = [
 ]
 USES = [
     ("plan", {}, "expected a SENTENCE or --prefer"),
-    ("plan", {"sentence": "w0", "prefer": "shortest"}, ""),
-    ("plan", {"prefer": "best"}, ""),
+    *(("plan", p, "") for p in ({"sentence": "w0", "prefer": "shortest"}, {"prefer": "best"})),
+    *(("simulate", {"noise": n}, "--noise: expected float") for n in (10**400, True, "1", [1])),
     ("explain", {"sentence": "w0"}, "--sentence"),
     ("export", {"sentence": "w0", "to": "sas"}, "--to sas"),
     ("verify", {"robot_type": "robot"}, "Leave out --robot-type"),
