@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations, cycle, pairwise
+from itertools import chain, combinations, cycle, pairwise
 from typing import Any, Literal
 
 import msgspec
@@ -157,7 +157,7 @@ def meaning(spaces: Sequence[PlanSpace]) -> tuple[str, list[tuple[str, ...]]] | 
         return None
     first = [_first_users(space) for space in spaces]
     meant = []
-    for name in sorted({name for users in first for name in users}, key=natural):
+    for name in sorted({*chain(*first)} - {*spaces[0].model.robots}, key=natural):
         answers = [users.get(name, ()) for users in first]
         sure = [answer for answer in answers if answer is not None]
         if len({*sure}) == len(spaces):
@@ -166,38 +166,42 @@ def meaning(spaces: Sequence[PlanSpace]) -> tuple[str, list[tuple[str, ...]]] | 
 
 
 def _first_users(space: PlanSpace) -> dict[str, tuple[str, ...] | None]:
-    """For each object that one task's plans use, who is first, None where mixtures do not agree.
-
-    One pass from the start: the earliest and the latest step in which a robot uses an object first,
-    and with each node what robots have not used on some way to it.
-    """
-    robots = space.model.robots
-    named = [
-        [frozenset((robot, name) for name in text.strip("()").split()[1:]) for text in labels]
-        for robot, labels in zip(robots, space.model.labels, strict=True)
-    ]
-    steps, nothing = space.cost_of(0)[0], frozenset[tuple[str, str]]()
-    earliest: dict[tuple[str, str], int] = {}
-    latest: dict[tuple[str, str], int] = {}
-    unused = {int(space.starts[0]): nothing.union(*(own for part in named for own in part))}
-    for step in range(1, steps + 1):
-        layer = space.layer_edges(steps + 1 - step)
-        for edge, source, target in np.column_stack(layer).tolist():
-            labels = enumerate(space.labels_of(edge))
-            used = nothing.union(*(named[robot][label] for robot, label in labels))
-            earliest |= dict.fromkeys(used - earliest.keys(), step)
-            latest |= dict.fromkeys(used & unused[source], step)
-            unused[target] = unused.get(target, nothing) | (unused[source] - used)
-    never = nothing.union(*(left for node, left in unused.items() if not space.layer[node]))
-    latest |= dict.fromkeys(never & earliest.keys(), steps + 1)
+    """For each object that one task's plans use, who is first, None where mixtures do not agree."""
+    robots, steps = space.model.robots, space.cost_of(0)[0]
     users: dict[str, tuple[str, ...] | None] = {}
-    for name in {name for _, name in earliest} - {*robots}:
-        own = [robot for robot in robots if (robot, name) in earliest]
-        until = min(latest[robot, name] for robot in own)
-        first = tuple(robot for robot in own if earliest[robot, name] <= until)
-        steady = all(earliest[robot, name] == latest[robot, name] for robot in first)
-        users[name] = first if until <= steps and (steady or len(first) == 1) else None
+    for name, first_uses in _first_uses(space).items():
+        until = min(map(max, first_uses.values()))
+        first = sorted(robot for robot, when in first_uses.items() if min(when) <= until)
+        agreed = len(first) == 1 or all(first_uses[robot] == {until} for robot in first)
+        users[name] = tuple(robots[r] for r in first) if agreed and until <= steps else None
     return users
+
+
+def _first_uses(space: PlanSpace) -> dict[str, dict[int, set[int]]]:
+    """For each object the robots (numbers) that use it, and in which steps plans use it first.
+
+    The step after the last one stands for never.  One pass from the start, with what robots have
+    not used on some way to each node.
+    """
+    model, steps = space.model, space.cost_of(0)[0]
+    named = [
+        [{(robot, name) for name in text.strip("()").split()[1:]} for text in labels]
+        for robot, labels in enumerate(model.labels)
+    ]
+    uses: dict[str, dict[int, set[int]]] = defaultdict(lambda: defaultdict(set))
+    unused = {int(space.starts[0]): set[tuple[int, str]]().union(*chain(*named))}
+    for step in range(1, steps + 1):
+        before, unused = unused, defaultdict(set)
+        for edge, source, target in np.column_stack(space.layer_edges(steps + 1 - step)).tolist():
+            labels = enumerate(space.labels_of(edge))
+            used = set().union(*(named[robot][label] for robot, label in labels))
+            for robot, name in used & before[source]:
+                uses[name][robot].add(step)
+            unused[target] |= before[source] - used
+    for robot, name in set().union(*unused.values()):
+        if name in uses:  # else nobody ever uses it
+            uses[name][robot].add(steps + 1)
+    return uses
 
 
 def _part(choices: Choices, robot: int) -> RobotPart:
