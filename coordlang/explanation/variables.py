@@ -233,12 +233,18 @@ def _candidates(atoms: Sequence[Atom], holds: Bools) -> Iterator[_Group]:
         yield from groups
         if shape[1] and all(g.exclusive for g in groups) and not all(g.exhaustive for g in groups):
             incomplete.append(shape)
-    for family in chain(combinations(incomplete, 2), combinations(incomplete, 3)):
-        lengths = {len(positions) for _, positions in family}
-        if len({predicate for predicate, _ in family}) == len(family) and len(lengths) == 1:
-            found = _groups(family, shapes, together, len(holds))
-            if all(g.exclusive and g.exhaustive for g in found):  # mostly the first one is not
-                yield from _groups(family, shapes, together, len(holds))
+    for family in _families(incomplete):
+        found = _groups(family, shapes, together, len(holds))
+        if all(group.exhaustive for group in found):  # mostly the first one is not
+            yield from _groups(family, shapes, together, len(holds))
+
+
+def _families(shapes: Sequence[_Shape]) -> Iterator[tuple[_Shape, ...]]:
+    """Two or three of the shapes, of different predicates and with keys of one length."""
+    for family in chain(combinations(shapes, 2), combinations(shapes, 3)):
+        predicates, keys = zip(*family, strict=True)
+        if len({*predicates}) == len(family) and len({*map(len, keys)}) == 1:
+            yield family
 
 
 def _groups(
