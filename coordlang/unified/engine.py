@@ -12,7 +12,7 @@ import threading
 import time
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any
@@ -275,22 +275,32 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         self, problem: Any, timeout: float | None = None, output_stream: Any = None
     ) -> Iterator[PlanGenerationResult]:
         """Every plan once: all but the last are `INTERMEDIATE`."""
-        main = threading.current_thread() is threading.main_thread()
-        if timeout is not None and not main:
+        end = math.inf if timeout is None else time.monotonic() + timeout
+        if timeout is not None and threading.current_thread() is not threading.main_thread():
             text = "coordlang: timeouts of the search hold in the main thread only"
             warnings.warn(text, stacklevel=3)
-        end = math.inf if timeout is None else time.monotonic() + timeout
+            timeout = None
         try:
-            with time_limit(timeout) if main else nullcontext():
+            with time_limit(timeout):
                 found, space, messages = self._search(problem)
         except (BadInput, UsageError) as error:
             raise UPUsageError(in_parameters(error)) from error
-        except (CoordlangError, MemoryError) as error:
-            status = next((s for kind, s in _STATUS.items() if isinstance(error, kind)), None)
-            if status is None:
-                raise
+        except tuple(_STATUS) as error:
+            status = next(s for kind, s in _STATUS.items() if isinstance(error, kind))
             yield self._none(status, in_parameters(error) or "out of memory")
             return
+        messages += [_warning(f"{metric} is ignored") for metric in _other_metrics(problem)]
+        yield from self._results(problem, found, space, messages, end)
+
+    def _results(
+        self,
+        problem: Any,
+        found: Translated,
+        space: PlanSpace,
+        messages: Sequence[LogMessage],
+        end: float,
+    ) -> Iterator[PlanGenerationResult]:
+        """The plans of a space, one by one; no further one from the time ``end`` on."""
         plans, model = Plans.of(space), space.model
         whole = model.is_joint_action or len(model.robots) == 1
         kind = PlanKind.SEQUENTIAL_PLAN if whole else PlanKind.PARTIAL_ORDER_PLAN
@@ -299,7 +309,6 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         metrics = {"makespan": str(makespan), "plans": str(plans.count)}
         if model.cost != "makespan":
             metrics["second cost"] = str(second)
-        messages += [_warning(f"{metric} is ignored") for metric in _other_metrics(problem)]
         for number in range(plans.count):
             if time.monotonic() > end:
                 yield self._none(Status.TIMEOUT, f"{number} of {plans.count} plans in time")

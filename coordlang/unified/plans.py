@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from fractions import Fraction
-from itertools import pairwise, product
+from itertools import chain, pairwise, product
 from typing import Any
 
 import networkx
@@ -48,24 +48,24 @@ def to_up(found: Translated, plans: Plans, plan: Plan, kind: Any, environment: A
     """A joint plan as a unified-planning plan of ``kind`` (a `PlanKind`)."""
     steps: list[list[Any]] = [[] for _ in plan]
     for number, text in numbered_actions(plans, plan, plans.steps(plan)):
-        schema, *args = text[1:-1].split()
-        members = found.schemas[schema]
-        agent = None if None in members else args.pop(0)
-        objects = tuple(found.objects[arg] for arg in args)
-        by = agent and found.agents[agent]
-        steps[number].append(ActionInstance(members[agent], objects, by))
+        steps[number].append(_instance(found, text))
     if kind == PlanKind.SEQUENTIAL_PLAN:
-        return SequentialPlan([action for step in steps for action in step], environment)
+        return SequentialPlan([*chain(*steps)], environment)
     if kind == PlanKind.TIME_TRIGGERED_PLAN:
         timed = [(Fraction(n), action, None) for n, step in enumerate(steps) for action in step]
         return TimeTriggeredPlan(timed, environment)
-    steps = [step for step in steps if step]
-    followers = {
-        action: list(after)
-        for step, after in zip(steps, [*steps[1:], []], strict=False)
-        for action in step
-    }
+    acting = [*filter(None, steps), []]
+    followers = {action: after for step, after in pairwise(acting) for action in step}
     return PartialOrderPlan(followers, environment)
+
+
+def _instance(found: Translated, text: str) -> ActionInstance:
+    """The action that a PDDL text stands for: what `label` gives for it."""
+    schema, *args = text[1:-1].split()
+    members = found.schemas[schema]
+    agent = None if None in members else args.pop(0)
+    objects = tuple(found.objects[arg] for arg in args)
+    return ActionInstance(members[agent], objects, agent and found.agents[agent])
 
 
 def of_up(
