@@ -12,6 +12,7 @@ from coordlang.language.candidates import Candidates
 from coordlang.language.listed import goal_text
 from coordlang.language.warping import Clause, pair, warping_path
 from coordlang.required.miscoordination import way_to
+from coordlang.symmetry.group import Symmetry
 from coordlang.verification.certificate_file import (
     Certificate,
     Cnf,
@@ -45,28 +46,39 @@ def certify(candidates: Candidates, evidence: Mapping[Clause, Evidence], size: i
 
 def _reason(clause: Clause, evidence: Evidence) -> Reason:
     """The plans behind a clause, from a candidate task's start on, with their warping paths."""
-    space, symmetry = evidence.space, evidence.symmetry
-    model = space.model
+    space, model = evidence.space, evidence.space.model
+    symmetry = evidence.symmetry or Symmetry({}, np.arange(len(space.rows)))
     start, prefix = way_to(space, int(space.sources_of(np.array(evidence.edges[0][0]))))
-    init = model.codec.decode(space.rows[space.state[start]])
-    goal = split_atoms(goal_text(model, space.goals[space.goal[start]]))
-    robots = list(range(space.robots))
-    edges = [[*prefix, *(step[robot] for step in evidence.edges)] for robot in robots]
-    plans = [[list(model.texts(space.labels_of(edge))) for edge in own] for own in edges]
-    states = [space.state[space.nodes_on(start, own)].tolist() for own in edges]
-    if symmetry is not None:
-        init, goal = (sorted(map(symmetry.text, texts)) for texts in (init, goal))
-        plans = [[list(symmetry.joint_action(model.robots, s)) for s in plan] for plan in plans]
-        states = [symmetry.states[own].tolist() for own in states]
-        # Where the symmetry takes robot i to robot k, plan i is what robot k follows in the image.
-        robots = [symmetry.robot(model.robots, robot) for robot in robots]
+    init = map(symmetry.text, model.codec.decode(space.rows[space.state[start]]))
+    goal = [*map(symmetry.text, split_atoms(goal_text(model, space.goals[space.goal[start]])))]
+    # Where the symmetry takes robot i to robot k, plan i is what robot k follows in the image.
+    robots = [symmetry.robot(model.robots, robot) for robot in range(space.robots)]
+    plans: dict[int, list[list[str | None]]] = {}
+    states: list[list[int]] = []
+    for robot, followed_by in enumerate(robots):
+        edges = [*prefix, *(step[robot] for step in evidence.edges)]
+        done = [model.texts(space.labels_of(edge)) for edge in edges]
+        plans[followed_by] = [list(symmetry.joint_action(model.robots, texts)) for texts in done]
+        states.append(symmetry.states[space.state[space.nodes_on(start, edges)]].tolist())
+    return Reason(
+        init=sorted(init),
+        goal=sorted(goal) if evidence.symmetry else goal,
+        plans=[plans[robot] for robot in sorted(plans)],
+        paths=_paths(robots, states, clause),
+    )
+
+
+def _paths(
+    robots: Sequence[int], states: Sequence[Sequence[int]], clause: Clause
+) -> list[WarpingPath]:
+    """Warping paths of the first plan with each other one; ``states`` are what each passes."""
     paths = []
     for robot, own in zip(robots[1:], states[1:], strict=True):
         joined = [[a == b or pair(a, b) in clause for b in own] for a in states[0]]
         cells = warping_path(states[0], own, joined)
         assert cells is not None, "the clause was made from warping paths of these plans"
         paths.append(WarpingPath((robots[0], robot), cells))
-    return Reason(init, goal, [plans[robots.index(n)] for n in range(len(robots))], paths)
+    return paths
 
 
 # ---- few clauses that still refute
