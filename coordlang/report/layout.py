@@ -6,16 +6,17 @@ Everything here is deterministic: the same input gives the same coordinates.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 
 from coordlang.sites.coordinates import Point, from_names
 from planners.joint.tables import Floats
 
-#: Sweeps over the layers of a plan space that order its nodes.
-_SWEEPS = 12
+#: Sweeps down and up over the layers of a plan space that order its nodes.
+_SWEEPS = 6
 #: From this ratio of the extents along the two main axes on neither of them counts as longer.
 _ROUND = 0.95
 
@@ -106,23 +107,25 @@ def layer_orders(sizes: Sequence[int], edges: Sequence[tuple[int, int]]) -> list
     to the next one.  Returns the place of each node within its layer.
     """
     bounds = np.cumsum([0, *sizes]).tolist()
-    layers = [range(low, high) for low, high in pairwise(bounds)]
-    before: list[list[int]] = [[] for _ in range(bounds[-1])]
-    after: list[list[int]] = [[] for _ in range(bounds[-1])]
+    layers = [[*range(low, high)] for low, high in pairwise(bounds)]
+    before, after = defaultdict[int, list[int]](list), defaultdict[int, list[int]](list)
     for source, target in sorted(set(edges)):
         before[target].append(source)
         after[source].append(target)
-    # From 0 to 1 over the layer, so that layers of different sizes compare.
-    place = [(number + 0.5) / len(layer) for layer in layers for number in range(len(layer))]
-
-    def mean(ends: Sequence[int]) -> float:
-        return round(sum(place[end] for end in ends) / len(ends), 9)
-
-    for sweep in range(_SWEEPS):
-        ends, turn = (before, layers[1:]) if sweep % 2 == 0 else (after, layers[-2::-1])
+    place: dict[int, float] = {}
+    for layer in layers:
+        place |= _spread(layer)
+    for ends, turn in [(before, layers[1:]), (after, layers[-2::-1])] * _SWEEPS:
         for layer in turn:
-            # A node without neighbours keeps its place.
-            wanted = sorted((mean(ends[node] or [node]), place[node], node) for node in layer)
-            for number, (_, _, node) in enumerate(wanted):
-                place[node] = (number + 0.5) / len(layer)
-    return [round(place[node] * len(layer) - 0.5) for layer in layers for node in layer]
+            mean = {}
+            for node in layer:
+                near = ends.get(node, [node])  # a node without neighbours keeps its place
+                mean[node] = round(sum(place[end] for end in near) / len(near), 9)
+            layer.sort(key=mean.__getitem__)
+            place |= _spread(layer)
+    return [*chain(*(np.argsort(layer).tolist() for layer in layers))]
+
+
+def _spread(layer: Sequence[int]) -> dict[int, float]:
+    """From 0 to 1 over the nodes of a layer, so that layers of different sizes compare."""
+    return {node: (number + 0.5) / len(layer) for number, node in enumerate(layer)}

@@ -68,33 +68,24 @@ def page_data(
     for key in listed:  # they are the first states
         tables.state(key)
     tasks = [task_data(shown, tables, seed) for shown in selection.tasks]
-    rows = np.stack([model.codec.parse_key(key) for key in tables.states])
-    states = [model.codec.decode(row) for row in rows]
+    rows = np.stack([*map(model.codec.parse_key, tables.states)])
+    states = [*map(model.codec.decode, rows)]
     world = find_world(model, states)
     if not 1 < len(world.places) <= MOST_PLACES:  # no map: atoms are text
         world = replace(world, places=(), links=(), roles={})
-    number = {fact: k for k, fact in enumerate(sorted(set(chain.from_iterable(states))))}
+    facts = sorted({*chain(*states)})
+    number = {fact: k for k, fact in enumerate(facts)}
     starts = model.codec.decode(first.space.rows[first.space.state[first.start]])
     for task, shown in zip(tasks, selection.tasks, strict=True):
         task |= task_summary(shown.language, world)
     return {
         "robots": list(model.robots),
-        "kept": {
-            "plan": model.kept_plan,
-            "plans": model.kept_plans,
-            "unit": model.unit,
-            "slack": model.slack,
-            "remembers": model.remembers,
-            "one": f"{'a' if model.slack else 'an'} {model.kept_plan}",
-        },
+        "kept": _kept(model),
         "words": [{"name": word} for word in language.words],
         "things": list(world.things),
         **_map(world, known),
-        "facts": [{"text": fact, "role": _role(fact, world)} for fact in number],
-        "labels": [
-            [_label(model, world, robot, text) for text in own]
-            for robot, own in enumerate(tables.labels)
-        ],
+        "facts": [{"text": fact, "role": _role(fact, world)} for fact in facts],
+        "labels": _labels(model, world, tables),
         "states": [[number[fact] for fact in state] for state in states],
         "state_words": first.partition.word_of(rows).tolist(),
         "mapped": len(listed),
@@ -127,19 +118,9 @@ def word_rows(
     ``examples``), and ``rest`` says that the formula is "every other state".  ``lifted`` has the
     formulas of words that are functions of features.
     """
-    terms_of: dict[str, Sequence[str] | None] = dict.fromkeys(language.words)
-    others, in_order = set[str](), False
-    if lifted:
-        terms_of |= {word: lifted.terms.get(word, ()) for word in language.words}
-    elif 0 < len(language.states) <= _STATES_EXPLAINED:
-        mapped = mapped_states(language.partition(model), model)
-        described = describe_words(mapped, all_covers(mapped))
-        in_order = described.in_order
-        others = {word for word, cover in described.rules if not cover}
-        covers = {word: cover.terms if cover else () for word, cover in described.rules}
-        terms_of = {word: [*map(term_text, terms)] for word, terms in covers.items()}
+    terms_of, others, in_order = _terms_of_words(language, model, lifted)
     sizes = language.sizes()
-    largest = max(sizes.values(), default=1) or 1
+    largest = max(1, *sizes.values())
     rows = []
     for word, terms in terms_of.items():
         states = (key for key, own in language.states.items() if own == word)
@@ -157,6 +138,26 @@ def word_rows(
             }
         )
     return rows, in_order
+
+
+def _terms_of_words(
+    language: Language, model: JointModel, lifted: LiftedWords | None
+) -> tuple[Mapping[str, Sequence[str] | None], Sequence[str], bool]:
+    """The terms of each word's formula, None where none was sought.
+
+    Then the words that are "every other state", and whether formulas are to be read in this order.
+    """
+    if lifted:
+        return {word: lifted.terms.get(word, ()) for word in language.words}, (), False
+    if not 0 < len(language.states) <= _STATES_EXPLAINED:
+        return dict.fromkeys(language.words), (), False
+    mapped = mapped_states(language.partition(model), model)
+    described = describe_words(mapped, all_covers(mapped))
+    others = [word for word, cover in described.rules if not cover]
+    terms_of = {
+        word: [*map(term_text, cover.terms)] if cover else [] for word, cover in described.rules
+    }
+    return terms_of, others, described.in_order
 
 
 def _map(world: World, known: Mapping[str, Point]) -> dict[str, Any]:
@@ -201,6 +202,26 @@ def _role(fact: str, world: World) -> list[Any]:
         case "mark", [place, text]:
             return ["mark", places.index(place), text]
     return ["other"]
+
+
+def _kept(model: JointModel) -> dict[str, Any]:
+    """What the page calls the plans that the plan space has."""
+    return {
+        "plan": model.kept_plan,
+        "plans": model.kept_plans,
+        "unit": model.unit,
+        "slack": model.slack,
+        "remembers": model.remembers,
+        "one": f"{'a' if model.slack else 'an'} {model.kept_plan}",
+    }
+
+
+def _labels(model: JointModel, world: World, tables: Tables) -> list[list[dict[str, Any]]]:
+    """The labels of each robot, in the order of the tables."""
+    return [
+        [_label(model, world, robot, text) for text in own]
+        for robot, own in enumerate(tables.labels)
+    ]
 
 
 def _label(model: JointModel, world: World, robot: int, text: str | None) -> dict[str, Any]:
