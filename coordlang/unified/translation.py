@@ -9,7 +9,7 @@ It is then read like any other PDDL.
 from __future__ import annotations
 
 import re
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement, count
@@ -297,13 +297,7 @@ class _Writer:
 
     def actions(self, subactions: Subactions) -> tuple[list[str], Schemas]:
         """The schemas and what they stand for: equal actions of several agents become one."""
-        groups: dict[tuple[str, ...], dict[str | None, Any]] = {}
-        for agent in self.agents or (None,):
-            for action in (agent or self.problem).actions:
-                parts = subactions.get(action.name, {}).items()
-                comments = [f"  ; subaction {robot} {text or 'idle'}" for robot, text in parts]
-                key = (action.name, *comments, *self.body(action, agent))
-                groups.setdefault(key, {})[agent and self.agent_name(agent)] = action
+        groups = self.groups(subactions)
         self.apart = any(len(members) < len(self.agents) for members in groups.values())
         self.require_one_form(key[0] for key in groups)
         own_types = {self.agent_name(agent): self.own_type(agent) for agent in self.agents}
@@ -311,12 +305,23 @@ class _Writer:
         schemas: Schemas = {}
         for key, members in groups.items():
             name = self.names.of("action", key, key[0])
-            types = list(dict.fromkeys(own_types[member] for member in members if member))
+            types = dict.fromkeys(own_types[member] for member in members if member)
             whose = f"(either {' '.join(types)})" if len(types) > 1 else "".join(types)
             agents = [f"  :agent {AGENT} - {whose}"] if whose else []
             actions.append("\n".join([f"(:action {name}", *agents, *key[1:]]))
             schemas[name] = members
         return actions, schemas
+
+    def groups(self, subactions: Subactions) -> dict[tuple[str, ...], dict[str | None, Any]]:
+        """Actions by their names and lines of PDDL, those of one name and text by agent."""
+        groups: dict[tuple[str, ...], dict[str | None, Any]] = defaultdict(dict)
+        for agent in self.agents or (None,):
+            owner = agent and self.agent_name(agent)
+            for action in (agent or self.problem).actions:
+                parts = subactions.get(action.name, {}).items()
+                comments = [f"  ; subaction {robot} {text or 'idle'}" for robot, text in parts]
+                groups[action.name, *comments, *self.body(action, agent)][owner] = action
+        return groups
 
     def require_one_form(self, actions: Iterable[str]) -> None:
         """Raise `UsageError` for a formula about an action that became several schemas.
