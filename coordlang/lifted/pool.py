@@ -162,14 +162,14 @@ def _comparable(one: Number, other: Number) -> bool:
 def _numbers(vocabulary: _Vocabulary, concepts: Sequence[Concept], most: int) -> Iterator[Number]:
     terms = list(vocabulary.terms())
     kinds = [("row", ""), ("column", "")]
-    kinds += [("degree", relation) for relation in vocabulary.relations]
-    kinds += [("position", relation) for relation in vocabulary.paths]
-    yield from (Attribute(*kind, term) for kind in kinds for term in terms)
-    for relation in vocabulary.relations:
-        yield from (Distance(relation, *pair) for pair in combinations(terms, 2))
+    kinds += product(["degree"], vocabulary.relations)
+    kinds += product(["position"], vocabulary.paths)
+    yield from (Attribute(*kind, term) for kind, term in product(kinds, terms))
+    for relation, pair in product(vocabulary.relations, combinations(terms, 2)):
+        yield Distance(relation, *pair)
     for predicate, arity in vocabulary.fluents:
         for args in product((ANY, *vocabulary.named), repeat=arity):
-            if sum(arg != ANY for arg in args) <= _NAMED:
+            if arity - args.count(ANY) <= _NAMED:
                 yield Count(predicate, args)
     # A feature adds two to the complexity of its number.
     yield from (Size(concept) for concept in concepts if 3 + concept.complexity <= most)
