@@ -7,7 +7,7 @@ of a task which has these plans only: near the true one, and a guide for a searc
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import product
 
 import numpy as np
@@ -43,40 +43,36 @@ class PlanTable:
     def __init__(
         self, spaces: Sequence[PlanSpace], states: int, seed: int, *, mixtures: bool
     ) -> None:
-        asked: list[Plans] = []
-        for space in spaces:
-            counted, starts = counts(space), space.starts
-            starts = starts[Choices(space).requires[starts]] if mixtures else starts
-            asked += [Plans(space, start, counted) for start in starts.tolist()]
-        few = len(asked) <= _TASKS
-        self.is_complete = few and all(plans.count <= _LISTED for plans in asked)
-        if not few:
+        asked = list(_tasks(spaces, mixtures))
+        self.is_complete = len(asked) <= _TASKS and all(own.count <= _LISTED for own in asked)
+        if len(asked) > _TASKS:
             drawn = np.random.default_rng(seed).choice(len(asked), _TASKS, replace=False)
             asked = [asked[number] for number in np.sort(drawn).tolist()]
         steps = 1 + max(int(plans.space.layer[plans.start]) for plans in asked)
         entries = [_task(plans, steps, mixtures, seed) for plans in asked]
-        passed, parts, cells = (np.concatenate(column) for column in zip(*entries, strict=True))
+        passed, parts, cells = zip(*entries, strict=True)
         #: (plans, steps) the states that each plan passes through; shorter ones repeat their last.
-        self._states = passed
-        self.plans = np.array([len(own) for own, *_ in entries])
+        self._states = np.concatenate(passed)
+        self.plans = np.array([*map(len, passed)])
         #: (tasks) the first plan of each task.
         self._first = np.cumsum(self.plans) - self.plans
         self.count = np.array([float(min(own.count, MANY)) for own in asked])
         #: (plans, robots) what each robot does in a plan: its number among the task's own
         #: sequences, of which each robot has ``_ways`` (tasks, robots).
-        self._parts = parts
-        self._ways = np.array([own.max(axis=0) + 1 for _, own, _ in entries])
+        self._parts = np.concatenate(parts)
+        self._ways = np.array([own.max(axis=0) + 1 for own in parts])
         #: (tasks) the number of the first sequence of robot 1 in each task, all tasks counted on.
         self._first_way = np.cumsum(self._ways[:, 0]) - self._ways[:, 0]
-        way = np.repeat(self._first_way, [len(own) for *_, own in entries]) + cells[:, 0]
+        mixed = np.concatenate(cells)
+        way = np.repeat(self._first_way, [*map(len, cells)]) + mixed[:, 0]
         order = np.argsort(way, kind="stable")
         #: (cells, robots) what each robot does in a mixture that is optimal, by task and by what
         #: robot 1 does, and (sequences + 1) the first cell of each of its sequences.
-        self._cells = cells[order]
+        self._cells = mixed[order]
         ways = np.arange(self._ways[:, 0].sum() + 1)
         self._first_cell = np.searchsorted(way[order], ways)
         task = np.repeat(np.arange(len(asked)), self.plans)
-        touched = np.unique(passed * len(asked) + task[:, None])  # by state, then by task
+        touched = np.unique(self._states * len(asked) + task[:, None])  # by state, then by task
         of_state = np.searchsorted(touched, np.arange(1, states) * len(asked))
         self.tasks_of_state = tuple(np.split(touched % len(asked), of_state))
 
@@ -148,6 +144,15 @@ class PlanTable:
             code, return_index=True, return_inverse=True, return_counts=True
         )
         return plans, task[first], inverse.reshape(-1), sizes
+
+
+def _tasks(spaces: Sequence[PlanSpace], mixtures: bool) -> Iterator[Plans]:
+    """The plans of each task; for ``mixtures`` of each one that requires coordination."""
+    for space in spaces:
+        counted, starts = counts(space), space.starts
+        if mixtures:
+            starts = starts[Choices(space).requires[starts]]
+        yield from (Plans(space, start, counted) for start in starts.tolist())
 
 
 def _task(plans: Plans, steps: int, mixtures: bool, seed: int) -> tuple[Ints, Ints, Ints]:
