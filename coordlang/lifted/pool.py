@@ -6,7 +6,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations, product
+from itertools import chain, combinations, product
 from typing import Any
 
 import numpy as np
@@ -108,17 +108,14 @@ class _Vocabulary:
 
     def __init__(self, worlds: Sequence[World], landmarks: bool) -> None:
         self.named = named_objects(worlds, landmarks)
-        self.fluents = sorted({known for world in worlds for known in world.fluents})
-        self.relations = sorted({name for world in worlds for name in world.relations})
+        self.fluents = sorted({*chain(*(world.fluents for world in worlds))})
+        self.relations = sorted({*chain(*(world.relations for world in worlds))})
         self.paths = [
             name
             for name in self.relations
             if all(positions(world.relations.get(name, ())) for world in worlds)
         ]
-        sets = {name for name, arity in self.fluents if arity == 1}
-        for world in worlds:
-            sets.update(world.types)
-            sets.update(n for n, own in world.statics.items() if any(len(a) == 1 for a in own))
+        sets = {name for name, arity in self.fluents if arity == 1}.union(*map(_sets, worlds))
         self.sets = sorted(sets - {str(Everything())})  # what is called so is not read back
 
     def terms(self) -> Iterator[Term]:
@@ -134,6 +131,12 @@ class _Vocabulary:
             for name in names:
                 yield Role(name, closure=closure)
                 yield Role(name, inverse=True, closure=closure)
+
+
+def _sets(world: World) -> set[str]:
+    """The types of a world, and its static predicates with one argument."""
+    unary = {name for name, tuples in world.statics.items() if any(len(a) == 1 for a in tuples)}
+    return unary.union(world.types)
 
 
 def _features(vocabulary: _Vocabulary, numbers: Sequence[Number], most: int) -> Iterator[Feature]:
@@ -199,19 +202,18 @@ def _concepts(vocabulary: _Vocabulary, states: Sequence[States], most: int) -> l
     levels: list[list[Concept]] = [[]]
     entries = sum(len(own) * len(own.world.objects) for own in states)
     for complexity in range(1, most - 2):
-        level: list[Concept] = []
+        levels.append([])
         for concept in sorted(_next_concepts(vocabulary, levels, complexity), key=str):
             members = [concept(own) for own in states]
             key = b"".join(np.packbits(own).tobytes() for own in members)
             if key not in seen:
                 seen.add(key)
-                level.append(concept)
+                levels[-1].append(concept)
                 for own, table in zip(states, members, strict=True):
                     own.known[concept,] = table
             if len(seen) > _CONCEPTS or len(seen) * entries > _ENTRIES:
-                return [concept for known in (*levels, level) for concept in known]
-        levels.append(level)
-    return [concept for level in levels for concept in level]
+                return [*chain(*levels)]
+    return [*chain(*levels)]
 
 
 def _next_concepts(

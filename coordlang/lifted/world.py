@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain
 from typing import Any, TypeVar
 
 import numpy as np
@@ -175,14 +176,8 @@ def named_objects(worlds: Sequence[World], landmarks: bool = False) -> tuple[str
     """
     common = set(worlds[0].objects).intersection(*(world.objects for world in worlds[1:]))
     if not landmarks and any(set(world.objects) != common for world in worlds):
-        common -= {
-            name
-            for world in worlds
-            for tuples in world.statics.values()
-            for args in tuples
-            if len(args) > 1
-            for name in args
-        }
+        tuples = chain(*(own for world in worlds for own in world.statics.values()))
+        common -= {*chain(*(args for args in tuples if len(args) > 1))}
     robots = worlds[0].robots
     return tuple(name for name in (*robots, *sorted(common - set(robots))) if name != ANY)
 
