@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from importlib.resources import files
@@ -80,13 +80,20 @@ def page_data(
         task |= task_summary(shown.language, world)
     return {
         "robots": list(model.robots),
-        "kept": _kept(model),
+        "kept": {
+            "plan": model.kept_plan,
+            "plans": model.kept_plans,
+            "unit": model.unit,
+            "slack": model.slack,
+            "remembers": model.remembers,
+            "one": f"{'a' if model.slack else 'an'} {model.kept_plan}",
+        },
         "words": [{"name": word} for word in language.words],
         "things": list(world.things),
         **_map(world, known),
         "facts": [{"text": fact, "role": _role(fact, world)} for fact in facts],
-        "labels": _labels(model, world, tables),
-        "states": [[number[fact] for fact in state] for state in states],
+        "labels": [_labels(model, world, robot, own) for robot, own in enumerate(tables.labels)],
+        "states": [[*map(number.get, state)] for state in states],
         "state_words": first.partition.word_of(rows).tolist(),
         "mapped": len(listed),
         "pair": _pair(world, states[: len(listed)], starts),
@@ -120,7 +127,7 @@ def word_rows(
     """
     terms_of, others, in_order = _terms_of_words(language, model, lifted)
     sizes = language.sizes()
-    largest = max(1, *sizes.values())
+    largest = max([1, *sizes.values()])
     rows = []
     for word, terms in terms_of.items():
         states = (key for key, own in language.states.items() if own == word)
@@ -143,21 +150,16 @@ def word_rows(
 def _terms_of_words(
     language: Language, model: JointModel, lifted: LiftedWords | None
 ) -> tuple[Mapping[str, Sequence[str] | None], Sequence[str], bool]:
-    """The terms of each word's formula, None where none was sought.
-
-    Then the words that are "every other state", and whether formulas are to be read in this order.
-    """
+    """Terms by word (None: not sought), words that are "every other state", and if in order."""
     if lifted:
         return {word: lifted.terms.get(word, ()) for word in language.words}, (), False
     if not 0 < len(language.states) <= _STATES_EXPLAINED:
         return dict.fromkeys(language.words), (), False
     mapped = mapped_states(language.partition(model), model)
     described = describe_words(mapped, all_covers(mapped))
-    others = [word for word, cover in described.rules if not cover]
-    terms_of = {
-        word: [*map(term_text, cover.terms)] if cover else [] for word, cover in described.rules
-    }
-    return terms_of, others, described.in_order
+    rules, in_order = described.rules, described.in_order
+    terms_of = {word: [*map(term_text, cover.terms)] if cover else [] for word, cover in rules}
+    return terms_of, [word for word, cover in rules if not cover], in_order
 
 
 def _map(world: World, known: Mapping[str, Point]) -> dict[str, Any]:
@@ -204,37 +206,18 @@ def _role(fact: str, world: World) -> list[Any]:
     return ["other"]
 
 
-def _kept(model: JointModel) -> dict[str, Any]:
-    """What the page calls the plans that the plan space has."""
-    return {
-        "plan": model.kept_plan,
-        "plans": model.kept_plans,
-        "unit": model.unit,
-        "slack": model.slack,
-        "remembers": model.remembers,
-        "one": f"{'a' if model.slack else 'an'} {model.kept_plan}",
-    }
-
-
-def _labels(model: JointModel, world: World, tables: Tables) -> list[list[dict[str, Any]]]:
-    """The labels of each robot, in the order of the tables."""
-    return [
-        [_label(model, world, robot, text) for text in own]
-        for robot, own in enumerate(tables.labels)
-    ]
-
-
-def _label(model: JointModel, world: World, robot: int, text: str | None) -> dict[str, Any]:
-    if text is None:
-        return {"text": "idle", "short": "idle", "moves": []}
-    label = model.label_number(robot, text)
-    moves = () if label is None else world.moves(model, robot, label)
-    short = own_text(text, model.robots[robot])
-    return {
-        "text": text,
-        "short": text if short == "idle" else short,
-        "moves": [[world.things.index(thing), world.places.index(place)] for thing, place in moves],
-    }
+def _labels(model: JointModel, world: World, robot: int, texts: Iterable[str | None]) -> list[Any]:
+    """What is shown of a robot's labels, of which the first is idling."""
+    shown: list[Any] = [{"text": "idle", "short": "idle", "moves": []}]
+    things, places = world.things, world.places
+    for text in filter(None, texts):
+        label = model.label_number(robot, text)
+        moves = () if label is None else world.moves(model, robot, label)
+        ends = [[things.index(thing), places.index(place)] for thing, place in moves]
+        own = own_text(text, model.robots[robot])
+        short = text if own == "idle" else own
+        shown.append({"text": text, "short": short, "moves": ends})
+    return shown
 
 
 def _state_graph(language: TaskLanguage) -> dict[str, Any]:

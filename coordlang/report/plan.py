@@ -287,7 +287,7 @@ def _spoken(data: Mapping[str, Any], names: Sequence[str], plan: FloorPlan) -> A
     spots = [{"look": "unmapped", "title": name, "text": ""} for name in names]
     for facts, word in zip(data["states"][: data["mapped"]], data["state_words"], strict=False):
         roles = (data["facts"][fact]["role"] for fact in facts)
-        at = {thing: place for kind, thing, place in (r for r in roles if r[0] == "at")}
+        at = dict(role[1:] for role in roles if role[0] == "at")
         if at[one] == start:
             name = data["words"][word]["name"]
             look = f"w c{word % 9}"

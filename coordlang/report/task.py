@@ -119,10 +119,10 @@ def _graph_data(part: PlanSpace, tables: Tables) -> dict[str, Any]:
     ends = zip(by_step.sources.tolist(), by_step.target.tolist(), strict=True)
     order = np.array(layer_orders(sizes, list(ends)))
     drawn = by_step.reordered(np.lexsort((order, steps - by_step.layer)))
-    keys = [model.codec.key(drawn.rows[state]) for state in drawn.state.tolist()]
+    keys = map(model.codec.key, drawn.rows[drawn.state])
     return {
         "nodes": {
-            "state": [tables.state(key) for key in keys],
+            "state": [*map(tables.state, keys)],
             "step": (steps - drawn.layer).tolist(),
             "order": [place for size in sizes for place in range(size)],
         },
@@ -158,7 +158,7 @@ def _witness_data(
         )
         init = space.rows[space.state[language.start]]
         rows, _, why = carried_out(model, init, filter(None, map(model.numbers, mixed)))
-        together = [model.codec.key(row) for row in rows]
+        together = [*map(model.codec.key, rows)]
         goal = space.goals[space.goal[language.start]]
         reaches = why is None and bool(model.holds(goal, rows[-1][None, :])[0])
     return {
@@ -166,10 +166,10 @@ def _witness_data(
             [[tables.label(robot, text) for robot, text in enumerate(step)] for step in plan]
             for plan in witness.plans
         ],
-        "states": [[tables.state(key) for key in states] for states in witness.states],
+        "states": [[*map(tables.state, keys)] for keys in witness.states],
         "breaks": witness.step,
         "reason": witness.reason,
-        "together": [tables.state(key) for key in together],
+        "together": [*map(tables.state, together)],
         "stops": None if why is None else len(together) - 1,
         "why": why,
         "reaches": reaches,
