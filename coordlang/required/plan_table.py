@@ -150,8 +150,7 @@ def _tasks(spaces: Sequence[PlanSpace], mixtures: bool) -> Iterator[Plans]:
     """The plans of each task; for ``mixtures`` of each one that requires coordination."""
     for space in spaces:
         counted, starts = counts(space), space.starts
-        if mixtures:
-            starts = starts[Choices(space).requires[starts]]
+        starts = starts[Choices(space).requires[starts]] if mixtures else starts
         yield from (Plans(space, start, counted) for start in starts.tolist())
 
 

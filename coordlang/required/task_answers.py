@@ -25,7 +25,7 @@ from planners.search.asynchronous import as_executed
 from planners.search.kept_plans import keeping_plans, key_of, model_digest, search, store_in_use
 from planners.search.plan_file import json_count
 from planners.search.plan_space import PlanSpace
-from planners.search.plans import counts
+from planners.search.plans import Plans
 from planners.system.messages import counted
 
 #: Additions after which the failures of one task are estimated, some seconds of work.
@@ -99,12 +99,8 @@ def _answer(shared: tuple[JointModel, Sequence[PlanningTask], Store | None], num
     witness = miscoordination(space, 0)
     found = NONE if witness is None else failures([space], [None], _ADDITIONS)
     fewest = None if witness is None else _fewest(space, found)
-    answer = TaskAnswer(space.least_makespan(0), _plans(space), witness, found, fewest)
+    answer = TaskAnswer(space.least_makespan(0), Plans.of(space).count, witness, found, fewest)
     return {"answer": np.frombuffer(msgspec.json.encode(answer, enc_hook=str), np.uint8)}
-
-
-def _plans(space: PlanSpace) -> int:
-    return counts(space)[int(space.starts[0])]
 
 
 def _fewest(space: PlanSpace, found: Failures) -> FewestActions | None:
@@ -115,7 +111,7 @@ def _fewest(space: PlanSpace, found: Failures) -> FewestActions | None:
     own = failures([fewer], [None], _ADDITIONS).mean
     if own is None or (own and (found.mean is None or own >= found.mean)):
         return None
-    return FewestActions(_plans(fewer), own > 0, float(own))
+    return FewestActions(Plans.of(fewer).count, own > 0, float(own))
 
 
 def fewest_actions(space: PlanSpace) -> PlanSpace | None:
