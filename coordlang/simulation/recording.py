@@ -62,17 +62,11 @@ class Scene:
         for name, (disc, text, front, way) in zip(record.robots, self._robots, strict=True):
             poses = self.run.poses[name][: index + 1]
             x, y, heading = poses[-1]
-            disc.set(
-                center=(x, y),
-                edgecolor=_ALARM if name in hit else "white",
-                linewidth=2.5 if name in hit else 0.8,
-            )
+            edge, width = (_ALARM, 2.5) if name in hit else ("white", 0.8)
+            disc.set(center=(x, y), edgecolor=edge, linewidth=width)
             text.set_position((x, y))
-            ends = [record.radius, 1.4 * record.radius]
-            front.set_data(
-                [x + end * math.cos(heading) for end in ends],
-                [y + end * math.sin(heading) for end in ends],
-            )
+            ahead = np.array([record.radius, 1.4 * record.radius])
+            front.set_data(x + ahead * math.cos(heading), y + ahead * math.sin(heading))
             way.set_data([pose[0] for pose in poses], [pose[1] for pose in poses])
 
     def _draw_floor(self) -> None:

@@ -248,20 +248,8 @@ class Robot:
             self._hear_of_events(self._monitor, sensed.heard)
         if not self._is_underway:
             self._heed_wishes(sensed)
-            begun = self.steps[-1].begin if self.steps else -1.0
-            if self._monitor.finished or not self._pace.may_begin(
-                self.done, self.words, begun, sensed.time
-            ):
+            if not self._begins(sensed.time):
                 return STANDING
-            if isinstance(self._monitor, EventMonitor):
-                event = self._started(self._monitor)
-                if event is None:
-                    return STANDING
-                self._begin(event, sensed.time)
-            else:
-                drew = drawn(self._monitor, self._random, self._monitor.allowed())
-                self._monitor.did(drew)
-                self._begin(drew, sensed.time)
         step = self.steps[-1]
         if step.place is None:
             has_ended = self._pace.is_common or sensed.time >= step.begin + self._pace.period
@@ -272,6 +260,21 @@ class Robot:
         if has_ended or step.place is None:
             return STANDING
         return self._driven(self._points[step.place], step, sensed)
+
+    def _begins(self, time: float) -> bool:
+        """Begin the next step now, if there is one and nothing keeps it back."""
+        begun = self.steps[-1].begin if self.steps else -1.0
+        if self._monitor.finished or not self._pace.may_begin(self.done, self.words, begun, time):
+            return False
+        if isinstance(self._monitor, EventMonitor):
+            chosen = self._started(self._monitor)
+            if chosen is None:
+                return False
+        else:
+            chosen = drawn(self._monitor, self._random, self._monitor.allowed())
+            self._monitor.did(chosen)
+        self._begin(chosen, time)
+        return True
 
     def told(self) -> tuple[list[Notice], list[Event]]:
         """What it has told all robots since this was asked last, and what is worth recording."""

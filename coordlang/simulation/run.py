@@ -166,18 +166,19 @@ class _Going:
             for one in robot.steps
         ]
         has_arrived, is_stuck = self.has_arrived, not self.has_arrived and not self.collisions
-        seconds = self.time
+        seconds, late = self.time, 0
         if has_arrived:
+            self._event("arrived", list(self.robots))
             seconds = max((step.end for step in steps if step.end is not None), default=0.0)
-        if has_arrived or is_stuck:
-            self._event("arrived" if has_arrived else "deadlock", list(self.robots))
+            late = max(0, math.ceil(seconds / self.period - 1e-6) - self.mission.steps)
+        elif is_stuck:
+            self._event("deadlock", list(self.robots))
         subplans = {name: robot.subplan() for name, robot in self.robots.items()}
-        late = math.ceil(seconds / self.period - 1e-6) - self.mission.steps
         return RunRecord(
             seed=self.seed,
             collisions=self.collisions,
             deadlock=is_stuck,
-            late=max(0, late) if has_arrived else 0,
+            late=late,
             messages=self.messages,
             seconds=seconds,
             arrived=has_arrived,

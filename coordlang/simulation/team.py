@@ -80,9 +80,7 @@ class Mission:
         if agreement == "sentence":
             found = choices(task_language, sentence)
             for name, own in zip(model.robots, found.robots, strict=True):
-                words = None
-                if not model.is_asynchronous:
-                    words = own_words(found.fits, task_language, own.robot)
+                words = own_words(found.fits, task_language, own.robot)
                 self._given[name] = monitor(found.fits, own, ""), words
 
     def team(self, seed: int) -> Team:
@@ -93,9 +91,7 @@ class Mission:
         team: Team = {}
         for robot, name in enumerate(self.robots):
             fits = self._only(self._drawn(f"{seed} plan" if agreed else f"{seed} plan {name}"))
-            words = None
-            if agreed and not fits.model.is_asynchronous:
-                words = own_words(fits, self.task_language, robot)
+            words = own_words(fits, self.task_language, robot) if agreed else None
             team[name] = monitor(fits, knowing_own(fits, robot), ""), words
         return team
 
@@ -164,8 +160,10 @@ class Mission:
         return self._plans.unrank(Random(seed).randrange(self._plans.count))
 
 
-def own_words(fits: PlanSpace, task_language: TaskLanguage, robot: int) -> OwnWords:
-    """How far in the sentence a robot may be after each of its own beginnings."""
+def own_words(fits: PlanSpace, task_language: TaskLanguage, robot: int) -> OwnWords | None:
+    """How far in the sentence a robot may be after its own beginnings; None without steps."""
+    if fits.model.is_asynchronous:
+        return None
     word = task_language.partition.word_of(fits.rows)[fits.state]
     # As many bits as words are passed before: the most of them is what is possibly true.
     passed = [(1 << number - 1) - 1 for number in words_passed(fits, word).tolist()]
