@@ -48,7 +48,7 @@ from coordlang.language.words import Language
 from coordlang.unified import NAME
 from coordlang.unified.plans import NoSteps, leaves_steps_open, of_up, to_up
 from coordlang.unified.translation import FEATURES, Concurrency, Subactions, Translated, translate
-from planners.check.rules import validate
+from planners.check.rules import Verdict, validate
 from planners.grounding.instantiate import idling_schemas
 from planners.loading import build
 from planners.pddl.model_options import ModelOptions
@@ -102,7 +102,8 @@ class EngineOptions:
 
         Raises `UPUsageError` for a value that there is not, or a language that cannot be read.
         """
-        known = (*_MODEL, *(name for name in cls.__dataclass_fields__ if name != "model"))
+        _model, *others = cls.__dataclass_fields__
+        known = (*_MODEL, *others)
         for name in given:
             if name not in known:
                 raise UPUsageError(f"there is no parameter {name!r}: there are {', '.join(known)}")
@@ -293,12 +294,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
         yield from self._results(problem, found, space, messages, end)
 
     def _results(
-        self,
-        problem: Any,
-        found: Translated,
-        space: PlanSpace,
-        messages: Sequence[LogMessage],
-        end: float,
+        self, problem: Any, found: Translated, space: PlanSpace, notes: list[LogMessage], end: float
     ) -> Iterator[PlanGenerationResult]:
         """The plans of a space, one by one; no further one from the time ``end`` on."""
         plans, model = Plans.of(space), space.model
@@ -315,7 +311,7 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
                 return
             status = _done(problem) if number == plans.count - 1 else Status.INTERMEDIATE
             plan = to_up(found, plans, plans.unrank(number), kind, problem.environment)
-            yield PlanGenerationResult(status, plan, self.name, {**metrics}, [*messages])
+            yield PlanGenerationResult(status, plan, self.name, {**metrics}, [*notes])
 
     def _search(self, problem: Any) -> tuple[Translated, PlanSpace, list[LogMessage]]:
         """The optimal plans, under the sentence if one is given."""
@@ -381,7 +377,9 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
                 verdict = validate(
                     found.domain, found.problem, loaded.team, texts, joint_actions=names
                 )
-                wrong_sentence = self._wrong_sentence(found, texts) if verdict.valid else None
+                if not verdict.valid:
+                    return self._refuted(verdict, steps)
+                wrong_sentence = self._wrong_sentence(found, texts)
         except NoSteps as error:
             reason = Reason.INAPPLICABLE_ACTION if error.action else Reason.MUTEX_CONFLICT
             return self._invalid(str(error), reason, error.action)
@@ -391,17 +389,19 @@ class CoordlangEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanVali
             raise UPUsageError(in_parameters(error)) from error
         if wrong_sentence is not None:
             return self._invalid(wrong_sentence, None)
-        if verdict.valid:
-            metrics = {"makespan": str(len(steps))}
-            if leaves_steps_open(plan):
-                messages.append(_warning(_OPEN))
-            return ValidationResult(Validity.VALID, self.name, messages, metrics=metrics)
+        metrics = {"makespan": str(len(steps))}
+        if leaves_steps_open(plan):
+            messages.append(_warning(_OPEN))
+        return ValidationResult(Validity.VALID, self.name, messages, metrics=metrics)
+
+    def _refuted(self, verdict: Verdict, steps: Sequence[Any]) -> ValidationResult:
+        """What an invalid plan breaks: the rules in a step of `of_up`, or the goal at the end."""
         assert verdict.step is not None
         if verdict.step == len(steps):
             return self._invalid(verdict.reason, Reason.UNSATISFIED_GOALS)
-        action = next(iter(steps[verdict.step][1].values()), None)
+        _, actions = steps[verdict.step]
         why = f"step {verdict.step + 1}: {verdict.reason}"
-        return self._invalid(why, Reason.INAPPLICABLE_ACTION, action)
+        return self._invalid(why, Reason.INAPPLICABLE_ACTION, next(iter(actions.values()), None))
 
     def _wrong_sentence(self, found: Translated, plan: Sequence[Texts]) -> str | None:
         """Why a plan has another sentence than the one given, or none; None if all is well."""

@@ -128,19 +128,22 @@ def translate(
 def _check_parameters(problem: Any, subactions: Subactions, concurrency: Concurrency) -> None:
     """Raise `UsageError` for subactions and formulas that no action of the problem can have."""
     agents = getattr(problem, "agents", ())
-    if subactions if agents else concurrency:
-        given = "subactions, with" if agents else "concurrency, without"
+    if agents:
+        unfit, given, parameter, kind = subactions, "subactions, with", "concurrency", str
+        example = '"(forall (?o - agent) (not (take ?o)))"'
+    else:
+        unfit, given, parameter, kind = concurrency, "concurrency, without", "subactions", Mapping
+        example = '{"r1": "(move ?a ?b)"}'
+    if unfit:
         raise UsageError(
             f"a problem is given {given} agents",
             remedy="Give concurrency where actions are agents' own, and subactions elsewhere.",
         )
     names = sorted({action.name for owner in agents or (problem,) for action in owner.actions})
-    parameter = "concurrency" if agents else "subactions"
-    example = '"(forall (?o - agent) (not (take ?o)))"' if agents else '{"r1": "(move ?a ?b)"}'
     for name, value in {**subactions, **concurrency}.items():
         if name not in names:
             what, remedy = f"there is no action {name!r}", f"The actions are {', '.join(names)}."
-        elif not isinstance(value, str if agents else Mapping):
+        elif not isinstance(value, kind):
             what, remedy = f"{value!r} for {name!r}", f"Write {example}."
         else:
             continue
@@ -185,7 +188,6 @@ class PddlNames:
 class _Writer:
     """The text, with the names of everything in it.
 
-    Types, objects and agents are named first, so that their names are kept where possible.
     ``declared`` are the predicates named so far; ``apart``: some action is not for all agents.
     """
 
@@ -207,12 +209,16 @@ class _Writer:
         self.root = min(roots) if is_root else None
         #: The type of all agents, by which formulas of the user name it.
         self.agent_type = self.names.of("type", None, "agent") if self.agents else ""
-        for t in problem.user_types:
+        self.name_things()
+
+    def name_things(self) -> None:
+        """Name types, objects and agents first, so that their names are kept where possible."""
+        for t in self.problem.user_types:
             self.type_name(t)
-        if concurrency:  # its formulas name actions, not fluents that are called so
+        if self.concurrency:  # its formulas name actions, not fluents that are called so
             for action in (a.name for agent in self.agents for a in agent.actions):
                 self.names.of("predicate", ("action", action), action)
-        for o in problem.all_objects:
+        for o in self.problem.all_objects:
             self.object_name(o)
         for agent in self.agents:
             self.agent_name(agent)
