@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 
 from coordlang.language.candidates import Candidates
 from coordlang.language.listed import goal_text
@@ -110,7 +110,7 @@ def _clause(reason: Reason, candidates: Candidates, tasks: _Tasks) -> Clause:
     """The pairs of states one of which must be separated."""
     row = candidates.model.codec.encode(reason.init)
     state = int(find_rows(candidates.rows, row[None, :])[0])
-    goal = _canonical(part for text in reason.goal for part in split_atoms(text))
+    goal = _canonical(chain(*map(split_atoms, reason.goal)))
     if (state, goal) not in tasks:
         raise Refuted(
             f"{' '.join(reason.init)} -> {' '.join(reason.goal)} is no candidate task",

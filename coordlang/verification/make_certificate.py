@@ -60,17 +60,12 @@ def _reason(clause: Clause, evidence: Evidence) -> Reason:
         done = [model.texts(space.labels_of(edge)) for edge in edges]
         plans[followed_by] = [list(symmetry.joint_action(model.robots, texts)) for texts in done]
         states.append(symmetry.states[space.state[space.nodes_on(start, edges)]].tolist())
-    return Reason(
-        init=sorted(init),
-        goal=sorted(goal) if evidence.symmetry else goal,
-        plans=[plans[robot] for robot in sorted(plans)],
-        paths=_paths(robots, states, clause),
-    )
+    goal = sorted(goal) if evidence.symmetry else goal
+    in_order = [plans[robot] for robot in sorted(plans)]
+    return Reason(sorted(init), goal, in_order, _paths(robots, states, clause))
 
 
-def _paths(
-    robots: Sequence[int], states: Sequence[Sequence[int]], clause: Clause
-) -> list[WarpingPath]:
+def _paths(robots: list[int], states: list[list[int]], clause: Clause) -> list[WarpingPath]:
     """Warping paths of the first plan with each other one; ``states`` are what each passes."""
     paths = []
     for robot, own in zip(robots[1:], states[1:], strict=True):
