@@ -168,8 +168,8 @@ def _numbers(vocabulary: _Vocabulary, concepts: Sequence[Concept], most: int) ->
     kinds += product(["degree"], vocabulary.relations)
     kinds += product(["position"], vocabulary.paths)
     yield from (Attribute(*kind, term) for kind, term in product(kinds, terms))
-    for relation, pair in product(vocabulary.relations, combinations(terms, 2)):
-        yield Distance(relation, *pair)
+    for relation, (one, other) in product(vocabulary.relations, combinations(terms, 2)):
+        yield Distance(relation, one, other)
     for predicate, arity in vocabulary.fluents:
         for args in product((ANY, *vocabulary.named), repeat=arity):
             if arity - args.count(ANY) <= _NAMED:

@@ -192,7 +192,7 @@ _OPEN = (
     "as its predecessors allow, and in another order it may be no plan"
 )
 #: What ends a search without a plan, and what it means; the first that fits counts.
-_STATUS = {
+_STATUS: dict[type[Exception], Status] = {
     # There may be plans with another sentence, so this is not a proof that there is none.
     NoPlanFits: Status.UNSOLVABLE_INCOMPLETELY,
     ProvedImpossible: Status.UNSOLVABLE_PROVEN,

@@ -128,22 +128,19 @@ def translate(
 def _check_parameters(problem: Any, subactions: Subactions, concurrency: Concurrency) -> None:
     """Raise `UsageError` for subactions and formulas that no action of the problem can have."""
     agents = getattr(problem, "agents", ())
-    if agents:
-        unfit, given, parameter, kind = subactions, "subactions, with", "concurrency", str
-        example = '"(forall (?o - agent) (not (take ?o)))"'
-    else:
-        unfit, given, parameter, kind = concurrency, "concurrency, without", "subactions", Mapping
-        example = '{"r1": "(move ?a ?b)"}'
-    if unfit:
+    if subactions if agents else concurrency:
+        given = "subactions, with" if agents else "concurrency, without"
         raise UsageError(
             f"a problem is given {given} agents",
             remedy="Give concurrency where actions are agents' own, and subactions elsewhere.",
         )
     names = sorted({action.name for owner in agents or (problem,) for action in owner.actions})
+    parameter = "concurrency" if agents else "subactions"
+    example = '"(forall (?o - agent) (not (take ?o)))"' if agents else '{"r1": "(move ?a ?b)"}'
     for name, value in {**subactions, **concurrency}.items():
         if name not in names:
             what, remedy = f"there is no action {name!r}", f"The actions are {', '.join(names)}."
-        elif not isinstance(value, kind):
+        elif not isinstance(value, str if agents else Mapping):
             what, remedy = f"{value!r} for {name!r}", f"Write {example}."
         else:
             continue
