@@ -23,6 +23,7 @@ from typing import Any
 from uuid import uuid4
 
 import distributed
+from distributed.client import ClosedClientError
 from distributed.scheduler import KilledWorker
 
 from planners.parallel.batch import Batch, Outcome, Packed, code_hash
@@ -39,7 +40,7 @@ _LOGGERS = ("distributed", "tornado", "asyncio")
 _TICK = 0.2
 _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?:[\w.-]+|\[[0-9a-fA-F:.]+\]):\d{1,5}")
 #: How the end of a connection is said.
-_GONE = (OSError, TimeoutError, CancelledError, asyncio.CancelledError)
+_GONE = (OSError, TimeoutError, CancelledError, asyncio.CancelledError, ClosedClientError)
 
 
 class ClusterFailed(CoordlangError):
@@ -123,6 +124,10 @@ class Cluster:
         executor = self.client.get_executor(pure=False, retries=0)
         try:
             self._require_workers()
+            for package, ours in expected.items():
+                found = self.client.run(versions, package, on_error="return")
+                for worker, theirs in found.items():
+                    _compare(f"the worker {worker}", package, theirs, ours)
             self.client.register_plugin(_Shared(Packed(batch)), name=name)
             yield [executor.submit(_do, name, expected, job) for job in jobs]
         except KilledWorker:
@@ -132,13 +137,15 @@ class Cluster:
                 remedy="Give the workers more memory (dask worker --memory-limit), or use smaller "
                 "or fewer tasks.",
             ) from None
-        except ModuleNotFoundError as error:
-            raise _other_version("a worker", f"there is no {error.name}") from None
         except _GONE:
             raise self._gone() from None
+        except (ImportError, TypeError, RuntimeError) as error:  # a job cannot be read there
+            if self.client.status != "running":
+                raise self._gone() from None
+            raise _other_version("the scheduler or a worker", error.__cause__ or error) from None
         finally:  # jobs that are not begun are dropped; those under way end by themselves, unheard
-            # ValueError: a plugin that is not there yet.
-            with postponed_signals(), suppress(RuntimeError, ValueError, *_GONE):
+            # ValueError, LookupError: a plugin that is not there yet, or not on every worker.
+            with postponed_signals(), suppress(RuntimeError, ValueError, LookupError, *_GONE):
                 executor.shutdown(wait=False)
                 if self.client.status == "running":
                     self.client.unregister_worker_plugin(name)
@@ -152,7 +159,7 @@ class Cluster:
     def _require_workers(self) -> None:
         """Wait for a worker, and say that once."""
         said = False
-        while not self.client.scheduler_info(n_workers=-1)["workers"]:
+        while not self.client.scheduler_info(n_workers=-1).get("workers"):  # none: it has gone
             if self.client.status != "running":
                 raise self._gone()
             if not said:
@@ -198,9 +205,23 @@ def versions(package: str) -> tuple[str, ...]:
     )
 
 
-def _other_version(worker: str, difference: str) -> UsageError:
+def _compare(
+    who: str, package: str, theirs: tuple[str, ...] | Exception, ours: Sequence[str]
+) -> None:
+    """Refuse other versions; an error is that of a worker that has none."""
+    if isinstance(theirs, OSError):  # it has just been lost
+        return
+    if isinstance(theirs, Exception):
+        raise _other_version(who, theirs)
+    for its, wanted in zip(theirs, ours, strict=True):
+        if its != wanted:
+            raise _other_version(who, f"{package} has {its} there, {wanted} here")
+
+
+def _other_version(who: str, difference: object) -> UsageError:
+    said = str(difference).partition("\n")[0]
     return UsageError(
-        f"{worker} does not do the same work: {difference}",
+        f"{who} does not do the same work: {said}",
         remedy="Use one environment for client, scheduler and workers, or install the same "
         "versions everywhere (pip install 'coordlang[cluster]').",
     )
@@ -217,9 +238,5 @@ def _do(name: str, expected: dict[str, tuple[str, ...]], job: Any) -> Any:
     """One job, as a task; see `planners.parallel.batch.Packed.attempt`."""
     worker = distributed.get_worker()
     for package, wanted in expected.items():
-        for theirs, ours in zip(versions(package), wanted, strict=True):
-            if theirs != ours:
-                raise _other_version(
-                    f"the worker {worker.address}", f"{package} has {theirs} there, {ours} here"
-                )
+        _compare(f"the worker {worker.address}", package, versions(package), wanted)
     return worker.plugins[name].work.attempt(job)

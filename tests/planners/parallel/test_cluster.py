@@ -22,7 +22,14 @@ from planners.parallel.workers import workers as opened
 from planners.system.errors import BadInput, CoordlangError, Note, OutOfTime, UsageError
 from planners.system.limits import time_limit
 from tests.support import jobs
-from tests.support.cluster import ENVIRONMENT, Cluster, needs_distributed, running_cluster
+from tests.support.cluster import (
+    ENVIRONMENT,
+    SCHEDULER,
+    WORKER,
+    Cluster,
+    needs_distributed,
+    running_cluster,
+)
 from tests.support.domains import DOMAINS
 from tests.support.jobs import batch, until, workers
 
@@ -169,23 +176,29 @@ def test_the_command_says_it_within_its_limit(silence: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_worker_is_waited_for_and_said(tmp_path: Path) -> None:
-    with running_cluster(tmp_path, 0) as cluster, opened(scheduler=str(cluster.file)) as found:
-        threading.Timer(0.5, cluster.add_worker).start()
-        with pytest.warns(Note, match="no worker has connected"):
-            assert len(list(found.tables(batch(jobs.squares, 1, [range(2)])))) == 1
+@pytest.mark.parametrize("other", ["scheduler", "worker"])
+def test_other_code_that_cannot_read_a_job(other: str, tmp_path: Path) -> None:
+    (tmp_path / "planners").mkdir()
+    (tmp_path / "planners" / "__init__.py").touch()
+    commands = {"scheduler": SCHEDULER, "worker": WORKER}
+    commands[other] = f"env PYTHONPATH={tmp_path} {commands[other]}"
+    with (
+        running_cluster(tmp_path, 1, **commands) as cluster,
+        opened(scheduler=str(cluster.file)) as found,
+        pytest.raises(UsageError, match=r"worker .*not do the same work: .*planners\.parallel"),
+    ):
+        list(found.tables(batch(jobs.squares, 1, [range(2)])))
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:no worker")
-def test_the_time_limit_holds_where_no_worker_comes(tmp_path: Path) -> None:
-    with (
-        running_cluster(tmp_path, 0) as cluster,
-        pytest.raises(OutOfTime),
-        time_limit(2),
-        opened(scheduler=str(cluster.file)) as found,
-    ):
-        list(found.tables(batch(jobs.squares, 1, [range(2)])))
+def test_a_worker_is_waited_for_and_said_within_the_time_limit(tmp_path: Path) -> None:
+    squares = batch(jobs.squares, 1, [range(2)])
+    with running_cluster(tmp_path, 0) as cluster, opened(scheduler=str(cluster.file)) as found:
+        with pytest.warns(Note, match="no worker"), pytest.raises(OutOfTime), time_limit(2):
+            list(found.tables(squares))
+        threading.Timer(0.5, cluster.add_worker).start()
+        with pytest.warns(Note, match="no worker has connected"):
+            assert len(list(found.tables(squares))) == 1
 
 
 @pytest.mark.slow
@@ -200,5 +213,6 @@ def test_a_scheduler_that_goes_is_an_error(begun: bool, tmp_path: Path) -> None:
             threading.Thread(target=kill).start()
         else:
             kill()
+            until(lambda: found.cluster.client.status == "closed")  # type: ignore[union-attr]
         with pytest.raises(CoordlangError, match="has gone"):
             list(found.tables(batch(jobs.waits, str(tmp_path), [0, 1])))
